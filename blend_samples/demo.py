@@ -34,7 +34,7 @@ STYLE = "CURLY"  # of styled.png
 SAMPLES_PER_SIDE = 3  # of each pixel
 PORTRAIT_SAMPLES_PER_SIDE = 4  # of dual_scattering.png
 LENS_PASSES = 4  # of it: blur is up to three pixels wide, and each pass draws all strands
-SMALL_SIZE = 520, 520  # pixels of the other pictures, two of which are shown side by side
+SMALL_SIZE = 440, 440  # pixels of the other pictures, two of which are shown side by side
 CYCLES_SAMPLES = 32  # by default; denoised, as Blender does unless told otherwise
 MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}
 REPORT_MILLISECONDS = {"recursion": 12.546, "subdivision": 5.653, "matrix": None}
@@ -165,26 +165,30 @@ def print_frame_table(hair):
     """The report's second table: frames a second, one sample a pixel, shadow maps as they are from frame to frame."""
     print(f"\n1280 × 720 on {gpu.platform.renderer_get()}      report [frames/s]   here [frames/s]")
     hair.vellus.hair.strand_count = STRAND_COUNT
+    with _head_and_hair_alone(hair):
+        drawn = read()
+        for label, model in MODELS.items():
+            portrait.make_chestnut(hair, model)
+            speed = _frames_per_second(with_look(drawn, hair))
+            print(f"  {STRAND_COUNT:6} strands, {label:30} {REPORT_FRAMES[label]:>10} {speed:17.1f}")
+
+
+@contextmanager
+def _head_and_hair_alone(hair):
+    """A scene without what the portrait adds to its head and its hair, in a context."""
+    others = [
+        other
+        for other in bpy.context.scene.objects
+        if other.type in {"MESH", "CURVES"} and other.name != "Head" and other.data != hair and not other.hide_render
+    ]
+    for other in others:
+        other.hide_render = True
     bpy.context.view_layer.update()
-    drawn = read()
-    for label, model in MODELS.items():
-        portrait.make_chestnut(hair, model)
-        speed = _frames_per_second(_head_and_hair(with_look(drawn, hair)))
-        print(f"  {STRAND_COUNT:6} strands, {label:30} {REPORT_FRAMES[label]:>10} {speed:17.1f}")
-
-
-def _head_and_hair(drawn):
-    """The scene without what the portrait adds to them."""
-    hair = ambient_visibility.densest([strands for strands, *_ in drawn.hair])
-    head_index = [owner[0] for owner in drawn.surface_owners].index(bpy.data.objects["Head"].session_uid)
-    return replace(
-        drawn,
-        hair=[drawn.hair[hair]],
-        hair_visibility=[drawn.hair_visibility[hair]],
-        surfaces=[drawn.surfaces[head_index]],
-        surface_visibility=[drawn.surface_visibility[head_index]],
-        clear=(),
-    )
+    try:
+        yield
+    finally:
+        for other in others:
+            other.hide_render = False
 
 
 def _frames_per_second(drawn):

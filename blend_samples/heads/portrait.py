@@ -12,7 +12,7 @@ from blend_samples.heads import brows, bust, eyes, head, skin
 from hair_addon import api
 from hair_addon.core.shading.fibre.principled import roughness_from_beta_r
 
-SIZE = 760, 760  # pixels of a picture
+SIZE = 720, 720  # pixels of a picture
 CAMERA, LOOK_AT, LENS = (0.42, -1.40, 0.745), Vector((0.0, -0.033, 0.692)), 126.0  # [m], [m], [mm]
 NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
 # Absorption per fibre radius at the roots, which a key light from above would else show brighter than the lengths, and

@@ -30,6 +30,7 @@ _FAR = wp.constant(grid_walk.FAR)
 _KNOWN = 0.015  # standard error of the mean light, as a part of it, below which no more paths are taken
 _FAINT = 0.3  # of the mean light that is drawn: light below it is worth no shadow each time
 _MOST_TURNS = 64  # of paths on the same hair
+_SPARE = 1.1  # by which more are taken: the error is an estimate, and each turn has a cost of its own
 _LEAST_TURN = 0.125  # paths of a further turn, as a part of all before
 
 
@@ -152,9 +153,9 @@ def gather(
             total, squares = total + float(brightness.sum()), squares + float(np.square(brightness).sum())
             taken += len(light)
             tried, turn = tried + more, turn + 1
-            missing = (_standard_error(total, squares, taken) / _KNOWN) ** 2 - 1.0
-            more = int(tried * min(max(missing, _LEAST_TURN), 1.0))
-            if missing < 0.0 or tried + more > most_paths:
+            wanted = (_standard_error(total, squares, taken) / _KNOWN) ** 2  # times as many
+            more = int(tried * min(max(_SPARE * wanted - 1.0, _LEAST_TURN), 1.0))
+            if wanted < 1.0 or tried + more > most_paths:
                 return sums, taken
 
 
