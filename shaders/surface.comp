@@ -7,7 +7,6 @@
 #include "include/no_segment.glsl"
 
 const int SIDE = 4;  // samples along each side of what a thread takes
-const uint STRIDE = 7919u;  // a prime beyond any number of rows of work groups
 
 // How far a sample may be off the plane of another one, as a part of the steps of depth, and by rounding.
 const float OFF_PLANE = 0.5;
@@ -68,7 +67,7 @@ int first_of(int index)
 // picture, as a surface may be in a part of it.
 uint turned_row()
 {
-  uint group = gl_WorkGroupID.y * STRIDE % gl_NumWorkGroups.y;
+  uint group = gl_WorkGroupID.y * uint(row_stride) % gl_NumWorkGroups.y;
   return group * gl_WorkGroupSize.y + gl_LocalInvocationID.y;
 }
 

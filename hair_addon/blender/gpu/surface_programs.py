@@ -37,7 +37,7 @@ def shading_program():
         info.sampler(slot, "UINT_2D", name)
     info.image(0, scene_programs.PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"READ", "WRITE"})
     numbers = "first_triangle", "part_triangle", "triangle_count", "window_left", "window_bottom"
-    for name in (*numbers, "is_coarse", "has_over"):
+    for name in (*numbers, "row_stride", "is_coarse", "has_over"):
         info.push_constant("INT", name)
     return compile_compute(info, "surface.comp")
 

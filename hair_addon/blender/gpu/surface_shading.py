@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawing of lit surfaces, each material with its images."""
 
+import math
+
 import gpu
 import numpy as np
 
 from ...core.shading.tables import surface_albedo
 from ..host.caches import Cache
-from . import drawing, surface_programs, uniforms, windows
+from . import drawing, scene_programs, surface_programs, uniforms, windows
 
 texture_cache = Cache()  # of the textures that all surfaces are drawn with
 
@@ -30,11 +32,24 @@ def shade(surface, parts, first_triangle, view, lights, samplers, buffer, pictur
         constants |= {"part_triangle": first // 3, "triangle_count": count // 3}
         constants |= {"window_left": left, "window_bottom": bottom}
         with drawing.bound(program, blocks, samplers | _of_material(blocks, material)):
+            # The first thread may begin before the window.
+            threads = [length // surface_programs.SIDE + 2 for length in size]
+            constants["row_stride"] = stride_over(-(-threads[1] // scene_programs.PICTURE_GROUP_SIZE))
             program.image("picture", picture)
             for name, value in constants.items():
                 program.uniform_int(name, value)
-            # The first thread may begin before the window.
-            drawing.dispatch_over(program, [length // surface_programs.SIDE + 2 for length in size])
+            drawing.dispatch_over(program, threads)
+
+
+def stride_over(count):
+    """The least step from the golden section of a number of rows on that comes to each row once, around and around.
+
+    Any rows that it comes to one after the other are spread over all.
+    """
+    stride = math.ceil(0.618 * count)
+    while math.gcd(stride, count) > 1:
+        stride += 1
+    return stride
 
 
 def draw_clear(surface, parts, view, lights, samplers):
