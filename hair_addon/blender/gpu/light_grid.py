@@ -5,6 +5,7 @@ import gpu
 import numpy as np
 
 from ..host.caches import Cache
+from .texture_sides import beside_powers
 
 _GREATEST = 60000.0  # of half floats
 
@@ -12,10 +13,12 @@ none_cache = Cache(capacity=1)
 
 
 def upload(means):
-    """A texture of `voxel_means.shares` (Z, Y, X, 4), linear between voxels."""
+    """A texture of `voxel_means.shares` (Z, Y, X, 4), linear between voxels, with `beside_powers` of them."""
+    beside = beside_powers(means.shape[:3]) - means.shape[:3]
     texels = np.clip(means, -_GREATEST, _GREATEST).astype(np.float32)
+    texels = np.pad(texels, [*((0, more) for more in beside), (0, 0)], mode="edge")
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
-    texture = gpu.types.GPUTexture(means.shape[2::-1], format="RGBA16F", data=data)
+    texture = gpu.types.GPUTexture(texels.shape[2::-1], format="RGBA16F", data=data)
     texture.filter_mode(True)
     texture.extend_mode("EXTEND")
     return texture

@@ -16,8 +16,10 @@ from ...core.kernels.checks import require_count, require_indices
 from ..host.caches import Cache
 from . import drawing, surface_programs, uniforms
 from .strand_textures import TEXTURE_WIDTH, bare_vertices
+from .texture_sides import beside_powers
 
 _ROW_VERTICES = TEXTURE_WIDTH // 3  # at most; each is three texels
+_ROW_CORNERS = TEXTURE_WIDTH - 1  # at most
 
 surface_cache = Cache(capacity=64)  # session_uid of a mesh object → `SurfaceOnGPU` that was drawn of it last
 
@@ -55,8 +57,8 @@ class _Corners:
     def texture(self):
         """Each corner's vertex, in two numbers of sixteen bits, and its uv: see shaders/include/surface_corner.glsl."""
         count = len(self.vertices)
-        width = min(count, TEXTURE_WIDTH)
-        texels = np.zeros((-(-count // width) * width, 4), np.float32)
+        width = min(count, _ROW_CORNERS)
+        texels = np.zeros((beside_powers(-(-count // width)) * width, 4), np.float32)
         texels[:count, 0], texels[:count, 1] = self.vertices & 0xFFFF, self.vertices >> 16
         if self.uvs is not None:
             texels[:count, 2:] = self.uvs
@@ -84,7 +86,7 @@ class SurfaceOnGPU:
     @property
     def row_vertices(self) -> int:
         """Whole vertices in a row of textures that have a texel for each."""
-        return min(self.vertex_count, _ROW_VERTICES)
+        return _row_of(self.vertex_count)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -164,12 +166,17 @@ def packed_colors(colors):
     return (roots @ np.array([65536.0, 256.0, 1.0])).astype(np.float32)
 
 
+def _row_of(count):
+    """How many of so many vectors are in a row of a texture: of a few, a third."""
+    return min(int(beside_powers(-(-count // 3))), _ROW_VERTICES)
+
+
 def _texture_of(vectors, known):
     """(N, 3) float32 in a texture of three texels each; known: (vectors, texture) of before, or None."""
     if known is not None and known[0] is not None and np.array_equal(vectors, known[0]):
         return known[1]
-    row = min(len(vectors), _ROW_VERTICES)
-    row_count = -(-len(vectors) // row)
+    row = _row_of(len(vectors))
+    row_count = beside_powers(-(-len(vectors) // row))
     texels = np.ascontiguousarray(vectors, np.float32).ravel()
     if row_count * row > len(vectors):
         texels = np.append(texels, np.zeros(3 * (row_count * row - len(vectors)), np.float32))

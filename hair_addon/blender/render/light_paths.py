@@ -9,7 +9,7 @@ from ...core.imaging import lamps
 from ...core.shading import appearance, light_paths
 from ...core.shading.fibre import strand_variation
 from ...core.shading.fibre.principled import varied_roughness
-from ..gpu import drawing, light_grid, world_texture
+from ..gpu import drawing, light_grid, texture_sides, world_texture
 from ..settings import preferences
 from . import seen_strands
 
@@ -58,7 +58,8 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
         for textures, of_hair in zip(drawn.hair_visibility, means, strict=True)
     ]
     lights = drawn.lights.copy()
-    lights["grid_corner"][:3], lights["grid_scale"][:3] = grid.corner, 1.0 / (grid.voxel * np.array(grid.shape))
+    lights["grid_corner"][:3] = grid.corner
+    lights["grid_scale"][:3] = 1.0 / (grid.voxel * texture_sides.beside_powers(grid.shape))
     return replace(drawn, lights=lights, hair_lights=None, hair_visibility=visibility)
 
 
