@@ -20,6 +20,7 @@ from . import kernel_cache
 from .checks import require_count
 
 PARTS_PER_CORE = 2  # for load balancing, as one core may have other work
+UNEVEN_PARTS_PER_CORE = 4  # where some parts may take longer than others
 LEAST_ROWS = 4096  # fewer are not worth a thread
 MOST_SHARES = 8  # of sums, each in memory of its own
 
@@ -71,6 +72,13 @@ def launch(
 def share_count(row_count: int, device: wp.DeviceLike, least_rows: int = LEAST_ROWS) -> int:
     """How many shares `launch_shares` should be given outputs for."""
     return max(1, min(_core_count(wp.get_device(device)), MOST_SHARES, row_count // least_rows))
+
+
+def part_count(row_count: int, device: wp.DeviceLike, least_rows: int = LEAST_ROWS) -> int:
+    """How many shares `launch_shares` should have where it has no outputs of each, and rows may take unlike times."""
+    core_count = _core_count(wp.get_device(device))
+    most = core_count * UNEVEN_PARTS_PER_CORE if core_count > 1 else 1
+    return max(1, min(most, row_count // least_rows))
 
 
 def launch_shares(

@@ -15,7 +15,7 @@ from .light_sources import Sources
 from .strand_grid import StrandGrid
 from .world_light import world_of
 
-_LEAST_PATHS = 4096  # fewer are not worth a thread
+_LEAST_PATHS = 1024  # fewer are not worth a thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +42,9 @@ class Surroundings:
 
 def launch(kernel: wp.Kernel, count: int, inputs: list[Any], device: wp.DeviceLike) -> None:
     """Run a kernel of `count` paths on all cores; its last argument is the first path of a share."""
-    shares = parallel.share_count(count, wp.get_device(device), _LEAST_PATHS)
+    parts = parallel.part_count(count, device, _LEAST_PATHS)
     if count:
-        parallel.launch_shares(kernel, count, inputs, [[] for _ in range(shares)], device)
+        parallel.launch_shares(kernel, count, inputs, [[] for _ in range(parts)], device)
 
 
 def mesh_of(corners: np.ndarray) -> wp.Mesh | None:

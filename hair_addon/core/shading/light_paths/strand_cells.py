@@ -222,7 +222,7 @@ def build(
         hair.corner, hair.voxel, hair.shape = wp.vec3(*corner.tolist()), side, wp.vec3i(*shape)
         hair.along_voxel = 1
         numbers = np.arange(int(np.prod(shape)), dtype=np.int32)
-        is_used = np.sum(_counts(hair, numbers, len(numbers), device), axis=0) > 0
+        is_used = sum(_counts(hair, numbers, len(numbers), device)) > 0
         bricks = np.where(is_used, np.cumsum(is_used, dtype=np.int32) - 1, -1).astype(np.int32)
         hair.along_voxel = along_voxel
         starts, ends = _ends(_counts(hair, bricks, int(bricks.max()) + 1, device))
@@ -247,7 +247,9 @@ def _counts(hair, bricks, brick_count, device):
 
 def _ends(counts):
     """((cells + 1,) first of each cell in all, for each share of the segments where its own begin)."""
-    total = np.sum(counts, axis=0, dtype=np.int64)
+    total = counts[0].astype(np.int64)
+    for one in counts[1:]:
+        total += one
     starts = np.zeros(len(total) + 1, np.int64)
     np.cumsum(total, out=starts[1:])
     if starts[-1] > np.iinfo(np.int32).max // 2:  # kernels count both words of each line
