@@ -10,6 +10,7 @@ from mathutils import Euler, Matrix
 from ...core.imaging import lamps
 from ..data.pictures import light_linking
 from ..data.pictures.rendered_instances import is_rendered
+from ..data.pictures.shader_sockets import ShaderInput, shown_shader
 from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn
@@ -141,23 +142,22 @@ def read_world(scene, view_layer=None):
 
 
 def _read_world(world, scene_frame):
-    background = _background(world.node_tree)
+    background = shown_shader(world.node_tree, ["BACKGROUND"])
     if background is None:
         return World(np.array(world.color))
-    strength = background.inputs["Strength"].default_value
-    color = background.inputs["Color"]
-    if not color.is_linked:
-        return World(strength * np.array(color.default_value[:3]))
-    source = color.links[0].from_node
-    if source.type == "RGB":
-        return World(strength * np.array(source.outputs[0].default_value[:3]))
-    to_image = _mapping(source) if source.type == "TEX_ENVIRONMENT" else None
-    if to_image is None or source.image is None:
+    strength, color = background["Strength"].value(), background["Color"]
+    constant = color.constant()
+    if constant is not None:
+        return World(strength * np.array(constant[:3]))
+    source = color.source()[0]
+    to_image = _mapping(source["Vector"]) if source.type == "TEX_ENVIRONMENT" else None
+    texture = source.node
+    if to_image is None or texture.image is None:
         return World(strength * np.array(world.color))
-    frame = _load_frame(source.image, source.image_user, scene_frame)
-    if not all(source.image.size):  # the access loads the file if necessary
+    frame = _load_frame(texture.image, texture.image_user, scene_frame)
+    if not all(texture.image.size):  # the access loads the file if necessary
         return World(strength * np.array(world.color))
-    return World(np.full(3, strength), source.image, to_image, source.projection == "MIRROR_BALL", frame)
+    return World(np.full(3, strength), texture.image, to_image, texture.projection == "MIRROR_BALL", frame)
 
 
 def _load_frame(image, user, scene_frame):
@@ -176,32 +176,25 @@ def _load_frame(image, user, scene_frame):
     return frame
 
 
-def _background(tree):
-    """The Background node that the world shows, or the only one."""
-    if tree is None:
-        return None
-    output = tree.get_output_node("ALL")
-    surface = output.inputs["Surface"].links if output else ()
-    if surface and surface[0].from_node.type == "BACKGROUND":
-        return surface[0].from_node
-    return next((node for node in tree.nodes if node.type == "BACKGROUND"), None)
-
-
-def _mapping(node):
-    """(4, 4) from world directions to a texture node's, None where it is not given by a Mapping node."""
-    vector = node.inputs["Vector"]
-    if not vector.is_linked:
-        return np.eye(4)
-    source = vector.links[0].from_node
-    if source.type == "TEX_COORD":
-        return np.eye(4) if vector.links[0].from_socket.name in {"Generated", "Normal"} else None
-    if source.type != "MAPPING" or any(socket.is_linked for socket in source.inputs if socket.name != "Vector"):
+def _mapping(vector):
+    """(4, 4) from world directions to a texture's, a `ShaderInput`; None where it is not given by a Mapping node."""
+    found, output = vector.source()
+    if found is None:
+        return None if vector.socket.is_linked else np.eye(4)
+    node = found.node
+    if node.type == "TEX_COORD":
+        return np.eye(4) if output.name in {"Generated", "Normal"} else None
+    if node.type != "MAPPING":
         return None
     # Vectors and normals are not translated: their node hides the location, which is found only by identifier.
-    values = {socket.identifier: socket.default_value for socket in source.inputs}
-    location = values["Location"] if source.vector_type in {"POINT", "TEXTURE"} else (0.0, 0.0, 0.0)
-    scale = np.array(values["Scale"])
-    if source.vector_type == "NORMAL":
+    inputs = {socket.identifier: ShaderInput(socket, found.groups) for socket in node.inputs}
+    location, rotation, scale = (inputs[name].constant() for name in ("Location", "Rotation", "Scale"))
+    if location is None or rotation is None or scale is None:
+        return None
+    if node.vector_type not in {"POINT", "TEXTURE"}:
+        location = (0.0, 0.0, 0.0)
+    scale = np.array(scale)
+    if node.vector_type == "NORMAL":
         scale = 1.0 / np.where(scale == 0.0, 1.0, scale)
-    matrix = np.array(Matrix.LocRotScale(location, Euler(values["Rotation"]), scale.tolist()), np.float64)
-    return np.linalg.pinv(matrix) if source.vector_type == "TEXTURE" else matrix
+    matrix = np.array(Matrix.LocRotScale(location, Euler(rotation), scale.tolist()), np.float64)
+    return np.linalg.pinv(matrix) if node.vector_type == "TEXTURE" else matrix

@@ -8,8 +8,8 @@ import numpy as np
 from mathutils import Euler, Matrix
 
 from ...host.notices import name_of, say
+from .shader_sockets import LUMINANCE, ShaderInput, shown_shader
 
-_LUMINANCE = (0.2126, 0.7152, 0.0722, 0.0)  # Rec. 709: a color that is read as a number
 _CHANNELS = {
     "Red": (1.0, 0.0, 0.0, 0.0),
     "Green": (0.0, 1.0, 0.0, 0.0),
@@ -74,38 +74,38 @@ def read_material(material):
     """
     if material is None:
         return SurfaceMaterial(roughness=0.5, reflectance=_reflectance(1.5, 0.5))
-    shader = _shader(material.node_tree)
+    shader = shown_shader(material.node_tree, _READERS)
     if shader is None:
         return SurfaceMaterial(tuple(material.diffuse_color[:3]))
-    return _READERS[shader.type](shader.inputs, material)
+    return _READERS[shader.type](shader, material)
 
 
 def _read_principled(sockets, material):
-    if float(_value(sockets["Alpha"])) < 0.5:
+    if float(sockets["Alpha"].value()) < 0.5:
         return _INVISIBLE
-    normal_map = _source(sockets["Normal"])[0]
-    is_mapped = normal_map is not None and normal_map.type == "NORMAL_MAP" and normal_map.space == "TANGENT"
+    normal_map = sockets["Normal"].source()[0]
+    is_mapped = normal_map is not None and normal_map.type == "NORMAL_MAP" and normal_map.node.space == "TANGENT"
     return SurfaceMaterial(
-        tuple(_value(sockets["Base Color"])[:3]),
-        float(_value(sockets["Roughness"])),
-        float(_value(sockets["Metallic"])),
-        _reflectance(float(_value(sockets["IOR"])), float(_value(sockets["Specular IOR Level"]))),
-        float(_value(normal_map.inputs["Strength"])) if is_mapped else 1.0,
-        float(_value(sockets["Transmission Weight"])) > 0.5,
+        tuple(sockets["Base Color"].value()[:3]),
+        float(sockets["Roughness"].value()),
+        float(sockets["Metallic"].value()),
+        _reflectance(float(sockets["IOR"].value()), float(sockets["Specular IOR Level"].value())),
+        float(normal_map["Strength"].value()) if is_mapped else 1.0,
+        float(sockets["Transmission Weight"].value()) > 0.5,
         _image_map(sockets["Base Color"], material),
         _image_map(sockets["Roughness"], material),
-        _image_map(normal_map.inputs["Color"], material, normal_map.uv_map) if is_mapped else None,
+        _image_map(normal_map["Color"], material, normal_map.node.uv_map) if is_mapped else None,
     )
 
 
 def _read_diffuse(sockets, material):
-    color, image = tuple(_value(sockets["Color"])[:3]), _image_map(sockets["Color"], material)
+    color, image = tuple(sockets["Color"].value()[:3]), _image_map(sockets["Color"], material)
     return SurfaceMaterial(color, color_image=image)
 
 
 def _read_glass(sockets, _material):
-    reflectance = _reflectance(float(_value(sockets["IOR"])), 0.5)
-    return SurfaceMaterial(roughness=float(_value(sockets["Roughness"])), reflectance=reflectance, is_clear=True)
+    reflectance = _reflectance(float(sockets["IOR"].value()), 0.5)
+    return SurfaceMaterial(roughness=float(sockets["Roughness"].value()), reflectance=reflectance, is_clear=True)
 
 
 def _read_transparent(_sockets, _material):
@@ -127,53 +127,21 @@ def _reflectance(refractive_index, level):
     return min(2.0 * level * ((refractive_index - 1.0) / (refractive_index + 1.0)) ** 2, 0.99)
 
 
-def _shader(tree):
-    """The shader that a material shows, if it can be read; or its first Principled BSDF; or None."""
-    if tree is None:
-        return None
-    output = tree.get_output_node("ALL")
-    shown = _source(output.inputs["Surface"])[0] if output else None
-    if shown is not None and shown.type in _READERS:
-        return shown
-    return next((node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"), None)
-
-
-def _source(socket):
-    """(node, output) that a socket is linked to, past reroutes; (None, None) of one that is not."""
-    while socket.is_linked:
-        link = socket.links[0]
-        if link.from_node.type != "REROUTE":
-            return link.from_node, link.from_socket
-        socket = link.from_node.inputs[0]
-    return None, None
-
-
-def _value(socket):
-    """What a socket is set to, or the constant that is linked to it."""
-    node, output = _source(socket)
-    if node is None or node.type not in {"RGB", "VALUE"}:
-        return socket.default_value
-    value = output.default_value
-    is_color = hasattr(socket.default_value, "__len__")
-    if is_color == hasattr(value, "__len__"):
-        return value
-    return (value,) * 3 if is_color else float(np.dot(_LUMINANCE, value))
-
-
-def _image_map(socket, material, uv_map=""):
-    """The `ImageMap` that is linked to a socket, also by one of its channels; None where there is none."""
-    node, output = _source(socket)
-    channels = _LUMINANCE
-    if node is not None and node.type == "SEPARATE_COLOR" and node.mode == "RGB":
+def _image_map(shader_input, material, uv_map=""):
+    """The `ImageMap` that is linked to a `ShaderInput`, also by one of its channels; None where there is none."""
+    found, output = shader_input.source()
+    channels = LUMINANCE
+    if found is not None and found.type == "SEPARATE_COLOR" and found.node.mode == "RGB":
         channels = _CHANNELS[output.name]
-        node, output = _source(node.inputs["Color"])
-    if node is None or node.type != "TEX_IMAGE" or node.image is None:
+        found, output = found["Color"].source()
+    if found is None or found.type != "TEX_IMAGE" or found.node.image is None:
         return None
+    node = found.node
     if output.name == "Alpha":
         channels = _CHANNELS["Alpha"]
     if not _is_readable(node.image, material):
         return None
-    mapping = _mapping(node.inputs["Vector"])
+    mapping = _mapping(found["Vector"])
     if mapping is None:
         say(f'The texture coordinates of "{name_of(material)}" are no UV map: it is drawn without its image.')
         return None
@@ -196,21 +164,24 @@ def _is_readable(image, material):
 
 
 def _mapping(vector):
-    """((2, 3) rows, name of the UV map) of a texture's coordinates; None where they are no UVs."""
-    node, output = _source(vector)
-    if node is None:
-        return np.eye(2, 3), ""
+    """((2, 3) rows, name of the UV map) of a texture's coordinates, a `ShaderInput`; None where they are no UVs."""
+    found, output = vector.source()
+    if found is None:  # where a group sets it, it is one place
+        return None if vector.socket.is_linked else (np.eye(2, 3), "")
+    node = found.node
     if node.type == "UVMAP":
         return np.eye(2, 3), node.uv_map
     if node.type == "TEX_COORD":
         return (np.eye(2, 3), "") if output.name == "UV" else None
     if node.type != "MAPPING" or node.vector_type not in {"POINT", "TEXTURE"}:
         return None
-    inner = _mapping(node.inputs["Vector"]) if node.inputs["Vector"].is_linked else None
-    if inner is None or any(socket.is_linked for socket in node.inputs if socket.name != "Vector"):
+    inner = _mapping(found["Vector"]) if found["Vector"].source()[0] is not None else None
+    # Vectors have no location, and their node hides its socket.
+    inputs = {socket.identifier: ShaderInput(socket, found.groups).constant() for socket in node.inputs}
+    values = [inputs.get(name) for name in ("Location", "Rotation", "Scale")]
+    if inner is None or any(value is None for value in values):
         return None
-    values = {socket.identifier: socket.default_value for socket in node.inputs}
-    placed = Matrix.LocRotScale(values["Location"], Euler(values["Rotation"]), values["Scale"])
+    placed = Matrix.LocRotScale(values[0], Euler(values[1]), values[2])
     matrix = np.array(placed, np.float64)
     if node.vector_type == "TEXTURE":
         matrix = np.linalg.pinv(matrix)
