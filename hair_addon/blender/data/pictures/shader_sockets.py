@@ -92,8 +92,10 @@ def nodes_of(tree, groups=()):
 
 
 def _link_of(socket):
-    """The link that a socket takes its value from; None where there is none."""
-    return next((link for link in socket.links if not link.is_muted), None) if socket.is_linked else None
+    """The link that a socket takes its value from; None where there is none, or one that leads around in a circle."""
+    if not socket.is_linked:
+        return None
+    return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
 
 
 def _passed_on(node, output):

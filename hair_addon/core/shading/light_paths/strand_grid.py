@@ -23,6 +23,7 @@ MOST_VOXELS = 200  # along a side
 CELLS_ALONG_VOXEL = 3  # at most: cells are wider than strands
 _SIZES_AN_OCTAVE = 4  # of voxels
 _LEAST_SEGMENTS = 8  # of a strand, that it can bend
+_AT_ONCE = 1000  # strands that are looked at for any area
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +98,7 @@ def build(
         require_count("values of roughness", len(strands.roughness), len(strands.points))
         require_count("fibers", len(strands.fibre), len(strands.points))
         require_indices("fibers", strands.fibre, len(fibres))
-    if not 0.0 < sum(float(_segment_areas(strands).sum()) for strands in systems) < np.inf:
+    if not 0.0 < sum(float(_segment_areas(strands.points, strands.radii).sum()) for strands in systems) < np.inf:
         raise HairError("Light needs strands of a length and a width above zero.")
     share = segment_count / max(sum(strands.radii[:, 1:].size for strands in systems), 1)
     kept, parts, point_count = [], [], 0
@@ -132,7 +133,11 @@ def build(
 
 def has_area(systems: Sequence[Strands]) -> bool:
     """Whether any strand has a length and a width, which light could meet."""
-    return any(_segment_areas(strands).any() for strands in systems)
+    return any(
+        _segment_areas(strands.points[first : first + _AT_ONCE], strands.radii[first : first + _AT_ONCE]).any()
+        for strands in systems
+        for first in range(0, len(strands.points), _AT_ONCE)
+    )
 
 
 def segment_of(grid: StrandGrid, system: int, strands: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -142,10 +147,11 @@ def segment_of(grid: StrandGrid, system: int, strands: np.ndarray, places: np.nd
     return kept.first_point + strands // kept.stride * kept.point_count + along
 
 
-def _segment_areas(strands):
-    """(S, P - 1) length × width of segments [m²]."""
-    lengths = np.linalg.norm(np.diff(strands.points, axis=1), axis=-1)
-    return lengths * (strands.radii[:, 1:] + strands.radii[:, :-1])
+def _segment_areas(points, radii):
+    """(S, P - 1) length × width of segments [m²] of strands (S, P, 3) with radii (S, P)."""
+    along = np.diff(points, axis=1)
+    lengths = np.sqrt(np.einsum("spc,spc->sp", along, along))
+    return lengths * (radii[:, 1:] + radii[:, :-1])
 
 
 def _thinned(strands, share):
@@ -171,7 +177,9 @@ def _voxels(places, radius, voxel_count):
     They stay where they are in the world while hair moves, and their size is one of a few: what is averaged by voxel
     changes no more than the hair does.
     """
-    low, high = places.min(axis=0).astype(np.float64) - radius, places.max(axis=0).astype(np.float64) + radius
+    # Column by column: NumPy is slow along the long axis of narrow arrays.
+    low, high = (np.array([end(column) for column in places.T], np.float64) for end in (np.min, np.max))
+    low, high = low - radius, high + radius
     least = 1e-6 * max(float((high - low).max()), 1e-6)
     size = np.maximum(high - low, least)
     side = max(float(np.prod(size) / voxel_count) ** (1.0 / 3.0), float(size.max()) / (MOST_VOXELS - 2), 2.0 * radius)

@@ -149,6 +149,21 @@ def test_groups_that_lead_nowhere_leave_the_color_of_the_viewport(scene):
         assert read_material(material).color == (1.0, 0.0, 1.0)
 
 
+def test_nodes_in_a_circle_end(scene):
+    """Blender keeps links that lead around, in red, and draws without them."""
+    material, tree, shown = new_material()
+    shader, gamma, way = (
+        tree.nodes.new(kind) for kind in ("ShaderNodeBsdfPrincipled", "ShaderNodeGamma", "NodeReroute")
+    )
+    gamma.mute = True
+    tree.links.new(gamma.inputs["Color"], way.outputs[0])
+    tree.links.new(way.inputs[0], gamma.outputs[0])
+    tree.links.new(shader.inputs["Base Color"], way.outputs[0])
+    tree.links.new(shown, shader.outputs[0])
+    bpy.context.view_layer.update()
+    assert len(read_material(material).color) == 3
+
+
 def test_a_world_in_a_group_shines_as_one_without(scene):
     """Its color is set on the group, and its strength by a node of one value, through the group."""
     inside, start, end = new_group(
