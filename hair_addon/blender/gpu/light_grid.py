@@ -4,8 +4,8 @@
 import gpu
 import numpy as np
 
+from ...core.imaging.texture_sides import beside_powers
 from ..host.caches import Cache
-from .texture_sides import beside_powers
 
 _GREATEST = 60000.0  # of half floats
 

@@ -12,11 +12,11 @@ import gpu
 import numpy as np
 
 from ...core import geometry
+from ...core.imaging.texture_sides import beside_powers
 from ...core.kernels.checks import require_count, require_indices
 from ..host.caches import Cache
 from . import drawing, surface_programs, uniforms
 from .strand_textures import TEXTURE_WIDTH, bare_vertices
-from .texture_sides import beside_powers
 
 _ROW_VERTICES = TEXTURE_WIDTH // 3  # at most; each is three texels
 _ROW_CORNERS = TEXTURE_WIDTH - 1  # at most

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core.imaging import lamps
+from ...core.imaging import lamps, texture_sides
 from ...core.shading import appearance, light_paths
 from ...core.shading.fibre import strand_variation
 from ...core.shading.fibre.principled import varied_roughness
-from ..gpu import drawing, light_grid, texture_sides, world_texture
+from ..gpu import drawing, light_grid, world_texture
 from ..settings import preferences
 from . import seen_strands
 

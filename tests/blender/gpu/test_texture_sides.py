@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.gpu import light_grid, surface_textures
-from hair_addon.blender.gpu.texture_sides import beside_powers
+from hair_addon.core.imaging.texture_sides import beside_powers
 
 
 def is_power(lengths):

@@ -57,10 +57,10 @@ class ShaderInput:
         """(the last socket on the way, the `ShaderNode` that is linked to it, its output, or None for both)."""
         socket, groups = self.socket, self.groups
         while (link := _link_of(socket)) is not None:
-            node, output = link.from_node, link.from_socket
-            if node.mute or node.type == "REROUTE":
-                before = _passed_on(node, output)
-            elif node.type == "GROUP":
+            node, output = _past_what_passes_on(link)
+            if node is None:
+                break
+            if node.type == "GROUP":
                 before, groups = _inside(node, output), (*groups, node)
             elif node.type == "GROUP_INPUT" and groups:
                 before, groups = _of_identifier(groups[-1].inputs, output), groups[:-1]
@@ -96,6 +96,17 @@ def _link_of(socket):
     if not socket.is_linked:
         return None
     return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
+
+
+def _past_what_passes_on(link):
+    """(node, output) that a link comes from, past reroutes and muted nodes.
+
+    (None, None) where nothing leads to these: they set nothing, as in Cycles.
+    """
+    while link is not None and (link.from_node.mute or link.from_node.type == "REROUTE"):
+        before = _passed_on(link.from_node, link.from_socket)
+        link = None if before is None else _link_of(before)
+    return (None, None) if link is None else (link.from_node, link.from_socket)
 
 
 def _passed_on(node, output):

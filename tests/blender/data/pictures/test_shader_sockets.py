@@ -149,6 +149,21 @@ def test_groups_that_lead_nowhere_leave_the_color_of_the_viewport(scene):
         assert read_material(material).color == (1.0, 0.0, 1.0)
 
 
+@pytest.mark.parametrize("kind", ["NodeReroute", "ShaderNodeGamma"])
+def test_what_nothing_leads_to_sets_nothing(scene, kind):
+    """A reroute, or a muted node: as in Cycles, the color is the shader's own."""
+    material, tree, shown = new_material()
+    shader, first, second = (tree.nodes.new(one) for one in ("ShaderNodeBsdfPrincipled", kind, kind))
+    for node in (first, second):
+        node.mute = kind != "NodeReroute"
+        node.inputs[0].default_value = (0.7, 0.2, 0.3, 1.0)
+    shader.inputs["Base Color"].default_value = COLOR
+    tree.links.new(second.inputs[0], first.outputs[0])
+    tree.links.new(shader.inputs["Base Color"], second.outputs[0])
+    tree.links.new(shown, shader.outputs[0])
+    np.testing.assert_allclose(read_material(material).color, COLOR[:3], rtol=1e-6)
+
+
 def test_nodes_in_a_circle_end(scene):
     """Blender keeps links that lead around, in red, and draws without them."""
     material, tree, shown = new_material()
