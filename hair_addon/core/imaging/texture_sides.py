@@ -5,11 +5,12 @@ Software drivers compile a program once for textures whose sides are powers of t
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
-def beside_powers(lengths):
-    """The least lengths, at least as great as these, of which none is a power of two."""
-    lengths = np.array(lengths)
-    while (is_power := lengths & (lengths - 1) == 0).any():
-        lengths += is_power
-    return lengths
+def beside_powers(lengths: ArrayLike) -> np.ndarray:
+    """The least lengths, at least as great as these whole numbers above zero, of which none is a power of two."""
+    found = np.array(lengths)
+    while (is_power := found & (found - 1) == 0).any():
+        found += is_power
+    return found
