@@ -4,11 +4,12 @@
 Software drivers compile a program once for textures whose sides are powers of two, and again for others.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 
-def beside_powers(lengths: ArrayLike) -> np.ndarray:
+def beside_powers(lengths: Sequence[int] | np.ndarray | int) -> np.ndarray:
     """The least lengths, at least as great as these whole numbers above zero, of which none is a power of two."""
     found = np.array(lengths)
     while (is_power := found & (found - 1) == 0).any():
