@@ -10,6 +10,7 @@ if TYPE_CHECKING:
         alembic,
         alembic_curves,
         array_file,
+        curve_file,
         file_lock,
         frame_cache,
         frame_manifest,

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curves of a file, whatever its format: readers make a `CurveFile`, and everything that uses curves takes one.
+
+A reader of a format is a function of a path that returns a `CurveFile` or raises `HairError`. It returns what is drawn:
+what is neither a polyline nor a Catmull-Rom spline through all of its points is evaluated to polylines, and what is
+closed ends where it began.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import HairError
+
+# Metres in a unit, by the names that people give them.
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048, "km": 1000.0}
+
+# Axis that points up → (3, 3), from such coordinates to Blender's, where it is Z.
+TO_Z_UP = {
+    "X": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
+    "Y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "Z": np.eye(3),
+}
+
+
+@dataclass(frozen=True)
+class Convention:
+    """Unit and axis of coordinates; None where nobody has said, and the file's own statement or a guess holds.
+
+    metres: in a unit; up: the axis that points up, X, Y or Z.
+    """
+
+    metres: float | None = None
+    up: str | None = None
+
+    def over(self, other: "Convention") -> "Convention":
+        """This one, with the other's values where it has none."""
+        return Convention(other.metres if self.metres is None else self.metres, self.up or other.up)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Points at several times: times (T,) [s], rising, and a function of an index that gives all points (N, 3)."""
+
+    times: np.ndarray
+    points_at: Callable[[int], np.ndarray]
+
+
+@dataclass(frozen=True)
+class CurveSet:
+    """The curves of one object of a file: C of them with N points, in the world as the file has it.
+
+    name: of the object, by which people choose it; points: (N, 3), of one curve after another; counts: (C,) points of
+    each; is_smooth: (C,) bool, which are Catmull-Rom splines whose end points count twice, as Blender draws them;
+    radii: (N,), None where the file has no widths; is_guide: what the file says, None if nothing. As Vellus and Unreal
+    have them, None if there are none: ids (C,) int32; root_uvs (C, 2); guide_ids (C, 3) int32, identities of guides of
+    the same file, and guide_weights (C, 3). motion: where the points move.
+    """
+
+    name: str
+    points: np.ndarray
+    counts: np.ndarray
+    is_smooth: np.ndarray
+    radii: np.ndarray | None = None
+    is_guide: bool | None = None
+    group_id: int = 0
+    group_name: str = ""
+    ids: np.ndarray | None = None
+    root_uvs: np.ndarray | None = None
+    guide_ids: np.ndarray | None = None
+    guide_weights: np.ndarray | None = None
+    motion: Motion | None = None
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+    def placed(self, metres: float, up: str) -> "CurveSet":
+        """The same in metres with Z up, float32; metres: in a unit of its coordinates, up: their axis."""
+        turn, motion = TO_Z_UP[up] * metres, self.motion
+
+        def turned(points):
+            return (np.asarray(points, np.float64) @ turn.T).astype(np.float32)
+
+        if motion is not None:
+            points_at = motion.points_at
+            motion = Motion(motion.times, lambda index: turned(points_at(index)))
+        radii = None if self.radii is None else (self.radii.astype(np.float64) * metres).astype(np.float32)
+        return replace(self, points=turned(self.points), radii=radii, motion=motion)
+
+
+@dataclass(frozen=True)
+class CurveFile:
+    """The objects of a file that have curves; stated: what the file says of its unit and axis; notes: to tell people.
+
+    usual: what such files have where neither they nor people say.
+    """
+
+    sets: list[CurveSet]
+    stated: Convention = Convention()
+    usual: Convention = Convention(1.0, "Z")
+    notes: list[HairError] = field(default_factory=list)
+
+
+def join(sets: Sequence[CurveSet]) -> CurveSet:
+    """One set of the curves of several, which are all placed; what only some of them have, none has afterwards.
+
+    Radii are an exception: curves without any get 0, which stands for none. Motion is kept where all that move have
+    the same times.
+    """
+    if len(sets) == 1:
+        return sets[0]
+
+    radii = None
+    if any(one.radii is not None for one in sets):
+        radii = np.concatenate([np.zeros(len(s.points), np.float32) if s.radii is None else s.radii for s in sets])
+    return replace(
+        sets[0],
+        points=np.concatenate([one.points for one in sets]),
+        counts=np.concatenate([one.counts for one in sets]),
+        is_smooth=np.concatenate([one.is_smooth for one in sets]),
+        radii=radii,
+        ids=_joined([one.ids for one in sets]),
+        root_uvs=_joined([one.root_uvs for one in sets]),
+        guide_ids=_joined([one.guide_ids for one in sets]),
+        guide_weights=_joined([one.guide_weights for one in sets]),
+        motion=_joined_motion(sets),
+    )
+
+
+def _joined(values: list[np.ndarray | None]) -> np.ndarray | None:
+    present = [value for value in values if value is not None]
+    return np.concatenate(present) if len(present) == len(values) else None
+
+
+def _joined_motion(sets):
+    motions = [one.motion for one in sets]
+    moving = [motion for motion in motions if motion is not None]
+    if not moving or any(not np.array_equal(motion.times, moving[0].times) for motion in moving):
+        return None
+
+    def points_at(index):
+        return np.concatenate(
+            [s.points if m is None else m.points_at(index) for s, m in zip(sets, motions, strict=True)]
+        )
+
+    return Motion(moving[0].times, points_at)
