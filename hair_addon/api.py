@@ -18,7 +18,8 @@ In Blender a surface is a mesh object, and guides and hair are Curves datablocks
 Settings are keyword arguments, which override those of a `Settings` object, or the defaults. Errors that the user can
 fix raise `HairError`, a message of one sentence, before anything in the scene is changed.
 
-In the installed extension this is bl_ext.user_default.vellus.hair_addon.api.
+In the installed extension this is bl_ext.user_default.vellus.hair_addon.api. In a checkout the add-on is registered
+when a function first needs Blender; a script that reads `vellus` properties before calls `hair_addon.register()`.
 """
 
 import os
@@ -30,6 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .api_arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
+from .api_blender import blender
 from .api_cards import CardSettings, TubeSettings, make_hair_cards, make_hair_tubes
 from .api_dynamics import (
     DynamicsSettings,
@@ -62,7 +64,7 @@ from .api_styles import (
     styles_of,
 )
 from .api_tables import bake_tables, table_settings
-from .core import dynamics, lazy
+from .core import dynamics
 from .core.errors import HairError
 from .core.files import settings_file
 from .core.files.settings_file import GroomSettings, require_styles
@@ -72,10 +74,8 @@ from .core.grooming.groom import GuideSettings, HairSettings
 from .core.long_work import Progress, no_progress, run_now
 from .core.params import require_class
 from .core.shading import presets
-from .core.shading.appearance import Appearance
+from .core.shading.appearance import Appearance, shown_changes
 from .core.styling.base import StyleSettings
-
-blender = lazy.Package(".blender", __package__)
 
 # Blender has no types outside of Blender. Wherever Curves are taken their object is too.
 Curves = Any
@@ -247,7 +247,8 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
     """Give hair a look, for the viewport and for Cycles.
 
     look: an `Appearance`, the name of a preset such as "BLOND", or None for the current one; changes: fields of
-    `Appearance`; model: "MARSCHNER" or "KAJIYA_KAY", None for the current one.
+    `Appearance`; model: "MARSCHNER" or "KAJIYA_KAY", None for the current one. A change of melanin, redness or tint,
+    of color, or of absorption also sets the parametrization to it.
 
     >>> api.shade(bpy.data.objects["Hair"], "AUBURN", roughness=0.25)
     >>> api.settings_of(bpy.data.objects["Hair"]).appearance.roughness
@@ -258,7 +259,7 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
     if isinstance(look, str):
         preset = presets.PRESETS[choice(look, "preset", presets.PRESETS)]
         look = replace(preset[1], mode=present.mode)  # the mode is not part of a preset
-    wanted = changed(Appearance, present if look is None else look, changes)
+    wanted = changed(Appearance, present if look is None else look, shown_changes(changes))
     if model is not None:
         choice(model, "model", [identifier for identifier, _label, _description in blender.settings.properties.MODELS])
     blender.groom.transfer.groom_settings.assign_look(target, wanted)

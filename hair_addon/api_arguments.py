@@ -7,14 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .core import lazy
+from .api_blender import blender
 from .core.errors import HairError
 from .core.geometry import mesh as mesh_math
 from .core.geometry.mesh import TriMesh
 from .core.long_work import Progress
 from .core.params import Settings, declared, described, require_class
-
-blender = lazy.Package(".blender", __package__)
 
 # Settings that refer to data in a .blend file.
 _OF_BLENDER = ("density_group", "density_image", "region_group", "region_attribute", "part_lines", "flow_lines")

@@ -5,11 +5,9 @@ import os
 from typing import Any
 
 from .api_arguments import changed, heard, path_of
-from .core import lazy
+from .api_blender import blender
 from .core.cards.card_settings import CardSettings, TubeSettings
 from .core.long_work import Progress, no_progress, run_now
-
-blender = lazy.Package(".blender", __package__)
 
 Curves = Any
 MeshObject = Any

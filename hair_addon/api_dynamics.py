@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .api_arguments import changed, choice, heard, mesh_of
-from .core import dynamics, lazy
+from .api_blender import blender
+from .core import dynamics
 from .core.dynamics.rod.presets import PRESETS, applied
 from .core.dynamics.rod.settings import DynamicsSettings
 from .core.errors import HairError
 from .core.geometry.strands import Strands, check_strands
 from .core.long_work import Progress, no_progress, run_now
 from .core.params import Param, array_of, plain_value
-
-blender = lazy.Package(".blender", __package__)
 
 Curves = Any
 

@@ -6,12 +6,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from .api_arguments import changed, heard, path_of
-from .core import lazy
+from .api_blender import blender
 from .core.errors import HairError
 from .core.files.export_settings import ExportSettings
 from .core.long_work import Progress, no_progress, run_now
-
-blender = lazy.Package(".blender", __package__)
 
 Curves = Any
 

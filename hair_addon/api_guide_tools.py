@@ -4,12 +4,10 @@
 from typing import Any
 
 from .api_arguments import changed, choice
-from .core import lazy
+from .api_blender import blender
 from .core.grooming import guide_tool_settings
 from .core.grooming.guide_tool_settings import CopySettings, ToolSettings
 from .core.params import require_class
-
-blender = lazy.Package(".blender", __package__)
 
 Curves = Any
 

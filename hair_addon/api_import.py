@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .api_arguments import are_arrays, changed, curves_object_of, heard, mesh_of
-from .core import geometry, grooming, lazy
+from .api_blender import blender
+from .core import geometry, grooming
 from .core.geometry.mesh import TriMesh
 from .core.geometry.strands import Strands, curve_offsets, from_numpy
 from .core.grooming import groom
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from .blender.groom.foreign.kept_hair import KeptHair
     from .blender.groom.transfer.groom_transfers import TransferredGroom
 
-blender = lazy.Package(".blender", __package__)
 
 Curves = Any
 MeshObject = Any

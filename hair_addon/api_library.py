@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .api_arguments import choice, heard, path_of
-from .core import grooming, lazy
+from .api_blender import blender
+from .core import grooming
 from .core.errors import HairError
 from .core.long_work import Progress, no_progress, run_now
 from .core.params import array_of, described, is_text
-
-blender = lazy.Package(".blender", __package__)
 
 Curves = Any
 MeshObject = Any

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from .api_arguments import changed, choice, heard, path_of
-from .core import imaging, lazy
+from .api_blender import blender
+from .core import imaging
 from .core.long_work import Progress, no_progress, run_now
 from .core.params import Param, plain_value
-
-blender = lazy.Package(".blender", __package__)
 
 __all__ = ["draw", "render"]
 _FRAMES = Param("")  # availability in this Blender is checked later

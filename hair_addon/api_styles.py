@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .api_arguments import changed, choice
-from .core import lazy
+from .api_blender import blender
 from .core.errors import HairError
 from .core.files import style_presets
 from .core.files.settings_file import require_styles
@@ -32,8 +32,6 @@ from .core.styling.smooth import Settings as Smooth
 from .core.styling.style_inputs import Inputs
 from .core.styling.trim import Settings as Trim
 from .core.styling.wet import Settings as Wet
-
-blender = lazy.Package(".blender", __package__)
 
 Curves = Any
 

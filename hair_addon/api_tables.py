@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from .api_arguments import changed, heard, path_of
-from .core import lazy
+from .api_blender import blender
 from .core.files.settings_file import GroomSettings
 from .core.long_work import Progress, no_progress, run_now
 from .core.params import Param, plain_value, require_class
 from .core.shading import appearance
 from .core.shading.tables import lookup_tables
-
-blender = lazy.Package(".blender", __package__)
 
 _ANY = Param("")
 

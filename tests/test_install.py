@@ -122,6 +122,12 @@ def test_installed_operators_run(walk, used):
     assert all(Path(wheel).is_relative_to(walk.profile) for wheel in used["wheels"])
 
 
+def test_code_of_readme_and_docstrings_runs_in_the_extension(walk, used):
+    ran = walk("scripts")
+    assert ran["failed"] == []
+    assert (ran["blocks"], ran["examples"] > 60) == (2, True)
+
+
 def test_enabling_and_disabling_twice_leaves_nothing_behind(walk):
     before, enabled, disabled, enabled_again, disabled_again = walk("twice")["states"]
     assert enabled["operators"] == sorted(operator.bl_idname.split(".")[1] for operator in operators.CLASSES)

@@ -5,6 +5,7 @@ import atexit
 
 import bpy
 
+from ..core.errors import HairError
 from . import manual
 from .groom import hair_systems
 from .host import running
@@ -28,9 +29,12 @@ CLASSES = (
 
 
 def require_registered():
-    """Register the add-on if the command line runs from a checkout."""
-    if not hasattr(bpy.types.Curves, "vellus"):
-        register()
+    """Register the add-on in a checkout. Raises `HairError` where it is an extension that is disabled."""
+    if hasattr(bpy.types.Curves, "vellus"):
+        return
+    if __package__.startswith("bl_ext."):  # Blender would register it once more when it is enabled
+        raise HairError("The add-on is disabled: enable Vellus in Blender's preferences.")
+    register()
 
 
 def register():

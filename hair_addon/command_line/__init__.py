@@ -7,6 +7,7 @@ Ctrl-C or SIGTERM.
 
 import sys
 
+from ..api_blender import NO_BLENDER
 from ..core.errors import HairError
 from ..core.long_work import Stopped
 from . import (
@@ -64,6 +65,11 @@ def run(given, said):
         if not said.interruption.is_asked:  # otherwise a consequence of the interruption
             said.fail(" ".join(str(error).split()))
             return 1
+    except ModuleNotFoundError as error:
+        if error.name != "bpy":
+            raise
+        said.fail(NO_BLENDER)
+        return 1
     except MemoryError:
         said.fail("Not enough memory: use fewer strands or a smaller picture.")
         return 1

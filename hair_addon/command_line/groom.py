@@ -16,8 +16,13 @@ from . import opening, options, style_options
 
 blender = lazy.Package("..blender", __package__)
 
+_SHARED = {name for name, *_ in declared(GuideSettings)} & {name for name, *_ in declared(HairSettings)}
+
 # Settings that only guides have.
-_OF_GUIDES = {name for name, *_ in declared(GuideSettings)} - {name for name, *_ in declared(HairSettings)}
+_OF_GUIDES = [setting for setting in declared(GuideSettings) if setting[0] not in _SHARED]
+
+# Settings of hair that grows: hair that is kept as it came has a look, and as many guides as are derived.
+_OF_GROWTH = [s for s in (*declared(GuideSettings), *declared(HairSettings)) if s[0] != "guide_count"]
 
 
 def add(verbs):
@@ -119,10 +124,7 @@ def _from_library(given, surface, console):
 
 def _follow_curves(given, surface, settings, file_axes, console):
     """Return (guides, hair) from the curves in another file, or in the open one."""
-
-    useless = [name for name in vars(given) if name in _OF_GUIDES]
-    if useless:
-        console.warn(f"Guides come from {given.guides_from}: {', '.join(sorted(useless))} have no effect.")
+    _warn_of_useless(options.options_given(given, _OF_GUIDES), f"Guides come from {given.guides_from}", console)
     with _curves_of(given.guides_from, given, file_axes) as curves_object:
         work = blender.groom.transfer.groom_settings.using_as_guides(
             curves_object, surface, settings, blender.data.scene.present_depsgraph()
@@ -135,6 +137,9 @@ def _follow_curves(given, surface, settings, file_axes, console):
 
 def _keep_curves(given, surface, settings, file_axes, console):
     """Return (guides, hair): the curves in another file, or in the open one, as hair, and guides derived from them."""
+    useless = options.options_given(given, _OF_GROWTH) + (["--style"] if given.styles else [])
+    useless += ["--style-preset"] if given.style_preset else []
+    _warn_of_useless(useless, f"Hair is kept as it came from {given.hair_from}", console)
     with _curves_of(given.hair_from, given, file_axes) as curves_object:
         work = blender.groom.foreign.kept_hair.using_as_hair(
             curves_object,
@@ -148,7 +153,14 @@ def _keep_curves(given, surface, settings, file_axes, console):
     error, high = 100.0 * made.mean_error, 100.0 * made.high_error
     console.warn(f"The guides reproduce the strands to {error:.1f}% (95%: {high:.1f}%) of their length.")
     blender.groom.transfer.groom_settings.assign_look(made.hair, settings.appearance)
+    blender.groom.transfer.groom_settings.assign_dynamics(made.guides, settings.dynamics)
     return made.guides, made.hair
+
+
+def _warn_of_useless(names, reason, console):
+    if names:
+        has = "has" if len(names) == 1 else "have"
+        console.warn(f"{reason}: {', '.join(names)} {has} no effect.")
 
 
 def _curves_of(path, given, file_axes):

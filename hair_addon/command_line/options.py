@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from ..core.files import settings_file
 from ..core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME
-from ..core.params import is_text, label_of, unit_of
+from ..core.params import is_text, label_of, plain_value, unit_of
+from ..core.shading.appearance import shown_changes
 from . import dynamics_options
 from .console import PROGRAM
 
@@ -80,8 +81,18 @@ def add_groom_settings(parser):
     dynamics_options.add_dynamics(parser)
 
 
+def option_of(name):
+    """The option that sets a field of settings."""
+    return _OPTIONS.get(name, "--" + name.replace("_", "-"))
+
+
+def options_given(options, declarations):
+    """Sorted names of the options that were given for some declared settings."""
+    return sorted({option_of(name) for name, *_ in declarations if hasattr(options, name)})
+
+
 def _add_setting(parser, name, default, details):
-    option = _OPTIONS.get(name, "--" + name.replace("_", "-"))
+    option = option_of(name)
     follows = details.typical is not None
     at_first = " [from the surface]" if follows else _in_words(default, unit_of(details))
     shown = f"{label_of(name, details)}: {details.description}{at_first}"
@@ -103,9 +114,17 @@ def _in_words(default, unit):
 
 
 def changed(settings, options, declarations):
-    """Return `Settings` with the declared fields that options override. Raises `HairError`."""
-    given = {name: getattr(options, name) for name, *_ in declarations if hasattr(options, name)}
-    return replace(settings, **{name: tuple(v) if isinstance(v, list) else v for name, v in given.items()})
+    """Return `Settings` with the declared fields that options override. Raises `HairError`, which names the option."""
+    return replace(settings, **_given(options, declarations))
+
+
+def _given(options, declarations):
+    """{field: value} of the options that were given, within their ranges."""
+    return {
+        name: plain_value(option_of(name), getattr(options, name), default, details)
+        for name, default, details in declarations
+        if hasattr(options, name)
+    }
 
 
 def groom_settings(options):
@@ -116,7 +135,9 @@ def groom_settings(options):
 
 def changed_groom(settings, options):
     """Return `GroomSettings` with options applied. Raises `HairError`."""
-    sections = {name: changed(getattr(settings, name), options, settings_file.declared_in(name)) for name in _SECTIONS}
+    given = {name: _given(options, settings_file.declared_in(name)) for name in _SECTIONS}
+    given["appearance"] = shown_changes(given["appearance"], option_of)
+    sections = {name: replace(getattr(settings, name), **given[name]) for name in _SECTIONS}
     return replace(settings, **sections, dynamics=dynamics_options.changed(options, settings.dynamics))
 
 

@@ -25,7 +25,9 @@ from hair_addon import (
     api_styles,
     api_tables,
 )
+from hair_addon.api_blender import NO_BLENDER
 from hair_addon.core.placement import cvt
+from hair_addon.core.shading import appearance
 from tests.support.dynamics.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
@@ -100,10 +102,20 @@ def test_the_example_of_plain_arrays_runs_without_blender(tmp_path):
 
 
 def test_examples_of_the_readme_run(tmp_path):
+    """As they stand: the add-on registers itself in a checkout."""
     in_blender, plain = readme("python")
     assert "import bpy" in in_blender and "bpy" not in plain
-    run_python("import hair_addon\nhair_addon.register()\n" + in_blender, tmp_path)
+    run_python(in_blender, tmp_path)
     run_python(WITHOUT_BLENDER + plain, tmp_path)
+
+
+def test_without_blender_functions_and_commands_say_so(tmp_path):
+    program = "from hair_addon import api\nfor call in (api.settings_of, api.add_hair, api.points):\n"
+    program += "    try: call(None)\n    except api.HairError as error: print(error)\n"
+    assert run_python(WITHOUT_BLENDER + program, tmp_path).splitlines() == [NO_BLENDER] * 3
+    program = "from hair_addon import command_line\nsys.exit(command_line.main(['info', 'shot.blend'], 'vellus'))"
+    ended = subprocess.run([sys.executable, "-c", WITHOUT_BLENDER + program], cwd=ROOT, capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (1, f"vellus: {NO_BLENDER}\n")
 
 
 @pytest.mark.parametrize(
@@ -123,6 +135,8 @@ def test_examples_of_the_readme_run(tmp_path):
         (lambda: api.shade(bpy.data.objects["Hair"], "PLAID"), "Unknown preset"),
         (lambda: api.shade(bpy.data.objects["Hair"], model="PHONG"), "Unknown model"),
         (lambda: api.shade(bpy.data.objects["Hair"], melanin=3), "Melanin must be between"),
+        (lambda: api.shade(bpy.data.objects["Hair"], melanin=1, color=(1, 0, 0)), "exclude each other"),
+        (lambda: api.shade(bpy.data.objects["Hair"], parametrization="MELANIN", color=(1, 0, 0)), "change nothing"),
         (lambda: api.shade(bpy.data.objects["Guides"]), "is not Vellus hair"),
         (lambda: api.points(bpy.data.objects["Sphere"]), "is not Vellus guides or hair"),
         (lambda: api.change_guides(bpy.data.objects["Guides"], "SHAVE"), "Unknown guide tool"),
@@ -201,6 +215,18 @@ def test_a_look_keeps_how_it_is_drawn(hair):
     api.shade(hair, "BLOND")
     look = api.settings_of(hair).appearance
     assert (look.mode, look.melanin, hair.data.vellus.model) == ("classic", 0.22, "KAJIYA_KAY")
+
+
+def test_a_color_of_a_script_is_seen(hair):
+    """Whatever the color followed from before."""
+    api.shade(hair, color=(0.5, 0.1, 0.02))
+    look = api.settings_of(hair).appearance
+    assert appearance.mean_color(look) == pytest.approx((0.5, 0.1, 0.02), rel=0.01)
+    api.shade(hair, melanin=0.9)
+    assert appearance.mean_color(api.settings_of(hair).appearance).max() < 0.1
+    api.shade(hair, "BLOND", color=(0.5, 0.1, 0.02))
+    mixed = appearance.mean_color(api.settings_of(hair).appearance)  # of strands that differ
+    assert mixed == pytest.approx((0.5, 0.1, 0.02), rel=0.03)
 
 
 def test_settings_of_combed_guides_leave_them(guides):

@@ -168,6 +168,11 @@ def test_tables_of_a_file_of_settings(tmp_path):
     assert table_exr.read_tables(tmp_path / "t").settings == expected
 
 
+def test_a_color_is_the_one_that_is_shown():
+    (told,) = run_here("settings", "--color", 0.5, 0.25, 0.125, "--json").results
+    assert told["appearance"]["parametrization"] == "COLOR" and told["appearance"]["color"] == [0.5, 0.25, 0.125]
+
+
 def test_settings_are_printed_or_written_to_begin_with(tmp_path):
     options = ("--strands", 77, "--gravity", 0.25)
     ended = run_here("settings", *options)
@@ -272,16 +277,17 @@ def test_an_empty_background_is_empty(shot, tmp_path):
         (["groom", HEAD, "--out", "x.fbx"], ".blend, .npz, .usd"),
         (["groom", HEAD, "--out", "x"], "not as a file without an extension"),
         (["groom", ROOT / "pyproject.toml", "--out", "x.npz"], "format that Vellus cannot read"),
-        (["groom", HEAD, "--guides", 0, "--out", "x.npz"], "Guide count must be"),
-        (["groom", HEAD, "--strands", -3, "--out", "x.npz"], "Strand count must be"),
-        (["groom", HEAD, "--influence-distance", "nan", "--out", "x.npz"], "Influence distance must be"),
-        (["groom", HEAD, "--influence-distance", 0, "--out", "x.npz"], "Influence distance must be"),
-        (["groom", HEAD, "--influence-distance", -1, "--out", "x.npz"], "Influence distance must be"),
+        (["groom", HEAD, "--guides", 0, "--out", "x.npz"], "--guides must be"),
+        (["groom", HEAD, "--strands", -3, "--out", "x.npz"], "--strands must be"),
+        (["groom", HEAD, "--influence-distance", "nan", "--out", "x.npz"], "--influence-distance must be"),
+        (["groom", HEAD, "--influence-distance", 0, "--out", "x.npz"], "--influence-distance must be"),
+        (["groom", HEAD, "--influence-distance", -1, "--out", "x.npz"], "--influence-distance must be"),
         (["groom", HEAD, "--density-group", "scalp", "--out", "x.npz"], 'no vertex group "scalp"'),
         (["groom", HEAD, "--settings", "missing.json", "--out", "x.npz"], "missing.json does not exist"),
-        (["bake-tables", "--ior", 0.9, "--out", "x"], "IOR must be"),
-        (["bake-tables", "--sigma-a", -1, 0, 0, "--out", "x"], "Absorption must be"),
-        (["bake-tables", "--mode", "energy", "--roughness", 1.5, "--out", "x"], "Roughness must be"),
+        (["bake-tables", "--ior", 0.9, "--out", "x"], "--ior must be"),
+        (["bake-tables", "--sigma-a", -1, 0, 0, "--out", "x"], "--sigma-a must be"),
+        (["bake-tables", "--mode", "energy", "--roughness", 1.5, "--out", "x"], "--roughness must be"),
+        (["settings", "--color", 1, 0, 0, "--melanin", 0.2, "--out", "x.json"], "--melanin and --color exclude each"),
         (["render", "missing.blend", "--out", "x.png"], "missing.blend does not exist"),
         (["render", HEAD.with_name("none.blend"), "--out", "x.gif"], "none.blend does not exist"),
         (["info", "missing.npz"], "missing.npz cannot be read"),

@@ -53,5 +53,10 @@ def test_hair_of_a_file_is_kept_and_guides_are_derived(sphere, rng, tmp_path):
     assert "The guides reproduce the strands to" in ended.errors
     with np.load(tmp_path / "kept.npz") as arrays:
         np.testing.assert_allclose(arrays["strand_points"], np.stack(lines), atol=1e-6)
+    useless = ("--strands", 50, "--seed", 3, "--style", "clump", "--dynamics", "hold=7")
+    ended = run_here("groom", path, "--hair-from", path, "--out", "//kept.blend", *useless)
+    assert "--seed, --strands, --style have no effect" in ended.errors and "--dynamics" not in ended.errors
+    guides = next(curves for curves in bpy.data.hair_curves if curves.vellus.kind == "GUIDES")
+    assert guides.vellus.dynamics.hold == 7.0
     ended = run_here("groom", path, "--hair-from", path, "--guides-from", path, "--out", "//kept.npz")
     assert ended.status == 1 and "exclude each other" in ended.errors

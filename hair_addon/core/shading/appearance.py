@@ -5,12 +5,14 @@ So are the defaults, but for the pigment: dark blond, which shows its shading in
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from ..errors import HairError
 from ..params import Settings, param, param_of
 from .fibre import kajiya_kay, marschner, strand_variation
 from .fibre.fresnel import dielectric_reflectance
@@ -107,6 +109,25 @@ class Appearance(Settings):
         high=1.0,
         subtype="FACTOR",
     )
+
+
+def shown_changes(changes: dict[str, Any], name_of: Callable[[str], str] = str) -> dict[str, Any]:
+    """Changes of an `Appearance`, with the parametrization that a color among them needs.
+
+    name_of: what messages call a field. Raises `HairError` for a color that the parametrization would not show.
+    """
+    given = {name: kind for kind, names in COLOR_FIELDS.items() for name in names if name in changes}
+    kinds = set(given.values())
+    if "parametrization" in changes:
+        kind = changes["parametrization"]
+        unseen = [name_of(name) for name, its in given.items() if its != kind]
+        if unseen and kind in COLOR_FIELDS:
+            raise HairError(f"{' and '.join(unseen)} would change nothing: the color follows from {kind}.")
+        return changes
+    if len(kinds) > 1:
+        names = " and ".join(map(name_of, given))
+        raise HairError(f"{names} exclude each other: the color follows from one of {', '.join(COLOR_FIELDS)}.")
+    return changes | ({"parametrization": kinds.pop()} if kinds else {})
 
 
 @lru_cache(maxsize=_KEPT)

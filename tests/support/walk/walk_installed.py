@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist does with the installed extension; run by a Python that has nothing but the bpy wheel.
 
-    python -I walk_installed.py install|operators|twice ZIP FOLDER
+    python -I walk_installed.py install|operators|scripts|twice ZIP FOLDER
 
 Prints one line of JSON at the end; test_install.py says what must stand in it.
 """
 
+import doctest
+import importlib
 import json
 import math
+import os
+import re
 import sys
 from pathlib import Path
 
@@ -16,6 +20,19 @@ import gpu
 import numpy as np
 
 MODULE = "bl_ext.user_default.vellus"
+README = Path(__file__).resolve().parents[3] / "README.md"
+# In the order of `tests/api/test_api.py`: later examples use what earlier ones made.
+API_FILES = (
+    "api_dynamics",
+    "api_guide_tools",
+    "api_styles",
+    "api_tables",
+    "api_export",
+    "api_library",
+    "api_import",
+    "api_pictures",
+    "api_cards",
+)
 
 
 def install(zip_path, _folder):
@@ -73,6 +90,46 @@ def _positions(curves):
     return values
 
 
+def scripts(_zip_path, folder):
+    """The code of README and of the docstrings, with the import that README gives for the extension."""
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    api = importlib.import_module(f"{MODULE}.hair_addon.api")
+    import warp  # there since the extension was enabled
+
+    warp.config.log_level = warp.LOG_WARNING  # what it says of loaded kernels is no part of an example
+    os.chdir(folder)
+    ran = 0
+    for block in re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL):
+        bpy.ops.wm.read_homefile(use_empty=True)
+        exec(block.replace("from hair_addon import api", f"from {MODULE}.hair_addon import api"), {})
+        ran += 1
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    bpy.context.object.name = "Scalp"
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.0, -6.0, 0.0), (math.radians(90.0), 0.0, 0.0)
+    bpy.context.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+    bpy.ops.wm.save_as_mainfile(filepath="shot.blend")
+    failed, runner = [], doctest.DocTestRunner(verbose=False)
+    for example in _examples(api):
+        said = []
+        example.globs = {"api": api, "bpy": bpy}
+        runner.run(example, out=said.append)
+        failed += said
+    return {"blocks": ran, "examples": runner.tries, "failed": failed}
+
+
+def _examples(api):
+    """The doctests of the functions of `api`, file by file as api.py imports them."""
+    modules = [api, *(importlib.import_module(f"{api.__package__}.{name}") for name in API_FILES)]
+    for module in modules:
+        found = doctest.DocTestFinder(exclude_empty=True).find(module, "api")
+        yield from sorted(
+            (test for test in found if test.examples and test.name != "api"), key=lambda test: test.lineno
+        )
+
+
 def twice(_zip_path, _folder):
     """What Blender holds before the add-on is ever enabled, and enabled and disabled, twice each."""
     draw_handlers = _count_draw_handlers()
@@ -125,7 +182,8 @@ def _count_draw_handlers():
 
 if __name__ == "__main__":
     verb, zip_argument, folder_argument = sys.argv[1:]
-    outcome = {"install": install, "operators": operators, "twice": twice}[verb](zip_argument, Path(folder_argument))
+    verbs = {"install": install, "operators": operators, "scripts": scripts, "twice": twice}
+    outcome = verbs[verb](zip_argument, Path(folder_argument))
     if verb == "install":
         bpy.ops.wm.save_userpref()
     print(json.dumps(outcome))

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Blender integration as functions of the Python interface use it: registered, or one sentence about why not."""
+
+import importlib.util
+from typing import Any
+
+from .core import lazy
+from .core.errors import HairError
+
+NO_BLENDER = "This needs Blender: run it in Blender's Python, or install the module bpy."
+
+
+class RegisteredBlender(lazy.Package):
+    """The package `blender`; scripts in a checkout need not register the add-on themselves."""
+
+    def __getattr__(self, name: str) -> Any:
+        require_blender()
+        require_registered = super().__getattr__("require_registered")
+        require_registered()
+        return super().__getattr__(name)
+
+
+def require_blender() -> None:
+    """Raise `HairError` where Python has no Blender."""
+    try:
+        is_there = importlib.util.find_spec("bpy") is not None
+    except ValueError:  # a module that was made without one
+        is_there = True
+    if not is_there:
+        raise HairError(NO_BLENDER)
+
+
+blender = RegisteredBlender(".blender", __package__)
