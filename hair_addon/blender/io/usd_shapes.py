@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shape of a prim of USD's curves at a time, as polylines or Catmull-Rom splines in its own coordinates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.errors import HairError
+from ...core.geometry import bezier_segments
+from ...core.geometry.bezier_segments import each
+from ...core.geometry.strands import curve_offsets
+
+_MOST_ORDER = 16  # of NURBS: what makes them is of 4, and of 8 at most
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Points (N, 3) float64 of curves, counts (S,) of each, and diameters (N,), None without any.
+
+    is_kept: which of the file's curves these are; is_smooth: whether they are Catmull-Rom splines; has_odd_widths:
+    whether the file has diameters, of a number that fits nothing; lines: as of `bezier_segments.polylines`, None of
+    curves that keep their points.
+    """
+
+    points: np.ndarray
+    counts: np.ndarray
+    widths: np.ndarray | None
+    is_kept: np.ndarray
+    is_smooth: bool = False
+    has_odd_widths: bool = False
+    lines: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class _Curves:
+    """A prim's curves as the file has them: points (N, 3), counts (S,), and is_kept (S,): which of them are valid.
+
+    segments: (S,) how many each has, where it is valid.
+    """
+
+    points: np.ndarray
+    counts: np.ndarray
+    is_kept: np.ndarray
+    segments: np.ndarray
+    is_closed: bool = False
+
+    @property
+    def rows(self):
+        """Which points are those of the curves that are kept."""
+        return np.flatnonzero(np.repeat(self.is_kept, self.counts))
+
+    @property
+    def kept_counts(self):
+        """(K,)."""
+        return self.counts[self.is_kept]
+
+
+@dataclass(frozen=True)
+class _Widths:
+    """Diameters of the curves that are kept: one for each of their points, or for each end of their segments, of which
+    each curve has one more than segments; is_odd: whether there are some that fit neither."""
+
+    of_points: np.ndarray | None = None
+    of_ends: np.ndarray | None = None
+    is_odd: bool = False
+
+
+def moving_attributes(prim):
+    """The attributes of a prim that move its curves."""
+    names = ("points", "tangents", "pointWeights", "curveVertexCounts")
+    return [prim.GetAttribute(name) for name in names if prim.HasAttribute(name)]
+
+
+def drawn(prim, time, lines=None) -> Drawn:
+    """The `Drawn` of a prim at a time; lines: into how many to divide each segment. Raises `HairError`."""
+    from pxr import UsdGeom
+
+    points = _array(prim, "points", time, np.float64, 3)
+    counts = _array(prim, "curveVertexCounts", time, np.int64)
+    _require(prim, counts.min(initial=0) >= 0 and counts.sum() == len(points), "curveVertexCounts", "points")
+    if prim.IsA(UsdGeom.HermiteCurves):
+        return _hermite(prim, time, points, counts, lines)
+    if prim.IsA(UsdGeom.NurbsCurves):
+        return _nurbs(prim, time, points, counts, lines)
+    kind, basis, wrap = (str(prim.GetAttribute(name).Get()) for name in ("type", "basis", "wrap"))
+    if kind == "linear":
+        return _linear(prim, time, points, counts, wrap == "periodic")
+    if basis not in bezier_segments.BASES:
+        raise HairError(f"{prim.GetPath()} has the basis {basis}, which USD does not define.")
+    return _cubic(prim, time, points, counts, basis, wrap, lines)
+
+
+def _array(prim, name, time, kind, width=1):
+    """An attribute's values (N,) or (N, width), none where there are none."""
+    value = prim.GetAttribute(name).Get(time) if prim.HasAttribute(name) else None
+    values = np.empty(0, kind) if value is None or not len(value) else np.asarray(value).astype(kind)
+    return values.reshape(-1, width) if width > 1 else values
+
+
+def _require(prim, is_valid, name, other):
+    """Raise `HairError` for arrays that do not fit each other."""
+    if not is_valid:
+        raise HairError(f"{prim.GetPath()} is damaged: its {name} do not fit its {other}.")
+
+
+def _linear(prim, time, points, counts, is_closed):
+    """Polylines: their own points; closed ones end where they begin."""
+    curves = _Curves(points, counts, counts >= 2 + is_closed, counts - (not is_closed), is_closed)
+    kept, starts = curves.kept_counts, curve_offsets(counts)[:-1][curves.is_kept]
+    own, along = each(kept + is_closed)
+    return _unchanged(curves, starts[own] + along % kept[own], kept + is_closed, _widths(prim, time, curves))
+
+
+def _cubic(prim, time, points, counts, basis, wrap, lines):
+    is_closed, is_pinned = wrap == "periodic", wrap == "pinned" and basis != "bezier"
+    is_kept = bezier_segments.is_cubic(counts, basis, wrap)
+    curves = _Curves(points, counts, is_kept, bezier_segments.segment_counts(counts, basis, wrap), is_closed)
+    widths = _widths(prim, time, curves, np.maximum(counts - 4, 0) + 2 if is_pinned else None)
+    if basis == "catmullRom" and wrap == "nonperiodic" and _ends_twice(curves):
+        own, along = each(curves.kept_counts - 2)
+        rows = curve_offsets(counts)[:-1][is_kept][own] + along + 1
+        return _unchanged(curves, rows, curves.kept_counts - 2, widths, is_smooth=True)
+    values = _with_widths(points[curves.rows], widths)
+    return _divided(curves, bezier_segments.cubic(values, curves.kept_counts, basis, wrap), widths, lines)
+
+
+def _hermite(prim, time, points, counts, lines):
+    tangents = _array(prim, "tangents", time, np.float64, 3)
+    _require(prim, len(tangents) == len(points), "tangents", "points")
+    curves = _Curves(points, counts, counts >= 2, counts - 1)
+    widths = _widths(prim, time, curves)
+    if widths.of_points is not None:  # one for each end of a segment: USD has no tangents of widths
+        widths = _Widths(of_ends=widths.of_points)
+    segments = bezier_segments.hermite(points[curves.rows], tangents[curves.rows], curves.kept_counts)
+    return _divided(curves, segments, widths, lines)
+
+
+def _nurbs(prim, time, points, counts, lines):
+    orders, knots = _array(prim, "order", time, np.int64), _array(prim, "knots", time, np.float64)
+    weights, ranges = _array(prim, "pointWeights", time, np.float64), _array(prim, "ranges", time, np.float64, 2)
+    orders = np.full(len(counts), orders[0]) if len(orders) == 1 else orders
+    _require(prim, len(orders) == len(counts) and orders.min(initial=2) >= 2, "order", "curveVertexCounts")
+    _require(prim, orders.max(initial=2) <= _MOST_ORDER, "order", "curves")
+    _require(prim, len(knots) == (counts + orders).sum(), "knots", "order")
+    _require(prim, np.isfinite(knots).all() and _rise(knots, counts + orders), "knots", "curves")
+    _require(prim, len(weights) in (0, len(points)) and (weights > 0.0).all(), "pointWeights", "points")
+    _require(prim, len(ranges) in (0, len(counts)) and np.isfinite(ranges).all(), "ranges", "curveVertexCounts")
+    curves = _Curves(points, counts, counts >= orders, counts - orders + 1)
+    kept, rows = curves.is_kept, curves.rows
+    widths = _widths(prim, time, curves)
+    segments = bezier_segments.nurbs(
+        _with_widths(points[rows], widths),
+        weights[rows] if len(weights) else None,
+        counts[kept],
+        orders[kept],
+        knots[np.repeat(kept, counts + orders)],
+        ranges[kept] if len(ranges) else None,
+    )
+    return _divided(curves, segments, widths, lines)
+
+
+def _rise(knots, counts):
+    """Whether each curve's knots rise."""
+    is_last = np.zeros(len(knots), bool)
+    is_last[curve_offsets(counts)[1:] - 1] = True
+    return bool(((np.diff(knots) >= 0.0) | is_last[:-1]).all())
+
+
+def _ends_twice(curves):
+    """Whether the first and the last two points of each curve are the same."""
+    first = curve_offsets(curves.counts)[:-1][curves.is_kept]
+    last = first + curves.kept_counts - 1
+    points = curves.points
+    return bool((points[first] == points[first + 1]).all() and (points[last] == points[last - 1]).all())
+
+
+def _unchanged(curves, rows, counts, widths, is_smooth=False):
+    """`Drawn` of curves that keep their points, or some of them, one for each end of a segment."""
+    kept = np.full(len(curves.points), -1)
+    kept[curves.rows] = np.arange(len(curves.rows))
+    values = widths.of_ends if widths.of_points is None else widths.of_points[kept[rows]]
+    return Drawn(curves.points[rows], counts, values, curves.is_kept, is_smooth, widths.is_odd)
+
+
+def _with_widths(points, widths):
+    return points if widths.of_points is None else np.column_stack([points, widths.of_points])
+
+
+def _divided(curves, segments, widths, lines):
+    """`Drawn` of Bézier segments, whose fourth value is a diameter where there is one for each point."""
+    if lines is None or len(lines) != len(segments.controls):
+        lines = bezier_segments.line_counts(segments)
+    values, counts, places = bezier_segments.polylines(segments, lines)
+    found = values[:, 3] if values.shape[1] > 3 else None
+    if widths.of_ends is not None:
+        before = np.minimum(places.astype(np.int64), len(widths.of_ends) - 2)
+        part = places - before
+        found = (1.0 - part) * widths.of_ends[before] + part * widths.of_ends[before + 1]
+    return Drawn(values[:, :3], counts, found, curves.is_kept, False, widths.is_odd, lines)
+
+
+def _widths(prim, time, curves, short_ends=None):
+    """The `_Widths` of curves; short_ends: (S,) ends of segments by another count that files have."""
+    from pxr import UsdGeom
+
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("widths")
+    if primvar and primvar.HasValue():
+        scope, values = str(primvar.GetInterpolation()), primvar.ComputeFlattened(time)
+    else:
+        shape = UsdGeom.Curves(prim)
+        scope, values = str(shape.GetWidthsInterpolation()), shape.GetWidthsAttr().Get(time)
+    if values is None or not len(values):
+        return _Widths()
+    values, counts, kept = np.asarray(values, np.float64).ravel(), curves.counts, curves.is_kept
+    ends = np.maximum(curves.segments, 1) + (not curves.is_closed)
+    sizes = {"constant": 1, "vertex": counts.sum(), "varying": ends.sum(), "uniform": len(counts)}
+    if short_ends is not None:
+        sizes["short"] = short_ends.sum()
+    # Files often say nothing of it, or the wrong thing: what has the right number of values is meant.
+    fitting = [one for one in (scope, *sizes) if sizes.get(one) == len(values)]
+    if not fitting:
+        return _Widths(is_odd=True)
+    if fitting[0] == "vertex":
+        return _Widths(of_points=values[curves.rows])
+    kept_ends = curves.segments[kept] + 1
+    if fitting[0] in ("constant", "uniform"):
+        every = np.broadcast_to(values, len(counts)) if fitting[0] == "constant" else values
+        return _Widths(of_ends=np.repeat(every[kept], kept_ends))
+    # Values that are missing are those of the first and of the last end; closed curves end where they begin.
+    there = ends if fitting[0] == "varying" else short_ends
+    own, along = each(kept_ends)
+    if curves.is_closed:
+        along = along % there[kept][own]
+    else:
+        along = np.clip(along - ((kept_ends - there[kept] + 1) // 2)[own], 0, (there[kept] - 1)[own])
+    return _Widths(of_ends=values[curve_offsets(there)[:-1][kept][own] + along])

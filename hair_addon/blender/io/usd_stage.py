@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""USD stages that are read: opened whole or refused, the curves that are drawn, and their place at each time."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import HairError
+
+_MOST_NAMED = 3  # files in a sentence
+
+
+@dataclass(frozen=True)
+class Found:
+    """Prims of curves that are drawn, and how many are not: invisible, proxies of others, scattered by instancers."""
+
+    prims: list
+    invisible: int
+    proxies: int
+    scattered: int
+
+    def notes(self, path: Path) -> Iterator[HairError]:
+        """What is said of those that are left out."""
+        for count, why in (
+            (self.invisible, "are invisible"),
+            (self.proxies, "are proxies"),
+            (self.scattered, "are scattered by a point instancer"),
+        ):
+            if count:
+                yield HairError(f"{path}: {count} curves objects {why} and left out.")
+
+
+@contextmanager
+def errors_named(path: Path):
+    """Raise `HairError` for errors of USD."""
+    bpy.utils.expose_bundled_modules()
+    from pxr import Tf
+
+    try:
+        yield
+    except Tf.ErrorException as error:
+        raise HairError(f"{path} cannot be read: {_cause_of(error)}.") from error
+
+
+def time_code(time: float | None):
+    """A `Usd.TimeCode`, the earliest for None."""
+    from pxr import Usd
+
+    return Usd.TimeCode.EarliestTime() if time is None else Usd.TimeCode(time)
+
+
+def opened(path: Path):
+    """The `Usd.Stage` of a file as it is on the disk. Raises `HairError`, also where files that it names are not."""
+    with errors_named(path):
+        from pxr import Usd
+
+        stage = Usd.Stage.Open(str(path))
+        stage.Reload()  # what another stage of this process holds open may be an older state of the file
+        missing = _missing(stage)
+    if missing:
+        named = ", ".join(missing[:_MOST_NAMED]) + ("…" if len(missing) > _MOST_NAMED else "")
+        raise HairError(f"{path} needs {named}, which cannot be found: put it there.")
+    return stage
+
+
+def _cause_of(error):
+    """USD's first error, without where in its sources that arose."""
+    text = str(error)
+    line = re.search(r":(\d+):\d+: parse error", text)
+    if line is not None:
+        return f"it is not valid in line {line[1]}"
+    causes = re.findall(r": '(.*?)'\s*$", text, re.MULTILINE | re.DOTALL)
+    return " ".join(causes[0].split()).rstrip(".") if causes else "it is damaged"
+
+
+def _missing(stage):
+    """Names of files, and of what is in them, that a stage is made of and that are not there."""
+    found = []
+    for error in stage.GetCompositionErrors():
+        named = re.search(r"@([^@]*)@(<[^>]*>)?", str(error))
+        name = str(error) if named is None else Path(named[1]).name + (named[2] or "")
+        if name not in found:
+            found.append(name)
+    return found
+
+
+def curves_of(stage, time) -> Found:
+    """The `Found` of a stage at a time, those of instances too."""
+    from pxr import Usd, UsdGeom
+
+    prims, invisible, proxies, instanced = [], 0, 0, 0
+    walk = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+    prototypes = _prototypes(stage)
+    for prim in walk:
+        if not prim.IsA(UsdGeom.Curves):
+            continue
+        shown = UsdGeom.Imageable(prim)
+        if any(prim.GetPath().HasPrefix(root) for root in prototypes):
+            instanced += 1
+        elif shown.ComputeVisibility(time) == UsdGeom.Tokens.invisible:
+            invisible += 1
+        elif shown.ComputePurpose() == UsdGeom.Tokens.proxy:
+            proxies += 1
+        else:
+            prims.append(prim)
+    return Found(prims, invisible, proxies, instanced)
+
+
+def _prototypes(stage):
+    """Paths of what point instancers scatter, which is not drawn where it stands."""
+    from pxr import Usd, UsdGeom
+
+    walk = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
+    instancers = [UsdGeom.PointInstancer(prim) for prim in walk if prim.IsA(UsdGeom.PointInstancer)]
+    return [path for one in instancers for path in (*one.GetPrototypesRel().GetForwardedTargets(), one.GetPath())]
+
+
+def times_of(prim, attributes, within: tuple[float, float] | None) -> list[float]:
+    """Times, in time codes, at which some attributes of a prim, or the transforms above it, have samples.
+
+    within: the file's first and last time, the first of which is among them where anything moves; None if it has none.
+    """
+    from pxr import UsdGeom
+
+    times = {time for attribute in attributes for time in attribute.GetTimeSamples()}
+    above = prim
+    while above and not above.IsPseudoRoot():
+        place = UsdGeom.Xformable(above)
+        if place:
+            times.update(place.GetTimeSamples())
+            if place.GetResetXformStack():
+                break
+        above = above.GetParent()
+    if within is not None and len(times) > 1:
+        times = {time for time in times if within[0] <= time <= within[1]} | {within[0]}
+    return sorted(times)
+
+
+def matrix_of(prim, time) -> np.ndarray:
+    """(4, 4) float64: a prim's coordinates → the stage's."""
+    from pxr import UsdGeom
+
+    return np.array(UsdGeom.Imageable(prim).ComputeLocalToWorldTransform(time)).T  # USD's have rows of vectors
+
+
+def primvar(prim, name: str, time):
+    """The values of a primvar, one for each index where it has such; None without any."""
+    from pxr import UsdGeom
+
+    found = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+    return found.ComputeFlattened(time) if found and found.HasValue() else None
+
+
+def is_skinned(prim) -> bool:
+    """Whether a skeleton bends a prim."""
+    from pxr import UsdSkel
+
+    bound = UsdSkel.BindingAPI(prim)
+    return bool(bound.GetInheritedSkeleton()) and bool(bound.GetJointIndicesPrimvar().HasAuthoredValue())

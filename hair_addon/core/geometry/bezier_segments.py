@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cubic curves of [UsdCurves24] and NURBS as rational Bézier segments, and these as polylines.
+
+A curve's values are rows of numbers: three of its place, and any others that are interpolated as its points are, such
+as a width.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import strands
+
+# How close a polyline comes to its curve: that of a strand of 20 cm to 40 µm, half a hair's thickness. An angle
+# keeps its length within its square / 24 of the curve's, 0.04 %.
+SAGITTA = 2e-4  # largest distance from the curve, as a part of its length
+TURN = 0.1  # largest angle between neighbouring lines [rad]
+
+_MOST_LINES = 128  # of a segment
+_AT_ONCE = 2048  # segments, which fit caches
+
+# Rows are Bézier controls, columns a segment's own four.
+BASES = {
+    "bezier": np.eye(4),
+    "bspline": np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6.0,
+    "catmullRom": np.array([[0, 6, 0, 0], [-1, 6, 1, 0], [0, 1, 6, -1], [0, 0, 6, 0]]) / 6.0,
+}
+STEPS = {"bezier": 3, "bspline": 1, "catmullRom": 1}
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Bézier segments of curves, one curve after another.
+
+    controls: (K, p + 1, D) float64; weights: (K, p + 1), positive, None for polynomials; counts: (S,) segments of each
+    curve; places: (K, 2) where a segment begins and ends among values that are linear between the ends of segments, of
+    which a curve of n segments has n + 1.
+    """
+
+    controls: np.ndarray
+    counts: np.ndarray
+    places: np.ndarray
+    weights: np.ndarray | None = None
+
+
+def cubic(values: np.ndarray, counts: np.ndarray, basis: str, wrap: str) -> Segments:
+    """The `Segments` of cubic curves of a basis; values: (N, D), counts: (S,) rows of each curve.
+
+    wrap: "nonperiodic", "periodic", or "pinned", which lets B-splines and Catmull-Rom splines begin and end at their
+    first and last points. `is_cubic` says which curves have segments.
+    """
+    values, counts = np.asarray(values, np.float64), np.asarray(counts, np.int64)
+    if wrap == "pinned" and basis != "bezier":
+        values, counts = _pinned(values, counts)
+        wrap = "nonperiodic"
+    step = STEPS[basis]
+    segments = segment_counts(counts, basis, wrap)
+    own, along = each(segments)
+    within = along[:, None] * step + np.arange(4)
+    if wrap == "periodic":
+        within %= counts[own][:, None]
+    rows = strands.curve_offsets(counts)[own][:, None] + within
+    controls = np.zeros((len(rows), 4, values.shape[1]))
+    for near, shares in enumerate(BASES[basis].T):
+        there = values[rows[:, near]]
+        for control in np.flatnonzero(shares):
+            controls[:, control] += shares[control] * there
+    return Segments(controls, segments, _places(segments, own, along))
+
+
+def segment_counts(counts: np.ndarray, basis: str, wrap: str) -> np.ndarray:
+    """(S,) segments of cubic curves of so many points; of those that are not `is_cubic` any number."""
+    counts = np.asarray(counts)
+    if wrap == "periodic":
+        return counts // STEPS[basis]
+    if wrap == "pinned" and basis != "bezier":
+        return counts - 1
+    return (counts - 4) // STEPS[basis] + 1
+
+
+def is_cubic(counts: np.ndarray, basis: str, wrap: str) -> np.ndarray:
+    """(S,) bool: which cubic curves of so many points have segments, and no points that belong to none."""
+    counts = np.asarray(counts)
+    if wrap == "periodic":
+        return (counts >= 3) & (counts % STEPS[basis] == 0)
+    if wrap == "pinned" and basis != "bezier":
+        return counts >= 2
+    return (counts >= 4) & ((counts - 4) % STEPS[basis] == 0)
+
+
+def _pinned(values, counts):
+    """Values of pinned curves with the two points before and after that they imply."""
+    starts = strands.curve_offsets(counts)
+    first, last = starts[:-1], starts[1:] - 1
+    out = np.empty((len(values) + 2 * len(counts), values.shape[1]))
+    own = np.repeat(np.arange(len(counts)), counts)
+    out[np.arange(len(values)) + 2 * own + 1] = values
+    at = first + 2 * np.arange(len(counts))
+    out[at] = 2.0 * values[first] - values[first + 1]
+    out[at + counts + 1] = 2.0 * values[last] - values[last - 1]
+    return out, counts + 2
+
+
+def hermite(values: np.ndarray, tangents: np.ndarray, counts: np.ndarray) -> Segments:
+    """The `Segments` of cubic Hermite curves; values and tangents: (N, D), counts: (S,) rows of each curve."""
+    values, tangents, counts = np.asarray(values, np.float64), np.asarray(tangents, np.float64), np.asarray(counts)
+    segments = np.maximum(counts - 1, 0)
+    own, along = each(segments)
+    start = strands.curve_offsets(counts)[own] + along
+    end = start + 1
+    inner = values[start] + tangents[start] / 3.0, values[end] - tangents[end] / 3.0
+    controls = np.stack([values[start], *inner, values[end]], axis=1)
+    return Segments(controls, segments, _places(segments, own, along))
+
+
+def nurbs(
+    values: np.ndarray,
+    weights: np.ndarray | None,
+    counts: np.ndarray,
+    orders: np.ndarray,
+    knots: np.ndarray,
+    ranges: np.ndarray | None,
+) -> Segments:
+    """The `Segments` of NURBS; values: (N, D) and weights (N,), counts: (S,) rows of each curve, orders: (S,).
+
+    knots: (N + sum of orders,), which rise; ranges: (S, 2) parameters where curves begin and end, None for all of them.
+    """
+    values, counts, orders = np.asarray(values, np.float64), np.asarray(counts, np.int64), np.asarray(orders, np.int64)
+    is_rational = weights is not None
+    if is_rational:
+        weights = np.asarray(weights, np.float64)[:, None]
+        values = np.hstack([values * weights, weights])
+    starts, knot_starts = strands.curve_offsets(counts), strands.curve_offsets(counts + orders)
+    knots = np.asarray(knots, np.float64)
+    low, high = knots[knot_starts[:-1] + orders - 1], knots[knot_starts[:-1] + counts]
+    if ranges is not None:
+        low, high = np.maximum(low, ranges[:, 0]), np.minimum(high, ranges[:, 1])
+    span_counts = counts - orders + 1
+    value_starts = strands.curve_offsets(span_counts + 1)
+    degree = int(orders.max(initial=2)) - 1
+    kept = [[], [], [], []]  # curve, place along it, controls, places
+    for order in np.unique(orders):
+        its = np.flatnonzero(orders == order)
+        own, along = each(span_counts[its])
+        own = its[own]
+        knot = knot_starts[own] + along + order - 1
+        begin, end = np.maximum(knots[knot], low[own]), np.minimum(knots[knot + 1], high[own])
+        is_there = begin < end
+        own, along, knot, begin, end = (a[is_there] for a in (own, along, knot, begin, end))
+        near_knots = knots[knot[:, None] + np.arange(2 - order, order)]
+        near_values = values[(starts[own] + along)[:, None] + np.arange(order)]
+        controls = _blossom(near_values, near_knots, begin, end)
+        part = (np.stack([begin, end], 1) - knots[knot][:, None]) / (knots[knot + 1] - knots[knot])[:, None]
+        for group, made in zip(
+            kept, (own, along, _raised(controls, degree), (value_starts[own] + along)[:, None] + part), strict=True
+        ):
+            group.append(made)
+    own, along, controls, places = (np.concatenate(group) for group in kept)
+    sorted_rows = np.lexsort((along, own))
+    controls, places = controls[sorted_rows], places[sorted_rows]
+    segments = np.bincount(own, minlength=len(counts))
+    if not is_rational:
+        return Segments(controls, segments, places)
+    return Segments(controls[..., :-1] / controls[..., -1:], segments, places, controls[..., -1])
+
+
+def _blossom(values, knots, begin, end):
+    """Bézier controls (K, p + 1, D) of spans; values: (K, p + 1, D) and knots (K, 2 p) that span the parameters."""
+    degree = values.shape[1] - 1
+    controls = np.empty_like(values)
+    for control in range(degree + 1):
+        level = values
+        for step in range(1, degree + 1):
+            at = end if step <= control else begin
+            left, right = knots[:, step - 1 : degree], knots[:, degree : 2 * degree - step + 1]
+            part = ((at[:, None] - left) / (right - left))[..., None]
+            level = (1.0 - part) * level[:, :-1] + part * level[:, 1:]
+        controls[:, control] = level[:, 0]
+    return controls
+
+
+def _raised(controls, degree):
+    """The same segments as controls of a higher degree."""
+    while controls.shape[1] <= degree:
+        higher = controls.shape[1]
+        part = (np.arange(1, higher) / higher)[:, None]
+        inner = part * controls[:, :-1] + (1.0 - part) * controls[:, 1:]
+        controls = np.concatenate([controls[:, :1], inner, controls[:, -1:]], axis=1)
+    return controls
+
+
+def each(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(own, along): of each of the things that counts (S,) say how many there are, whose it is, and which of its."""
+    own = np.repeat(np.arange(len(counts)), counts)
+    return own, np.arange(len(own)) - strands.curve_offsets(counts)[:-1][own]
+
+
+def _places(segments, own, along):
+    start = strands.curve_offsets(segments + 1)[own] + along
+    return np.stack([start, start + 1], axis=1).astype(np.float64)
+
+
+def polylines(segments: Segments, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(values (M, D), counts (S,), places (M,)) of polylines that follow curves; places: as of `Segments`.
+
+    All points are on the curves, and the first and the last are the curves' own. lines: (K,) as `line_counts` has them.
+    """
+    owners = np.repeat(np.arange(len(segments.counts)), segments.counts)
+    has_any = segments.counts > 0
+    counts = np.bincount(owners, lines, len(segments.counts)).astype(np.int64) + has_any
+    controls = segments.controls
+    if segments.weights is not None:
+        controls = np.concatenate([controls * segments.weights[..., None], segments.weights[..., None]], axis=2)
+    values, places = np.empty((int(counts.sum()), controls.shape[2])), np.empty(int(counts.sum()))
+    firsts = strands.curve_offsets(segments.counts)[:-1][has_any]
+    at = strands.curve_offsets(counts)[:-1][has_any]
+    values[at], places[at] = controls[firsts, 0], segments.places[firsts, 0]
+    # Lines of a segment come after all before, and the first points of its own and of all earlier curves.
+    after = strands.curve_offsets(lines)[:-1] + np.cumsum(has_any)[owners]
+    in_order = np.argsort(lines, kind="stable")
+    numbers, begins = np.unique(lines[in_order], return_index=True)
+    for number, alike in zip(numbers, np.split(in_order, begins[1:]), strict=True):
+        parts = np.arange(1, number + 1) / number
+        for first in range(0, len(alike), _AT_ONCE):
+            some = alike[first : first + _AT_ONCE]
+            rows = after[some] + np.arange(number)[:, None]
+            values[rows] = _at(controls[some], parts)
+            begin, end = segments.places[some].T
+            places[rows] = begin + parts[:, None] * (end - begin)
+    if segments.weights is not None:
+        values = values[:, :-1] / values[:, -1:]
+    return values, counts, places
+
+
+def _at(controls, parts):
+    """(T, K, D) polynomial values of segments (K, p + 1, D) at parts (T,) in [0, 1] of each."""
+    degree, total, binomial = controls.shape[1] - 1, 0.0, 1.0
+    for control in range(degree + 1):
+        # Sums in this order, and no product of matrices, have the same bits on every processor.
+        basis = binomial * parts**control * (1.0 - parts) ** (degree - control)
+        total = total + basis[:, None, None] * controls[:, control]
+        binomial *= (degree - control) / (control + 1)
+    return total
+
+
+def line_counts(segments: Segments) -> np.ndarray:
+    """(K,) int64: into how many lines of the same range of parameters to divide segments, by `SAGITTA` and `TURN`."""
+    points = segments.controls[..., :3]
+    degree = points.shape[1] - 1
+    legs = np.diff(points, axis=1)
+    lengths = np.linalg.norm(legs, axis=2).sum(axis=1)
+    if degree < 2:
+        return np.ones(len(points), np.int64)
+    owners = np.repeat(np.arange(len(segments.counts)), segments.counts)
+    whole = np.bincount(owners, lengths, len(segments.counts))[owners]
+    bend = degree * (degree - 1) * np.linalg.norm(np.diff(legs, axis=1), axis=2).max(axis=1)  # bounds |C''|
+    if segments.weights is not None:
+        bend = bend * (segments.weights.max(axis=1) / segments.weights.min(axis=1)) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_distance = np.sqrt(bend / (8.0 * SAGITTA * whole))
+        by_angle = bend / (TURN * lengths)
+        # Straight lines are one, in spite of rounding.
+        wanted = np.where(bend > 1e-9 * whole, np.ceil(np.maximum(by_distance, by_angle)), 1.0)
+    return np.clip(np.nan_to_num(wanted, nan=1.0), 1, _MOST_LINES).astype(np.int64)
