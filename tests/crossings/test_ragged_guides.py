@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.data.strands import curves
+from hair_addon.blender.data.strands import curves, stored_roots
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
@@ -88,7 +88,7 @@ def test_a_brush_that_adds_and_deletes_changes_the_hair(ragged, sphere, rng):
     points[-7:] = next(iter(lines_on(sphere, rng, 1, 7, 7)))
     write_points(ragged, points)
     assert not np.array_equal(stored(bpy.data.objects["Hair"]), before)
-    stale = curves.stored_roots(ragged.data, pipeline.scene.read_surface(sphere, bpy.context.evaluated_depsgraph_get()))
+    stale = stored_roots.points(ragged.data, pipeline.scene.read_surface(sphere, bpy.context.evaluated_depsgraph_get()))
     np.testing.assert_allclose(stale.barycentric.sum(axis=1), 1.0, atol=1e-5)
     assert curves.is_hand_made(ragged.data)
 

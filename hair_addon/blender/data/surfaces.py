@@ -148,9 +148,14 @@ class Surface:
 
     @cached_property
     def topology(self):
-        """A key of the triangles and their order; the same for a mirrored mesh."""
-        triangles = self.mesh.triangles[:, [0, 2, 1]] if self.is_mirrored else self.mesh.triangles
-        return hashlib.blake2b(triangles.tobytes(), digest_size=16).hexdigest()
+        """A key of the faces by their corners, in their order, whichever triangles they are cut into."""
+        key = hashlib.blake2b(self.faces.corner_vertices.tobytes(), digest_size=16)
+        key.update(self.faces.starts.tobytes())
+        return key.hexdigest()
+
+    def points_at(self, polygons, vertices, barycentric):
+        """(`SurfacePoints`, (N,) bool: which are none) of places in polygons, as `places` gives them."""
+        return geometry.face_places.on_triangles(self.mesh, self.faces, polygons, vertices, barycentric)
 
     def to_local_normals(self, normals):
         """(N, 3) unit normals → unit normals in local coordinates: the inverse transpose of `to_local`."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides on an edited mesh: transformed with the surface, or rooted again if its faces changed."""
+"""Guides on an edited mesh: transformed with the surface, and rooted again where faces have changed."""
 
 import numpy as np
 from bpy.types import Curves, Depsgraph
@@ -7,12 +7,12 @@ from bpy.types import Curves, Depsgraph
 from ...core import geometry
 from ...core.geometry.mesh import require_finite
 from ..data import scene
-from ..data.strands import curves, curves_objects, kept_shapes, posed_strands
-from . import bindings
+from ..data.strands import curves, curves_objects, kept_shapes, stored_roots
+from . import bindings, edited_faces
 
 _ROOTED_AGAIN = {
-    "GUIDES": 'The faces of "{name}" have changed: guides are rooted at the nearest points.',
-    "HAIR": 'The faces of "{name}" have changed: strands are rooted at the nearest points.',
+    "GUIDES": '{guides} guides and {strands} strands lost their faces of "{name}": rooted at the nearest points.',
+    "HAIR": '{strands} strands lost their faces of "{name}": rooted at the nearest points.',
 }
 
 
@@ -20,17 +20,20 @@ def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.n
     """Carry guides, combed or not, or hair that is kept as it came, with an edited surface; whether it was edited.
 
     axes_before: `to_world_axes` of the surface before the edit, None if unknown. Shape keys and modifiers are not
-    edits: strands are stored on the surface at rest. If faces were added or removed, roots move to the nearest
-    points. Raises `HairError`, for linked guides only if they would change.
+    edits: strands are stored on the surface at rest. Roots whose face is gone move to the nearest points. Raises
+    `HairError`, for linked guides only if they would change.
     """
     state = guide_curves.vellus
     surface = scene.read_surface(guide_curves.surface, depsgraph)
-    roots = curves.read_root_places(guide_curves, len(surface.rest))
-    stored = curves.stored_roots(guide_curves, surface)
+    roots = stored_roots.places(guide_curves, len(surface.rest))
+    stored = stored_roots.points(guide_curves, surface)
     if state.topology != surface.topology or roots is None or stored is None:
         curves.require_not_linked(guide_curves)
-        _root_again(guide_curves, surface)
-        state.status = _ROOTED_AGAIN[state.kind].format(name=surface.name)
+        lost, lost_between = edited_faces.root_again(guide_curves, surface, depsgraph)
+        if lost or lost_between:
+            strand_count = lost_between if state.kind == "GUIDES" else lost
+            sentence = _ROOTED_AGAIN[state.kind]
+            state.status = sentence.format(name=surface.name, guides=lost, strands=strand_count)
         return True
     before = curves.stood_on(guide_curves)
     if before is None or before.shape != surface.rest.shape or np.array_equal(before, surface.rest):
@@ -47,14 +50,7 @@ def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.n
             bindings.invalidate(target)
     else:
         motion = geometry.surface_deform.motion(before, surface.rest, surface.faces, roots[0])
-        counts = curves.point_counts(guide_curves)
-        kept_shapes.move(guide_curves, lambda points: posed_strands.carried(points, motion, roots, counts))
+        edited_faces.carry(guide_curves, surface, motion, roots, stored)
     curves.write_roots(guide_curves, surface, stored)
     curves.keep_surface(guide_curves, surface)
     return True
-
-
-def _root_again(guide_curves, surface):
-    points = surface.from_local(curves.first_points(guide_curves))
-    curves.write_roots(guide_curves, surface, curves.read_roots(guide_curves, surface, points))
-    curves.keep_surface(guide_curves, surface)

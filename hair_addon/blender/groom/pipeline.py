@@ -18,7 +18,7 @@ from ...core.long_work import Work, part_of, run_now
 from ...core.styling.base import StyleSettings
 from ..data import masks, scene
 from ..data.scene import Surface
-from ..data.strands import curves, curves_objects, drawn_lines, partings
+from ..data.strands import curves, curves_objects, drawn_lines, partings, stored_roots
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items
@@ -300,7 +300,7 @@ def _kept_roots(target, surface, key, count):
         return None
     if len(target.curves) != count:
         return None
-    return curves.stored_roots(target, surface, is_complete=True)
+    return stored_roots.points(target, surface, is_complete=True)
 
 
 def restyle(

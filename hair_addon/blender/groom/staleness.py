@@ -14,9 +14,14 @@ from ..data.strands import curves, drawn_lines, partings
 from ..host.notices import text_of
 from ..settings import setting_properties
 
+_HALF = 16  # digits of a root key that are of settings
+
 
 def root_key(settings: Settings, density: np.ndarray | None, image: np.ndarray | None = None) -> str:
-    """Key of the inputs of root placement, apart from the surface. image: its values, if there is one."""
+    """Key of the inputs of root placement, apart from the surface. image: its values, if there is one.
+
+    Its first half is that of the settings, its second that of what is painted.
+    """
     names = (
         *("seed", "guide_count", "relax_iterations", "density_image", "curvature", "symmetric"),
         "strand_count",
@@ -26,7 +31,30 @@ def root_key(settings: Settings, density: np.ndarray | None, image: np.ndarray |
         values["density_image"] = settings.density_image or None
     placing = repr(list(values.values()))
     painted = b"".join(values.tobytes() for values in (density, image) if values is not None)
-    return hashlib.blake2b(placing.encode() + painted, digest_size=16).hexdigest()
+    return _half_key(placing.encode()) + _half_key(painted)
+
+
+def _half_key(data):
+    return hashlib.blake2b(data, digest_size=_HALF // 2).hexdigest()
+
+
+def keep_roots(target: Curves, depsgraph: Depsgraph, matching: np.ndarray) -> None:
+    """Let the roots of guides or hair count as placed on a surface with other faces, as they are stored.
+
+    matching: (V,) each vertex of before now, -1 where it is gone. Where weights of those that are still there show that
+    the mask was painted meanwhile, roots stay out of date. Raises `HairError`.
+    """
+    state = target.vellus
+    if not state.root_key:
+        return
+    settings, density, image = _placing(target, depsgraph)
+    if density is not None and (matching >= 0).all():
+        as_before = root_key(settings, density[matching], image)
+        if as_before[_HALF:] != state.root_key[_HALF:]:
+            return
+    key = root_key(settings, density, image)
+    if key[:_HALF] == state.root_key[:_HALF]:
+        state.root_key = key
 
 
 def guides_digest(guide_curves: Curves | None) -> str:
@@ -64,10 +92,15 @@ def has_other_flow(guides: Curves, depsgraph: Depsgraph) -> bool:
 
 def has_other_mask(target: Curves, depsgraph: Depsgraph) -> bool:
     """Whether the mask has changed since roots were placed: other names, or painted. Raises `HairError`."""
+    return target.vellus.root_key != root_key(*_placing(target, depsgraph))
+
+
+def _placing(target, depsgraph):
+    """Settings, weights (V,) and the values of the image that place roots of guides or hair now."""
     state, mask = target.vellus, masks.of_curves(target)
     group, settings_class = (
         (state.guides, groom.GuideSettings) if state.kind == "GUIDES" else (state.hair, groom.HairSettings)
     )
     settings = setting_properties.to_settings(group, settings_class)
     density = scene.read_vertex_group(target.surface, depsgraph, mask.group)
-    return state.root_key != root_key(settings, density, scene.read_image(mask.image))
+    return settings, density, scene.read_image(mask.image)

@@ -13,7 +13,7 @@ from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
 from ..data import guide_map_readers
 from ..data.scene import Surface
-from ..data.strands import attributes, curves, curves_objects, kept_shapes
+from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots
 from ..host.notices import name_of
 from ..materials import looks
 from ..settings import animated, setting_properties, style_items
@@ -163,7 +163,7 @@ def _store_roots(guide_curves, bound):
     if guide_curves is None or attributes.is_from_library(guide_curves) or guide_curves.session_uid != bound.guide_uid:
         return
     roots, surface = bound.guides.roots, bound.surface
-    stored = curves.read_root_places(guide_curves, len(surface.rest))
+    stored = stored_roots.places(guide_curves, len(surface.rest))
     if stored is None or not all(map(np.array_equal, stored, surface.places(roots))):
         curves.write_roots(guide_curves, surface, roots)
 

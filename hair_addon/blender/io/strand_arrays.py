@@ -8,7 +8,7 @@ from ...core import geometry
 from ...core.errors import HairError
 from ...core.files.groom_curves import Rows, slices
 from ...core.grooming import groom
-from ..data.strands import attributes, curves, posed_strands
+from ..data.strands import attributes, curves, posed_strands, stored_roots
 from ..groom import selection
 from ..host.notices import name_of
 from ..live import live_hair
@@ -62,7 +62,7 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
     to_world = _to_world(datablock) * (metres_per_unit(bpy.context.scene) * per_metre)
     pose = posed_strands.read_pose(datablock.surface, bpy.context.evaluated_depsgraph_get())
     at_rest = _at_rest(datablock) if local is None else local
-    stored = curves.read_root_places(datablock, np.inf)
+    stored = stored_roots.places(datablock, np.inf)
     places = pose.rooted(datablock.vellus.topology, stored, at_rest[:, 0])
 
     def rows(some):

@@ -12,7 +12,7 @@ import numpy as np
 from ...core import geometry
 from ...core.errors import HairError
 from ..data import scene
-from ..data.strands import curves, follow_nodes, posed_strands
+from ..data.strands import curves, follow_nodes, posed_strands, stored_roots
 
 
 def renew():
@@ -39,7 +39,7 @@ def _seen(datablock):
     if datablock.vellus.kind not in {"GUIDES", "HAIR"} or surface_object is None or surface_object.type != "MESH":
         return unchanged
     surface = scene.read_surface(surface_object, scene.present_depsgraph())
-    places = curves.read_root_places(datablock, len(surface.rest))
+    places = stored_roots.places(datablock, len(surface.rest))
     if surface.cage_corners == 0 or surface.topology != datablock.vellus.topology or places is None:
         return unchanged
     at_rest, counts = curves.read_points(datablock), curves.point_counts(datablock)

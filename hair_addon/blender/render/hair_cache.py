@@ -21,7 +21,7 @@ from ...core.grooming import groom
 from ...core.kernels.checks import require_count, require_indices
 from ...core.shading import appearance
 from ...core.shading.tables import lookup_tables, strand_tables
-from ..data.strands import attributes, curves, posed_strands, simulated_guides
+from ..data.strands import attributes, curves, posed_strands, simulated_guides, stored_roots
 from ..gpu import hair_shading, strand_textures
 from ..groom import bindings
 from ..host import paths
@@ -42,7 +42,7 @@ class _KeptStrands:
     radii: np.ndarray  # (S, P) float32
     randoms: np.ndarray  # (S,) float32
     wetness: np.ndarray | None  # (S,) float32, None where strands do not differ
-    places: tuple | None  # roots as `curves.read_root_places` returns them, None for none
+    places: tuple | None  # roots as `stored_roots.places` returns them, None for none
     rooted_on: tuple  # (session_uid of the surface, its topology)
     growing: Future | None = None  # of these points, which other threads may be computing; None where they are read
     on_gpu: strand_textures.StrandsOnGPU | None = None  # where `pose` carried them
@@ -263,7 +263,7 @@ def _is_same(datablock, kept, bound):
         and np.array_equal(kept.randoms, curves.read_randoms(datablock))
         and made_strands.are_equal(kept.wetness, curves.read_wetness(datablock))
         and kept.rooted_on == _rooted_on(datablock, datablock.vellus.topology)
-        and (bound is not None or _are_places(kept.places, curves.read_root_places(datablock, np.inf)))
+        and (bound is not None or _are_places(kept.places, stored_roots.places(datablock, np.inf)))
     )
 
 
@@ -296,7 +296,7 @@ def _read(datablock, bound, shown):
     shown: the `BoundHair` whose points are read, which may be without the styles of `bound`.
     """
     if bound is None:
-        places = None if datablock.surface is None else curves.read_root_places(datablock, np.inf)
+        places = None if datablock.surface is None else stored_roots.places(datablock, np.inf)
         return _KeptStrands(*_shown_strands(datablock), places, _rooted_on(datablock, datablock.vellus.topology))
     if bound.is_written or bound.has_moved_only:
         randoms, wetness = curves.read_randoms(datablock), curves.read_wetness(datablock)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         connected_components,
         counting_sort,
         curvature,
+        face_places,
         fingerprint,
         hash_grid,
         landmark_warp,

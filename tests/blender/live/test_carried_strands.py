@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.data.strands import curves, posed_strands
+from hair_addon.blender.data.strands import posed_strands, stored_roots
 from hair_addon.blender.gpu import ambient_visibility, strand_textures
 from hair_addon.blender.gpu.strands import maker_choice, vertex_turner
 from hair_addon.blender.groom import bindings, pipeline
@@ -124,7 +124,7 @@ def test_another_topology_while_the_surface_bends_is_carried_anew(watched, monke
 def carried_as_stored(hair):
     """(S, P, 3): the points of Curves where Warp carries them from the roots that are stored."""
     pose = posed_strands.read_pose(hair.data.surface, bpy.context.evaluated_depsgraph_get())
-    return pose.carry(points(hair), hair.data.vellus.topology, curves.read_root_places(hair.data, np.inf))
+    return pose.carry(points(hair), hair.data.vellus.topology, stored_roots.places(hair.data, np.inf))
 
 
 def test_non_finite_vertices_are_refused_until_they_are_mended(watched, monkeypatch):

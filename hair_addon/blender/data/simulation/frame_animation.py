@@ -15,7 +15,7 @@ from ....core.styling.strand_wetness import mean_amount
 from ...host.notices import name_of
 from ...settings import properties, setting_properties, shared_wetness
 from .. import scene
-from ..strands import curves
+from ..strands import stored_roots
 from . import force_fields, simulated_world
 
 _HALF = 16  # digits of a digest, for what carries guides, and for what else acts on them
@@ -34,7 +34,7 @@ def digest_of(guides, blender_scene, depsgraph, settings):
     if surface is None or surface.type != "MESH":
         raise HairError('"{name}" has no surface: attach the guides to a mesh.', name=name_of(guides))
     vertices = _vertices(surface, depsgraph, metres)
-    places = curves.read_root_places(guides, len(vertices))
+    places = stored_roots.places(guides, len(vertices))
     if places is None or not len(vertices):
         sentence = 'The guides "{name}" are not rooted on their surface as it is now: comb or regenerate them.'
         raise HairError(sentence, name=name_of(guides))

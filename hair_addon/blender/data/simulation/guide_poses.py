@@ -12,7 +12,7 @@ import numpy as np
 
 from ....core import dynamics
 from ....core.errors import HairError
-from ..strands import curves, posed_strands
+from ..strands import posed_strands, stored_roots
 from ..strands.posed_strands import Pose
 
 
@@ -101,7 +101,7 @@ def read(guides, depsgraph, metres):
     pose = posed_strands.read_pose(surface_object, depsgraph)
     if pose.surface is None:
         raise HairError('"{name}" is not a mesh: attach the guides to a mesh.', name=surface_object.name)
-    places = curves.read_root_places(guides, len(pose.surface.rest))
+    places = stored_roots.places(guides, len(pose.surface.rest))
     if places is None or guides.vellus.topology != pose.surface.topology or not places[1].any(axis=1).all():
         raise HairError(
             'The guides "{name}" are not rooted on their surface as it is now: comb or regenerate them.',

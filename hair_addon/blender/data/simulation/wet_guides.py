@@ -10,7 +10,7 @@ from ....core.styling.strand_wetness import mean_amount
 from ...host.notices import name_of
 from ...settings import shared_wetness
 from .. import scene
-from ..strands import curves, style_inputs
+from ..strands import stored_roots, style_inputs
 
 
 def of_guides(guides, surface, depsgraph, known, roots=None):
@@ -47,7 +47,7 @@ def unkeyed(guides, depsgraph):
 def _weights(guides, surface, depsgraph, key, known, roots=None):
     """(G,) float32 of a mask; kept in {mask: weights}."""
     if key not in known:
-        roots = curves.stored_roots(guides, surface) if roots is None else roots
+        roots = stored_roots.points(guides, surface) if roots is None else roots
         if roots is None:
             raise HairError(
                 'The guides "{name}" are not rooted on their surface as it is now: comb or regenerate them.',

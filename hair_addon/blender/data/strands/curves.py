@@ -12,10 +12,9 @@ from ....core import geometry
 from ....core.errors import HairError
 from ....core.geometry import mesh as mesh_math
 from ....core.geometry import strands
-from ....core.geometry.mesh import SurfacePoints
 from ....core.grooming import groom
 from ...host.notices import name_of
-from . import attributes, follow_nodes, simulated_guides
+from . import attributes, follow_nodes, simulated_guides, stored_roots
 
 _GUIDE_MAP = ("guide_index", "guide_weight")
 
@@ -102,7 +101,7 @@ def write_roots(curves, surface, roots, normals=None):
     attributes.write(curves, "surface_normal", "FLOAT_VECTOR", "CURVE", normals)
     attributes.write(curves, "root_triangle", "INT", "CURVE", stored.triangle)
     attributes.write(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE", stored.barycentric)
-    for name, vertices in zip(follow_nodes.ROOT_VERTICES, surface.root_vertices(roots).T, strict=True):
+    for name, vertices in zip(stored_roots.VERTICES, surface.root_vertices(roots).T, strict=True):
         attributes.write(curves, name, "INT", "CURVE", vertices)
     curves.surface_uv_map = surface.uv_map
     curves.vellus.topology = surface.topology
@@ -159,28 +158,6 @@ def write_moved(curves, points):
     _write_positions(curves, points)
     if was_combed:
         curves.vellus.written = before
-
-
-def read_root_places(curves, vertex_count):
-    """Stored (S, 3) int32 root vertices and (S, 3) float32 barycentric coordinates in Blender's order; or None.
-
-    Rows that are invalid for a mesh with so many vertices are zero.
-    """
-    barycentric = attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
-    corners = [attributes.read(curves, name, "INT", "CURVE") for name in follow_nodes.ROOT_VERTICES]
-    if barycentric is None or any(corner is None for corner in corners):
-        return None
-    vertices = np.stack(corners, axis=1)
-    is_lost = ~_are_barycentric(barycentric) | (vertices < 0).any(axis=1) | (vertices >= vertex_count).any(axis=1)
-    vertices[is_lost], barycentric[is_lost] = 0, 0.0
-    return vertices, barycentric
-
-
-def _are_barycentric(coordinates):
-    """(S,) bool: whether rows of (S, 3) are places inside a triangle, to rounding. NaN is not."""
-    is_inside = ((coordinates >= -1e-3) & (coordinates <= 1.0 + 1e-3)).all(axis=1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        return is_inside & (abs(coordinates.sum(axis=1) - 1.0) < 1e-3)
 
 
 def _resize(curves, strand_count, point_count):
@@ -278,7 +255,7 @@ def read_roots(curves, surface, first_points):
     Roots of curves that were added or slid in sculpt mode are outdated, and all roots if the triangles changed.
     """
     mesh_math.check_mesh(surface.mesh)
-    stored = stored_roots(curves, surface)
+    stored = stored_roots.points(curves, surface)
     if stored is None or curves.vellus.topology != surface.topology:
         return nearest_roots(surface, first_points)
     distance = np.linalg.norm(mesh_math.positions(surface.mesh, stored) - first_points, axis=1)
@@ -343,24 +320,6 @@ def even_points(points, offsets, are_smooth):
     if (np.diff(offsets) == groom.POINT_COUNT).all():
         return points.reshape(-1, groom.POINT_COUNT, 3)
     return geometry.resampling.resample(points, offsets, groom.POINT_COUNT, are_smooth())
-
-
-def stored_roots(curves, surface, is_complete=False):
-    """`SurfacePoints` from the curves' attributes; impossible ones become a corner of triangle 0. None if absent.
-
-    is_complete: None if any of them is impossible, too.
-    """
-    barycentric = attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
-    triangle = attributes.read(curves, "root_triangle", "INT", "CURVE")
-    if barycentric is None or triangle is None:
-        return None
-    # Curves that sculpt mode adds carry zeros; a surface that lost faces leaves indices out of range.
-    known = _are_barycentric(barycentric) & (triangle >= 0) & (triangle < len(surface.mesh.triangles))
-    if is_complete and not known.all():
-        return None
-    triangle[~known] = 0
-    barycentric[~known] = (1.0, 0.0, 0.0)
-    return surface.swap_winding(SurfacePoints(triangle, barycentric))
 
 
 def followers(guide_curves):

@@ -12,6 +12,7 @@ import bpy
 
 from ....core import geometry
 from ...host.notices import name_of
+from . import stored_roots
 
 _NAME = "Vellus Follow Surface"
 # Of the nodes below. Groups of other versions, from older files, are not changed: on surfaces without subdivision they
@@ -28,7 +29,6 @@ _INPUTS = {
     "Cage Corners": ("Socket_4", "NodeSocketInt"),
     "Paused": ("Socket_5", "NodeSocketBool"),
 }
-ROOT_VERTICES = ("root_vertex_0", "root_vertex_1", "root_vertex_2")
 
 
 def add_modifier(curves_object):
@@ -269,7 +269,7 @@ class _Tree:
         """Vectors of a surface's vertices at the strands' roots."""
         barycentric = self._named("root_barycentric", "FLOAT_VECTOR")
         weights = self._node("ShaderNodeSeparateXYZ", {0: barycentric}).outputs
-        corners = [self._named(name, "INT") for name in ROOT_VERTICES]
+        corners = [self._named(name, "INT") for name in stored_roots.VERTICES]
         found = self._node("GeometryNodeAttributeDomainSize", {0: evaluated}).outputs["Point Count"]
         is_other = self._node(
             "FunctionNodeCompare", {"A": found, "B": vertex_count}, data_type="INT", operation="NOT_EQUAL"

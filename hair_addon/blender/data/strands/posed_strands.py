@@ -45,7 +45,7 @@ class Pose:
         """Return (M, P, 3) float32: the chosen strands on the deformed surface; unchanged if it is not deformed.
 
         points: (S, P, 3) float32 of all strands at rest, in local coordinates; topology: of the surface that they were
-        rooted on; places: their roots there, as `Surface.places` or `curves.read_root_places` returns them, or None.
+        rooted on; places: their roots there, as `Surface.places` or `stored_roots.places` returns them, or None.
         Strands are rooted at the nearest place where the surface has other triangles now, or what is stored is damaged.
         """
         if not self.is_deformed:

@@ -7,7 +7,7 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.data.strands import curves, follow_nodes
+from hair_addon.blender.data.strands import curves, follow_nodes, stored_roots
 from hair_addon.blender.live import events
 from hair_addon.core.grooming import following
 from tests.support.counting import counts_of
@@ -275,7 +275,7 @@ def test_guides_that_were_told_other_roots_are_carried_from_there(sphere):
     key_shape(sphere, lambda vertices: vertices * np.float32([1.0, 2.0, 0.5]))
     drawn_points(guides)
     surface = scene.read_surface(sphere, bpy.context.evaluated_depsgraph_get())
-    roots = curves.stored_roots(guides.data, surface)
+    roots = stored_roots.points(guides.data, surface)
     curves.write_roots(guides.data, surface, roots[::-1])
     update()
     drawn = drawn_points(guides)

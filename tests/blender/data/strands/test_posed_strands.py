@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.data.strands import curves, posed_strands
+from hair_addon.blender.data.strands import curves, posed_strands, stored_roots
 from hair_addon.blender.io import strand_arrays
 from tests.support.dynamics.following import drawn_points, grow
 
@@ -27,7 +27,7 @@ def at_rest(curves_object):
     """Points (S, P, 3), their surface's topology, and where they are rooted."""
     datablock = curves_object.data
     stored = curves.read_points(datablock).reshape(len(datablock.curves), -1, 3)
-    return stored, datablock.vellus.topology, curves.read_root_places(datablock, np.inf)
+    return stored, datablock.vellus.topology, stored_roots.places(datablock, np.inf)
 
 
 def test_what_is_drawn_is_what_is_exported(bent):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.data.strands import curves
+from hair_addon.blender.data.strands import curves, stored_roots
 from hair_addon.core.geometry import mesh
 from tests.support.dynamics.following import surface_points, update
 from tests.support.guide_tools import grown_from_nothing, select_guides, wave
@@ -250,11 +250,11 @@ def test_guides_rooted_off_the_surface_keep_their_roots(imported, tool):
     imported.data.attributes["position"].data.foreach_set("vector", off.ravel())
     apart = imported.data.attributes["root_distance"]
     surface = scene.read_surface(bpy.data.objects["Sphere"], bpy.context.evaluated_depsgraph_get())
-    stored = curves.stored_roots(imported.data, surface)
+    stored = stored_roots.points(imported.data, surface)
     places = surface.from_local(curves.first_points(imported.data))
     gaps = np.linalg.norm(places - mesh.positions(surface.mesh, stored), axis=1) / surface.scale
     apart.data.foreach_set("value", gaps.astype(np.float32))
     getattr(bpy.ops.vellus, tool)()
-    stored = curves.stored_roots(imported.data, surface)
+    stored = stored_roots.points(imported.data, surface)
     found = curves.read_roots(imported.data, surface, surface.from_local(curves.first_points(imported.data)))
     assert found.is_same(stored) and len(stored) != len(places)

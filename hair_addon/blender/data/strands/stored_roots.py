@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Roots as Curves store them: a triangle, its vertices, and barycentric coordinates.
+
+The vertices tell the place in a face, whichever triangles this is cut into now.
+"""
+
+import numpy as np
+
+from ....core import geometry
+from ....core.geometry.mesh import SurfacePoints
+from . import attributes
+
+VERTICES = ("root_vertex_0", "root_vertex_1", "root_vertex_2")
+
+
+def points(curves, surface, is_complete=False):
+    """`SurfacePoints` of roots on faces as they were stored; impossible ones become a corner of triangle 0.
+
+    is_complete: None if any of them is impossible; None too if none are stored.
+    """
+    barycentric = attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
+    triangle = attributes.read(curves, "root_triangle", "INT", "CURVE")
+    if barycentric is None or triangle is None:
+        return None
+    # Curves that sculpt mode adds carry zeros; a surface that lost faces leaves indices out of range.
+    known = are_barycentric(barycentric) & (triangle >= 0) & (triangle < len(surface.mesh.triangles))
+    triangle[~known] = 0
+    found = surface.swap_winding(SurfacePoints(triangle, barycentric))
+    vertices = _vertices(curves)
+    if vertices is not None:
+        cut_otherwise = np.flatnonzero(known & (vertices != surface.root_vertices(found)).any(axis=1))
+        if len(cut_otherwise):
+            polygons = geometry.face_places.owners(surface.faces)[triangle[cut_otherwise]]
+            its_places = vertices[cut_otherwise], barycentric[cut_otherwise]
+            present, are_none = surface.points_at(polygons, *its_places)
+            found.triangle[cut_otherwise], found.barycentric[cut_otherwise] = present.triangle, present.barycentric
+            known[cut_otherwise[are_none]] = False
+    if is_complete and not known.all():
+        return None
+    found.triangle[~known] = 0
+    found.barycentric[~known] = (1.0, 0.0, 0.0)
+    return found
+
+
+def places(curves, vertex_count):
+    """Stored (S, 3) int32 root vertices and (S, 3) float32 barycentric coordinates in Blender's order; or None.
+
+    Rows that are invalid for a mesh with so many vertices are zero.
+    """
+    barycentric, vertices = attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE"), _vertices(curves)
+    if barycentric is None or vertices is None:
+        return None
+    is_lost = ~are_barycentric(barycentric) | (vertices < 0).any(axis=1) | (vertices >= vertex_count).any(axis=1)
+    vertices[is_lost], barycentric[is_lost] = 0, 0.0
+    return vertices, barycentric
+
+
+def are_barycentric(coordinates):
+    """(S,) bool: whether rows of (S, 3) are places inside a triangle, to rounding. NaN is not."""
+    is_inside = ((coordinates >= -1e-3) & (coordinates <= 1.0 + 1e-3)).all(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return is_inside & (abs(coordinates.sum(axis=1) - 1.0) < 1e-3)
+
+
+def _vertices(curves):
+    """(S, 3) int32 vertices that roots lie between, in Blender's order of corners; None where they are not stored."""
+    corners = [attributes.read(curves, name, "INT", "CURVE") for name in VERTICES]
+    return None if any(corner is None for corner in corners) else np.stack(corners, axis=1)

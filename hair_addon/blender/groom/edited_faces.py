@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Roots on a surface whose faces have changed: those whose own face is still there keep their place in it.
+
+An edit of other faces, *Join*, *Separate* or *Extrude*, gives vertices and faces other numbers. Vertices are known by
+where they were when strands were rooted. Roots whose face is gone move to the nearest points.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from bpy.types import Curves, Depsgraph
+
+from ...core import geometry
+from ...core.geometry.mesh import SurfacePoints, require_finite
+from ..data.scene import Surface
+from ..data.strands import attributes, curves, kept_shapes, posed_strands, stored_roots
+from . import staleness
+
+if TYPE_CHECKING:
+    from ...core.geometry.surface_deform import SurfaceMotion
+
+
+@dataclass(frozen=True)
+class _Edit:
+    """What has become of the vertices that strands were rooted between."""
+
+    surface: Surface  # as it is now
+    matching: np.ndarray  # (V,) int32: each vertex of before now, -1 where it is gone
+    before: np.ndarray  # (W, 3) float32: where those of now were; those that are new, where they are
+
+
+def root_again(strands: Curves, surface: Surface, depsgraph: Depsgraph) -> tuple[int, int]:
+    """Root guides or kept hair, and the hair between guides, on a surface with other faces.
+
+    Strands are carried with vertices that were moved in the same edit. Returns how many guides, or kept strands, and
+    how many strands between guides had a face that is gone.
+    """
+    edit = _edit(curves.stood_on(strands), surface)
+    places, stored = _rooted(strands, edit)
+    lost = ~places[1].any(axis=1)
+    if not np.array_equal(edit.before, surface.rest):
+        roots = places[0][~lost]
+        motion = geometry.surface_deform.motion(edit.before, surface.rest, surface.faces, roots)
+        carry(strands, surface, motion, places, stored)
+    lost_between = 0
+    for hair in curves.followers(strands):
+        if curves.is_hand_made(hair) or attributes.is_from_library(hair) or not len(hair.curves):
+            continue
+        between, on_surface = _rooted(hair, edit)
+        _write(hair, edit, on_surface, depsgraph)
+        lost_between += int((~between[1].any(axis=1)).sum())
+    _write(strands, edit, stored, depsgraph)
+    curves.keep_surface(strands, surface)
+    return int(lost.sum()), lost_between
+
+
+def carry(strands: Curves, surface: Surface, motion: "SurfaceMotion", places: tuple, roots: SurfacePoints) -> None:
+    """Carry strands as their surface was moved; those without a place stay.
+
+    places: (S, 3) vertices and (S, 3) weights; roots: `SurfacePoints` of the same, which lie apart where a face is cut
+    otherwise than it was.
+    """
+    vertices, weights = places
+    counts, is_lost = curves.point_counts(strands), ~weights.any(axis=1)
+    its_vertices, its_weights = surface.places(roots)
+    slide = _between(motion.after, its_vertices, its_weights) - _between(motion.after, vertices, weights)
+    slide[is_lost | (its_vertices == vertices).all(axis=1)] = 0.0
+
+    def carried(points):
+        moved = posed_strands.carried(points, motion, places, counts) + np.repeat(slide, counts, axis=0)
+        return np.where(np.repeat(is_lost, counts)[:, None], points, moved)
+
+    kept_shapes.move(strands, carried)
+
+
+def _between(positions, vertices, weights):
+    return (weights[..., None] * positions[vertices]).sum(axis=1)
+
+
+def _edit(before, surface):
+    require_finite(surface.rest)
+    if before is None:
+        before = np.zeros((0, 3), np.float32)
+    matching = geometry.face_places.matching_vertices(before, surface.rest)
+    there = surface.rest.copy()
+    is_known = matching >= 0
+    there[matching[is_known]] = before[is_known]
+    return _Edit(surface, matching, there)
+
+
+def _rooted(strands, edit):
+    """((S, 3) vertices of now and (S, 3) weights, zeros where the face is gone), `SurfacePoints` (S,)."""
+    surface = edit.surface
+    stored = stored_roots.places(strands, len(edit.matching))
+    if stored is None:
+        count = len(strands.curves)
+        vertices, weights = np.zeros((count, 3), np.int32), np.zeros((count, 3), np.float32)
+    else:
+        vertices, weights = stored
+    known = np.flatnonzero(weights.any(axis=1))
+    now = edit.matching[vertices[known]]
+    polygons = _polygons_with(surface, now)
+    known, now, polygons = (rows[polygons >= 0] for rows in (known, now, polygons))
+    found, are_none = surface.points_at(polygons, now, weights[known])
+    is_lost = np.ones(len(vertices), bool)
+    is_lost[known[~are_none]] = False
+    vertices[known], vertices[is_lost], weights[is_lost] = now, 0, 0.0
+    triangle, barycentric = np.empty(len(vertices), np.int32), np.empty((len(vertices), 3), np.float32)
+    triangle[known], barycentric[known] = found.triangle, found.barycentric
+    if is_lost.any():
+        nearest = curves.nearest_roots(surface, surface.from_local(curves.first_points(strands)[is_lost]))
+        triangle[is_lost], barycentric[is_lost] = nearest.triangle, nearest.barycentric
+    return (vertices, weights), SurfacePoints(triangle, barycentric)
+
+
+def _polygons_with(surface, vertices):
+    """`face_places.polygons_with` of roots, many of which are between the same vertices."""
+    count = len(surface.rest)
+    keys = (vertices[:, 0].astype(np.float64) * count + vertices[:, 1]) * count + vertices[:, 2]
+    if count > 200_000:  # beyond which such a number is not exact
+        return geometry.face_places.polygons_with(surface.faces, count, vertices)
+    _keys, first, which = np.unique(keys, return_index=True, return_inverse=True)
+    return geometry.face_places.polygons_with(surface.faces, count, vertices[first])[which]
+
+
+def _write(strands, edit, roots, depsgraph):
+    """Store roots as of a mask that is as it was, where nobody has painted it."""
+    curves.write_roots(strands, edit.surface, roots)
+    staleness.keep_roots(strands, depsgraph, edit.matching)

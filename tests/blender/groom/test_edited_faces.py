@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair on a surface whose faces have changed: it stays wherever its own face has."""
+
+import re
+from contextlib import contextmanager
+
+import bmesh
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data.strands import stored_roots
+from tests.support.reading import attribute, evaluated_points, points, write_points
+
+GRID = 8  # faces along a side, 1 m wide
+
+
+@pytest.fixture
+def hair(scene):
+    """Combed guides and 400 strands on a bumpy grid with a weight group and an eye beside it; the hair's object."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=GRID, y_subdivisions=GRID, size=1.0)
+    grid = bpy.context.object
+    grid.name = "Skin"
+    for vertex in grid.data.vertices:
+        vertex.co.z = 0.1 * np.sin(7.0 * vertex.co.x) * np.cos(5.0 * vertex.co.y)
+    group = grid.vertex_groups.new(name="Scalp")
+    group.add([vertex.index for vertex in grid.data.vertices], 1.0, "REPLACE")
+    bpy.ops.vellus.add_hair(guide_count=40, strand_count=400, length=0.2, density_group="Scalp")
+    guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    bent = points(guides)
+    bent[:, :, 0] += np.linspace(0.0, 0.3, bent.shape[1]) ** 2
+    write_points(guides, bent)
+    return hair
+
+
+@contextmanager
+def edit_mode():
+    skin = bpy.data.objects["Skin"]
+    bpy.context.view_layer.objects.active = skin
+    bpy.ops.object.mode_set(mode="EDIT")
+    yield
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+
+
+def select(*faces):
+    """Select these faces of the skin, in Object Mode."""
+    skin = bpy.data.objects["Skin"].data
+    skin.polygons.foreach_set("select", np.isin(np.arange(len(skin.polygons)), faces))
+    skin.edges.foreach_set("select", np.zeros(len(skin.edges), bool))
+    skin.vertices.foreach_set("select", np.zeros(len(skin.vertices), bool))
+    bpy.context.tool_settings.mesh_select_mode = (False, False, True)
+    chosen = [edge for face in faces for edge in skin.polygons[face].vertices]
+    for vertex in chosen:
+        skin.vertices[vertex].select = True
+
+
+def faces_of(curves_object, count):
+    """(S,) bool: which strands are rooted on one of the first faces."""
+    return attribute(curves_object, "root_triangle") // 2 < count
+
+
+def roots_apart(curves_object):
+    """The largest distance of a stored root from where its strand begins."""
+    skin = bpy.data.objects["Skin"].data
+    vertices, weights = stored_roots.places(curves_object.data, len(skin.vertices))
+    places = np.array([vertex.co for vertex in skin.vertices])
+    assert weights.any(axis=1).all()
+    there = (weights[..., None] * places[vertices]).sum(axis=1)
+    return np.linalg.norm(there - points(curves_object)[:, 0], axis=1).max()
+
+
+def join():
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=1, radius=0.1, location=(0.0, 0.0, -1.0))
+    eye, skin = bpy.context.object, bpy.data.objects["Skin"]
+    skin.select_set(True)
+    eye.select_set(True)
+    bpy.context.view_layer.objects.active = skin
+    bpy.ops.object.join()
+
+
+def extrude():
+    select(0, 1)
+    with edit_mode():
+        bpy.ops.mesh.extrude_region_move(TRANSFORM_OT_translate={"value": (0.0, 0.0, 0.2)})
+
+
+def separate():
+    select(0, 1)
+    with edit_mode():
+        bpy.ops.mesh.separate(type="SELECTED")
+
+
+def delete():
+    select(0, 1)
+    with edit_mode():
+        bpy.ops.mesh.delete(type="FACE")
+
+
+def cut():
+    select(0, 1)
+    with edit_mode():
+        bpy.ops.mesh.subdivide(number_cuts=1)
+
+
+EDITS = {edit.__name__: edit for edit in (join, extrude, separate, delete, cut)}
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_strands_stay_whose_face_is_left_alone(hair, name):
+    guides, before = bpy.data.objects["Guides"], points(hair)
+    guides_before, lost = points(guides), faces_of(hair, 2)
+    counts = faces_of(guides, 2).sum(), lost.sum()
+    kept = np.ones(len(before), bool) if name == "join" else ~lost
+    EDITS[name]()
+    bpy.context.view_layer.update()
+    assert len(bpy.data.objects["Skin"].data.polygons) != GRID**2 or name == "extrude"
+    np.testing.assert_array_equal(points(guides), guides_before)
+    # Faces beside those that are cut get other corners, and with these another shape.
+    np.testing.assert_allclose(points(hair)[kept, 0], before[kept, 0], rtol=0.0, atol=0.02 if name == "cut" else 1e-6)
+    # Normals of vertices beside the faces have changed, and guides nearby turn strands by them.
+    is_far = before[:, 0, 1] > 0.0
+    np.testing.assert_allclose(points(hair)[is_far], before[is_far], rtol=0.0, atol=1e-3)
+    assert roots_apart(hair) < 1e-6
+    np.testing.assert_allclose(evaluated_points(hair), points(hair), rtol=0.0, atol=1e-6)
+    said = [int(number) for number in re.findall(r"\d+", guides.data.vellus.status)]
+    if name == "join":
+        assert guides.data.vellus.status == ""
+    else:
+        # A cut face is made of others, which hold a part of its corners: some roots find theirs.
+        assert 0 < said[1] <= counts[1] and said[0] <= counts[0]
+        assert "rooted at the nearest points." in guides.data.vellus.status
+    assert hair.data.vellus.status == ""
+
+
+def test_strands_are_carried_with_what_is_moved_while_faces_come_and_go(hair):
+    """All in one visit of Edit Mode: faces are deleted, and others are moved."""
+    before, moved = points(hair), slice(20, 60)
+    lost = faces_of(hair, 1)
+    corners = np.array([attribute(hair, name) for name in stored_roots.VERTICES])
+    is_moved = ((corners >= 20) & (corners < 60)).all(axis=0)
+    is_still = ((corners < 20) | (corners >= 60)).all(axis=0)
+    select(0)
+    with edit_mode():
+        bpy.ops.mesh.extrude_region_move()
+        bpy.ops.mesh.delete(type="FACE")
+        edited = bmesh.from_edit_mesh(bpy.data.objects["Skin"].data)
+        edited.verts.ensure_lookup_table()
+        for vertex in edited.verts[moved]:
+            vertex.co.z += 0.5
+    raised = before + np.array((0.0, 0.0, 0.5), np.float32)
+    assert is_moved.sum() > 50 and is_still.sum() > 50
+    np.testing.assert_allclose(points(hair)[is_moved, 0], raised[is_moved, 0], atol=1e-6)
+    np.testing.assert_allclose(points(hair)[is_still & ~lost, 0], before[is_still & ~lost, 0], atol=1e-6)
+
+
+def test_a_remeshed_surface_has_its_strands_at_the_nearest_points(hair):
+    skin, before = bpy.data.objects["Skin"], points(hair)
+    skin.data.remesh_voxel_size = 0.02
+    modifier = skin.modifiers.new("Solid", "SOLIDIFY")
+    modifier.thickness = 0.05
+    bpy.context.view_layer.objects.active = skin
+    bpy.ops.object.modifier_apply(modifier="Solid")
+    bpy.context.view_layer.update()
+    bpy.ops.object.voxel_remesh()
+    bpy.context.view_layer.update()
+    assert np.linalg.norm(points(hair)[:, 0] - before[:, 0], axis=1).max() < 0.04
+    assert "400 strands" in bpy.data.objects["Guides"].data.vellus.status
+
+
+def test_a_mask_that_is_painted_in_the_same_edit_places_strands_again(hair):
+    skin = bpy.data.objects["Skin"]
+    half = [vertex.index for vertex in skin.data.vertices if vertex.co.x < -0.05]
+    skin.vertex_groups["Scalp"].add(half, 0.0, "REPLACE")
+    join()
+    bpy.context.view_layer.update()
+    assert points(hair)[:, 0, 0].min() > -0.2
+
+
+def test_a_quad_that_is_cut_otherwise_keeps_its_strands(scene):
+    """One of four quads becomes concave at its second corner: Blender cuts it along its other diagonal."""
+    mesh = bpy.data.meshes.new("Skin")
+    places = [(x, y, 0.0) for y in range(3) for x in range(3)]
+    mesh.from_pydata(places, [], [(0, 1, 4, 3), (1, 2, 5, 4), (3, 4, 7, 6), (4, 5, 8, 7)])
+    skin = bpy.data.objects.new("Skin", mesh)
+    bpy.context.collection.objects.link(skin)
+    bpy.context.view_layer.objects.active = skin
+    bpy.ops.vellus.add_hair(guide_count=40, strand_count=300, length=0.2)
+    guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    before, combed = points(hair)[:, 0], points(guides)[:, 0]
+    mesh.vertices[1].co = (0.3, 0.6, 0.0)
+    mesh.calc_loop_triangles()
+    assert {*mesh.loop_triangles[0].vertices} == {0, 1, 3}
+    mesh.update_tag()
+    bpy.context.view_layer.update()
+    for strands, roots in ((guides, combed), (hair, before)):
+        far, is_first = roots[:, 1] > 1.0, faces_of(strands, 1)
+        np.testing.assert_allclose(points(strands)[far, 0], roots[far], atol=1e-6)
+        assert roots_apart(strands) < 1e-6
+        x, y, _z = points(strands)[is_first, 0].T
+        assert is_first.sum() > 5
+        assert (y >= np.where(x < 0.3, 2.0 * x, 0.6 + (x - 0.3) / 1.75) - 1e-6).all()  # in what is left of the quad
+    assert guides.data.vellus.status == ""
