@@ -290,19 +290,16 @@ def take(pictures):
 
 
 def take_looks(window):
-    """The menu of looks, where it opens."""
-    import bpy
-
+    """All looks, by a click on the small picture in the header of the panel."""
     window.show_panels(PANELS["shading"])
-    x, y = window.sidebar.x - 250, window.sidebar.y + 700
-    window.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
     yield from pause(0.3)
     before = window.screen()
-    window.run(bpy.ops.wm.call_panel, "INVOKE_DEFAULT", name="VELLUS_PT_looks", keep_open=True)
+    x, y = window.sidebar.x + window.sidebar.width - 101, window.sidebar.y + window.sidebar.height - 16
+    yield from window.drag(x, y, x)
     yield from pause(2.0)  # previews are loaded beside
     after = window.screen()
     changed = abs(after - before).max(axis=2) > 0.02
-    changed[:, window.sidebar.x :] = False
+    changed[: len(changed) - y + 11] = False  # the picture in the header, which is marked
     rows, columns = changed.any(axis=1).nonzero()[0], changed.any(axis=0).nonzero()[0]
     window.write("looks", after[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1])
     window.window.event_simulate(type="ESC", value="PRESS", x=x, y=y)

@@ -13,7 +13,7 @@ from .live import first_setup, handlers, invalidation
 from .render.frames import engine
 from .render.viewport import viewport
 from .settings import preferences, properties, translations
-from .ui import asset_shelf, engine_panels, keymap, look_previews, menus, operators, panels
+from .ui import asset_shelf, engine_panels, keymap, look_previews, menus, operators, panels, picture_menus
 
 CLASSES = (
     preferences.VellusPreferences,
@@ -21,6 +21,7 @@ CLASSES = (
     *hair_systems.CLASSES,
     engine.VellusRenderEngine,
     *operators.CLASSES,
+    *picture_menus.CLASSES,
     *panels.LISTS,
     *panels.CLASSES,
     *menus.CLASSES,
@@ -44,6 +45,7 @@ def register():
     translations.register()
     properties.register()
     hair_systems.register()
+    picture_menus.register()
     menus.register()
     asset_shelf.register()
     engine_panels.register()
@@ -69,6 +71,7 @@ def unregister():
     engine_panels.unregister()
     asset_shelf.unregister()
     menus.unregister()
+    picture_menus.unregister()
     hair_systems.unregister()
     properties.unregister()
     look_previews.unregister()

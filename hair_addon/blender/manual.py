@@ -11,7 +11,7 @@ import bpy
 
 from .groom import hair_systems
 from .settings import preferences, properties, style_items
-from .ui import operators
+from .ui import operators, picture_menus
 
 # Page → the classes whose properties it explains, unless a property has its own entry below.
 _CLASSES = {
@@ -19,7 +19,7 @@ _CLASSES = {
     "strands": (properties.VellusHairSettings, properties.VellusCurves),
     "dynamics": (properties.VellusDynamicsSettings, properties.VellusCollider),
     "styles": style_items.CLASSES,
-    "shading": (properties.VellusAppearance,),
+    "shading": (properties.VellusAppearance, picture_menus.VellusPictures),
     "lookup_tables": (properties.VellusMarschnerSettings,),
     "rendering": (properties.VellusRenderSettings, properties.VellusPassSettings),
     "index": (preferences.VellusPreferences,),
@@ -28,7 +28,7 @@ _CLASSES = {
 
 _PROPERTIES = {"model": "shading", "is_drawn": "shading", "viewport_percentage": "shading", "show_guides": "systems"}
 _PROPERTIES |= {"table_folder": "lookup_tables", "simulates": "dynamics", "cache_folder": "dynamics"}
-_PROPERTIES |= {"shows_styles_while_combing": "surface"}
+_PROPERTIES |= {"shows_styles_while_combing": "surface", "style": "styles"}
 
 # Page → the operators that it explains, a heading each.
 _OPERATORS = {

@@ -178,6 +178,10 @@ def test_combing_fits_the_brushes_that_add_to_the_guides(guides, shipped):
         assert settings.curve_length == pytest.approx(np.median(lengths), rel=1e-5)
         assert settings.points_per_curve == 41
         assert settings.use_length_interpolate and settings.use_point_count_interpolate
+        assert settings.use_shape_interpolate  # else they plant spikes along the normal in draped hair
+    assert guides.data.use_sculpt_collision  # else strokes push guides into the surface
+    assert guides.data.surface_collision_distance == pytest.approx(0.02 * np.median(lengths), rel=1e-5)
+    guides.data.use_sculpt_collision = False  # an artist's choice
     brush("Add").curve_length = 0.7  # an artist's choice
     bpy.ops.object.mode_set(mode="OBJECT")
     guides.data.vellus.guides.length = 0.2
@@ -185,5 +189,6 @@ def test_combing_fits_the_brushes_that_add_to_the_guides(guides, shipped):
     bpy.ops.vellus.comb_guides()
     assert brush("Add").curve_length == pytest.approx(0.7)
     assert brush("Density").curve_length < 0.3
+    assert not guides.data.use_sculpt_collision
     shipped()
     bpy.ops.object.mode_set(mode="OBJECT")

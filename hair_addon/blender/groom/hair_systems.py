@@ -8,7 +8,7 @@ the edited system are computed from the objects of a view layer and the active o
 import bpy
 from bpy.types import Curves, Object, ViewLayer
 
-from ..settings import properties
+from ..settings import computed_properties, properties
 from .selection import active_of_kind, make_active, object_of, painted_hair, surface_of
 
 
@@ -93,13 +93,13 @@ class VellusSystem(bpy.types.PropertyGroup):
     """Properties of an object in the list of hair systems"""
 
     __annotations__ = {
-        "title": properties.computed_text(
+        "title": computed_properties.computed_text(
             "Name",
             "Name of the hair object and its curves",
             lambda group: group.id_data.name,
             lambda group, name: rename(group.id_data, name),
         ),
-        "is_visible": properties.computed_flag(
+        "is_visible": computed_properties.computed_flag(
             "Show in Viewports",
             "Show this hair in viewports of this view layer. Renders are not affected",
             lambda group: not group.id_data.hide_get(),
@@ -114,7 +114,7 @@ CLASSES = (VellusSystem,)
 def register() -> None:
     """Register the list's properties of objects, and its active row of view layers."""
     bpy.types.Object.vellus_system = properties.group_of(VellusSystem)
-    bpy.types.ViewLayer.vellus_system = properties.computed_index(
+    bpy.types.ViewLayer.vellus_system = computed_properties.computed_index(
         "Edited System", "The hair system to edit", _edited_index, _edit_at
     )
 

@@ -248,6 +248,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     )
     cache_identity: bpy.props.StringProperty(description="Folder of the baked frames", options={"HIDDEN"})
     delivered_key: bpy.props.StringProperty(description="Baked frames that were delivered", options={"HIDDEN"})
+    was_combed: bpy.props.BoolProperty(description="Sculpt Mode was fitted to these guides", options={"HIDDEN"})
     is_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_dynamics_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
@@ -326,25 +327,6 @@ def file(description):
     return bpy.props.StringProperty(
         name="File", description=description, subtype="FILE_PATH", options=_RELATIVE, translation_context=CONTEXT
     )
-
-
-def computed_text(name, description, get, set):
-    """A line of text of a group that is stored elsewhere; get(group), set(group, text): as in bpy.props."""
-    return bpy.props.StringProperty(**_computed(name, description, get, set), options=_NOT_KEYED)
-
-
-def computed_flag(name, description, get, set):
-    """The same for a boolean, also if the group's datablock is linked."""
-    return bpy.props.BoolProperty(**_computed(name, description, get, set), options={"LIBRARY_EDITABLE"})
-
-
-def computed_index(name, description, get, set):
-    """The same for a list index, -1 for none."""
-    return bpy.props.IntProperty(**_computed(name, description, get, set), options=_NOT_KEYED)
-
-
-def _computed(name, description, get, set):
-    return {"name": name, "description": description, "get": get, "set": set, "translation_context": CONTEXT}
 
 
 def group_of(group_class):

@@ -197,6 +197,12 @@ def _diameters(settings_class):
     return [(name, details.diameter[0]) for name, _default, details in declared(settings_class) if details.diameter]
 
 
+def is_stored_as(settings, others, skip=()):
+    """Whether `Settings` of one class are the same once properties hold them, but for those of `skip`."""
+    first, second = as_stored(settings), as_stored(others)
+    return all(getattr(first, name) == getattr(second, name) for name in names_of(type(first)) if name not in skip)
+
+
 def names_of(settings_class):
     """Names of the settings of a class, in the order of declaration."""
     return tuple(name for name, _default, _details in declared(settings_class))

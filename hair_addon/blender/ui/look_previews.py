@@ -54,12 +54,26 @@ def swatch(name):
             color = appearance.mean_color(saved_looks.read(name))
         except HairError:
             return 0
-        preview = previews.new(key)
-        pixels = np.ones((_SWATCH_SIZE, _SWATCH_SIZE, 4), np.float32)
-        pixels[..., :3] = Color(color).from_scene_linear_to_srgb()
-        preview.icon_size = preview.image_size = (_SWATCH_SIZE, _SWATCH_SIZE)
-        preview.icon_pixels_float = preview.image_pixels_float = pixels.ravel().tolist()
+        _fill(previews.new(key), color)
     return previews[key].icon_id
+
+
+def present_swatch(look):
+    """Icon of the mean color of an `Appearance`."""
+    color = appearance.mean_color(look)
+    shown = bytes(np.rint(255.0 * np.array(Color(color).from_scene_linear_to_srgb()).clip(0.0, 1.0)).astype(np.uint8))
+    key = f"color {shown.hex()}"  # sliders that are dragged need a few hundred at most
+    previews = _collection()
+    if key not in previews:
+        _fill(previews.new(key), color)
+    return previews[key].icon_id
+
+
+def _fill(preview, color):
+    pixels = np.ones((_SWATCH_SIZE, _SWATCH_SIZE, 4), np.float32)
+    pixels[..., :3] = Color(color).from_scene_linear_to_srgb()
+    preview.icon_size = preview.image_size = (_SWATCH_SIZE, _SWATCH_SIZE)
+    preview.icon_pixels_float = preview.image_pixels_float = pixels.ravel().tolist()
 
 
 def _collection():

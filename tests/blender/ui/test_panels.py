@@ -12,7 +12,7 @@ import pytest
 
 from hair_addon.blender.data import scene
 from hair_addon.blender.host import running
-from hair_addon.blender.settings import saved_looks
+from hair_addon.blender.settings import picture_choices, properties, saved_looks, setting_properties
 from hair_addon.blender.ui import look_previews, menus, panels
 from hair_addon.core.grooming import cost
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
@@ -293,16 +293,36 @@ def test_the_redo_panel_follows_the_order_of_the_panels(hair, operator, owner):
 
 
 def test_looks_have_pictures_of_their_own(hair):
-    """A picture for each built-in look, all different; nothing is loaded before the menu is drawn."""
+    """A picture for each built-in look, all different; nothing is loaded before they are drawn."""
     look_previews.unregister()
     assert look_previews._previews is None
-    drawn = draw(named("looks")).drawn
-    assert drawn["template_icon"] == drawn["vellus.apply_preset"] == len(PRESETS)
-    assert len(look_previews._previews) == len(PRESETS)
+    assert draw(named("shading")).drawn["pictures of look"] == 1
+    assert draw(named("looks")).drawn["vellus.apply_preset"] == len(PRESETS)
+    pictures = bpy.context.window_manager.vellus_pictures
+    assert pictures.look == picture_choices.PRESENT  # new hair has a color of its own, which is shown
+    assert len(look_previews._previews) == len(PRESETS) + 1
     files = {path.stem: path.read_bytes() for path in look_previews.FOLDER.glob("*.png")}
     assert set(files) == set(PRESETS) and len(set(files.values())) == len(files)
     look_previews.unregister()
     assert look_previews._previews is None
+
+
+def test_a_click_on_a_picture_gives_its_look(hair, tmp_path, monkeypatch):
+    """As an operator, which undo takes back; the picture that is shown is that of the look that is there."""
+    monkeypatch.setattr(saved_looks.FILES, "folder", lambda create: tmp_path)
+    mine = Appearance(parametrization="COLOR", color=(0.5, 0.01, 0.01))
+    saved_looks.write("Mine", mine)
+    pictures, state = bpy.context.window_manager.vellus_pictures, hair.data.vellus
+    state.appearance.mode = "classic"
+    for name in ("AUBURN", "WET_BLOND", "DYED_BLUE"):
+        pictures.look = name
+        assert pictures.look == name
+        assert properties.own_look_of(state) == setting_properties.as_stored(replace(PRESETS[name][1], mode="classic"))
+    pictures.look = "own Mine"
+    assert properties.own_look_of(state) == setting_properties.as_stored(replace(mine, mode="classic"))
+    assert pictures.look == picture_choices.PRESENT
+    pictures.look = picture_choices.PRESENT
+    assert properties.own_look_of(state) == setting_properties.as_stored(replace(mine, mode="classic"))
 
 
 def test_a_saved_look_has_a_swatch_of_its_color(hair, tmp_path, monkeypatch):

@@ -347,10 +347,28 @@ def test_locks_that_are_too_small_are_explained(hair, settings, monkeypatch):
 
 
 def test_presets_are_offered_with_pictures_where_there_are_some(hair, tmp_path, monkeypatch):
+    assert draw(bpy.types.VELLUS_PT_styles).drawn["pictures of style"] == 1
     drawn = draw(bpy.types.VELLUS_PT_style_presets).drawn
     assert drawn["vellus.apply_style_preset"] == len(style_presets.PRESETS)
-    (tmp_path / "curly.png").write_bytes((look_previews.FOLDER / "BLOND.png").read_bytes())
     monkeypatch.setattr(look_previews, "style_presets", SimpleNamespace(FOLDER=tmp_path))
     look_previews.unregister()
-    assert draw(bpy.types.VELLUS_PT_style_presets).drawn["template_icon"] == 1
+    assert look_previews.style_picture("CURLY") is None
+    (tmp_path / "curly.png").write_bytes((look_previews.FOLDER / "BLOND.png").read_bytes())
+    assert look_previews.style_picture("CURLY") is not None
     look_previews.unregister()
+
+
+def test_a_click_on_a_picture_gives_its_styles(hair, tmp_path, monkeypatch):
+    monkeypatch.setattr(saved_styles.FILES, "folder", lambda create: tmp_path)
+    pictures = bpy.context.window_manager.vellus_pictures
+    pictures.style = "CURLY"
+    wanted = [style_items.styles_of(state())]
+    bpy.ops.vellus.save_style_preset(name="Mine")
+    pictures.style = "STRAIGHT"
+    assert style_items.styles_of(state()) != wanted[0]
+    bpy.ops.vellus.apply_style_preset(preset="CURLY")
+    assert style_items.styles_of(state()) == wanted[0] != ()
+    pictures.style = "STRAIGHT"
+    pictures.style = "own Mine"
+    assert [kind_of(style) for style in style_items.styles_of(state())] == [kind_of(style) for style in wanted[0]]
+    assert pictures.style == "PRESENT"

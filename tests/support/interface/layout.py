@@ -73,8 +73,9 @@ class Layout:
     def grid_flow(self, columns, row_major, even_columns, even_rows, align):
         return self._part()
 
-    def template_icon(self, icon_value, scale):
-        self.drawn["template_icon"] += 1
+    def template_icon_view(self, owner, name, show_labels, scale, scale_popup):
+        assert owner.bl_rna.properties[name].type == "ENUM" and show_labels
+        self.drawn[f"pictures of {name}"] += 1
 
     def operator(self, name, text=None, icon="NONE", icon_value=0, translate=True, depress=False):
         category, operator = name.split(".")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's brushes that add curves: new guides are as long as those around them, and have as many points."""
+"""Blender's brushes for guides: those that add fit in with the guides around, and strokes stay outside of the mesh."""
 
 import bpy
 import numpy as np
@@ -15,8 +15,11 @@ _SHIPPED = {
     "curve_length": 0.3,
     "points_per_curve": 8,
     "use_length_interpolate": False,
+    "use_shape_interpolate": False,
     "use_point_count_interpolate": False,
 }
+
+_OFF_SURFACE = 0.02  # of the median length of guides: how far above the surface strokes keep them
 
 _fitted = {}  # name of a brush → its settings as they were left here
 
@@ -24,8 +27,8 @@ _fitted = {}  # name of a brush → its settings as they were left here
 def fit(guides: Curves, sculpt: CurvesSculpt) -> None:
     """Fit Blender's Add and Density brushes to guide Curves, unless an artist has set them; sculpt mode is on.
 
-    They take length and number of points from the guides around, and the median of all where there are none. sculpt:
-    the `CurvesSculpt` settings of the scene, whose active brush stays active.
+    They take length, shape and number of points from the guides around, which may be draped, and the medians of all
+    where there are none. sculpt: the `CurvesSculpt` settings of the scene, whose active brush stays active.
     """
     if not len(guides.curves):
         return
@@ -37,6 +40,7 @@ def fit(guides: Curves, sculpt: CurvesSculpt) -> None:
         "curve_length": float(np.median(lengths)),
         "points_per_curve": int(np.median(curves.point_counts(guides))),
         "use_length_interpolate": True,
+        "use_shape_interpolate": True,
         "use_point_count_interpolate": True,
     }
     for name in _ADDING:
@@ -48,6 +52,15 @@ def fit(guides: Curves, sculpt: CurvesSculpt) -> None:
         bpy.ops.brush.asset_activate(
             asset_library_type=library, asset_library_identifier=custom, relative_asset_identifier=identifier
         )
+
+
+def collide(guides: Curves) -> None:
+    """Let strokes of Blender's brushes keep guides above their surface: once, as an artist may switch it off again."""
+    if guides.vellus.was_combed or not len(guides.curves):
+        return
+    guides.vellus.was_combed = True
+    guides.use_sculpt_collision = True
+    guides.surface_collision_distance = _OFF_SURFACE * float(np.median(_lengths(guides)))
 
 
 def _fit(brush, settings):

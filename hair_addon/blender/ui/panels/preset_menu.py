@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Popover of presets: the built-in ones with their pictures, one's own, and a button that saves another."""
+"""Popover of presets by name: the built-in ones, one's own, and a button that saves another."""
 
 import bpy
 
 from ...settings.translations import CONTEXT
 
-_COLUMNS = 4
-_PICTURE_SCALE = 4.0  # in heights of a row
+_COLUMNS = 3
 
 
 class PresetMenu:
@@ -22,7 +21,7 @@ class PresetMenu:
 
     @staticmethod
     def presets():
-        """(identifier, label, icon of its picture or None) of each built-in preset."""
+        """(identifier, label) of each built-in preset."""
         raise NotImplementedError
 
     @staticmethod
@@ -36,11 +35,8 @@ class PresetMenu:
         layout.emboss = "PULLDOWN_MENU"
         layout.operator_context = "EXEC_DEFAULT"
         grid = layout.grid_flow(columns=_COLUMNS, row_major=True, even_columns=True, even_rows=True, align=True)
-        for identifier, label, picture in self.presets():
-            column = grid.column(align=True)
-            if picture is not None:
-                column.template_icon(icon_value=picture, scale=_PICTURE_SCALE)
-            column.operator(self.apply_preset, text=label).preset = identifier
+        for identifier, label in self.presets():
+            grid.operator(self.apply_preset, text=label).preset = identifier
         layout.separator()
         column = layout.column(align=True)
         for name, icon in self.saved():

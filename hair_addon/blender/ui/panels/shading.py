@@ -9,7 +9,7 @@ from ....core.shading.presets import PRESETS
 from ...groom.diagnostics import modifier_notes
 from ...groom.selection import active_of_kind, hair_of, object_of
 from ...settings import saved_looks
-from .. import look_previews
+from .. import look_previews, picture_menus
 from ..setting_rows import others, row, rows
 from .preset_menu import PresetMenu
 from .tab import HairTab, split, write, write_status
@@ -34,7 +34,7 @@ class VELLUS_PT_looks(PresetMenu, bpy.types.Panel):
 
     @staticmethod
     def presets():
-        return ((name, label, look_previews.picture(name)) for name, (label, _look) in PRESETS.items())
+        return ((name, label) for name, (label, _look) in PRESETS.items())
 
     @staticmethod
     def saved():
@@ -47,8 +47,9 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
     bl_label = "Shading"
     bl_idname = "VELLUS_PT_shading"
 
-    def draw_header_preset(self, _context):
+    def draw_header_preset(self, context):
         layout = self.layout
+        picture_menus.draw(layout, context, "look")
         layout.emboss = "NONE"
         layout.popover(panel="VELLUS_PT_looks", icon="PRESET", text="")
 

@@ -13,7 +13,7 @@ from ...groom.styles.hair_styles import points_wanted
 from ...groom.styles.style_notes import notes_of
 from ...settings import saved_styles, style_items
 from ...settings.translations import interface_text
-from .. import look_previews, setting_rows
+from .. import picture_menus, setting_rows
 from .preset_menu import PresetMenu
 from .tab import HairTab, split, write
 
@@ -49,7 +49,7 @@ class VELLUS_PT_style_presets(PresetMenu, bpy.types.Panel):
 
     @staticmethod
     def presets():
-        return ((name, label, look_previews.style_picture(name)) for name, label in style_presets.PRESETS.items())
+        return style_presets.PRESETS.items()
 
     @staticmethod
     def saved():
@@ -66,8 +66,9 @@ class VELLUS_PT_styles(HairTab, bpy.types.Panel):
     def poll(cls, context):
         return hair_of(context.object) is not None
 
-    def draw_header_preset(self, _context):
+    def draw_header_preset(self, context):
         layout = self.layout
+        picture_menus.draw(layout, context, "style")
         layout.emboss = "NONE"
         layout.popover(panel="VELLUS_PT_style_presets", icon="PRESET", text="")
 

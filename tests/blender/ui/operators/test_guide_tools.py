@@ -213,3 +213,11 @@ def test_the_redo_panel_of_copies_picks_groups(waved):
     drawn = redo_panel("copy_guide_shape")
     assert {row for row in drawn.drawn if row != "label"} == {"source", "target", "mapping", "copy_length", "amount"}
     assert drawn.picked["source"] == drawn.picked["target"] == bpy.data.objects["Sphere"].vertex_groups
+
+
+def test_no_attraction_says_why_nothing_changes(waved, capfd):
+    """At an amount of 0, with which the redo panel may begin."""
+    before = points(bpy.data.objects["Guides"])
+    use_tool("attract_guides", amount=0.0)
+    assert np.array_equal(points(bpy.data.objects["Guides"]), before)
+    assert "at an amount of 0 they stay as they are" in capfd.readouterr().out

@@ -23,5 +23,10 @@ class VELLUS_OT_attract_guides(GuideTool, bpy.types.Operator):
         if not self.properties.is_property_set("clearance"):
             self.clearance = _PART * guide_tools.median_length(guides)
 
+    def message(self, count):
+        if not count and not self.amount:
+            return "No guides changed: at an amount of 0 they stay as they are", {}
+        return super().message(count)
+
     def apply(self, guides, settings, depsgraph):
         return guide_tools.attract(guides, settings, depsgraph)

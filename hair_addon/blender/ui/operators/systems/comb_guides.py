@@ -38,4 +38,5 @@ class VELLUS_OT_comb_guides(HairOperator, bpy.types.Operator):
         except RuntimeError as error:  # hidden by a library or a driver
             sentence = '"{name}" cannot be combed: {cause}.'
             raise HairError(sentence, name=guides.name, cause=cause_of(error)) from error
+        brushes.collide(guides.data)
         brushes.fit(guides.data, context.tool_settings.curves_sculpt)

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A choice among pictures: an enumeration whose items have icons, and which is stored nowhere."""
+
+import bpy
+
+from .translations import CONTEXT
+
+PRESENT = "PRESENT"  # identifier of the item that stands for what is there and is none of the others
+
+
+def pictured(name, description, entries, present, choose):
+    """An enumeration property; entries(): [(identifier, label, icon)]; present(): identifier of what is there, or
+    `PRESENT`; choose(identifier): called when a picture is clicked.
+    """
+    texts = {}  # Blender reads those of dynamic items as long as it likes, while it asks for items anew
+
+    def kept(text):
+        return texts.setdefault(text, text)
+
+    def items(_group, _context):
+        return [
+            (kept(identifier), kept(label), "", icon, number)
+            for number, (identifier, label, icon) in enumerate(entries())
+        ]
+
+    def read(_group):
+        identifiers = [entry[0] for entry in entries()]
+        found = present()
+        return identifiers.index(found) if found in identifiers else -1
+
+    def write(_group, number):
+        identifier = entries()[number][0]
+        if identifier not in (PRESENT, present()):
+            choose(identifier)
+
+    return bpy.props.EnumProperty(
+        name=name, description=description, items=items, get=read, set=write, translation_context=CONTEXT
+    )
+
+
+def attach(name, group_class):
+    """Give the window manager a group of such properties."""
+    setattr(bpy.types.WindowManager, name, bpy.props.PointerProperty(type=group_class))
+
+
+def detach(name):
+    """Take it away again."""
+    delattr(bpy.types.WindowManager, name)
