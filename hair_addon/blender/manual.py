@@ -23,7 +23,7 @@ _CLASSES = {
     "lookup_tables": (properties.VellusMarschnerSettings,),
     "rendering": (properties.VellusRenderSettings, properties.VellusPassSettings),
     "index": (preferences.VellusPreferences,),
-    "systems": (hair_systems.VellusSystem,),
+    "systems": (hair_systems.VellusSystem, hair_systems.VellusNewHair),
 }
 
 _PROPERTIES = {"model": "shading", "is_drawn": "shading", "viewport_percentage": "shading", "show_guides": "systems"}

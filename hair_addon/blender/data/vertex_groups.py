@@ -2,7 +2,17 @@
 """Weights ↔ vertex groups of mesh objects."""
 
 import numpy as np
-from bpy.types import VertexGroup
+from bpy.types import Object, VertexGroup
+
+
+def has_weights(mesh_object: Object, name: str) -> bool:
+    """Whether some vertex of a mesh object has a weight above zero in a vertex group."""
+    index = mesh_object.vertex_groups[name].index
+    return any(
+        member.group == index and member.weight > 0.0
+        for vertex in mesh_object.data.vertices
+        for member in vertex.groups
+    )
 
 
 def paint(group: VertexGroup, weights: np.ndarray, leaves_out_zero: bool = True) -> None:

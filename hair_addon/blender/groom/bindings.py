@@ -6,7 +6,7 @@ be dropped at any time: the next change of a guide then searches again.
 """
 
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,7 @@ from ...core.interpolation.hair_binding import HairBinding
 from ..data.scene import Surface
 from ..host.caches import Cache
 from . import styled_hair
+from .size_fitting import Fits
 from .styled_hair import StyledHair
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ class BoundHair:
     shares: np.ndarray | None = None  # (S, k) float32, the weights of each strand's guides as they are combed now
     growing: Future | None = None  # of `points`
     free: Future | None = None  # of the points that follow guides, where `points` are kept outside of something
+    fits: Fits = field(default_factory=Fits)  # which of the settings are fitted to the surface
     is_written: bool = False  # whether the datablock holds these points
     has_moved_only: bool = False  # whether only points, and perhaps the guide map, are unwritten
     is_map_written: bool = False  # whether the datablock holds this guide map

@@ -9,6 +9,7 @@ import bpy
 from bpy.types import Curves, Object, ViewLayer
 
 from ..settings import computed_properties, properties
+from . import mask_suggestions
 from .selection import active_of_kind, make_active, object_of, painted_hair, surface_of
 
 
@@ -108,11 +109,30 @@ class VellusSystem(bpy.types.PropertyGroup):
     }
 
 
-CLASSES = (VellusSystem,)
+class VellusNewHair(bpy.types.PropertyGroup):
+    """Settings of the next hair system on a mesh object"""
+
+    __annotations__ = {
+        "mask": computed_properties.computed_text(
+            "Guide Mask",
+            "Vertex group that new hair grows in; length, thickness and gravity are fitted to it. Leave empty for the "
+            "whole mesh",
+            lambda group: mask_suggestions.mask_of(group.id_data),
+            lambda group, name: _choose_mask(group.id_data, name),
+        )
+    }
+
+
+def _choose_mask(surface, name):
+    surface.vellus.new_hair_mask, surface.vellus.has_new_hair_mask = name, True
+
+
+CLASSES = (VellusSystem, VellusNewHair)
 
 
 def register() -> None:
     """Register the list's properties of objects, and its active row of view layers."""
+    bpy.types.Object.vellus_new_hair = properties.group_of(VellusNewHair)
     bpy.types.Object.vellus_system = properties.group_of(VellusSystem)
     bpy.types.ViewLayer.vellus_system = computed_properties.computed_index(
         "Edited System", "The hair system to edit", _edited_index, _edit_at
@@ -123,3 +143,4 @@ def unregister() -> None:
     """Take both away again; nothing is stored in files."""
     del bpy.types.ViewLayer.vellus_system
     del bpy.types.Object.vellus_system
+    del bpy.types.Object.vellus_new_hair

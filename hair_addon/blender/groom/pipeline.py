@@ -11,7 +11,7 @@ from bpy.types import Curves, Depsgraph, Object
 
 from ...core.errors import HairError
 from ...core.geometry import strands
-from ...core.grooming import following, groom, groom_defaults, hair_styles
+from ...core.grooming import following, groom, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.long_work import Work, part_of, run_now
@@ -22,7 +22,7 @@ from ..data.strands import curves, curves_objects, drawn_lines, partings, stored
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items
-from . import bindings, grown_guides, staleness, styled_hair, writing
+from . import bindings, grown_guides, size_fitting, styled_hair, writing
 from .bindings import BoundHair
 from .styled_hair import ReadStyles, StyledHair
 
@@ -52,16 +52,15 @@ def distributing_guides(
 ) -> Work[Curves]:
     """`distribute_guides` as work in steps (core/long_work.py); may_drape: as in `adding_hair`."""
     surface = _read_surface(surface_object, depsgraph)
-    density, texture = masks.own(settings).read(surface_object, surface, depsgraph)
-    completed = groom_defaults.complete(settings, surface.posed_mesh, density, texture)
-    settings = grown_guides.draped_if_new(settings, completed, surface, density) if may_drape else completed
-    key = staleness.root_key(settings, density, None if texture is None else texture.values)
+    mask = masks.own(settings).read(surface_object, surface, depsgraph)
+    sized = size_fitting.of_guides(settings, surface, mask, target if keeps_roots else None, may_drape)
+    settings, key = sized.settings, sized.root_key
     roots = _kept_roots(target, surface, key, settings.guide_count) if keeps_roots else None
     flow = drawn_lines.read(surface_object, surface, settings.flow_lines, depsgraph)
     place, target = Remembered(surface_object), Remembered(target)
-    mask = density, texture
     grown = yield lambda progress: grown_guides.grow(surface, settings, mask, flow, progress, roots)
-    return writing.write_guides(target.find(), place.find(), surface, grown, settings, key, drawn_lines.key(flow))
+    flow_key = drawn_lines.key(flow)
+    return writing.write_guides(target.find(), place.find(), surface, grown, settings, key, flow_key, sized.fits)
 
 
 def interpolate_hair(
@@ -103,10 +102,9 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     """The `BoundHair` that is to grow between guides, as work in steps."""
     surface = _read_surface(guide_curves.surface, depsgraph, target)
     guides = curves.read_guides(guide_curves, surface, preferences.device())
-    mask = masks.of_strands(settings, guide_curves.vellus.guides)
-    density, texture = mask.read(guide_curves.surface, surface, depsgraph)
-    settings = groom_defaults.complete(settings, surface.posed_mesh, density, texture, len(guides.roots))
-    key = staleness.root_key(settings, density, None if texture is None else texture.values)
+    mask = masks.of_strands(settings, guide_curves.vellus.guides).read(guide_curves.surface, surface, depsgraph)
+    sized = size_fitting.of_hair(settings, surface, mask, len(guides.roots), target)
+    settings, key = sized.settings, sized.root_key
     parting = partings.read(guide_curves.surface, surface, guide_curves, settings, depsgraph)
     styles = new_styles if target is None else style_items.styles_of(target.vellus)
     read = styled_hair.read_styles(styles, guide_curves.surface, surface, guide_curves, depsgraph)
@@ -114,7 +112,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     roots = _kept_roots(target, surface, key, settings.strand_count) if known is None else None
     device, guide_uid = preferences.device(), guide_curves.session_uid
 
-    ground = _ground(surface, (density, texture), parting, device)
+    ground = _ground(surface, mask, parting, device)
 
     def compute(progress):
         if known is None:
@@ -124,7 +122,8 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
             binding = hair_binding.weigh_again(known.binding, settings)
             make_trees = styled_hair.trees_again(known.styles, settings)
         styles = styled_hair.bind(read, binding, guides, settings, surface, make_trees)
-        return _known_by(BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, styles), progress)
+        bound = BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, styles, fits=sized.fits)
+        return _known_by(bound, progress)
 
     return (yield compute)
 
@@ -148,19 +147,18 @@ def complete(
     """`GuideSettings` and `HairSettings` with open settings computed from a mesh object. Raises `HairError`."""
     _check_surface(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)
-    completed, _masks = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
-    return completed
+    sized, _masks = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
+    return sized[0].settings, sized[1].settings
 
 
-def _completed(surface_object, surface, guide_settings, hair_settings, depsgraph):
-    """((`GuideSettings`, `HairSettings`), their masks): weights (V,) and `Texture` of guides, and of strands."""
+def _completed(surface_object, surface, guide_settings, hair_settings, depsgraph, may_drape=False):
+    """((`Sized` guides, `Sized` hair), their masks): weights (V,) and `Texture` of guides, and of strands."""
     guide_mask, hair_mask = masks.own(guide_settings), masks.of_strands(hair_settings, guide_settings)
     of_guides = guide_mask.read(surface_object, surface, depsgraph)
     of_hair = of_guides if hair_mask == guide_mask else hair_mask.read(surface_object, surface, depsgraph)
-    mesh, count = surface.posed_mesh, guide_settings.guide_count
-    guide_settings = groom_defaults.complete(guide_settings, mesh, *of_guides)
-    hair_settings = groom_defaults.complete(hair_settings, mesh, *of_hair, guide_count=count)
-    return (guide_settings, hair_settings), (of_guides, of_hair)
+    guides = size_fitting.of_guides(guide_settings, surface, of_guides, may_drape=may_drape)
+    hair = size_fitting.of_hair(hair_settings, surface, of_hair, guide_settings.guide_count)
+    return (guides, hair), (of_guides, of_hair)
 
 
 def adding_hair(
@@ -178,32 +176,29 @@ def adding_hair(
     No object is made before all of it is computed.
     """
     surface = _read_surface(surface_object, depsgraph)
-    completed, read = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
-    open_settings, (guide_settings, hair_settings) = guide_settings, completed
-    (density, texture), of_hair = read
-    if may_drape:
-        guide_settings = grown_guides.draped_if_new(open_settings, guide_settings, surface, density)
+    sized, read = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph, may_drape)
+    (of_guides, of_hair), (mask, hair_mask) = sized, read
+    guide_settings, hair_settings = of_guides.settings, of_hair.settings
     parting = partings.read(surface_object, surface, None, hair_settings, depsgraph)
     flow = drawn_lines.read(surface_object, surface, guide_settings.flow_lines, depsgraph)
     styling = styled_hair.read_styles(styles, surface_object, surface, None, depsgraph)
     device, place = preferences.device(), Remembered(surface_object)
-    hair_key = staleness.root_key(hair_settings, of_hair[0], of_hair[1] and of_hair[1].values)
 
     def compute(progress):
         groom.load_kernels(device, progress)
-        grown = grown_guides.grow(surface, guide_settings, (density, texture), flow, part_of(progress, 0.0, 0.5))
+        grown = grown_guides.grow(surface, guide_settings, mask, flow, part_of(progress, 0.0, 0.5))
         guides = _as_written(grown.strands, surface, device)
         progress = part_of(progress, 0.5, 1.0)
-        ground = _ground(surface, of_hair, parting, device)
+        ground = _ground(surface, hair_mask, parting, device)
         binding = _bind(surface, guides, hair_settings, ground, None, progress)
         styled = _styled(styling, binding, guides, hair_settings, surface, ground)
-        bound = BoundHair(binding, hair_settings, hair_key, parting.key, guides, None, surface, styled)
+        known = binding, hair_settings, of_hair.root_key, parting.key, guides, None, surface, styled
+        bound = BoundHair(*known, fits=of_hair.fits)
         return grown, _growing(bound, progress)
 
     grown, bound = yield compute
-    key = staleness.root_key(guide_settings, density, None if texture is None else texture.values)
-    flow_key = drawn_lines.key(flow)
-    guide_curves = writing.write_guides(None, place.find(), surface, grown, guide_settings, key, flow_key)
+    keys = of_guides.root_key, drawn_lines.key(flow), of_guides.fits
+    guide_curves = writing.write_guides(None, place.find(), surface, grown, guide_settings, *keys)
     return guide_curves, write_between(guide_curves, bound)
 
 
@@ -220,12 +215,13 @@ def hair_between(
 
     def compute(guides, progress, density=None):
         density = painted if density is None else density
-        completed = groom_defaults.complete(settings, surface.posed_mesh, density, texture, len(guides))
-        key = staleness.root_key(completed, density, None if texture is None else texture.values)
-        ground = _ground(surface, (density, texture), parting, device)
+        mask = density, texture
+        sized = size_fitting.of_hair(settings, surface, mask, len(guides))
+        completed, ground = sized.settings, _ground(surface, mask, parting, device)
         binding = _bind(surface, guides, completed, ground, None, progress)
         styles = _styled(ReadStyles(), binding, guides, completed, surface, ground)
-        return _growing(BoundHair(binding, completed, key, parting.key, guides, None, surface, styles), progress)
+        known = binding, completed, sized.root_key, parting.key, guides, None, surface, styles
+        return _growing(BoundHair(*known, fits=sized.fits), progress)
 
     return compute
 

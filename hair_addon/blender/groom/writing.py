@@ -17,9 +17,10 @@ from ..data.strands import attributes, curves, curves_objects, kept_shapes, stor
 from ..host.notices import name_of
 from ..materials import looks
 from ..settings import animated, setting_properties, style_items
-from . import bindings, hair_outside, staleness
+from . import bindings, hair_outside, size_fitting, staleness
 from .bindings import BoundHair
 from .grown_guides import GrownGuides
+from .size_fitting import Fits
 
 # Of the guides' own Curves, by their length: so they are seen on a surface of any size.
 _GUIDE_RADIUS = 1.0 / 300.0
@@ -33,16 +34,18 @@ def write_guides(
     settings: GuideSettings,
     key: str,
     flow_key: str,
+    fits: Fits,
 ) -> Curves:
     """Write guides into Curves, a new object's for None; returns them.
 
     settings: completed for the surface, so with a length; key: `staleness.root_key`; flow_key: `drawn_lines.key` of
-    their flow lines.
+    their flow lines; fits: which settings are fitted to the surface.
     """
     guides = grown.strands
     require_count(target, *guides.points.shape)
     target = target or curves_objects.new_object("Guides", surface_object, is_rendered=False).data
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
+    size_fitting.keep(target, fits)
     target.vellus.status = grown.status
     target.vellus.root_key, target.vellus.flow_key = key, flow_key
     radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * (settings.length or 0.0) / surface.scale, np.float32)
@@ -88,6 +91,7 @@ def write_hair(target: Curves) -> None:
     bound.catch_up()
     if not bound.has_moved_only:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
+        size_fitting.keep(target, bound.fits)
         kept_shapes.forget(target)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
         binding, radii = bound.binding, bound.radii

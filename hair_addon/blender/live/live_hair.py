@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data.strands import curves, simulated_guides
-from ..groom import bindings, hair_outside, pipeline, reweighed_hair, staleness, writing
+from ..groom import bindings, hair_outside, pipeline, reweighed_hair, size_fitting, staleness, writing
 from ..groom.styles import painted_masks
 from ..host import running, running_operators
 from ..host.notices import text_of
@@ -119,6 +119,7 @@ def make_again(hair, depsgraph):
         bound = pipeline.bind_hair(guide_curves, settings, depsgraph, hair)
         writing.require_count(hair, len(bound.binding.positions), len(bound.radii))
         bindings.keep(hair, bound)
+        size_fitting.show(hair, bound.settings, bound.fits)
         _follow_simulated(hair)
     except HairError as error:
         hair.vellus.is_stale = False

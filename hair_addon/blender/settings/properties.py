@@ -143,9 +143,13 @@ class VellusDynamicsSettings(bpy.types.PropertyGroup):
 
 
 class VellusCollider(bpy.types.PropertyGroup):
-    """Collision of hair with a mesh object"""
+    """Hair and a mesh object: how hair collides with it, and where new hair grows"""
 
-    __annotations__ = setting_properties.annotations(ColliderSettings, mark_colliding)
+    __annotations__ = {
+        **setting_properties.annotations(ColliderSettings, mark_colliding),
+        "new_hair_mask": bpy.props.StringProperty(options={"HIDDEN"}),
+        "has_new_hair_mask": bpy.props.BoolProperty(options={"HIDDEN"}),
+    }
 
 
 class VellusCurves(bpy.types.PropertyGroup):
@@ -254,6 +258,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     is_dynamics_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     topology: bpy.props.StringProperty(description="Triangulation that the stored roots refer to", options={"HIDDEN"})
     root_key: bpy.props.StringProperty(description="Settings and inputs that placed the roots", options={"HIDDEN"})
+    fit_key: bpy.props.StringProperty(description="Inputs that sizes were fitted to", options={"HIDDEN"})
     parting_key: bpy.props.StringProperty(description="Settings and inputs that parted the hair", options={"HIDDEN"})
     flow_key: bpy.props.StringProperty(description="Flow lines that the guides were grown along", options={"HIDDEN"})
     written: bpy.props.StringProperty(description="Fingerprint of the generated points", options={"HIDDEN"})

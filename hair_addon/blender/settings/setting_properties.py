@@ -11,6 +11,7 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.params import declared, from_surface, label_of
 from ..host.notices import text_of
+from . import fitted_sizes
 from .translations import CONTEXT
 
 _SMALL_WORDS = {"in", "of", "per", "to", "with"}  # stay lower case in titles
@@ -25,8 +26,13 @@ def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, ove
     """
     highs = high or {}
     made = {}
+    sizes = [name for name in fitted_sizes.fitted(settings_class) if name not in skip]
+    if sizes:
+        made |= fitted_sizes.operator_properties() if update is None else fitted_sizes.group_properties(sizes, update)
+    mark = update
     for name, default, details in declared(settings_class):
         if name not in skip:
+            update = fitted_sizes.by_hand(name, mark) if mark is not None and name in sizes else mark
             details = replace(details, high=highs.get(name, details.high))
             is_unkeyed = details.is_structural or name in unkeyed
             made[name] = _property(name, default, details, update, is_unkeyed, set(override))
@@ -174,21 +180,21 @@ def shortest(value):
 def given_settings(operator, settings_class, skip=()):
     """The `Settings` that an operator's properties give.
 
-    Those that follow from the surface are None unless the operator was called or redone with them. skip and errors as
-    in `to_settings`.
+    Those that follow from the surface are None unless the operator was called with them, or they were changed. skip and
+    errors as in `to_settings`.
     """
     is_given = operator.properties.is_property_set
     for radius, diameter in _diameters(settings_class):
         if is_given(diameter) and not is_given(radius):
             setattr(operator, radius, _radius_of(getattr(operator, diameter)))
-    left_open = {name: None for name in from_surface(settings_class) if name not in skip and not is_given(name)}
+    names = [name for name in from_surface(settings_class) if name not in skip]
+    left_open = {name: None for name in names if fitted_sizes.is_open(operator, name)}
     return replace(to_settings(operator, settings_class, skip), **left_open)
 
 
 def show(operator, group, settings_class):
-    """Show values computed from the surface in an operator's redo panel, and keep them when another setting changes."""
-    for name in from_surface(settings_class):
-        setattr(operator, name, getattr(group, name))
+    """Show sizes in an operator's redo panel. Fitted ones are fitted again when another setting changes."""
+    fitted_sizes.show(operator, group, settings_class)
     for radius, diameter in _diameters(settings_class):
         setattr(operator, diameter, shortest(_millimeters_of(shortest(getattr(group, radius)))))
 
@@ -208,11 +214,14 @@ def names_of(settings_class):
     return tuple(name for name, _default, _details in declared(settings_class))
 
 
-def assign(owner, settings, skip=()):
-    """Write `Settings` into an operator's or group's properties, but for those of `skip`."""
+def assign(owner, settings, skip=(), fits=()):
+    """Write `Settings` into an operator's or group's properties, but for those of `skip`; fits: sizes that are fitted
+    to the surface."""
     for name, _default, _details in declared(type(settings)):
         if name not in skip:
             setattr(owner, name, getattr(settings, name))
+    if fits:
+        fitted_sizes.keep_flags(owner, dict.fromkeys(fits, True))
 
 
 def values_of(owner, names):
@@ -221,7 +230,8 @@ def values_of(owner, names):
     return {n: value[:] if isinstance(value, bpy.types.bpy_prop_array) else value for n, value in values.items()}
 
 
-def copy(source, target, settings_class):
-    """Copy the properties of a `Settings` class from one owner to another."""
+def prefill(operator, group, settings_class):
+    """Begin an operator with the settings of a property group."""
     for name, _default, _details in declared(settings_class):
-        setattr(target, name, getattr(source, name))
+        setattr(operator, name, getattr(group, name))
+    show(operator, group, settings_class)

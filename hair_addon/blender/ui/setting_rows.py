@@ -9,7 +9,7 @@ from ...core.params import declared
 from ...core.styling.base import ProfiledSettings, StyleSettings
 from ...core.styling.kinds import KINDS
 from ..host.notices import text_of
-from ..settings import setting_properties, style_items
+from ..settings import fitted_sizes, setting_properties, style_items
 from ..settings.translations import interface_text
 
 # Blender's own property split gives names 40 % of the width, which cuts them in a sidebar of its default width.
@@ -44,10 +44,19 @@ _CONTACT = ("collision_distance", "friction", "keeps_hair_outside")
 _VOLUME = ("hair_friction", "hair_pressure", "cell_size")
 
 
-def row(layout, owner, name):
-    """A row of a property, its name in a column of its own."""
+def row(layout, owner, name, size=""):
+    """A row of a property, its name in a column of its own.
+
+    size: of a property that may be fitted to the surface, the name that its flag is called by.
+    """
     value_side = _below_name(layout, owner, name) if name in WIDE else _value_side(layout, owner, name)
-    value_side.prop(owner, name, text="")
+    flag = fitted_sizes.flag_of(size or name)
+    if flag not in owner.bl_rna.properties:
+        value_side.prop(owner, name, text="")
+        return
+    sides = value_side.row(align=True)
+    sides.prop(owner, name, text="")
+    sides.prop(owner, flag, text="", icon="AUTO")
 
 
 def _below_name(layout, owner, name):
@@ -76,7 +85,7 @@ def rows(layout, owner, settings_class, names):
     """A row for each of these settings of a class, in the order of declaration."""
     for name, _default, details in declared(settings_class):
         if name in names:
-            row(layout, owner, details.diameter[0] if details.diameter else name)
+            row(layout, owner, details.diameter[0] if details.diameter else name, name)
 
 
 def all_rows(layout, owner, settings_class):

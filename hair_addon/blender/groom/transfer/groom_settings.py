@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair ↔ all of its settings, as `settings_file.GroomSettings`."""
 
-from dataclasses import replace
-
 from bpy.types import Curves, Depsgraph, Object
 
 from ....core.dynamics.rod.settings import DynamicsSettings
@@ -13,7 +11,7 @@ from ....core.shading.appearance import TABLE_FIELDS, Appearance
 from ...data import scene
 from ...data.strands import curves
 from ...materials import looks
-from ...settings import properties, setting_properties, style_items
+from ...settings import fitted_sizes, properties, setting_properties, style_items
 from .. import pipeline, writing
 from ..foreign import hand_made_guides
 
@@ -39,11 +37,13 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
         curves.require_editable(target)
     depsgraph = scene.present_depsgraph()
     of_guides, of_hair = pipeline.complete(guides.surface, settings.guides, settings.hair, depsgraph)
-    settings = replace(settings, guides=of_guides, hair=of_hair)
-    for group, wanted in ((guides.vellus.guides, settings.guides), (hair.vellus.hair, settings.hair)):
+    groups = (guides.vellus.guides, settings.guides, of_guides), (hair.vellus.hair, settings.hair, of_hair)
+    for group, given, wanted in groups:
         # Otherwise everything would be regenerated without need.
         if setting_properties.to_settings(group, type(wanted)) != wanted:
             setting_properties.assign(group, wanted)
+        is_open = fitted_sizes.open_names(given)
+        fitted_sizes.keep_flags(group, {name: name in is_open for name in fitted_sizes.fitted(type(given))})
     assign_dynamics(guides, settings.dynamics)
     style_items.assign(hair.vellus, settings.styles, settings.style_names)
     _assign_shading(hair, settings)

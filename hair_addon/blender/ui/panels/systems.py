@@ -5,6 +5,7 @@ import bpy
 
 from ...groom.hair_systems import edited_system, guides_of_system, systems_of
 from ...groom.selection import object_of, surface_of
+from .. import setting_rows
 from .tab import HairTab
 
 _ROWS = 3  # of a list that holds less
@@ -44,8 +45,10 @@ class VELLUS_PT_systems(HairTab, bpy.types.Panel):
         return surface_of(context.object) is not None
 
     def draw(self, context):
-        layout = self.layout
-        if not systems_of(surface_of(context.object), context.view_layer):
+        layout, surface = self.layout, surface_of(context.object)
+        if not systems_of(surface, context.view_layer):
+            if len(surface.vertex_groups):
+                setting_rows.search_row(layout, surface.vellus_new_hair, "mask", surface, "vertex_groups")
             layout.operator("vellus.add_hair", icon="ADD")
             layout.operator("vellus.apply_groom", icon="ASSET_MANAGER", text="Apply Groom…")
             return

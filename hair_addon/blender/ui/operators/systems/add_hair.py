@@ -6,9 +6,9 @@ import bpy
 from .....core.grooming import cost
 from .....core.grooming.groom import GuideSettings, HairSettings
 from ....data import scene
-from ....groom import pipeline
+from ....groom import mask_suggestions, pipeline
 from ....groom.selection import make_active, object_of, surface_of
-from ....settings import setting_properties
+from ....settings import fitted_sizes, setting_properties
 from ... import setting_rows
 from ..base.modal import LongOperator
 
@@ -37,13 +37,17 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
         strands = setting_rows.titled(self.layout, "Strands")
         setting_rows.all_strand_rows(strands, self.properties, surface, skip=_OWN)
 
+    def prefill(self, context):
+        if not self.properties.is_property_set("density_group"):
+            self.density_group = mask_suggestions.filled(surface_of(context.object))
+
     def seconds(self, context):
         guide_settings, hair_settings = self._settings()
         face_count = scene.triangle_count(surface_of(context.object), context.view_layer)
         return cost.guide_seconds(guide_settings, face_count) + cost.hair_seconds(hair_settings, face_count)
 
     def work(self, context):
-        may_drape = not self.properties.is_property_set("drape")
+        may_drape = fitted_sizes.is_open(self, "drape")
         surface, depsgraph = surface_of(context.object), context.evaluated_depsgraph_get()
         return pipeline.adding_hair(surface, *self._settings(), depsgraph, may_drape=may_drape)
 
@@ -57,7 +61,6 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
     def after(self, context, made):
         guides, hair = made
         setting_properties.show(self, guides.vellus.guides, GuideSettings)
-        self.drape = guides.vellus.guides.drape
         setting_properties.show(self, hair.vellus.hair, HairSettings)
         context.view_layer.update()  # to evaluate the new objects
         make_active(object_of(hair, context.view_layer), context.view_layer)

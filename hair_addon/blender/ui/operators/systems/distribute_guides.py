@@ -9,7 +9,7 @@ from ....data import scene
 from ....data.strands.curves import require_editable
 from ....groom import pipeline
 from ....groom.selection import guides_again, surface_of
-from ....settings import setting_properties
+from ....settings import fitted_sizes, setting_properties
 from ... import setting_rows
 from ..base.modal import LongOperator
 
@@ -32,7 +32,7 @@ class VELLUS_OT_distribute_guides(LongOperator, bpy.types.Operator):
     def prefill(self, context):
         guides = guides_again(context.object)
         if guides is not None:
-            setting_properties.copy(guides.vellus.guides, self, GuideSettings)
+            setting_properties.prefill(self, guides.vellus.guides, GuideSettings)
 
     def seconds(self, context):
         face_count = scene.triangle_count(surface_of(context.object), context.view_layer)
@@ -44,12 +44,11 @@ class VELLUS_OT_distribute_guides(LongOperator, bpy.types.Operator):
         surface, target = surface_of(context.object), guides_again(context.object)
         if target is not None:
             require_editable(target)
-        may_drape = not self.properties.is_property_set("drape")
+        may_drape = fitted_sizes.is_open(self, "drape")
         return pipeline.distributing_guides(surface, settings, depsgraph, target, may_drape=may_drape)
 
     def after(self, context, made):
         setting_properties.show(self, made.vellus.guides, GuideSettings)
-        self.drape = made.vellus.guides.drape
 
     def message(self, made):
         return "{count} guides", {"count": len(made.curves)}

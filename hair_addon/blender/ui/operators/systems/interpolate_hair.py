@@ -32,7 +32,7 @@ class VELLUS_OT_interpolate_hair(LongOperator, bpy.types.Operator):
     def prefill(self, context):
         hair = active_of_kind(context.object, "HAIR")
         if hair is not None:
-            setting_properties.copy(hair.vellus.hair, self, HairSettings)
+            setting_properties.prefill(self, hair.vellus.hair, HairSettings)
 
     def seconds(self, context):
         surface = guides_of(context.object).surface

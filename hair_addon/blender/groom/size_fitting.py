@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sizes of guides and hair that are fitted to their surface: again where its mask or their number has changed.
+
+Nothing else fits them again, so that hair is as thick in each frame of a surface that moves.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from bpy.types import Curves
+
+from ...core.geometry.texture import Texture
+from ...core.grooming import groom_defaults
+from ...core.grooming.groom import GuideSettings, HairSettings
+from ...core.params import Settings
+from ..data.scene import Surface
+from ..settings import fitted_sizes, setting_properties
+from . import grown_guides, staleness
+
+type Mask = tuple[np.ndarray | None, Texture | None]
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Names of the sizes that are fitted, and the key of what they were fitted to."""
+
+    names: frozenset[str] = frozenset()
+    key: str = ""
+
+
+@dataclass(frozen=True)
+class Sized[S: Settings]:
+    """Settings that are complete, the `staleness.root_key` of them, and their `Fits`."""
+
+    settings: S
+    root_key: str
+    fits: Fits
+
+
+def of_guides(
+    given: GuideSettings, surface: Surface, mask: Mask, target: Curves | None = None, may_drape: bool = False
+) -> Sized[GuideSettings]:
+    """`GuideSettings` with open sizes computed; target: guides that are updated, whose fitted ones are fitted again.
+
+    may_drape: drape guides as `grown_guides.draped_if_new`, whatever the settings say.
+    """
+    key = root_key(given, mask)
+    kept = _kept(target and target.vellus.guides, given)
+    is_refitted = target is not None and target.vellus.fit_key != key
+    opened = fitted_sizes.opened(given, kept) if is_refitted else given
+    completed = groom_defaults.complete(opened, surface.posed_mesh, *mask)
+    names = kept | fitted_sizes.open_names(given) | ({"drape"} if may_drape else set())
+    if may_drape:
+        completed = grown_guides.draped_if_new(opened, completed, surface, mask[0])
+    elif is_refitted and "drape" in kept and opened.gravity is None and not opened.flow_lines:
+        draped = grown_guides.draped_if_new(opened, completed, surface, mask[0]).drape
+        is_hanging = groom_defaults.known(completed.gravity) >= grown_guides.HANGING
+        completed = replace(completed, drape=draped or (given.drape and is_hanging))
+    return Sized(completed, key, Fits(frozenset(names), key))
+
+
+def of_hair(
+    given: HairSettings, surface: Surface, mask: Mask, guide_count: int, target: Curves | None = None
+) -> Sized[HairSettings]:
+    """`HairSettings` with open sizes computed; target: as for `of_guides`."""
+    key = root_key(given, mask)
+    fit_key = f"{key} {guide_count}"
+    kept = _kept(target and target.vellus.hair, given)
+    is_refitted = target is not None and target.vellus.fit_key != fit_key
+    opened = fitted_sizes.opened(given, kept) if is_refitted else given
+    completed = groom_defaults.complete(opened, surface.posed_mesh, *mask, guide_count)
+    return Sized(completed, key, Fits(frozenset(kept | fitted_sizes.open_names(given)), fit_key))
+
+
+def root_key(settings: Settings, mask: Mask) -> str:
+    """The `staleness.root_key` of settings and their mask."""
+    density, texture = mask
+    return staleness.root_key(settings, density, None if texture is None else texture.values)
+
+
+def keep(target: Curves, fits: Fits) -> None:
+    """Store `Fits` with Curves, whose sizes have just been written."""
+    group = target.vellus.guides if target.vellus.kind == "GUIDES" else target.vellus.hair
+    target.vellus.fit_key = fits.key
+    fitted_sizes.keep_flags(group, dict.fromkeys(fits.names, True))
+
+
+def show(hair: Curves, settings: HairSettings, fits: Fits) -> None:
+    """Show the fitted sizes of hair that is written later, without marking it."""
+    fitted_sizes.keep_values(hair.vellus.hair, {name: getattr(settings, name) for name in fits.names})
+    hair.vellus.fit_key = fits.key
+
+
+def _kept(group, given):
+    """The fitted sizes of a property group that `given` settings leave as they are."""
+    if group is None:
+        return set()
+    stored = setting_properties.to_settings(group, type(given))
+    names = fitted_sizes.names_in(group, type(given))
+    return {name for name in names if getattr(stored, name) == getattr(given, name)}
