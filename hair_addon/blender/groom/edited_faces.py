@@ -14,7 +14,7 @@ from bpy.types import Curves, Depsgraph
 from ...core import geometry
 from ...core.geometry.mesh import SurfacePoints, require_finite
 from ..data.scene import Surface
-from ..data.strands import attributes, curves, kept_shapes, posed_strands, stored_roots
+from ..data.strands import attributes, curves, kept_shapes, posed_strands, stored_roots, surface_space
 from . import staleness
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def root_again(strands: Curves, surface: Surface, depsgraph: Depsgraph) -> tuple
     Strands are carried with vertices that were moved in the same edit. Returns how many guides, or kept strands, and
     how many strands between guides had a face that is gone.
     """
-    edit = _edit(curves.stood_on(strands), surface)
+    edit = _edit(surface_space.rest_before(strands), surface)
     places, stored = _rooted(strands, edit)
     lost = ~places[1].any(axis=1)
     if not np.array_equal(edit.before, surface.rest):
@@ -51,7 +51,7 @@ def root_again(strands: Curves, surface: Surface, depsgraph: Depsgraph) -> tuple
         _write(hair, edit, on_surface, depsgraph)
         lost_between += int((~between[1].any(axis=1)).sum())
     _write(strands, edit, stored, depsgraph)
-    curves.keep_surface(strands, surface)
+    surface_space.keep_surface(strands, surface)
     return int(lost.sum()), lost_between
 
 

@@ -10,7 +10,7 @@ from bpy.types import Curves, Depsgraph, Object, ViewLayer
 from ...core.errors import HairError
 from ...core.geometry import mesh, uv_check
 from ..data import scene
-from ..data.strands import curves, curves_objects
+from ..data.strands import curves, curves_objects, surface_space
 from ..host.notices import name_of
 from ..materials import materials
 from . import edited_surfaces
@@ -128,7 +128,7 @@ def apply_scale(surface_object: Object, view_layer: ViewLayer) -> None:
     all_guides = curves_on(surface_object, "GUIDES")  # those too that are not live
     for guides in all_guides:
         curves.require_editable(guides)
-    axes_before = np.array(surface_object.matrix_world.to_3x3(), np.float64)
+    to_world_before = surface_space.to_world(surface_object)
     with bpy.context.temp_override(
         active_object=surface_object,
         object=surface_object,
@@ -138,4 +138,4 @@ def apply_scale(surface_object: Object, view_layer: ViewLayer) -> None:
         bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
     view_layer.update()
     for guides in all_guides:
-        edited_surfaces.follow_surface(guides, bpy.context.evaluated_depsgraph_get(), axes_before)
+        edited_surfaces.follow_surface(guides, bpy.context.evaluated_depsgraph_get(), to_world_before)

@@ -107,7 +107,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     settings, key = sized.settings, sized.root_key
     parting = partings.read(guide_curves.surface, surface, guide_curves, settings, depsgraph)
     styles = new_styles if target is None else style_items.styles_of(target.vellus)
-    read = styled_hair.read_styles(styles, guide_curves.surface, surface, guide_curves, depsgraph)
+    read = styled_hair.read_styles(styles, guide_curves.surface, surface, guide_curves, depsgraph, target)
     known = _known_binding(target, settings, key, parting.key, guides, surface)
     roots = _kept_roots(target, surface, key, settings.strand_count) if known is None else None
     device, guide_uid = preferences.device(), guide_curves.session_uid
@@ -319,7 +319,7 @@ def restyle(
     if combed is None or len(combed):
         return False
     styles = style_items.styles_of(target.vellus)
-    read = styled_hair.read_styles(styles, target.surface, bound.surface, guide_curves, depsgraph)
+    read = styled_hair.read_styles(styles, target.surface, bound.surface, guide_curves, depsgraph, target)
     if not read.is_same(bound.styles.read):
         before = bound.styles
         styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, lambda: before.trees)

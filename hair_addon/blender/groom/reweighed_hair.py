@@ -38,7 +38,7 @@ def reweighed(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
     if following.combed(guides, known.guides) is None:
         return None
     styles = style_items.styles_of(target.vellus)
-    read = styled_hair.read_styles(styles, target.surface, known.surface, guide_curves, depsgraph)
+    read = styled_hair.read_styles(styles, target.surface, known.surface, guide_curves, depsgraph, target)
     if not read.is_same(known.styles.read):
         return None
     if replace(known.settings, **others) == settings:

@@ -10,6 +10,7 @@ import numpy as np
 from bpy.types import Curves, Depsgraph, Object
 
 from ...core import grooming
+from ...core.geometry.affine import Affine
 from ...core.geometry.strands import Strands
 from ...core.grooming.groom import HairSettings
 from ...core.interpolation.hair_binding import HairBinding
@@ -18,7 +19,7 @@ from ...core.styling.base import StyleSettings, has_effect
 from ...core.styling.clump_trees import ClumpTrees
 from ...core.styling.style_inputs import Inputs
 from ..data.scene import Surface
-from ..data.strands import style_inputs
+from ..data.strands import style_inputs, surface_space
 from ..settings import setting_properties
 
 if TYPE_CHECKING:
@@ -27,13 +28,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReadStyles:
-    """Styles of a hair, and what they name, as read."""
+    """Styles of a hair, and what they name, as read.
+
+    applied: from the local coordinates that the hair was made in, whose axes random shapes follow, to those of now.
+    """
 
     styles: tuple[StyleSettings, ...] = ()
     inputs: Inputs = field(default_factory=Inputs)
+    applied: Affine = field(default_factory=Affine.identity)
 
     def is_same(self, other: "ReadStyles") -> bool:
         """Whether hair styled by one is hair styled by the other."""
+        if not np.array_equal(self.applied.matrix, other.applied.matrix):
+            return False
         return self._active == other._active and _are_same(self.inputs, other.inputs)
 
     @property
@@ -84,12 +91,15 @@ def read_styles(
     surface: Surface,
     guide_curves: Curves | None,
     depsgraph: Depsgraph,
+    hair: Curves | None = None,
 ) -> ReadStyles:
-    """The `ReadStyles` of hair on a surface; guide_curves: None for guides that are new. Raises `HairError`."""
+    """The `ReadStyles` of hair on a surface; guide_curves, hair: None for what is new. Raises `HairError`."""
     if not styles:
         return ReadStyles()
     styles = [setting_properties.as_stored(settings) for settings in styles]  # as Curves will give them back
-    return ReadStyles(tuple(styles), style_inputs.read(surface_object, surface, guide_curves, styles, depsgraph))
+    applied = Affine.identity() if hair is None else surface_space.applied(hair)
+    inputs = style_inputs.read(surface_object, surface, guide_curves, styles, depsgraph)
+    return ReadStyles(tuple(styles), inputs, applied)
 
 
 def bind(
@@ -110,7 +120,7 @@ def bind(
         read.styles,
         make_trees(),
         read.inputs,
-        grooming.hair_styles.rotation_of(surface.to_world_axes),
+        grooming.hair_styles.rotation_of(surface.to_world_axes @ read.applied.axes),
     )
     return StyledHair(read, styling, make_trees)
 

@@ -13,7 +13,7 @@ from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
 from ..data import guide_map_readers
 from ..data.scene import Surface
-from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots
+from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots, surface_space
 from ..host.notices import name_of
 from ..materials import looks
 from ..settings import animated, setting_properties, style_items
@@ -53,7 +53,7 @@ def write_guides(
     points.set_result(surface.to_local(guides.numpy()))
     curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
     curves.write_points(target, points)
-    curves.keep_surface(target, surface)
+    surface_space.keep_surface(target, surface)
     return target
 
 
@@ -67,7 +67,7 @@ def write_hand_made(surface_object: Object, surface: Surface, guides: Strands) -
     curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
     attributes.write_positions(target, surface.to_local(points))
     target.vellus.written = curves.BY_HAND
-    curves.keep_surface(target, surface)
+    surface_space.keep_surface(target, surface)
     return target
 
 

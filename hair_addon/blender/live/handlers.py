@@ -7,7 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..data import rest_nodes
-from ..data.strands import curves_objects
+from ..data.strands import curves_objects, surface_space
 from ..groom import bindings, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import running, scene_time
@@ -66,7 +66,7 @@ def after_depsgraph_update(scene, depsgraph):
     stale_marks.follow_partings(moved, depsgraph)
     stale_marks.follow_flow(moved, depsgraph)
     stale_marks.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
-    reported.remember_axes()
+    reported.remember_places()
     if _is_undone:
         _is_undone = False
         simulated_hair.follow_undo(scene, depsgraph)
@@ -256,6 +256,7 @@ def after_frame_change(scene, depsgraph):
 def before_reading(*_args):
     """Write hair before its Curves are read by a save or a render, and what a render reads of hair's own scene."""
     moving_surfaces.resume()
+    stale_marks.follow_applied()
     live_hair.write_all()
     if bpy.app.background:  # in a window a timer repairs, and a render runs beside it
         composite.repair()
@@ -272,6 +273,8 @@ def before_rendering(*_args):
 def before_saving(*_args):
     """Store in the file what it is known by under another name."""
     frame_folders.remember()
+    for datablock in bpy.data.hair_curves:
+        surface_space.remember_place(datablock)
 
 
 @persistent
@@ -292,6 +295,7 @@ def after_load(*_args):
     live_hair.cancel_writing()
     invalidation.clear()
     older_files.renew()
+    stale_marks.follow_applied()
     _hide_drawn_hair()
     composite.follow_all()  # of linked hair a file does not store that it is hidden from engines
 

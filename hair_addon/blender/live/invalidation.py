@@ -31,7 +31,7 @@ COPIES = (
     simulated_guides.point_cache,
     reported.guide_cache,
     reported.painting_cache,
-    reported.axes_cache,
+    reported.place_cache,
     paused_hair.paused_cache,
     moving_surfaces.moved_cache,
     moving_surfaces.unchecked_cache,

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from ..data.strands import curves
+from ..data.strands import curves, surface_space
 from ..host.caches import Cache
 
 # session_uid of guide Curves → their (N, 3) points. Blender reports the geometry of Curves as updated even if only the
@@ -14,9 +14,9 @@ guide_cache = Cache()
 # session_uid of a surface in Texture Paint mode → True. Blender may not report painting before that mode ends.
 painting_cache = Cache()
 
-# session_uid of a surface → (3, 3) local to world axes. After a rotation or scale was applied, its former value is not
-# stored anywhere else.
-axes_cache = Cache()
+# session_uid of Curves → `Affine`, where their surface was. After a transform was applied to it, or it was deleted,
+# nothing else may know.
+place_cache = Cache()
 
 
 def have_guides_moved(guide_curves):
@@ -32,10 +32,13 @@ def points_of(guide_curves):
     return guide_cache.get(guide_curves.session_uid)
 
 
-def remember_axes():
-    """Store the world axes of all surfaces, after an update."""
-    axes_cache.clear()
+def remember_places():
+    """Store where all surfaces are, after an update."""
     for datablock in bpy.data.hair_curves:
         if datablock.surface is not None:
-            axes = datablock.surface.matrix_world.to_3x3()
-            axes_cache.keep(datablock.surface.session_uid, np.array(axes, np.float64))
+            place_cache.keep(datablock.session_uid, surface_space.to_world(datablock.surface))
+
+
+def place_before(datablock):
+    """The `Affine` of the surface of Curves in the last update, or None."""
+    return place_cache.get(datablock.session_uid)

@@ -6,9 +6,9 @@ from contextlib import contextmanager
 import bpy
 
 from ...core.errors import HairError
-from ..data import masks
+from ..data import masks, scene
 from ..data.strands import curves, drawn_lines
-from ..groom import bindings, edited_surfaces, staleness
+from ..groom import applied_transforms, bindings, edited_surfaces, staleness
 from ..host.notices import text_of
 from ..settings import style_items
 from . import events, reported
@@ -19,13 +19,15 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
 
     is_mesh_edited: whether its mesh has changed, not modifiers alone, so that its weights may have too.
     """
-    axes_before = reported.axes_cache.get(surface_object.session_uid)
     for guides in bpy.data.hair_curves:
         state = guides.vellus
-        if guides.surface != surface_object or not _is_carried(guides) or not state.is_live:
+        if guides.surface != surface_object or not _is_carried(guides):
             continue
         try:
-            was_edited = edited_surfaces.follow_surface(guides, depsgraph, axes_before)
+            place = reported.place_before(guides)
+            was_edited = edited_surfaces.follow_surface(guides, depsgraph, place, state.is_live)
+            if not state.is_live:
+                continue
             is_placed = not curves.is_hand_made(guides)  # where its mask says
             if is_mesh_edited and not was_edited and is_placed and _may_be_painted(guides, depsgraph):
                 state.is_stale = True
@@ -35,6 +37,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         if was_edited:
             events.strands_made(guides)
             mark_followers(guides)
+    edited_surfaces.follow_alone(surface_object, depsgraph, reported.place_before)
     for hair in bpy.data.hair_curves if is_mesh_edited else ():
         state = hair.vellus
         if hair.surface != surface_object or state.kind != "HAIR" or not state.is_live:
@@ -44,6 +47,14 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
                 _mark(hair)
             elif has_masks(state):
                 state.is_stale = True
+
+
+def follow_applied():
+    """Carry hair whose surface had a transform applied where nothing said so: in a file, by Blender without Vellus."""
+    due = {datablock.surface for datablock in bpy.data.hair_curves if applied_transforms.is_due(datablock)}
+    for surface_object in due:
+        if surface_object.type == "MESH" and surface_object.mode == "OBJECT":
+            follow_surface(surface_object, scene.present_depsgraph(), False)
 
 
 @contextmanager
@@ -145,9 +156,10 @@ def follow_styles(changed):
 
 
 def mark_followers(guide_curves):
-    """Mark all hair between some guides as stale."""
+    """Mark all hair between some guides as stale, but for kept hair that has followed them."""
     for hair in curves.followers(guide_curves):
-        _mark(hair)
+        if not (curves.is_hand_made(hair) and hair.vellus.followed == staleness.guides_digest(guide_curves)):
+            _mark(hair)
 
 
 def _mark(hair):

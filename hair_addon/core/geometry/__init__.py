@@ -7,6 +7,7 @@ from ..lazy import submodules
 
 if TYPE_CHECKING:
     from . import (
+        affine,
         bezier_segments,
         bspline,
         closest_point,

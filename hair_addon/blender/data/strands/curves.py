@@ -131,25 +131,6 @@ def write_points(curves, growing):
     curves.update_tag()
 
 
-# The property with the surface's positions when guides were rooted on it. In a group, because Blender's USD exporter
-# warns about bare arrays.
-_STOOD_ON = "vellus_stood_on"
-
-
-def keep_surface(curves, surface):
-    """Store the rest positions of the surface's vertices: guides are transformed from these after an edit."""
-    if _STOOD_ON in curves:
-        # Blender 5.2 writes an array over a shorter one, past its end.
-        del curves[_STOOD_ON]
-    curves[_STOOD_ON] = {"rest": surface.rest.ravel()}
-
-
-def stood_on(curves):
-    """(V, 3) float32 that `keep_surface` remembered, or None."""
-    kept = curves.get(_STOOD_ON)
-    return None if kept is None else np.array(kept["rest"], np.float32).reshape(-1, 3)
-
-
 def write_moved(curves, points):
     """Write positions of strands that moved with their surface: combed ones remain combed."""
     if not len(curves.points):

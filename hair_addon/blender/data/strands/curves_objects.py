@@ -8,6 +8,8 @@ from mathutils import Matrix
 from .. import rest_nodes, surface_collections
 from . import follow_nodes
 
+_UNMOVED = Matrix()
+
 _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
 
@@ -66,14 +68,26 @@ def show_again(curves_object):
         del curves_object[_RAYS_BEFORE]
 
 
-def clear_parent_inverse(curves):
-    """Remove the parent inverse that Blender set to keep children in place when their surface's transform was applied.
+def objects_of(curves):
+    """The objects that hold Curves."""
+    return [user for user in bpy.data.objects if user.data == curves]
 
-    For Curves whose points were transformed for that.
-    """
-    for user in bpy.data.objects:
-        if user.data == curves and user.parent == curves.surface:
-            user.matrix_local = Matrix()
+
+def stand_on(curves_object, surface_object):
+    """Make an object a child of its surface without a transform of its own: local coordinates are the surface's."""
+    curves_object.parent, curves_object.parent_type = surface_object, "OBJECT"
+    curves_object.matrix_parent_inverse.identity()
+    curves_object.delta_location, curves_object.delta_scale = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+    curves_object.delta_rotation_euler = (0.0, 0.0, 0.0)
+    curves_object.delta_rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
+    curves_object.matrix_basis.identity()  # last, as Blender takes what deltas do away from it
+
+
+def stands_apart(curves_object):
+    """Whether an object is no child of its surface, or has a transform of its own."""
+    if curves_object.parent != curves_object.data.surface or curves_object.parent_type != "OBJECT":
+        return True
+    return curves_object.matrix_parent_inverse != _UNMOVED or curves_object.matrix_basis != _UNMOVED
 
 
 def keep_rest(surface_object):

@@ -50,13 +50,16 @@ def is_edited(hair, present):
     return written != "" and written != geometry.fingerprint.fingerprint(present)
 
 
-def move(datablock, function):
-    """Move points of Curves and the shape that was kept of them; function: (N, 3) float32 → (N, 3) float32."""
+def move(datablock, function, of_shape=None):
+    """Move points of Curves and the shape that was kept of them; function: (N, 3) float32 → (N, 3) float32.
+
+    of_shape: the same of the shape, None where it moves as the points do.
+    """
     present, shape = curves.read_points(datablock), read(datablock)
     was_written = datablock.vellus.kept_written != "" and not is_edited(datablock, present)
     moved = np.ascontiguousarray(function(present), np.float32)
     curves.write_moved(datablock, moved)
     if shape is not None:
-        keep(datablock, function(shape))
+        keep(datablock, (of_shape or function)(shape))
     if was_written:
         datablock.vellus.kept_written = geometry.fingerprint.fingerprint(moved)

@@ -23,7 +23,7 @@ from ....core.long_work import Work, part_of, run_now
 from ....core.params import Param, plain_value
 from ...data import masks, scene, usable_surfaces, vertex_groups
 from ...data.scene import Surface
-from ...data.strands import attributes, curves, curves_objects, follow_nodes, posed_strands
+from ...data.strands import attributes, curves, curves_objects, follow_nodes, posed_strands, surface_space
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...settings import preferences
@@ -259,18 +259,13 @@ def write(
     curves.write_roots(datablock, surface, rooted.roots)
     # Distance in local units up to which first points are up to date (`curves.read_roots`).
     attributes.write(datablock, "root_distance", "FLOAT", "CURVE", rooted.distances / surface.scale)
-    curves.keep_surface(datablock, surface)
+    surface_space.keep_surface(datablock, surface)
     return datablock
 
 
 def _put_on(curves_object, surface_object, is_rendered):
     """Parent an object to its surface, with the surface's coordinates and no other transforms."""
-    curves_object.parent, curves_object.parent_type = surface_object, "OBJECT"
-    curves_object.matrix_parent_inverse.identity()
-    curves_object.delta_location, curves_object.delta_scale = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-    curves_object.delta_rotation_euler = (0.0, 0.0, 0.0)
-    curves_object.delta_rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
-    curves_object.matrix_basis.identity()  # last, as Blender takes what deltas do away from it
+    curves_objects.stand_on(curves_object, surface_object)
     for constraint in curves_object.constraints:
         constraint.enabled = False
     curves_objects.render(curves_object, is_rendered=is_rendered)

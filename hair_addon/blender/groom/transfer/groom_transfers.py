@@ -22,7 +22,7 @@ from ....core.grooming.transfer_settings import TransferSettings
 from ....core.long_work import Work
 from ...data import landmarks, scene, usable_surfaces
 from ...data.scene import Surface
-from ...data.strands import attributes, curves, curves_objects, guide_curves, kept_shapes
+from ...data.strands import attributes, curves, curves_objects, guide_curves, kept_shapes, surface_space
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...materials import looks
@@ -174,6 +174,7 @@ def _copy(datablock, target, made, is_rendered):
     made.append(copy)
     copy.surface = target
     kept_shapes.forget(copy)
+    surface_space.forget_applied(copy)
     state = copy.vellus
     state.root_key = state.parting_key = state.flow_key = state.followed = ""
     state.cache_identity = state.delivered_key = state.status = ""
@@ -206,7 +207,7 @@ def _write_guides(guides, surface: Surface, places: Places, points, scale):
     guides.vellus.written = curves.BY_HAND
     curves.write_roots(guides, surface, places.roots)
     attributes.write(guides, "root_distance", "FLOAT", "CURVE", apart / surface.scale)
-    curves.keep_surface(guides, surface)
+    surface_space.keep_surface(guides, surface)
     transferred_names.scale_lengths(guides.vellus.guides, places.scale)
     transferred_names.scale_lengths(guides.vellus.dynamics, places.scale)
 

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The space of strands: the local coordinates of their surface, what it was, and what has become of these coordinates.
+
+*Apply*, *Set Origin* and their like change the local coordinates of a mesh and leave it where it is in the world. What
+is stored in these coordinates beside Curves, such as baked frames, is carried by `applied`.
+"""
+
+import numpy as np
+
+from ....core.geometry.affine import Affine
+
+# Properties of Curves. In groups, because Blender's USD exporter warns about bare arrays.
+_STOOD_ON = "vellus_stood_on"  # the surface, when strands were rooted on it
+_APPLIED = "vellus_applied"
+
+
+def to_world(an_object, depsgraph=None):
+    """The `Affine` from an object's local coordinates to the world; of a depsgraph's frame where one is given."""
+    placed = an_object if depsgraph is None else an_object.evaluated_get(depsgraph)
+    return Affine.of(placed.matrix_world)
+
+
+def keep_surface(curves, surface):
+    """Store a `Surface` at rest and where its object is: strands are transformed from there after an edit."""
+    matrix = np.eye(4) if curves.surface is None else np.array(curves.surface.matrix_world)
+    _keep(curves, _STOOD_ON, {"rest": surface.rest.ravel(), "to_world": matrix.ravel()})
+
+
+def remember_place(curves):
+    """Store where the surface's object is now, before a file is saved: transforms are applied elsewhere, too."""
+    kept = curves.get(_STOOD_ON)
+    if kept is not None and curves.surface is not None and curves.library is None:
+        kept["to_world"] = np.array(curves.surface.matrix_world).ravel()
+
+
+def rest_before(curves):
+    """(V, 3) float32 vertices of the surface that `keep_surface` stored, or None."""
+    kept = curves.get(_STOOD_ON)
+    return None if kept is None else np.array(kept["rest"], np.float32).reshape(-1, 3)
+
+
+def to_world_before(curves):
+    """The `Affine` that was stored with the surface, or None: files of older versions have none."""
+    kept = curves.get(_STOOD_ON)
+    if kept is None or len(kept.get("to_world", ())) != 16:
+        return None
+    return Affine.of(kept["to_world"])
+
+
+def applied(curves):
+    """The `Affine` from the local coordinates that strands were made in to those that they have now."""
+    kept = curves.get(_APPLIED)
+    found = Affine.identity() if kept is None or len(kept.get("matrix", ())) != 16 else Affine.of(kept["matrix"])
+    return found if found.is_valid else Affine.identity()
+
+
+def note_applied(curves, change):
+    """Note that an `Affine` was applied to the local coordinates."""
+    _keep(curves, _APPLIED, {"matrix": (change @ applied(curves)).matrix.ravel()})
+
+
+def forget_applied(curves):
+    """Count from the present local coordinates on, as for Curves that were copied to another surface."""
+    if _APPLIED in curves:
+        del curves[_APPLIED]
+
+
+def _keep(curves, name, values):
+    if name in curves:
+        # Blender 5.2 writes an array over a shorter one, past its end.
+        del curves[name]
+    curves[name] = values

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair on surfaces that stand anywhere, and the law of its place: hair goes wherever its surface goes."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from tests.support.exchange.imported import curves_object, select
+
+GUIDES, STRANDS = 8, 24
+
+
+def add_body():
+    """A mesh of 1 m without any symmetry, off its origin."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=0.5)
+    body = bpy.context.object
+    body.name = body.data.name = "Body"
+    for vertex in body.data.vertices:
+        x, y, z = vertex.co
+        vertex.co = (1.3 * x + 0.3 if x > 0.0 else x + 0.3, 0.8 * y + 0.1 * x, z + 0.2 * x * y - 0.1)
+    body.data.update()
+    return body
+
+
+def _placed(location=(0, 0, 0), rotation=(0, 0, 0), scale=(1, 1, 1)):
+    def place(body):
+        body.location, body.rotation_euler, body.scale = location, rotation, scale
+
+    return place
+
+
+def _on_a_rig(scale, has_inverse):
+    def place(body):
+        rig = bpy.data.objects.new("Rig", None)
+        bpy.context.collection.objects.link(rig)
+        rig.location, rig.rotation_euler, rig.scale = (1.0, -2.0, 0.5), (0.3, 0.1, -0.4), scale
+        bpy.context.view_layer.update()
+        body.parent = rig
+        if has_inverse:
+            body.matrix_parent_inverse = rig.matrix_world.inverted()
+        body.location, body.rotation_euler, body.scale = (0.5, 0.2, 1.0), (0.1, 0.6, 0.2), (1.5, 1.5, 1.5)
+
+    return place
+
+
+def _in_centimetres(body):
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    body.location, body.scale = (150.0, 20.0, -30.0), (100.0, 100.0, 100.0)
+
+
+_FAR, _TURNED = (3.0, 1.0, -2.0), (0.4, -0.3, 1.2)
+
+# Where a surface may stand: {kind: function of the body}.
+PLACES = {
+    "moved": _placed(_FAR),
+    "turned": _placed((0.2, 0.0, 0.1), _TURNED),
+    "small": _placed(_FAR, _TURNED, (0.01, 0.01, 0.01)),
+    "large": _placed(_FAR, _TURNED, (100.0, 100.0, 100.0)),
+    "uneven": _placed(_FAR, _TURNED, (2.0, 0.5, 1.2)),
+    "mirrored": _placed(_FAR, _TURNED, (-1.0, 1.0, 1.0)),
+    "mirrored and uneven": _placed(_FAR, _TURNED, (1.5, -0.8, 1.0)),
+    "on a scaled rig": _on_a_rig((2.0, 2.0, 2.0), False),
+    "on a rig in centimetres": _on_a_rig((0.01, 0.01, 0.01), False),
+    "on a sheared rig": _on_a_rig((2.0, 0.6, 1.0), False),
+    "with a parent inverse": _on_a_rig((2.0, 2.0, 2.0), True),
+    "in a scene of centimetres": _in_centimetres,
+}
+
+
+def grow(place):
+    """A body at one of `PLACES` with combed guides and styled hair, kept hair, and hand-made guides."""
+    body = add_body()
+    PLACES[place](body)
+    bpy.context.view_layer.update()
+    size = world_scale(body)
+    select(body)
+    bpy.ops.vellus.add_hair(guide_count=GUIDES, strand_count=STRANDS, length=0.3 * size, radius=0.001 * size)
+    hair, guides = bpy.data.objects["Hair"], bpy.data.objects["Guides"]
+    for style in ("CURL", "FRIZZ"):
+        bpy.context.view_layer.objects.active = hair
+        bpy.ops.vellus.add_style(style=style)
+    comb(guides)
+    uses = {"Kept": bpy.ops.vellus.use_as_hair, "Made": lambda: bpy.ops.vellus.use_as_guides(grows_hair=False)}
+    for name, use in uses.items():
+        own = curves_object(outward(body, 12), name)
+        own.data.attributes.new("radius", "FLOAT", "POINT").data.foreach_set(
+            "value", np.linspace(0.002, 0.001, len(own.data.points)) * size
+        )
+        select(body, own)
+        use()
+    comb(bpy.data.objects["Kept"].data.vellus.guide_curves)
+    bpy.context.view_layer.update()
+    return body
+
+
+def outward(body, count):
+    """Lines (P, 3) in the world that stand on a mesh object, of unlike point counts."""
+    matrix, size = body.matrix_world, world_scale(body)
+    middle = sum((matrix @ v.co for v in body.data.vertices), matrix.translation * 0.0) / len(body.data.vertices)
+    chosen = list(body.data.vertices)[:: len(body.data.vertices) // count][:count]
+    lines = []
+    for index, vertex in enumerate(chosen):
+        root = matrix @ vertex.co
+        away = (root - middle).normalized() * 0.25 * size
+        steps = np.linspace(0.0, 1.0, 4 + index % 3)[:, None]
+        lines.append(np.array(root) + steps * np.array(away) + steps**2 * np.float32([0.0, 0.0, 0.05 * size]))
+    return lines
+
+
+def comb(guides, amount=0.15):
+    """Bend guides as a brush does, in their local units; guides: an object or its Curves."""
+    curves = getattr(guides, "data", guides)
+    points = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", points.ravel())
+    starts = np.array([c.first_point_index for c in curves.curves] + [len(points)])
+    for first, end in pairwise(starts):
+        along = np.linspace(0.0, 1.0, end - first)[:, None] ** 2
+        length = np.linalg.norm(points[end - 1] - points[first])
+        points[first:end] += along * amount * length * np.float32([1.0, -0.5, 0.3])
+    curves.attributes["position"].data.foreach_set("vector", points.ravel())
+    curves.update_tag()
+    bpy.context.view_layer.update()
+
+
+def world_scale(an_object):
+    """The mean factor from an object's local units to the world's."""
+    return abs(an_object.matrix_world.to_3x3().determinant()) ** (1.0 / 3.0)
+
+
+@dataclass
+class Placed:
+    """All that is seen of a surface and its hair, in the world.
+
+    vertices: (V, 3); strands: {name of a Curves object: ((N, 3) points, (N,) radii, (S,) lengths)} as evaluated.
+    """
+
+    vertices: np.ndarray
+    strands: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+    @property
+    def size(self):
+        return float(np.ptp(self.vertices, axis=0).max())
+
+
+def seen(body_name="Body"):
+    """The present `Placed`."""
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    body = bpy.data.objects[body_name].evaluated_get(depsgraph)
+    vertices = np.empty((len(body.data.vertices), 3), np.float32)
+    body.data.vertices.foreach_get("co", vertices.ravel())
+    found = {o.name: _strands(o.evaluated_get(depsgraph)) for o in bpy.data.objects if o.type == "CURVES"}
+    return Placed(_in_world(vertices, body.matrix_world), found)
+
+
+def _strands(evaluated):
+    curves = evaluated.data
+    points, radii = np.empty((len(curves.points), 3), np.float32), np.empty(len(curves.points), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", points.ravel())
+    curves.attributes["radius"].data.foreach_get("value", radii)
+    points = _in_world(points, evaluated.matrix_world)
+    starts = np.empty(len(curves.curves) + 1, np.int32)
+    curves.curve_offset_data.foreach_get("value", starts)
+    steps = np.linalg.norm(np.diff(points, axis=0, append=points[-1:]), axis=1)
+    steps[starts[1:] - 1] = 0.0  # from a tip to the next root
+    lengths = np.add.reduceat(steps, starts[:-1])
+    return points, radii * world_scale(evaluated), lengths
+
+
+def _in_world(points, matrix):
+    matrix = np.array(matrix, np.float64)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def went(before, after):
+    """(4, 4) by which the vertices of a `Placed` went to those of another. Fails where they did not go together."""
+    ones = np.ones((len(before.vertices), 1))
+    found, *_ = np.linalg.lstsq(np.hstack([before.vertices, ones]), after.vertices, rcond=None)
+    moved = np.hstack([before.vertices, ones]) @ found
+    np.testing.assert_allclose(moved, after.vertices, atol=_tolerance(before, after, 1e-5), rtol=0.0)
+    matrix = np.eye(4)
+    matrix[:3] = found.T
+    return matrix
+
+
+def require_carried(before, after, points=2e-5, names=None):
+    """The law: all points of strands went as the surface did, and their widths and lengths as its size.
+
+    points: tolerance in parts of the surface's size; names: of objects, None for all.
+    """
+    matrix = went(before, after)
+    factor = abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0)
+    is_even = np.allclose(matrix[:3, :3].T @ matrix[:3, :3], factor**2 * np.eye(3), atol=1e-4 * factor**2)
+    assert before.strands.keys() == after.strands.keys()
+    tolerance = _tolerance(before, after, points)
+    for name in before.strands if names is None else names:
+        (were, radii, lengths), (are, radii_now, lengths_now) = before.strands[name], after.strands[name]
+        assert were.shape == are.shape, name
+        apart = np.linalg.norm(_in_world(were, matrix) - are, axis=1)
+        assert apart.max() <= tolerance, f"{name}: {apart.max():.3g} off, of a size of {after.size:.3g}"
+        np.testing.assert_allclose(radii_now, factor * radii, rtol=1e-4, err_msg=f"widths of {name}")
+        if is_even:
+            np.testing.assert_allclose(lengths_now, factor * lengths, rtol=1e-3, err_msg=f"lengths of {name}")
+
+
+def _tolerance(before, after, part):
+    """Parts of the size, and what single precision leaves of coordinates."""
+    farthest = max(abs(before.vertices).max(), abs(after.vertices).max())
+    return part * after.size + 1e-6 * farthest
+
+
+def move_elsewhere(an_object):
+    """An object of the same mesh as seen, whose own transform is another."""
+    matrix = Matrix.Translation((0.5, -1.0, 2.0)) @ Matrix.Rotation(1.0, 4, "X") @ Matrix.Scale(0.01, 4)
+    mesh = an_object.data.copy()
+    mesh.transform(matrix.inverted() @ an_object.matrix_world)
+    other = bpy.data.objects.new("Other", mesh)
+    bpy.context.collection.objects.link(other)
+    other.matrix_world = matrix
+    bpy.context.view_layer.update()
+    return other
