@@ -13,7 +13,7 @@ from ...core.geometry.mesh import Faces, TriMesh
 from ...core.geometry.texture import Texture
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn, name_of
-from . import subdivided_surfaces
+from . import subdivided_surfaces, surface_space
 from .surfaces import Surface, transformed
 
 _MOST_CORNERS = 100_000  # of a face: the time to triangulate one grows faster than its corners
@@ -44,7 +44,10 @@ def read_surface(surface_object, depsgraph):
         rest = _rest_positions(mesh, posed)
         faces = faces_read_again(surface_object, mesh)
         uv_map, loop_uvs = _loop_uvs(mesh)
-        read = _Reading(name_of(surface_object), rest, faces, uv_map, loop_uvs, to_world_axes, rest is not posed)
+        is_turned = surface_space.is_turned(surface_object)
+        read = _Reading(
+            name_of(surface_object), rest, faces, uv_map, loop_uvs, to_world_axes, rest is not posed, is_turned
+        )
         if known is None or not known[0].is_same(read):
             if read.has_rest and (np.diff(faces.starts) > 3).any():
                 # Where polygons are cut depends on where vertices are: triangles are to stay the same in every pose.
@@ -52,6 +55,8 @@ def read_surface(surface_object, depsgraph):
                 # mesh.
                 mesh.vertices.foreach_set("co", rest.ravel())
             corners = triangle_corners(mesh, faces, read.name)
+            if is_turned:
+                corners = corners[_turned_order(faces)]
             known = None
     finally:
         evaluated.to_mesh_clear()
@@ -78,9 +83,10 @@ class _Reading:
     loop_uvs: np.ndarray | None  # (C, 2) float32
     to_world_axes: np.ndarray
     has_rest: bool  # whether Blender stores where vertices are at rest
+    is_turned: bool
 
     def is_same(self, other):
-        named = [(reading.name, reading.uv_map, reading.has_rest) for reading in (self, other)]
+        named = [(read.name, read.uv_map, read.has_rest, read.is_turned) for read in (self, other)]
         if named[0] != named[1] or (self.loop_uvs is None) != (other.loop_uvs is None):
             return False
         mine, its = (
@@ -94,6 +100,13 @@ class _Reading:
             for r in (self, other)
         )
         return all(a is b or np.array_equal(a, b) for a, b in zip(mine, its, strict=True))
+
+
+def _turned_order(faces):
+    """(T,) int: the triangles of each face from its last one on, as a turned face has them in the order of before."""
+    counts = np.diff(faces.starts) - 2
+    firsts = np.repeat(np.cumsum(counts) - counts, counts)
+    return 2 * firsts + np.repeat(counts, counts) - 1 - np.arange(len(firsts))
 
 
 def _surface_of(read, posed, corners, cage_corners):
@@ -120,6 +133,7 @@ def _surface_of(read, posed, corners, cage_corners):
         is_mirrored,
         cage_corners,
         smooth_rest,
+        read.is_turned,
     )
 
 

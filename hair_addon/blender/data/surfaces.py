@@ -37,6 +37,9 @@ class Surface:
     is_mirrored: bool  # negative scale: triangles are wound the other way than in Blender
     cage_corners: int  # of the faces that modifiers subdivide to a smooth surface, 0 for none
     smooth_rest: np.ndarray  # (V, 3) float32, vertices on the smooth surface at rest; `rest` itself where none is
+    is_turned: bool = (
+        False  # whether Blender has turned its faces since hair grew: triangles are in the order of before
+    )
 
     @cached_property
     def to_local_axes(self):
@@ -137,6 +140,11 @@ class Surface:
         return self.root_vertices(points), self.swap_winding(points).barycentric
 
     @property
+    def names_otherwise(self):
+        """Whether triangles are wound otherwise than those by which strands are known: in Blender, before a turn."""
+        return self.is_mirrored != self.is_turned
+
+    @property
     def scale(self):
         """The mean scale of the object: metres in a unit of its local coordinates."""
         return abs(np.linalg.det(self.to_world_axes)) ** (1.0 / 3.0)
@@ -149,9 +157,16 @@ class Surface:
     @cached_property
     def topology(self):
         """A key of the faces by their corners, in their order, whichever triangles they are cut into."""
-        key = hashlib.blake2b(self.faces.corner_vertices.tobytes(), digest_size=16)
-        key.update(self.faces.starts.tobytes())
-        return key.hexdigest()
+        return _key_of(self.faces.corner_vertices, self.faces.starts)
+
+    @cached_property
+    def turned_topology(self):
+        """`topology` with each face turned, as Blender turns them where it applies a scale that mirrors."""
+        starts, sizes = self.faces.starts[:-1], np.diff(self.faces.starts)
+        first, size = np.repeat(starts, sizes), np.repeat(sizes, sizes)
+        corner = np.arange(len(first)) - first
+        turned = self.faces.corner_vertices[first + (size - corner) % np.maximum(size, 1)]
+        return _key_of(turned, self.faces.starts)
 
     def points_at(self, polygons, vertices, barycentric):
         """(`SurfacePoints`, (N,) bool: which are none) of places in polygons, as `places` gives them."""
@@ -167,7 +182,7 @@ class Surface:
     def identities(self, roots):
         """(S,) int32 identities and (S,) float32 random numbers in [0, 1), independent of the other strands."""
 
-        return geometry.root_frames.identities(self.swap_winding(roots))
+        return geometry.root_frames.identities(roots.wound_otherwise() if self.names_otherwise else roots)
 
     def uvs(self, points):
         """(N, 2) float32 UV coordinates of surface points; zeros without a UV map."""
@@ -183,6 +198,12 @@ class Surface:
     def swap_winding(self, points):
         """The same points with barycentric coordinates in Blender's order of corners, or back."""
         return points.wound_otherwise() if self.is_mirrored else points
+
+
+def _key_of(corner_vertices, starts):
+    key = hashlib.blake2b(np.ascontiguousarray(corner_vertices, np.int32).tobytes(), digest_size=16)
+    key.update(starts.tobytes())
+    return key.hexdigest()
 
 
 def transformed(positions, matrix):

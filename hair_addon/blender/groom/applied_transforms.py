@@ -12,6 +12,7 @@ from bpy.types import Curves, Depsgraph
 
 from ...core.errors import HairError
 from ...core.geometry.affine import Affine
+from ..data import surface_space
 from ..data.scene import Surface
 from ..data.strands import (
     attributes,
@@ -20,7 +21,6 @@ from ..data.strands import (
     kept_shapes,
     simulated_guides,
     stored_roots,
-    surface_space,
 )
 from . import bindings, pipeline, staleness
 
@@ -59,15 +59,26 @@ def _fitted(strands, surface, rest_before):
     return change if is_found else None
 
 
+def note(strands: list[Curves], surface: Surface, change: Affine) -> None:
+    """Note that a transform was applied to what strands are rooted on, before any of them follows.
+
+    Of a scale that mirrors: Blender has turned the faces, and a `Surface` that is read afterwards knows it.
+    """
+    for one in strands:
+        if change.is_mirroring and one.vellus.topology == surface.turned_topology:
+            stored_roots.turn(one)
+            one.vellus.topology = surface.topology
+        surface_space.note_applied(one, change)
+
+
 def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgraph) -> None:
     """Keep strands where they are in the world: their points, widths and what else is stored in local units.
 
-    Guides before their hair.
+    Guides before their hair, and all when `note` has noted it.
     """
     firsts, followed = curves.first_points(strands), staleness.guides_digest(strands)
     left = _left(strands, surface, change, firsts)
     shown = simulated_guides.point_cache.get(strands.session_uid)
-    surface_space.note_applied(strands, change)
     if left is not change and _is_as_made(strands, surface, left, depsgraph):
         strands.vellus.written = staleness.guides_digest(strands)
     kept_shapes.move(strands, left.points, change.points)

@@ -13,8 +13,9 @@ from bpy.types import Curves, Depsgraph
 
 from ...core import geometry
 from ...core.geometry.mesh import SurfacePoints, require_finite
+from ..data import surface_space
 from ..data.scene import Surface
-from ..data.strands import attributes, curves, kept_shapes, posed_strands, stored_roots, surface_space
+from ..data.strands import attributes, curves, kept_shapes, posed_strands, stored_roots
 from . import staleness
 
 if TYPE_CHECKING:

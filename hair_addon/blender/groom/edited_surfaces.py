@@ -10,8 +10,8 @@ from ...core import geometry
 from ...core.errors import HairError
 from ...core.geometry.affine import Affine
 from ...core.geometry.mesh import require_finite
-from ..data import scene
-from ..data.strands import curves, stored_roots, surface_space
+from ..data import scene, surface_space
+from ..data.strands import curves, stored_roots
 from . import applied_transforms, edited_faces
 
 _ROOTED_AGAIN = {
@@ -32,6 +32,11 @@ def follow_surface(
     """
     state = guide_curves.vellus
     surface = scene.read_surface(guide_curves.surface, depsgraph)
+    if state.topology == surface.turned_topology:
+        change = applied_transforms.find(guide_curves, surface, to_world_before)
+        if change is not None and change.is_mirroring:
+            _carry(guide_curves, surface, change, depsgraph)
+            return True
     roots = stored_roots.places(guide_curves, len(surface.rest))
     stored = stored_roots.points(guide_curves, surface)
     if state.topology != surface.topology or roots is None or stored is None:
@@ -49,20 +54,29 @@ def follow_surface(
         return False
     change = applied_transforms.find(guide_curves, surface, to_world_before)
     if change is not None:
-        curves.require_not_linked(guide_curves)
-        require_finite(surface.rest)
-        for target in (guide_curves, *applied_transforms.followed_by(guide_curves)):
-            applied_transforms.follow(target, surface, change, depsgraph)
-    elif before is not None and follows_edits:
+        _carry(guide_curves, surface, change, depsgraph)
+        return True
+    if before is not None and follows_edits:
         curves.require_not_linked(guide_curves)
         require_finite(surface.rest)
         motion = geometry.surface_deform.motion(before, surface.rest, surface.faces, roots[0])
         edited_faces.carry(guide_curves, surface, motion, roots, stored)
         curves.write_roots(guide_curves, surface, stored)
-    else:
-        return False
+        surface_space.keep_surface(guide_curves, surface)
+        return True
+    return False
+
+
+def _carry(guide_curves, surface, change, depsgraph):
+    """Keep guides and the hair between them in place, as an `Affine` was applied to their surface."""
+    curves.require_not_linked(guide_curves)
+    require_finite(surface.rest)
+    targets = [guide_curves, *applied_transforms.followed_by(guide_curves)]
+    applied_transforms.note(targets, surface, change)
+    surface = scene.read_surface(guide_curves.surface, depsgraph)
+    for target in targets:
+        applied_transforms.follow(target, surface, change, depsgraph)
     surface_space.keep_surface(guide_curves, surface)
-    return True
 
 
 def follow_alone(
@@ -78,6 +92,8 @@ def follow_alone(
             change = applied_transforms.find(hair, surface, place_before(hair))
             if change is not None:
                 curves.require_not_linked(hair)
+                applied_transforms.note([hair], surface, change)
+                surface = scene.read_surface(surface_object, depsgraph)
                 applied_transforms.follow(hair, surface, change, depsgraph)
         except HairError as error:
             hair.vellus.status = str(error)

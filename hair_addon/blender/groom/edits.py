@@ -9,8 +9,8 @@ from bpy.types import Curves, Depsgraph, Object, ViewLayer
 
 from ...core.errors import HairError
 from ...core.geometry import mesh, uv_check
-from ..data import scene
-from ..data.strands import curves, curves_objects, surface_space
+from ..data import scene, surface_space
+from ..data.strands import curves, curves_objects
 from ..host.notices import name_of
 from ..materials import materials
 from . import edited_surfaces

@@ -248,7 +248,7 @@ def _ground(surface, mask, parting, device):
         "lines": parting.lines,
         "drawn_on": _drawn_on(surface),
         "shape": surface.shape,
-        "is_mirrored": surface.is_mirrored,
+        "is_mirrored": surface.names_otherwise,
         "device": device,
     }
 

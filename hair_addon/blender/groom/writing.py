@@ -11,9 +11,9 @@ from ...core.errors import HairError
 from ...core.geometry.strands import Strands, lengths
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
-from ..data import guide_map_readers
+from ..data import guide_map_readers, surface_space
 from ..data.scene import Surface
-from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots, surface_space
+from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots
 from ..host.notices import name_of
 from ..materials import looks
 from ..settings import animated, setting_properties, style_items

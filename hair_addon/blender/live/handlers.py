@@ -6,8 +6,8 @@ import contextlib
 import bpy
 from bpy.app.handlers import persistent
 
-from ..data import rest_nodes
-from ..data.strands import curves_objects, surface_space
+from ..data import rest_nodes, surface_space
+from ..data.strands import curves_objects
 from ..groom import bindings, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import running, scene_time

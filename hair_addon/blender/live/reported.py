@@ -4,7 +4,8 @@
 import bpy
 import numpy as np
 
-from ..data.strands import curves, surface_space
+from ..data import surface_space
+from ..data.strands import curves
 from ..host.caches import Cache
 
 # session_uid of guide Curves → their (N, 3) points. Blender reports the geometry of Curves as updated even if only the

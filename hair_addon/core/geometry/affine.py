@@ -52,6 +52,11 @@ class Affine:
         return self.matrix.tolist()
 
     @property
+    def is_mirroring(self) -> bool:
+        """Whether it turns left into right."""
+        return bool(np.linalg.det(self.axes) < 0.0)
+
+    @property
     def is_valid(self) -> bool:
         """Whether it is finite and has an inverse."""
         return bool(np.isfinite(self.matrix).all()) and abs(np.linalg.det(self.axes)) >= 1e-30

@@ -55,6 +55,16 @@ def places(curves, vertex_count):
     return vertices, barycentric
 
 
+def turn(curves):
+    """Turn the triangles that roots are stored in, as Blender turns faces where it applies a scale that mirrors."""
+    vertices, barycentric = _vertices(curves), attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
+    if vertices is None or barycentric is None:
+        return
+    attributes.write(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE", barycentric[:, [0, 2, 1]])
+    for name, column in zip(VERTICES, (0, 2, 1), strict=True):
+        attributes.write(curves, name, "INT", "CURVE", vertices[:, column])
+
+
 def are_barycentric(coordinates):
     """(S,) bool: whether rows of (S, 3) are places inside a triangle, to rounding. NaN is not."""
     is_inside = ((coordinates >= -1e-3) & (coordinates <= 1.0 + 1e-3)).all(axis=1)

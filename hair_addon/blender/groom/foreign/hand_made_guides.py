@@ -21,9 +21,9 @@ from ....core.grooming.groom import HairSettings
 from ....core.grooming.rooted_curves import RootedCurves, reversal
 from ....core.long_work import Work, part_of, run_now
 from ....core.params import Param, plain_value
-from ...data import masks, scene, usable_surfaces, vertex_groups
+from ...data import masks, scene, surface_space, usable_surfaces, vertex_groups
 from ...data.scene import Surface
-from ...data.strands import attributes, curves, curves_objects, follow_nodes, posed_strands, surface_space
+from ...data.strands import attributes, curves, curves_objects, follow_nodes, posed_strands
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...settings import preferences

@@ -158,7 +158,7 @@ def _bind(hair, present, depsgraph, followed):
         lines=parting.lines,
         drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
         roots=roots,
-        is_mirrored=surface.is_mirrored,
+        is_mirrored=surface.names_otherwise,
     )
     rest = kept_shapes.read(hair)
     bound = KeptBinding(surface, binding, shape, present if rest is None else rest, starts, guides)

@@ -90,7 +90,7 @@ def using_as_hair(
             placed.rooted.roots,
             wanted,
             settings.guide_count,
-            is_mirrored=surface.is_mirrored,
+            is_mirrored=surface.names_otherwise,
             progress=part_of(progress, 0.1, 1.0),
         )
         return placed, wanted, derived

@@ -102,7 +102,7 @@ def _between(guides, count, mask, depsgraph):
         regions=parting.regions,
         lines=parting.lines,
         drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
-        is_mirrored=surface.is_mirrored,
+        is_mirrored=surface.names_otherwise,
         device=device,
     )
     point_count = max(int(np.bincount(guides.counts).argmax()), 2)

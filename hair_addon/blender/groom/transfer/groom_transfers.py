@@ -20,9 +20,9 @@ from ....core.grooming.groom import HairSettings
 from ....core.grooming.groom_transfer import Ground, Places
 from ....core.grooming.transfer_settings import TransferSettings
 from ....core.long_work import Work
-from ...data import landmarks, scene, usable_surfaces
+from ...data import landmarks, scene, surface_space, usable_surfaces
 from ...data.scene import Surface
-from ...data.strands import attributes, curves, curves_objects, guide_curves, kept_shapes, surface_space
+from ...data.strands import attributes, curves, curves_objects, guide_curves, kept_shapes
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...materials import looks

@@ -5,9 +5,10 @@
 is stored in these coordinates beside Curves, such as baked frames, is carried by `applied`.
 """
 
+import bpy
 import numpy as np
 
-from ....core.geometry.affine import Affine
+from ...core.geometry.affine import Affine
 
 # Properties of Curves. In groups, because Blender's USD exporter warns about bare arrays.
 _STOOD_ON = "vellus_stood_on"  # the surface, when strands were rooted on it
@@ -57,6 +58,12 @@ def applied(curves):
 def note_applied(curves, change):
     """Note that an `Affine` was applied to the local coordinates."""
     _keep(curves, _APPLIED, {"matrix": (change @ applied(curves)).matrix.ravel()})
+
+
+def is_turned(surface_object):
+    """Whether a mirroring scale was applied to a mesh object on which hair grows, as then Blender turns its faces."""
+    grown = (datablock for datablock in bpy.data.hair_curves if datablock.surface == surface_object)
+    return any(applied(datablock).is_mirroring for datablock in grown if _APPLIED in datablock)
 
 
 def forget_applied(curves):
