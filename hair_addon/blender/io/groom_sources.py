@@ -9,6 +9,7 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.files import groom_curves
 from ...core.files.groom_curves import GroomCurves
+from ...core.geometry import strands
 from ...core.shading import strand_colors
 from ..data.strands import attributes, curves, exported_curves, simulated_guides
 from ..groom import guide_maps, hair_systems, selection
@@ -76,22 +77,21 @@ def group_names(chosen):
 
 def _guide_curves(guides, group, name, first_id, per_metre):
     local = _guides_at_rest(guides)
-    curve_count, point_count, _ = strand_arrays.shape_of(guides) if local is None else local.shape
+    counts = strand_arrays.counts_of(guides) if local is None else np.full(*local.shape[:2], np.int32)
     return GroomCurves(
         group_id=group,
         group_name=name,
         is_guide=True,
-        curve_count=curve_count,
-        point_count=point_count,
+        counts=counts,
         first_id=first_id,
-        widths=_widths(guides, guides, point_count, per_metre),
+        widths=_widths(guides, guides, counts, per_metre),
         root_uvs=exported_curves.read_root_uvs(guides),
     )
 
 
 def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
-    curve_count, point_count, _ = strand_arrays.shape_of(hair)
-    widths = _widths(hair, shown, point_count, per_metre)  # first: what follows may evaluate again
+    counts = strand_arrays.counts_of(hair)
+    widths = _widths(hair, shown, counts, per_metre)  # first: what follows may evaluate again
     guides = hair.vellus.guide_curves
     guide_count = 0 if guides is None else len(guides.curves)
     # Without guides in the file there are none to name.
@@ -99,35 +99,56 @@ def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
     guide_map = guide_maps.of(hair, depsgraph) if guide_count and settings.has_guides else None
     ids, weights = (None, None) if guide_map is None else groom_curves.closest_guides(*guide_map, first_id)
     look, randoms = properties.look_of(hair.vellus), curves.read_randoms(hair)
-
-    def colors(some):
-        return strand_colors.colors(look, randoms[some], point_count)
-
-    def roughness(some):
-        return strand_colors.roughness(look, randoms[some], point_count)
-
+    colors, roughness = _shading_of(look, randoms, counts, shown) if settings.has_color else (None, None)
     return GroomCurves(
         group_id=group,
         group_name=name,
         is_guide=False,
-        curve_count=curve_count,
-        point_count=point_count,
+        counts=counts,
         first_id=first_id + guide_count,
         widths=widths,
         root_uvs=exported_curves.read_root_uvs(hair),
         guide_ids=ids,
         guide_weights=weights,
-        colors=colors if settings.has_color else None,
-        roughness=roughness if settings.has_color else None,
+        colors=colors,
+        roughness=roughness,
         look=look,
     )
 
 
-def _widths(datablock, shown, point_count, per_metre):
+def _widths(datablock, shown, counts, per_metre):
     """Diameters of some strands, in the file's units; shown: the Curves that have the radii."""
-    radii = exported_curves.read_radii(shown, point_count)
-    factor = 2.0 * strand_arrays.world_scale(datablock) * per_metre
-    return lambda some: radii(some) * np.float32(factor)
+    if np.array_equal(counts, exported_curves.counts_kept(shown)):
+        radii = exported_curves.radii_kept(shown)
+    else:  # guides that simulate, which have as many points each
+        radii = exported_curves.read_radii(shown, int(counts[0]))(slice(None)).ravel()
+    factor = np.float32(2.0 * strand_arrays.world_scale(datablock) * per_metre)
+    return lambda some: radii[_points_of(counts, some)] * factor
+
+
+def _points_of(counts, some):
+    """The slice of points of a slice of curves."""
+    first = int(counts[: some.start].sum(dtype=np.int64))
+    return slice(first, first + int(counts[some].sum(dtype=np.int64)))
+
+
+def _shading_of(look, randoms, counts, shown):
+    """(colors, roughness) of the points of a slice of curves."""
+    if (counts == counts[0]).all():
+        count = int(counts[0])
+        return (
+            lambda some: strand_colors.colors(look, randoms[some], count).reshape(-1, 3),
+            lambda some: strand_colors.roughness(look, randoms[some], count).ravel(),
+        )
+    along = strands.places_along(exported_curves.points_kept(shown), strands.curve_offsets(counts))
+
+    def colors(some):
+        return strand_colors.colors_at(look, np.repeat(randoms[some], counts[some]), along[_points_of(counts, some)])
+
+    def roughness(some):
+        return np.repeat(strand_colors.roughness(look, randoms[some], 1)[:, 0], counts[some])
+
+    return colors, roughness
 
 
 def _guides_at_rest(guides):
@@ -145,8 +166,8 @@ def points_of(source, per_metre):
     if source.is_modified and modified_strands.curves_of(datablock) is None:
         raise HairError('The number of strands of "{name}" changes: remove its keys.', name=name_of(datablock))
     local = _guides_at_rest(datablock) if exported.is_guide else None
-    shape = (strand_arrays.shape_of(datablock) if local is None else local.shape)[:2]
-    if shape != (exported.curve_count, exported.point_count):
+    counts = strand_arrays.counts_of(datablock) if local is None else np.full(*local.shape[:2])
+    if not np.array_equal(counts, exported.counts):
         raise HairError('The number of strands of "{name}" changes: remove its keys.', name=name_of(datablock))
     if exported.is_guide:
         rows = strand_arrays.world_rows(datablock, per_metre, local)
@@ -209,6 +230,8 @@ def notes_of(chosen, sources, settings):
             yield HairError('"{name}" is called {group} in the file.', name=name_of(hair), group=name)
         if settings.has_hair:
             yield from modified_strands.notes_of(hair)
+        if settings.has_guides and hair.vellus.guide_curves is not None:
+            yield from _notes_of_guides(hair.vellus.guide_curves)
         if not (settings.has_hair and settings.has_guides):
             continue
         if hair.vellus.guide_curves is None:
@@ -217,3 +240,11 @@ def notes_of(chosen, sources, settings):
             yield HairError(
                 '"{name}" has no guide weights: Unreal computes its own. Regenerate the strands first.', name=name
             )
+
+
+def _notes_of_guides(guides):
+    """What is said of guides that do not have their own numbers of points in a file."""
+    local = _guides_at_rest(guides)
+    if local is not None and (curves.point_counts(guides) != local.shape[1]).any():
+        sentence = '"{name}" is written with {count} points a guide, as it is simulated.'
+        yield HairError(sentence, name=name_of(guides), count=local.shape[1])

@@ -7,8 +7,9 @@ import numpy as np
 from ...core import geometry
 from ...core.errors import HairError
 from ...core.files.groom_curves import Rows, slices
+from ...core.geometry import strands
 from ...core.grooming import groom
-from ..data.strands import attributes, curves, posed_strands, stored_roots
+from ..data.strands import attributes, curves, exported_curves, posed_strands, stored_roots
 from ..groom import selection
 from ..host.notices import name_of
 from ..live import live_hair
@@ -27,49 +28,78 @@ def world_points(datablock):
     Without other modifiers than ours. Curves of different point counts are resampled to the largest, and Catmull-Rom
     splines to points on the curve, as many as strands have.
     """
-    return _whole(world_rows(datablock), shape_of(datablock))
+    bring_up_to_date()
+    return _whole(world_rows(datablock, local=_at_rest(datablock)), shape_of(datablock))
 
 
 def shown_points(datablock):
     """The same with an artist's modifiers, where `modified_strands` has curves that they have made."""
-    return _whole(shown_rows(datablock), shape_of(datablock))
+    shown = _shown(datablock)
+    if shown is None:
+        return world_points(datablock)
+    points = _at_rest(shown)
+    return _whole(_placed(lambda some: points[some].reshape(-1, 3), _to_world(datablock)), shape_of(datablock))
 
 
 def _whole(rows, shape):
     world = np.empty(shape, np.float32)
     for some in slices(len(world)):
-        world[some] = rows(some)
+        world[some] = rows(some).reshape(-1, *shape[1:])
     return world
 
 
+def counts_of(datablock):
+    """(S,) int32: points of each curve that `world_rows` and `shown_rows` give. Raises `HairError`."""
+    shape_of(datablock)
+    return exported_curves.counts_kept(datablock)
+
+
 def shown_rows(datablock, per_metre=1.0) -> Rows:
-    """What `shown_points` has of a slice of curves, as `world_rows`."""
-    bring_up_to_date()
-    shown = modified_strands.curves_of(datablock)
-    if shown is None or shown == datablock:
+    """What `world_rows` gives, with an artist's modifiers, where `modified_strands` has curves that they have made."""
+    shown = _shown(datablock)
+    if shown is None:
         return world_rows(datablock, per_metre)
-    to_world = _to_world(datablock) * (metres_per_unit(bpy.context.scene) * per_metre)
-    points = _at_rest(shown)
-    return lambda some: (points[some].astype(np.float64) @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
+    points, starts = exported_curves.points_kept(shown), strands.curve_offsets(exported_curves.counts_kept(shown))
+    return _placed(lambda some: points[starts[some.start] : starts[some.stop]], _to_world(datablock) * per_metre)
 
 
 def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
-    """A function of a slice of curves that gives what `world_points` does for them, times `per_metre`.
+    """A function of a slice of curves that gives (N, 3) float32 points of them [m], times `per_metre`.
 
-    local: (S, P, 3) float32 that is taken for the points at rest, None for those of the datablock.
+    Where `world_points` has them, but each curve has as many points as `counts_of` says. local: (S, P, 3) float32 that
+    is taken for the points at rest, None for those of the datablock.
     """
     bring_up_to_date()
-    to_world = _to_world(datablock) * (metres_per_unit(bpy.context.scene) * per_metre)
+    if local is None:
+        points, counts = exported_curves.points_kept(datablock), exported_curves.counts_kept(datablock)
+    else:
+        points, counts = local.reshape(-1, 3), np.full(*local.shape[:2])
     pose = posed_strands.read_pose(datablock.surface, bpy.context.evaluated_depsgraph_get())
-    at_rest = _at_rest(datablock) if local is None else local
-    stored = stored_roots.places(datablock, np.inf)
-    places = pose.rooted(datablock.vellus.topology, stored, at_rest[:, 0])
+    starts, stored = strands.curve_offsets(counts), stored_roots.places(datablock, np.inf)
+    places = pose.rooted(datablock.vellus.topology, stored, points[starts[:-1]])
+
+    def carried(some):
+        its = points[starts[some.start] : starts[some.stop]]
+        return pose.carry_rooted(its, counts[some], places, some)
+
+    return _placed(carried, _to_world(datablock) * per_metre)
+
+
+def _placed(local, to_world) -> Rows:
+    """`Rows` of local ones where a (4, 4) matrix takes them."""
+    to_file = to_world * metres_per_unit(bpy.context.scene)
 
     def rows(some):
-        carried = pose.carry_rooted(at_rest, places, some).astype(np.float64)
-        return (carried @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
+        return (local(some).astype(np.float64) @ to_file[:3, :3].T + to_file[:3, 3]).astype(np.float32)
 
     return rows
+
+
+def _shown(datablock):
+    """Evaluated Curves that an artist's modifiers have made of a datablock; None where it has none, or others fit."""
+    bring_up_to_date()
+    shown = modified_strands.curves_of(datablock)
+    return None if shown == datablock else shown
 
 
 def other_places(datablock):

@@ -63,8 +63,8 @@ class UsdGroomWriter:
 
         group = UsdGeom.Xform.Define(self._stage, f"{_ROOT}/{curves.group_name}").GetPath()
         path = group.AppendChild("guides" if curves.is_guide else "strands")
-        made = hair_file.define_curves(self._stage, path, curves.point_counts)
-        widths = np.float32(_all(curves.widths, curves)).ravel()
+        made = hair_file.define_curves(self._stage, path, curves.counts)
+        widths = np.float32(_all(curves.widths, curves))
         made.CreateWidthsAttr(_array("FloatArray", widths))
         _write_primvars(made.GetPrim(), curves)
         if curves.is_guide:
@@ -75,12 +75,12 @@ class UsdGroomWriter:
         return len(self._added) - 1
 
     def write_points(self, number, points):
-        """Write the points (n, P, 3) [m] of added curves, at the next time. Raises `HairError` for non-finite ones."""
+        """Write the points (N, 3) [m] of added curves, at the next time. Raises `HairError` for non-finite ones."""
         from pxr import Usd
 
         made, check, moves, reach, times = self._added[number]
         time = Usd.TimeCode(self._first_frame + len(times)) if moves else Usd.TimeCode.Default()
-        values = np.concatenate([part.reshape(-1, 3) for part in check.parts(points)])
+        values = np.concatenate([*check.parts(points)])
         made.CreatePointsAttr().Set(_array("Vec3fArray", values), time)
         made.CreateExtentAttr().Set(hair_file.extent(values, reach), time)
         times.append(time)
@@ -152,11 +152,11 @@ def _write_primvars(prim, curves):
         _primvar(prim, "groom_closest_guides", "Int3Array", "uniform", _array("Vec3iArray", curves.guide_ids))
         _primvar(prim, "groom_guide_weights", "Float3Array", "uniform", _array("Vec3fArray", curves.guide_weights))
     if curves.colors is not None:
-        colors = _array("Vec3fArray", _all(curves.colors, curves).reshape(-1, 3))
+        colors = _array("Vec3fArray", _all(curves.colors, curves))
         _primvar(prim, "groom_color", "Color3fArray", "vertex", colors)
         _primvar(prim, "displayColor", "Color3fArray", "vertex", colors)
     if curves.roughness is not None:
-        roughness = _array("FloatArray", _all(curves.roughness, curves).ravel())
+        roughness = _array("FloatArray", _all(curves.roughness, curves))
         _primvar(prim, "groom_roughness", "FloatArray", "vertex", roughness)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import HairError
+from ..geometry import strands
 from ..shading.appearance import Appearance
 
 AT_ONCE = 16_384  # curves in a part: arrays of all of them would take several times their memory
@@ -18,24 +19,24 @@ MOST_POINTS_OF_CURVE = 255
 MOST_POINTS_OF_GROUP = 2**24 - 1
 MOST_CURVES_OF_GROUP = 2**22 - 1
 
-# Values of some curves: those of a slice of all.
+# Values at the points of some curves, one curve after another: those of a slice of all.
 type Rows = Callable[[slice], np.ndarray]
 
 
 @dataclass(frozen=True)
 class GroomCurves:
-    """All of some guides or strands but where they are; S curves of P points.
+    """All of some guides or strands but where they are.
 
-    first_id: identity of the first, the others' follow; widths: diameters (n, P), in the units of points; root_uvs:
-    (S, 2), None without a UV map; guide_ids and guide_weights: (S, 3) as `closest_guides` gives them, None of guides;
-    colors: linear RGB (n, P, 3), and roughness (n, P), None if they are not exported; look: of strands.
+    counts: (S,) int32 points of each curve; first_id: identity of the first, the others' follow; widths: diameters
+    (N,), in the units of points; root_uvs: (S, 2), None without a UV map; guide_ids and guide_weights: (S, 3) as
+    `closest_guides` gives them, None of guides; colors: linear RGB (N, 3), and roughness (N,), None if they are not
+    exported; look: of strands.
     """
 
     group_id: int
     group_name: str
     is_guide: bool
-    curve_count: int
-    point_count: int
+    counts: np.ndarray
     first_id: int
     widths: Rows
     root_uvs: np.ndarray | None = None
@@ -51,14 +52,14 @@ class GroomCurves:
         return guides_name(self.group_name) if self.is_guide else self.group_name
 
     @property
+    def curve_count(self) -> int:
+        """S."""
+        return len(self.counts)
+
+    @property
     def ids(self) -> np.ndarray:
         """(S,) int32."""
         return np.arange(self.first_id, self.first_id + self.curve_count, dtype=np.int32)
-
-    @property
-    def point_counts(self) -> np.ndarray:
-        """(S,) int32: points of each curve."""
-        return np.full(self.curve_count, self.point_count, np.int32)
 
 
 def slices(count: int) -> Iterator[slice]:
@@ -100,7 +101,7 @@ class Check:
     no_length: set[int] = field(default_factory=set)
 
     def parts(self, points: Rows) -> Iterator[np.ndarray]:
-        """Points (n, P, 3) float32 of all curves, part after part. Raises `HairError` at non-finite coordinates."""
+        """Points (N, 3) float32 of all curves, part after part. Raises `HairError` at non-finite coordinates."""
         for chosen in slices(self.curves.curve_count):
             part = np.asarray(points(chosen), np.float32)
             # The sum is finite exactly where all are, but for an overflow, and reads the points only once.
@@ -108,8 +109,11 @@ class Check:
                 raise HairError(
                     'The group "{name}" has non-finite coordinates: nothing was written.', name=self.curves.group_name
                 )
-            is_short = (part == part[:, :1]).all(axis=(1, 2))
-            self.no_length.update((chosen.start + np.flatnonzero(is_short)).tolist())
+            counts = self.curves.counts[chosen]
+            starts = strands.curve_offsets(counts)[:-1]
+            is_off_root = part != np.repeat(part[starts], counts, axis=0)
+            is_long = np.logical_or.reduceat(is_off_root.ravel(), 3 * starts)
+            self.no_length.update((chosen.start + np.flatnonzero(~is_long)).tolist())
             yield part
 
     def notes(self) -> Iterator[HairError]:
@@ -128,16 +132,18 @@ class Check:
         if curves.guide_weights is not None and not curves.guide_weights.any(axis=1).all():
             count = int((~curves.guide_weights.any(axis=1)).sum())
             yield HairError('"{name}": {count} strands follow no guide, and none moves them.', name=name, count=count)
-        yield from limit_notes(name, curves.curve_count, curves.point_count)
+        yield from limit_notes(name, curves.counts)
 
 
-def limit_notes(name: str, curve_count: int, point_count: int) -> Iterator[HairError]:
-    """What Unreal will not hold of a group's guides or strands: that many curves, each of that many points."""
-    if point_count > MOST_POINTS_OF_CURVE:
+def limit_notes(name: str, counts: np.ndarray) -> Iterator[HairError]:
+    """What Unreal will not hold of a group's guides or strands, which have (S,) points each."""
+    curve_count, point_count = len(counts), int(counts.sum(dtype=np.int64))
+    most = int(counts.max(initial=0))
+    if most > MOST_POINTS_OF_CURVE:
         yield HairError(
             '"{name}" has {count} points a strand: Unreal keeps the first {most}.',
             name=name,
-            count=point_count,
+            count=most,
             most=MOST_POINTS_OF_CURVE,
         )
     if curve_count > MOST_CURVES_OF_GROUP:
@@ -147,11 +153,11 @@ def limit_notes(name: str, curve_count: int, point_count: int) -> Iterator[HairE
             count=curve_count,
             most=MOST_CURVES_OF_GROUP,
         )
-    if curve_count * point_count > MOST_POINTS_OF_GROUP:
+    if point_count > MOST_POINTS_OF_GROUP:
         yield HairError(
             '"{name}" has {count} points, but Unreal holds {most} in a group: use fewer strands or divide the hair.',
             name=name,
-            count=curve_count * point_count,
+            count=point_count,
             most=MOST_POINTS_OF_GROUP,
         )
 

@@ -38,13 +38,11 @@ class UnrealGroomWriter:
         """Write all of some curves but their points; returns their number. moves: whether points of each time come."""
         writer = self._moving if moves else self._still
         width = Parameter("width", "float32", "vertex", _of_points(curves, curves.widths))
-        self._added.append(
-            (writer.add(curves.name, curves.point_counts, width, _parameters(curves)), writer, Check(curves))
-        )
+        self._added.append((writer.add(curves.name, curves.counts, width, _parameters(curves)), writer, Check(curves)))
         return len(self._added) - 1
 
     def write_points(self, number: int, points: Rows) -> None:
-        """Write the points (n, P, 3) [cm] of added curves, at the next time. Raises `HairError` for non-finite ones."""
+        """Write the points (N, 3) [cm] of added curves, at the next time. Raises `HairError` for non-finite ones."""
         curves, writer, check = self._added[number]
         writer.write_points(curves, check.parts(points))
 

@@ -14,12 +14,28 @@ def colors(look: Appearance, randoms: np.ndarray, point_count: int) -> np.ndarra
 
     Points are evenly spaced along strands.
     """
+    differing, position = _variation(look, np.asarray(randoms), np.linspace(0.0, 1.0, point_count))
+    return np.broadcast_to(_colors(look, differing[:, None], position[None]), (len(randoms), point_count, 3))
+
+
+def colors_at(look: Appearance, randoms: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """The same (N, 3) at points of strands; randoms: (N,) of their strands, positions: (N,) from root 0 to tip 1."""
+    differing, position = _variation(look, np.asarray(randoms), np.asarray(positions))
+    return np.broadcast_to(_colors(look, differing, position), (len(positions), 3))
+
+
+def _variation(look, randoms, positions):
+    """Random numbers and positions, each one value where colors do not depend on them."""
     settings = appearance.strand_settings(look)
-    differing = np.asarray(randoms) if settings.random_color > 0.0 else np.zeros(1)
-    position = np.linspace(0.0, 1.0, point_count) if settings.has_gradient else np.zeros(1)
-    sigma_a = strand_variation.strand_sigma_a(settings, differing[:, None], position[None])
-    found = color_from_sigma_a(sigma_a, look.radial_roughness).astype(np.float32)
-    return np.broadcast_to(found, (len(randoms), point_count, 3))
+    return (
+        randoms if settings.random_color > 0.0 else np.zeros(1),
+        positions if settings.has_gradient else np.zeros(1),
+    )
+
+
+def _colors(look, randoms, positions):
+    sigma_a = strand_variation.strand_sigma_a(appearance.strand_settings(look), randoms, positions)
+    return color_from_sigma_a(sigma_a, look.radial_roughness).astype(np.float32)
 
 
 def roughness(look: Appearance, randoms: np.ndarray, point_count: int) -> np.ndarray:

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.simulation import guide_poses
-from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom.dynamics import frame_folders
 from hair_addon.core.errors import HairError
 from tests.support.dynamics.following import update
@@ -126,28 +124,6 @@ def test_hair_whose_settings_have_just_changed_is_exported_as_they_are(hair, tmp
     made = export(tmp_path / "groom.abc")
     assert made.strands == 321
     assert len(shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")["P"].only) == 321 * 41
-
-
-def test_guides_of_any_number_of_points_are_exported(imported, tmp_path):
-    """With their ends where they are, and as many points as the longest."""
-    guides = api.use_as_guides(imported, bpy.data.objects["Sphere"])
-    api.interpolate_hair(guides, strand_count=50)
-    update()
-    ends = world_ends(bpy.data.objects[imported.name])
-    export(tmp_path / "groom.abc")
-    (name,) = (n for n in alembic_reader.read(tmp_path / "groom.abc").objects["groom"].children if "_guides" in n)
-    found = shape(alembic_reader.read(tmp_path / "groom.abc"), name)
-    points = found["P"].only.reshape(len(ends), -1, 3)
-    assert (found["nVertices"].only == points.shape[1]).all() and points.shape[1] == 12
-    np.testing.assert_allclose(points[:, [0, -1]], 100.0 * ends, atol=1e-2)
-    assert (found["groom_width"].only > 0.0).all()
-
-
-def world_ends(curves_object):
-    """(S, 2, 3) [m]: the first and the last point of each curve."""
-    offsets, matrix = curves.curve_offsets(curves_object.data), np.array(curves_object.matrix_world)
-    ends = curves.read_points(curves_object.data)[np.stack([offsets[:-1], offsets[1:] - 1], axis=1)]
-    return ends @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def test_hair_that_lost_its_guides_is_exported_alone(hair, tmp_path):

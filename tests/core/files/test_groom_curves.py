@@ -58,10 +58,12 @@ def test_slices_cover_all_curves_once():
 
 
 def test_the_limits_of_unreal_are_said_beyond_them_alone():
-    at_most = (groom_curves.MOST_CURVES_OF_GROUP, 4)
-    assert list(groom_curves.limit_notes("a", *at_most)) == []
-    assert list(groom_curves.limit_notes("a", 65_793, 255)) == []
-    assert "255" in str(next(groom_curves.limit_notes("a", 65_793, 256)))
-    for count, points, word in ((2**22, 2, "strands"), (2**22 - 1, 5, "points")):
-        (note,) = groom_curves.limit_notes("a", count, points)
+    def notes(*counts_and_points):
+        return [*groom_curves.limit_notes("a", np.concatenate([np.full(*one) for one in counts_and_points]))]
+
+    assert notes((groom_curves.MOST_CURVES_OF_GROUP, 4)) == []
+    assert notes((65_793, 255)) == [] and notes((60_000, 5), (60_000, 255)) == []
+    assert "256" in str(notes((60_000, 3), (1, 256))[0])
+    for case, word in (((2**22, 2), "strands"), ((2**22 - 1, 5), "points")):
+        (note,) = notes(case)
         assert word in str(note)

@@ -48,25 +48,23 @@ def groom(rng, strand_count=40, guide_count=6, point_count=5):
         3,
         "Long",
         True,
-        guide_count,
-        point_count,
+        np.full(guide_count, point_count, np.int32),
         100,
-        lambda chosen: np.full((chosen.stop - chosen.start, point_count), 0.02, np.float32),
+        lambda chosen: np.full((chosen.stop - chosen.start) * point_count, 0.02, np.float32),
         rng.random((guide_count, 2), np.float32),
     )
     strands = GroomCurves(
         3,
         "Long",
         False,
-        strand_count,
-        point_count,
+        np.full(strand_count, point_count, np.int32),
         100 + guide_count,
-        lambda chosen: arrays["widths"][chosen],
+        lambda chosen: arrays["widths"][chosen].ravel(),
         arrays["uvs"],
         ids,
         weights,
-        lambda chosen: arrays["colors"][chosen],
-        lambda chosen: arrays["roughness"][chosen],
+        lambda chosen: arrays["colors"][chosen].reshape(-1, 3),
+        lambda chosen: arrays["roughness"][chosen].ravel(),
     )
     return guides, strands, arrays
 
@@ -77,7 +75,7 @@ def write(path, added, rate=None, first_frame=0):
         numbers = [writer.add(curves, len(samples) > 1) for curves, samples in added]
         for number, (_curves, samples) in zip(numbers, added, strict=True):
             for points in samples:
-                writer.write_points(number, points.__getitem__)
+                writer.write_points(number, lambda chosen, of=points: of[chosen].reshape(-1, 3))
     return writer.notes()
 
 
@@ -118,7 +116,7 @@ def test_every_parameter_is_as_specified(written):
 def test_a_parameter_has_as_many_values_as_its_scope_says(written):
     archive, _arrays, guides, strands = written
     for path, curves in (("/groom/Long_guides/Long_guidesShape", guides), ("/groom/Long/LongShape", strands)):
-        counts = {"constant": 1, "uniform": curves.curve_count, "vertex": curves.curve_count * curves.point_count}
+        counts = {"constant": 1, "uniform": curves.curve_count, "vertex": curves.counts.sum()}
         for (place, name), found in parameters(archive).items():
             if place == path:
                 assert len(found.only) == counts[found.scope], name
@@ -141,7 +139,7 @@ def test_every_array_comes_back(written):
     ):
         shape = geometry(archive, path)
         np.testing.assert_array_equal(shape["P"].only, points.reshape(-1, 3))
-        np.testing.assert_array_equal(shape["nVertices"].only, curves.point_counts)
+        np.testing.assert_array_equal(shape["nVertices"].only, curves.counts)
         np.testing.assert_array_equal(shape["curveBasisAndType"].only[0], (1, 0, 0, 0))  # linear, open
         np.testing.assert_allclose(
             shape[".selfBnds"].only[0], [*points.min(axis=(0, 1)), *points.max(axis=(0, 1))], rtol=1e-6
@@ -177,16 +175,15 @@ def test_guides_move_while_strands_stay(rng, tmp_path):
 def test_memory_does_not_grow_with_the_number_of_strands(rng, tmp_path, monkeypatch):
     monkeypatch.setattr(groom_curves, "AT_ONCE", 1000)
     _guides, strands, _arrays = groom(rng)
-    part = rng.random((1000, 41, 3), np.float32)
+    part = rng.random((1000 * 41, 3), np.float32)
     peaks = []
     for parts in (4, 40):
         large = replace(
             strands,
-            curve_count=1000 * parts,
-            point_count=41,
-            widths=lambda _chosen: part[..., 0],
+            counts=np.full(1000 * parts, 41, np.int32),
+            widths=lambda _chosen: part[:, 0],
             colors=lambda _chosen: part,
-            roughness=lambda _chosen: part[..., 1],
+            roughness=lambda _chosen: part[:, 1],
             root_uvs=None,
             guide_ids=None,
             guide_weights=None,

@@ -3,7 +3,8 @@
 
 import numpy as np
 
-from ....core.geometry import strands
+from ....core.geometry import bezier_segments, strands
+from ....core.grooming import groom
 from . import attributes, curves
 
 
@@ -46,3 +47,49 @@ def read_radii(datablock, point_count):
         )
     rows = stored.reshape(len(counts), point_count)
     return lambda some: attributes.valid_radii(rows[some])
+
+
+def counts_kept(datablock):
+    """(S,) int32: points of each curve in files that can keep them.
+
+    Polylines have their own points. Catmull-Rom splines of few have points between them too, at least as many as
+    strands have, by their number alone: they are as many at all times.
+    """
+    counts = curves.point_counts(datablock)
+    return ((counts - 1) * _lines_of_segments(datablock, counts) + 1).astype(np.int32)
+
+
+def points_kept(datablock):
+    """(N, 3) float32 local points of curves, as many as `counts_kept` says."""
+    return _kept(datablock, curves.read_points(datablock))
+
+
+def radii_kept(datablock):
+    """(N,) float32 radii in local units, at least zero, of the points that `points_kept` has."""
+    kept = _kept(datablock, attributes.valid_radii(curves.read_radii(datablock))[:, None])[:, 0]
+    return np.maximum(kept, np.float32(0.0))
+
+
+def _lines_of_segments(datablock, counts):
+    """(S,) into how many lines the segments of each curve are divided."""
+    is_divided = attributes.are_smooth(datablock) & (counts > 2) & (counts < groom.POINT_COUNT)
+    return np.where(is_divided, -((1 - groom.POINT_COUNT) // np.maximum(counts - 1, 1)), 1)
+
+
+def _kept(datablock, values):
+    """Values (N, D) at the points of curves → (M, D) float32 at those that `counts_kept` counts."""
+    counts = curves.point_counts(datablock)
+    lines = _lines_of_segments(datablock, counts)
+    is_divided = lines > 1
+    if not is_divided.any():
+        return values
+    starts, its = strands.curve_offsets(counts)[:-1][is_divided], counts[is_divided]
+    own, along = bezier_segments.each(its + 2)  # end points count twice
+    rows = starts[own] + np.clip(along - 1, 0, its[own] - 1)
+    segments = bezier_segments.cubic(values[rows], its + 2, "catmullRom", "nonperiodic")
+    made, _counts, _places = bezier_segments.polylines(segments, np.repeat(lines[is_divided], its - 1))
+    wanted = (counts - 1) * lines + 1
+    out = np.empty((int(wanted.sum()), values.shape[1]), np.float32)
+    out[np.repeat(is_divided, wanted)] = made
+    out[~np.repeat(is_divided, wanted)] = values[~np.repeat(is_divided, counts)]
+    return out

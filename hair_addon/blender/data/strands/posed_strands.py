@@ -50,13 +50,17 @@ class Pose:
         """
         if not self.is_deformed:
             return points[chosen]
-        return self.carry_rooted(points, self.rooted(topology, places, points[:, 0]), chosen)
-
-    def carry_rooted(self, points, places, chosen):
-        """The same of strands whose places `rooted` gave: for parts of many strands."""
-        if not self.is_deformed:
-            return points[chosen]
+        places = self.rooted(topology, places, points[:, 0])
         return carried(points[chosen], self.motion_at(places[0]), (places[0][chosen], places[1][chosen]))
+
+    def carry_rooted(self, points, counts, places, chosen):
+        """The same of points (N, 3) of chosen strands that have counts (M,) each, and whose places `rooted` gave.
+
+        For parts of many strands.
+        """
+        if not self.is_deformed:
+            return points
+        return carried(points, self.motion_at(places[0]), (places[0][chosen], places[1][chosen]), counts)
 
     def rooted(self, topology, places, firsts):
         """Root places on this surface, as `carry` takes them; firsts: (S, 3) local first points."""
