@@ -44,7 +44,14 @@ from .api_dynamics import (
 )
 from .api_export import ExportSettings, export_groom
 from .api_guide_tools import change_guides
-from .api_import import DerivationSettings, TransferSettings, transfer_groom, use_as_guides, use_as_hair
+from .api_import import (
+    DerivationSettings,
+    TransferSettings,
+    import_curves,
+    transfer_groom,
+    use_as_guides,
+    use_as_hair,
+)
 from .api_library import apply_groom, groom_names, save_groom
 from .api_pictures import draw, render
 from .api_styles import (
@@ -117,6 +124,7 @@ __all__ = [
     "dynamics_of",
     "export_groom",
     "groom_names",
+    "import_curves",
     "interpolate_hair",
     "load_settings",
     "make_hair_cards",

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Python interface's functions of hair that comes from elsewhere, or goes to another mesh; api.py offers them."""
 
+import os
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .api_arguments import are_arrays, changed, curves_object_of, heard, mesh_of
+from .api_arguments import are_arrays, changed, choice, curves_object_of, heard, mesh_of, path_of
 from .api_blender import blender
 from .core import geometry, grooming
+from .core.files.curve_file import TO_Z_UP, Convention, parsed_unit
 from .core.geometry.mesh import TriMesh
 from .core.geometry.strands import Strands, curve_offsets, from_numpy
 from .core.grooming import groom
@@ -20,13 +22,14 @@ from .core.long_work import Progress, no_progress, run_now
 if TYPE_CHECKING:
     from .blender.groom.foreign.kept_hair import KeptHair
     from .blender.groom.transfer.groom_transfers import TransferredGroom
+    from .blender.io.curve_files import Found
 
 
 Curves = Any
 MeshObject = Any
 Arrays = TriMesh | tuple[ArrayLike, ArrayLike]
 
-__all__ = ["DerivationSettings", "TransferSettings", "transfer_groom", "use_as_guides", "use_as_hair"]
+__all__ = ["DerivationSettings", "TransferSettings", "import_curves", "transfer_groom", "use_as_guides", "use_as_hair"]
 
 
 def use_as_guides(
@@ -87,13 +90,15 @@ def use_as_hair(
     *,
     applies_modifiers: bool = True,
     follows_guides: bool = False,
+    guides: Curves | None = None,
     progress: Progress = no_progress,
     **changes: Any,
 ) -> "KeptHair":
     """Use curves not created by Vellus as hair, as they are, and derive guides that reproduce them.
 
     curves, surface and applies_modifiers: as of `use_as_guides`; settings: `DerivationSettings`; changes: its fields by
-    name; follows_guides: replace the strands with strands on the same roots that follow the guides. Returns what has
+    name; follows_guides: replace the strands with strands on the same roots that follow the guides; guides: a curves
+    object that becomes the hair's guides, as they are, in place of derived ones. Returns what has
     `hair` and `guides`, the Curves, and `mean_error` and `high_error`: how far strands are from their reproduction as a
     part of their length, the root mean square and what 95 % stay below. No point moves.
 
@@ -115,8 +120,43 @@ def use_as_hair(
         wanted,
         applies_modifiers=applies_modifiers,
         follows_guides=follows_guides,
+        guides_object=None if guides is None else curves_object_of(guides),
     )
     return run_now(work, progress)
+
+
+def import_curves(
+    path: str | os.PathLike,
+    surface: MeshObject,
+    kind: str = "HAIR",
+    *,
+    name: str = "",
+    unit: str | float | None = None,
+    up: str | None = None,
+) -> "Found":
+    """Read curves of a file, for `use_as_guides` and `use_as_hair`; the surface is where they are expected.
+
+    path: .abc, .usd, .usdc, .usda, .usdz, .npz or .blend; kind: "GUIDES" or "HAIR", of which a groom has both; name: of
+    an object or a group, "" for all; unit: m, cm, mm, in, ft, km or meters in a unit; up: the axis that points up, X, Y
+    or Z; None for what the file says. Returns what has `curves`, a curves object, `guides`, one of the guides that the
+    file has for this hair or None, and `notes`, sentences about what was assumed or left out.
+
+    >>> api.export_groom("groom.abc", [bpy.data.objects["Hair"]])
+    []
+    >>> found = api.import_curves("groom.abc", bpy.data.objects["Scalp"])
+    >>> used = api.use_as_hair(found.curves, bpy.data.objects["Scalp"], guides=found.guides)
+    >>> len(used.hair.curves) == len(bpy.data.objects["Hair"].data.curves), found.notes
+    (True, [])
+    """
+    choice(kind, "kind", ("GUIDES", "HAIR"))
+    if up is not None:
+        choice(up, "axis", tuple(TO_Z_UP))
+    metres = None if unit is None else parsed_unit(str(unit))
+    wanted = blender.io.curve_files.Wanted(kind, name, Convention(metres, up))
+    with blender.io.curve_files.curves_of(
+        path_of(path), wanted, blender.data.arguments.surface_object(surface)
+    ) as found:
+        return found
 
 
 def transfer_groom(

@@ -2,6 +2,7 @@
 """groom: a mesh → guides and hair."""
 
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 
 from .. import api
@@ -12,7 +13,7 @@ from ..core.grooming.groom import GuideSettings, HairSettings
 from ..core.long_work import run_now
 from ..core.params import declared
 from ..core.shading.presets import PRESETS
-from . import opening, options, style_options
+from . import curve_options, opening, options, style_options
 
 blender = lazy.Package("..blender", __package__)
 
@@ -31,15 +32,9 @@ def add(verbs):
     parser.add_argument("input", help="file with the mesh: .blend .obj .ply .stl .glb .gltf .usd* .abc")
     parser.add_argument("--out", required=True, help=".blend, .usd*, .abc, or .npz with the arrays")
     parser.add_argument("--surface", default="", metavar="NAME", help="mesh object; needed if the file has several")
-    parser.add_argument("--up", choices=("Y", "Z"), default="Z", help="axis that points up in an .obj, .ply, .stl [Z]")
+    curve_options.add_axis(parser)
     parser.add_argument("--preset", choices=PRESETS, metavar="NAME", help=f"a look: {', '.join(PRESETS)}")
-    parser.add_argument(
-        "--guides-from", metavar="FILE", help="use the curves of a .blend, .usd*, .abc or .npz as guides"
-    )
-    parser.add_argument(
-        "--hair-from", metavar="FILE", help="use the curves of such a file as hair, as they are, and derive --guides"
-    )
-    parser.add_argument("--guides-object", default="", metavar="NAME", help="curves object in either file")
+    curve_options.add_curves(parser)
     parser.add_argument(
         "--from-library", metavar="FILE[:NAME]", help="put on a groom that was saved to an asset library's .blend"
     )
@@ -57,17 +52,13 @@ def run(given, console):
         look = replace(PRESETS[given.preset][1], mode=settings.appearance.mode)
         settings = options.changed_groom(replace(settings, appearance=look), given)
 
-    came_from = given.guides_from or given.hair_from
-    if given.guides_from and given.hair_from:
-        raise HairError("--guides-from and --hair-from exclude each other.")
-    if given.guides_object and not came_from:
-        raise HairError("--guides-object needs --guides-from or --hair-from.")
-    if came_from:
-        blender.io.curve_files.require_readable(came_from)
+    came_from = curve_options.checked(given)
     if given.from_library and (came_from or given.settings):
         raise HairError(
             "--from-library brings guides and settings: leave out --guides-from, --hair-from and --settings."
         )
+    if came_from:
+        blender.io.curve_files.require_readable(came_from)
     blender.io.mesh_files.require_readable(given.input)
     blender.io.groom_files.require_writable(given.out)
     file_axes = opening.open_file(given, console)
@@ -125,9 +116,9 @@ def _from_library(given, surface, console):
 def _follow_curves(given, surface, settings, file_axes, console):
     """Return (guides, hair) from the curves in another file, or in the open one."""
     _warn_of_useless(options.options_given(given, _OF_GUIDES), f"Guides come from {given.guides_from}", console)
-    with _curves_of(given.guides_from, given, file_axes) as curves_object:
+    with _curves_of("GUIDES", given, surface, file_axes, console) as found:
         work = blender.groom.transfer.groom_settings.using_as_guides(
-            curves_object, surface, settings, blender.data.scene.present_depsgraph()
+            found.curves, surface, settings, blender.data.scene.present_depsgraph()
         )
         made = run_now(work, console.progress)
     for sentence, values in made.notes():
@@ -136,22 +127,30 @@ def _follow_curves(given, surface, settings, file_axes, console):
 
 
 def _keep_curves(given, surface, settings, file_axes, console):
-    """Return (guides, hair): the curves in another file, or in the open one, as hair, and guides derived from them."""
+    """Return (guides, hair): the curves in another file, or in the open one, as hair, and guides.
+
+    The guides that the file has for this hair, or guides derived from it.
+    """
     useless = options.options_given(given, _OF_GROWTH) + (["--style"] if given.styles else [])
     useless += ["--style-preset"] if given.style_preset else []
     _warn_of_useless(useless, f"Hair is kept as it came from {given.hair_from}", console)
-    with _curves_of(given.hair_from, given, file_axes) as curves_object:
+    with _curves_of("HAIR", given, surface, file_axes, console) as found:
+        if found.guides is not None:
+            counts = options.options_given(given, [("guide_count",)])
+            _warn_of_useless(counts, f"Guides come from {given.hair_from} too", console)
         work = blender.groom.foreign.kept_hair.using_as_hair(
-            curves_object,
+            found.curves,
             surface,
             blender.data.scene.present_depsgraph(),
             DerivationSettings(guide_count=settings.guides.guide_count),
+            guides_object=found.guides,
         )
         made = run_now(work, console.progress)
     for sentence, values in made.notes():
         console.warn(sentence.format(**values))
-    error, high = 100.0 * made.mean_error, 100.0 * made.high_error
-    console.warn(f"The guides reproduce the strands to {error:.1f}% (95%: {high:.1f}%) of their length.")
+    if found.guides is None:
+        error, high = 100.0 * made.mean_error, 100.0 * made.high_error
+        console.warn(f"The guides reproduce the strands to {error:.1f}% (95%: {high:.1f}%) of their length.")
     blender.groom.transfer.groom_settings.assign_look(made.hair, settings.appearance)
     blender.groom.transfer.groom_settings.assign_dynamics(made.guides, settings.dynamics)
     return made.guides, made.hair
@@ -163,7 +162,13 @@ def _warn_of_useless(names, reason, console):
         console.warn(f"{reason}: {', '.join(names)} {has} no effect.")
 
 
-def _curves_of(path, given, file_axes):
-    """A context with the curves object of a file, which may be the open one."""
+@contextmanager
+def _curves_of(kind, given, surface, file_axes, console):
+    """What is found in a file, which may be the open one; said to people."""
+    path = given.guides_from or given.hair_from
+    wanted = curve_options.wanted(kind, given, file_axes)
     is_open = path.resolve() == given.input.resolve()
-    return blender.io.curve_files.curves_of(path, given.guides_object, file_axes, is_open)
+    with blender.io.curve_files.curves_of(path, wanted, surface, is_open) as found:
+        for note in found.notes:
+            console.warn(str(note))
+        yield found

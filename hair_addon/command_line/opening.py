@@ -10,7 +10,7 @@ def open_file(given, console):
     """Open `given.input`; returns (3, 3), Blender's axes → the file's. Raises `HairError`."""
     blender.require_registered()
     file_axes = blender.io.mesh_files.open_file(
-        given.input, up=getattr(given, "up", "Z"), runs_scripts=given.enable_scripts
+        given.input, up=getattr(given, "up", None) or "Z", runs_scripts=given.enable_scripts
     )
     kept = blender.io.mesh_files.scripts_kept_from_running()
     if kept:

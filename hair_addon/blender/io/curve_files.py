@@ -1,130 +1,216 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Import of curves: .blend, USD, Alembic, and .npz arrays of grooms."""
+"""Import of curves as guides or hair: .blend, USD, Alembic, and .npz arrays of grooms."""
 
-import zipfile
 from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ...core.errors import HairError, cause_of
-from ..data.strands import attributes
-from ..host import paths
-from . import mesh_checks, strand_arrays
-
-_ARRAY = "guide_points"
-
-
-def _read_blend(path, name, _file_axes):
-    with bpy.data.libraries.load(str(path)) as (there, wanted):
-        wanted.objects = [name] if name and name in there.objects else there.objects
-    for read in wanted.objects:
-        if read is not None:
-            bpy.context.scene.collection.objects.link(read)
-
-
-def _read_usd(path, _name, _file_axes):
-    # The open scene must not change: no frame range, no world.
-    bpy.ops.wm.usd_import(
-        filepath=str(path),
-        import_meshes=False,
-        import_cameras=False,
-        import_lights=False,
-        import_materials=False,
-        import_volumes=False,
-        create_world_material=False,
-        set_frame_range=False,
-    )
-
-
-def _read_alembic(path, _name, _file_axes):
-    mesh_checks.require_alembic(path)
-    bpy.ops.wm.alembic_import(filepath=str(path), set_frame_range=False, as_background_job=False)
-
-
-def _read_arrays(path, _name, file_axes):
-    with open(path, "rb") as file, np.load(file) as arrays:
-        if _ARRAY not in arrays:
-            raise HairError(f"{path} has no curves: an .npz file needs an array {_ARRAY} (G, P, 3).")
-        points = arrays[_ARRAY]
-    if (
-        points.ndim != 3
-        or points.shape[2] != 3
-        or points.shape[0] < 1
-        or points.shape[1] < 2
-        or points.dtype.kind != "f"
-    ):
-        raise HairError(f"{path}: {_ARRAY} has shape {points.shape}, but must be (G, P, 3), P at least 2.")
-    points = points @ file_axes / strand_arrays.metres_per_unit(bpy.context.scene)
-    datablock = bpy.data.hair_curves.new(path.stem)
-    datablock.add_curves([points.shape[1]] * points.shape[0])
-    datablock.set_types(type="POLY")
-    attributes.write(datablock, "position", "FLOAT_VECTOR", "POINT", points)
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new(path.stem, datablock))
-
+from ...core.files import alembic_grooms, array_grooms, curve_file, curve_units
+from ...core.files.curve_file import Convention
+from ...core.geometry.mesh import TriMesh
+from ..data import scene
+from ..host import scene_time
+from . import curve_objects, strand_arrays, usd_curves
 
 _USD = (".usd", ".usdc", ".usda", ".usdz")
 
-# Ending → (function that adds what a file holds to the scene, operator that it needs).
-_FORMATS = {
-    ".blend": (_read_blend, None),
-    **dict.fromkeys(_USD, (_read_usd, "wm.usd_import")),
-    ".abc": (_read_alembic, "wm.alembic_import"),
-    ".npz": (_read_arrays, None),
+# Ending → reader of a `CurveFile`, but for .blend files, which have objects.
+_READERS = {
+    **dict.fromkeys(_USD, usd_curves.read),
+    ".abc": alembic_grooms.read,
+    ".npz": array_grooms.read,
 }
+ENDINGS = (".blend", *_READERS)
+
+_OTHER = {"GUIDES": "HAIR", "HAIR": "GUIDES"}
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is wanted of a file: kind "GUIDES" or "HAIR", of the objects or groups of a name, of all for "".
+
+    said: the unit and the axis of its coordinates, where people say them; axis: of arrays that do not say.
+    """
+
+    kind: str
+    name: str = ""
+    said: Convention = field(default_factory=Convention)
+    axis: str = "Z"
+
+
+@dataclass(frozen=True)
+class Found:
+    """An object of the wanted curves, one of the guides that the file has for them, and what to tell people."""
+
+    curves: bpy.types.Object
+    guides: bpy.types.Object | None = None
+    notes: list[HairError] = field(default_factory=list)
 
 
 def require_readable(path):
     """Raise `HairError` unless there is a file of a kind that holds curves."""
     path = Path(path)
     if not path.is_file():
-        raise HairError(f"{path} is not a file: check the path.")
-    ending = path.suffix.lower()
-    if ending not in _FORMATS:
-        raise HairError(f"{path} has a format that guides cannot be read from: use {', '.join(_FORMATS)}.")
-    operator = _FORMATS[ending][1]
-    if operator is not None and not paths.has_operator(operator):
-        raise HairError(f"{path} cannot be read: this build of Blender lacks its importer, {operator}.")
+        raise HairError("{path} is not a file: check the path.", path=path)
+    if path.suffix.lower() not in ENDINGS:
+        sentence = "{path} has a format that curves cannot be read from: use {endings}."
+        raise HairError(sentence, path=path, endings=", ".join(ENDINGS))
 
 
 @contextmanager
-def curves_of(path, name, file_axes, is_open=False):
-    """The object of curves in a file, or the one of a name, added to the open scene; all else that came goes again.
+def curves_of(path, wanted, surface_object, is_open=False):
+    """What is `Found` in a file, in the open scene; all else that came with it goes again.
 
-    file_axes: (3, 3), Blender's axes → those of arrays; is_open: whether the file is what is open. Raises `HairError`.
+    is_open: whether the file is what is open. Raises `HairError`.
     """
     path = Path(path)
     require_readable(path)
+    if path.suffix.lower() != ".blend":
+        yield _made(path, wanted, surface_object)
+        return
+    if wanted.said != Convention():
+        raise HairError("{path} has its own unit and axes: leave out those that were given.", path=path)
     before = set(bpy.data.objects)
     if not is_open:
-        try:
-            _FORMATS[path.suffix.lower()][0](path, name, file_axes)
-        except (OSError, RuntimeError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
-            raise HairError(f"{path} cannot be read: {cause_of(error)}.") from error
+        _append(path)
         bpy.context.view_layer.update()
     came = set(bpy.data.objects) - (set() if is_open else before)
-    chosen = _choose(
-        path, [o for o in came if o.type in {"CURVES", "CURVE"} and o.name in bpy.context.view_layer.objects], name
-    )
-    yield chosen
-    for other in came - {chosen} if not is_open else ():
-        bpy.data.objects.remove(other)
+    chosen = _chosen_objects(path, came, wanted, is_open)
+    if is_open:
+        yield Found(curve_objects.joined(chosen))
+        bpy.context.view_layer.update()
+        return
+    guides = [] if wanted.kind == "GUIDES" else _guides_of(chosen, came)
+    for one in [*chosen, *guides]:
+        curve_objects.make_plain(one)
+    used = {*chosen, *guides}
+    found = Found(curve_objects.joined(chosen), curve_objects.joined(guides) if guides else None)
+    others = came - used
+    data = {one.data for one in others if one.type == "CURVES"}
+    bpy.data.batch_remove(others)
+    bpy.data.batch_remove([one for one in data if not one.users])
     bpy.context.view_layer.update()
+    yield found
 
 
-def _choose(path, found, name):
-    found = sorted(found, key=lambda o: o.name)
-    if name:
-        chosen = [o for o in found if o.name == name]
-        if not chosen:
-            raise HairError(f'{path} has no curves object "{name}".')
-        return chosen[0]
-    ours = [o for o in found if o.type == "CURVES" and o.data.vellus.kind == "GUIDES"]
-    found = ours if len(ours) == 1 else found
+# ---------------------------------------------------------------------------------------------------- files
+
+
+def _made(path, wanted, surface_object):
+    """What is `Found` in a file of another program, or of arrays."""
+    reader = _READERS[path.suffix.lower()]
+    file = reader(path, wanted.axis) if reader is array_grooms.read else reader(path)
+    chosen, guides = _chosen_sets(path, file.sets, wanted)
+    reading = curve_units.choose(file, [*chosen, *guides], wanted.said, _mesh(surface_object), str(path))
+    notes = [*file.notes, *reading.notes, *_notes_on_groups(path, chosen)]
+    curves, its_guides = ([_now(one.placed(reading.metres, reading.up)) for one in sets] for sets in (chosen, guides))
+    if any(one.motion is not None for one in chosen):
+        notes.append(HairError("{path} moves: its curves are read at the present frame alone.", path=path))
+    joined, made_guides, guide_ids = curve_file.join(curves), None, None
+    if guides:
+        joined_guides = curve_file.join(its_guides)
+        made_guides = curve_objects.new_object("Guides", joined_guides, surface_object)
+        guide_ids = joined_guides.ids
+    made = curve_objects.new_object(_name(path, chosen), joined, surface_object, guide_ids)
+    return Found(made, made_guides, notes)
+
+
+def _name(path, chosen):
+    return chosen[0].name if len(chosen) == 1 else path.stem
+
+
+def _now(curves):
+    """Curves that move, where they are at the scene's time, or the nearest that the file has."""
+    if curves.motion is None:
+        return curves
+    now = scene_time.present_frame() / scene_time.frame_rate(bpy.context.scene)
+    index = int(np.argmin(np.abs(curves.motion.times - now)))
+    return replace(curves, points=curves.motion.points_at(index))
+
+
+def _chosen_sets(path, sets, wanted):
+    """([sets that are wanted], [those of the guides of these])."""
+    every = [one for one in sets if len(one)]
+    if not every:
+        raise HairError("{path} has no curves.", path=path)
+    named = [one for one in every if not wanted.name or wanted.name in (one.name, one.group_name)]
+    if not named:
+        names = _listed([one.name for one in every])
+        sentence = '{path} has no curves "{name}", but {names}.'
+        raise HairError(sentence, path=path, name=wanted.name, names=names)
+    is_guide = wanted.kind == "GUIDES"
+    # What the file says to be of the kind; else what it says nothing of; else the rest.
+    chosen = next(
+        found
+        for found in ([one for one in named if one.is_guide is kind] for kind in (is_guide, None, not is_guide))
+        if found
+    )
+    if is_guide or chosen[0].is_guide is not False:
+        return chosen, []
+    groups = {(one.group_id, one.group_name) for one in chosen}
+    return chosen, [one for one in every if one.is_guide and (one.group_id, one.group_name) in groups]
+
+
+def _notes_on_groups(path, chosen):
+    groups = list(dict.fromkeys(one.group_name or str(one.group_id) for one in chosen if one.is_guide is not None))
+    if len(groups) > 1:
+        sentence = "{path} has {count} groups ({names}): they are read as one, unless one is named."
+        yield HairError(sentence, path=path, count=len(groups), names=_listed(groups))
+
+
+def _listed(names):
+    return ", ".join(names[:5]) + ("…" if len(names) > 5 else "")
+
+
+def _mesh(surface_object):
+    """The surface as it is now, a `TriMesh` in the world [m]."""
+    surface = scene.read_surface(surface_object, scene.present_depsgraph())
+    matrix = np.array(surface_object.matrix_world) * strand_arrays.metres_per_unit(bpy.context.scene)
+    return TriMesh((surface.posed @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32), surface.mesh.triangles)
+
+
+# ---------------------------------------------------------------------------------------------------- .blend files
+
+
+def _append(path):
+    try:
+        with bpy.data.libraries.load(str(path)) as (there, wanted):
+            wanted.objects = there.objects
+    except (OSError, RuntimeError, ValueError) as error:
+        raise HairError("{path} cannot be read: {cause}.", path=path, cause=cause_of(error)) from error
+    for read in wanted.objects:
+        if read is not None:
+            bpy.context.scene.collection.objects.link(read)
+            read.hide_viewport = False
+            read.hide_set(False)
+
+
+def _chosen_objects(path, came, wanted, is_open):
+    layer = bpy.context.view_layer
+    found = [o for o in came if o.type in {"CURVES", "CURVE"} and layer.objects.get(o.name) == o]
+    found.sort(key=lambda one: one.name)
     if not found:
-        raise HairError(f"{path} has no curves to use as guides.")
-    if len(found) > 1:
-        names = ", ".join(o.name for o in found[:5]) + ("…" if len(found) > 5 else "")
-        raise HairError(f"{path} has {len(found)} curves objects ({names}): choose one with --guides-object.")
-    return found[0]
+        raise HairError("{path} has no curves.", path=path)
+    if wanted.name:
+        chosen = [one for one in found if one.name == wanted.name]
+        if not chosen:
+            sentence = '{path} has no curves "{name}", but {names}.'
+            raise HairError(sentence, path=path, name=wanted.name, names=_listed([one.name for one in found]))
+        return chosen
+    kinds = {one: one.data.vellus.kind if one.type == "CURVES" else "NONE" for one in found}
+    order = (wanted.kind, "NONE", _OTHER[wanted.kind])
+    kind, chosen = next((kind, some) for kind in order if (some := [one for one in found if kinds[one] == kind]))
+    if is_open and kind != "NONE" and len(chosen) > 1:
+        sentence = "{path} has {count} curves objects of that kind ({names}): name one."
+        raise HairError(sentence, path=path, count=len(chosen), names=_listed([one.name for one in chosen]))
+    return chosen
+
+
+def _guides_of(chosen, came):
+    """The objects of the guides that hair follows."""
+    wanted = {one.data.vellus.guide_curves for one in chosen if one.type == "CURVES"} - {None}
+    return [one for one in came if one.type == "CURVES" and one.data in wanted]

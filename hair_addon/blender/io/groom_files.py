@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Grooms → files: a .blend, arrays, USD, Alembic."""
 
+import contextlib
+
 import bpy
 import numpy as np
 
 from ...core.errors import HairError
 from ...core.files.whole_file import require_place, require_room, whole_file
+from ..data.strands import attributes, exported_curves
 from ..groom.selection import object_of
 from ..host import paths, scene_time
-from . import strand_arrays
+from . import mesh_files, strand_arrays
 from .chosen_objects import only_chosen
 
 _USD = (".usd", ".usdc", ".usda", ".usdz")
 ENDINGS = (".blend", ".npz", *_USD, ".abc")
+
+_KIND = "groom_guide"  # [UnrealGroom26]: 1 of guides, 0 of strands
 
 _OPERATORS = {".abc": "wm.alembic_export"} | dict.fromkeys(_USD, "wm.usd_export")
 
@@ -44,7 +49,7 @@ def write(path, guides, hair, file_axes):
         if ending == ".npz":
             np.savez(partial, **arrays(guides, hair, file_axes))
         else:
-            with only_chosen(_objects(guides, hair)):
+            with only_chosen(_objects(guides, hair)), _kinds_told(guides, hair):
                 _export(partial.absolute(), ending, guides, hair)
 
 
@@ -55,12 +60,15 @@ def save_copy(path):
 
 
 def arrays(guides, hair, file_axes):
-    """{name: float32 [m]}: roots (S, 3), guide_points (G, P, 3) and strand_points (S, P, 3)."""
-    turned = {
-        name: np.ascontiguousarray(strand_arrays.world_points(curves) @ file_axes.T.astype(np.float32))
-        for name, curves in (("guide_points", guides), ("strand_points", hair))
-    }
-    return {"roots": turned["strand_points"][:, 0], **turned}
+    """{name: array} as `array_grooms` has them; file_axes: as of `write`."""
+    made = {}
+    for name, curves in (("guide", guides), ("strand", hair)):
+        points = strand_arrays.world_points(curves)
+        made[f"{name}_points"] = np.ascontiguousarray(points @ file_axes.T.astype(np.float32))
+        radii = exported_curves.read_radii(curves, points.shape[1])(slice(0, len(points)))
+        made[f"{name}_widths"] = radii * np.float32(2.0 * strand_arrays.world_scale(curves))
+    axis = mesh_files.axis_of(file_axes)
+    return {"roots": made["strand_points"][:, 0], **made, "up": np.array(axis)}
 
 
 def _objects(guides, hair):
@@ -69,6 +77,27 @@ def _objects(guides, hair):
     layer.update()
     found = (object_of(guides, layer), object_of(hair, layer), guides.surface)
     return [one for one in found if one is not None]
+
+
+@contextlib.contextmanager
+def _kinds_told(guides, hair):
+    """Let Blender's exporters write which curves are guides: USD takes attributes of curves, Alembic properties of
+    objects.
+    """
+    told = [(guides, True), (hair, False)]
+    objects = [(object_of(datablock, bpy.context.view_layer), is_guide) for datablock, is_guide in told]
+    objects = [(one, is_guide) for one, is_guide in objects if one is not None and _KIND not in one]
+    for datablock, is_guide in told:
+        attributes.write(datablock, _KIND, "INT", "CURVE", np.full(len(datablock.curves), is_guide, np.int32))
+    for one, is_guide in objects:
+        one[_KIND] = int(is_guide)
+    try:
+        yield
+    finally:
+        for one, _is_guide in objects:
+            del one[_KIND]
+        for datablock, _is_guide in told:
+            datablock.attributes.remove(datablock.attributes[_KIND])
 
 
 def _export(partial, ending, guides, hair):

@@ -63,6 +63,16 @@ _FORMATS = {
 _UP_IS_ASKED = {".obj", ".ply", ".stl"}
 
 
+def asks_for_axis(path):
+    """Whether a file does not say which of its axes points up."""
+    return Path(path).suffix.lower() in _UP_IS_ASKED
+
+
+def axis_of(file_axes):
+    """The axis, Y or Z, that points up in a file; file_axes: as `open_file` returns."""
+    return next(name for name, axes in _UP.items() if np.array_equal(axes, file_axes))
+
+
 def require_readable(path):
     """Raise `HairError` unless there is a file of a kind that `open_file` takes."""
     path = Path(path)

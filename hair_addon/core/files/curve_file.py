@@ -24,6 +24,21 @@ TO_Z_UP = {
 }
 
 
+def parsed_unit(text: str) -> float:
+    """Metres in a unit, by its name or as a number. Raises `HairError`."""
+    if text in UNITS:
+        return UNITS[text]
+    try:
+        metres = float(text)
+    except ValueError:
+        metres = 0.0
+    if not 0.0 < metres < 1e9:
+        raise HairError(
+            "{unit} is not a unit: use {names}, or meters in a unit as a number.", unit=text, names=", ".join(UNITS)
+        )
+    return metres
+
+
 @dataclass(frozen=True)
 class Convention:
     """Unit and axis of coordinates; None where nobody has said, and the file's own statement or a guess holds.
@@ -87,6 +102,31 @@ class CurveSet:
             motion = Motion(motion.times, lambda index: turned(points_at(index)))
         radii = None if self.radii is None else (self.radii.astype(np.float64) * metres).astype(np.float32)
         return replace(self, points=turned(self.points), radii=radii, motion=motion)
+
+    def some(self, is_chosen: np.ndarray) -> "CurveSet":
+        """Some of the curves; is_chosen: (C,) bool."""
+        if is_chosen.all():
+            return self
+        rows, motion = np.repeat(is_chosen, self.counts), self.motion
+        if motion is not None:
+            points_at = motion.points_at
+            motion = Motion(motion.times, lambda index: points_at(index)[rows])
+
+        def of_curves(values):
+            return None if values is None else values[is_chosen]
+
+        return replace(
+            self,
+            points=self.points[rows],
+            counts=self.counts[is_chosen],
+            is_smooth=self.is_smooth[is_chosen],
+            radii=None if self.radii is None else self.radii[rows],
+            ids=of_curves(self.ids),
+            root_uvs=of_curves(self.root_uvs),
+            guide_ids=of_curves(self.guide_ids),
+            guide_weights=of_curves(self.guide_weights),
+            motion=motion,
+        )
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,8 @@ class DerivationSettings(Settings):
 class DerivedGuides:
     """Guides of some hair, and how closely they reproduce it.
 
-    guides: `Strands` (G, P) on the processor; sources: (G,) the strands that they stand at; binding: of all strands to
+    guides: `Strands` (G, P) on the processor; sources: (G,) the strands that they stand at, none of guides that came
+    with the hair; binding: of all strands to
     them; guide_map: (S, k) int32 guides, -1 for none, and float32 weights of each strand; errors: (S,) root mean square
     distance between the points of a strand and of its reproduction, as a part of the strand's length.
     """
@@ -103,6 +104,23 @@ def derive(
         if found.mean < best.mean:
             best = found
     return DerivedGuides(best.guides, sources, binding, best.guide_map, best.errors)
+
+
+def reproduced(
+    mesh: TriMesh,
+    points: np.ndarray,
+    roots: SurfacePoints,
+    settings: HairSettings,
+    guides: Strands,
+    *,
+    is_mirrored: bool = False,
+    progress: Progress = no_progress,
+) -> DerivedGuides:
+    """`DerivedGuides` of strands that came with guides, which stay as they are; other arguments as of `derive`."""
+    groom.load_kernels("cpu", part_of(progress, 0.0, 0.5))
+    binding = groom.bind_hair(mesh, guides, settings, roots=roots, is_mirrored=is_mirrored)
+    found = _Reproduction(binding, guides, points, lengths(points))
+    return DerivedGuides(guides, np.zeros(0, np.int64), binding, found.guide_map, found.errors)
 
 
 class _Reproduction:

@@ -191,10 +191,13 @@ def test_arrays_are_in_metres_and_the_axes_of_the_file(scene, tmp_path, kind):
         ended = run_here(*groom, "--length", length, "--out", tmp_path / "out.npz")
         assert ended.status == 0, ended.errors
         arrays = load(tmp_path / "out.npz")
+        assert str(arrays.pop("up")) == "YZ"[up is Z]
         assert {name: array.shape for name, array in arrays.items()} == {
             "roots": (200, 3),
             "guide_points": (30, 41, 3),
+            "guide_widths": (30, 41),
             "strand_points": (200, 41, 3),
+            "strand_widths": (200, 41),
         }
         assert all(array.dtype == np.float32 for array in arrays.values())
         np.testing.assert_array_equal(arrays["roots"], arrays["strand_points"][:, 0])

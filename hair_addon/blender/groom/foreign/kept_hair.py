@@ -17,14 +17,14 @@ from ....core import geometry, grooming
 from ....core.errors import HairError
 from ....core.geometry import strands
 from ....core.grooming import groom, groom_defaults
-from ....core.grooming.derived_guides import DerivationSettings, DerivedGuides
+from ....core.grooming.derived_guides import DerivationSettings
 from ....core.grooming.groom import HairSettings
 from ....core.grooming.rooted_curves import RootedCurves
 from ....core.long_work import Work, part_of
 from ....core.params import Param, declared, plain_value
 from ...data import scene
 from ...data.scene import Surface
-from ...data.strands import attributes, curves, curves_objects, kept_shapes
+from ...data.strands import attributes, curves, curves_objects, exported_curves, kept_shapes
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...materials import looks
@@ -60,11 +60,13 @@ def using_as_hair(
     *,
     applies_modifiers: bool = True,
     follows_guides: bool = False,
+    guides_object: Object | None = None,
 ) -> Work[KeptHair]:
     """Make an object's curves hair and derive guides, as work in steps; returns `KeptHair`.
 
     applies_modifiers: as of `hand_made_guides.using_as_guides`; follows_guides: regenerate the strands, on their roots,
-    by the guides. Raises `HairError` before anything changes.
+    by the guides; guides_object: of guides that came with the hair, which are kept in place of derived ones; weights
+    that the hair stores of them too. Raises `HairError` before anything changes.
     """
     applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
     follows_guides = plain_value("Follow Guides", follows_guides, False, _SWITCH)
@@ -74,13 +76,31 @@ def using_as_hair(
     seen = foreign_curves.read(curves_object, applies_modifiers)
     if len(seen.starts) < 2:
         raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
-    to_surface = np.linalg.inv(np.array(surface_object.matrix_world)) @ np.array(curves_object.matrix_world)
+    from_world = np.linalg.inv(np.array(surface_object.matrix_world))
+    to_surface = from_world @ np.array(curves_object.matrix_world)
     place, its_surface = Remembered(curves_object), Remembered(surface_object)
+    given = None if guides_object is None else _given_guides(guides_object, surface_object, from_world)
+    its_guides = None if guides_object is None else Remembered(guides_object)
 
     def compute(progress):
         progress("Rooting strands", 0.0)
         placed = hand_made_guides.on_surface(surface, seen, to_surface)
         count = len(placed.counts)
+        if given is not None:
+            guides = hand_made_guides.on_surface(surface, *given)
+            wanted = groom_defaults.complete(
+                HairSettings(strand_count=count), surface.posed_mesh, None, None, len(guides.counts)
+            )
+            derived = grooming.derived_guides.reproduced(
+                surface.mesh,
+                placed.even(surface),
+                placed.rooted.roots,
+                wanted,
+                strands.from_numpy(guides.even(surface), guides.rooted.roots),
+                is_mirrored=surface.is_mirrored,
+                progress=part_of(progress, 0.1, 1.0),
+            )
+            return placed, wanted, derived, guides
         wanted = groom_defaults.complete(
             HairSettings(strand_count=count), surface.posed_mesh, None, None, min(settings.guide_count, count)
         )
@@ -93,21 +113,40 @@ def using_as_hair(
             is_mirrored=surface.names_otherwise,
             progress=part_of(progress, 0.1, 1.0),
         )
-        return placed, wanted, derived
+        return placed, wanted, derived, None
 
-    placed, wanted, derived = yield compute
+    placed, wanted, derived, kept_guides = yield compute
     hair = hand_made_guides.write(
         place.find(), its_surface.find(), surface, placed, seen, applies_modifiers, kind="HAIR"
     )
     wanted = replace(wanted, radius=_write_widths(hair, surface, placed, wanted))
-    guides = writing.write_hand_made(hair.surface, surface, derived.guides)
-    _write_hair(hair, guides, surface, placed, wanted, derived)
+    guide_map = derived.guide_map
+    if its_guides is None or kept_guides is None or given is None:
+        guides = writing.write_hand_made(hair.surface, surface, derived.guides)
+    else:
+        stored = exported_curves.read_guide_map(hair, len(given[0].starts) - 1)
+        guides = hand_made_guides.write(its_guides.find(), hair.surface, surface, kept_guides, given[0], True)
+        guide_map = guide_map if stored is None else _among(kept_guides.rooted.kept, *stored)
+    _write_hair(hair, guides, surface, placed, wanted, guide_map)
     if follows_guides:
         pipeline.interpolate_hair(guides, wanted, depsgraph, hair)
     return KeptHair(hair, guides, placed.rooted, derived.mean_error, derived.high_error)
 
 
-def _write_hair(hair, guides, surface, placed, settings, derived: DerivedGuides):
+def _given_guides(guides_object, surface_object, from_world):
+    """(`SeenCurves`, (4, 4) matrix to the surface's coordinates) of guides that came with hair."""
+    hand_made_guides.require_usable(guides_object, surface_object)
+    return foreign_curves.read(guides_object, True), from_world @ np.array(guides_object.matrix_world)
+
+
+def _among(kept, indices, weights):
+    """A map to some guides as a map to those of them that are kept, (K,) rising."""
+    places = np.minimum(np.searchsorted(kept, indices), len(kept) - 1)
+    is_there = (indices >= 0) & (kept[places] == indices)
+    return np.where(is_there, places, -1).astype(np.int32), np.where(is_there, weights, np.float32(0.0))
+
+
+def _write_hair(hair, guides, surface, placed, settings, guide_map):
     state = hair.vellus
     state.guide_curves = guides
     setting_properties.assign(state.hair, settings)
@@ -115,7 +154,7 @@ def _write_hair(hair, guides, surface, placed, settings, derived: DerivedGuides)
     for name, data_type, values in zip(("id", "strand_random"), ("INT", "FLOAT"), identities, strict=True):
         if not attributes.has(hair, name, data_type, "CURVE"):
             attributes.write(hair, name, data_type, "CURVE", values)
-    curves.write_guide_map(hair, derived.guide_map)
+    curves.write_guide_map(hair, guide_map)
     kept_shapes.keep(guides, curves.read_points(guides))
     # So that regenerated strands take these roots, and nothing is regenerated unless asked for.
     state.root_key = staleness.root_key(settings, None)

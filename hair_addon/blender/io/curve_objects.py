@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curves of a file as an object of the open scene, and objects of curves as one."""
+
+import bpy
+import numpy as np
+
+from ..data.strands import attributes, curves
+from ..groom.foreign import foreign_curves
+from . import strand_arrays
+
+
+def new_object(name, placed, surface_object, guide_ids=None):
+    """A new object of a `CurveSet` in metres with Z up; it is in the scene, with the coordinates of a surface.
+
+    guide_ids: (G,) identities of the guides that it follows; their places among these are kept, with weights.
+    """
+    to_world = np.array(surface_object.matrix_world, np.float64) * strand_arrays.metres_per_unit(bpy.context.scene)
+    to_world[3, 3] = 1.0
+    back, scale = np.linalg.inv(to_world), abs(np.linalg.det(to_world[:3, :3])) ** (1.0 / 3.0)
+    points = placed.points.astype(np.float64) @ back[:3, :3].T + back[:3, 3]
+    datablock = bpy.data.hair_curves.new(name)
+    datablock.add_curves(np.asarray(placed.counts).tolist())
+    datablock.set_types(type="POLY")
+    if placed.is_smooth.any():
+        datablock.set_types(type="CATMULL_ROM", indices=np.flatnonzero(placed.is_smooth).tolist())
+    attributes.write(datablock, "position", "FLOAT_VECTOR", "POINT", points.astype(np.float32))
+    if placed.radii is not None:
+        attributes.write(datablock, "radius", "FLOAT", "POINT", placed.radii / np.float32(scale))
+    if placed.ids is not None:
+        attributes.write(datablock, "id", "INT", "CURVE", placed.ids)
+    if guide_ids is not None and placed.guide_ids is not None:
+        curves.write_guide_map(datablock, _guide_map(guide_ids, placed.guide_ids, placed.guide_weights))
+    made = bpy.data.objects.new(name, datablock)
+    bpy.context.scene.collection.objects.link(made)
+    made.matrix_world = surface_object.matrix_world
+    bpy.context.view_layer.update()
+    return made
+
+
+def _guide_map(known, ids, weights):
+    """(S, k) int32 places among known identities, -1 for none, and (S, k) float32 weights."""
+    order = np.argsort(known, kind="stable")
+    places = np.minimum(np.searchsorted(known, ids, sorter=order), len(known) - 1)
+    indices = order[places]
+    is_used = (known[indices] == ids) & (weights > 0.0)
+    return np.where(is_used, indices, -1).astype(np.int32), np.where(is_used, weights, 0.0).astype(np.float32)
+
+
+def make_plain(curves_object):
+    """Make guides, hair or any other curves of a file curves as they are seen, which are of no surface."""
+    datablock = foreign_curves.take(curves_object, True)
+    datablock.vellus.kind, datablock.vellus.guide_curves, datablock.surface = "NONE", None, None
+    matrix = curves_object.matrix_world.copy()
+    curves_object.parent = None
+    curves_object.matrix_world = matrix
+    bpy.context.view_layer.update()
+
+
+def joined(objects):
+    """One object of the curves of several as they are seen now: the first of them, into which the others go."""
+    first, *others = objects
+    if not others:
+        return first
+    for one in objects:
+        datablock = foreign_curves.take(one, True)
+        curves.write_guide_map(datablock, None)  # of other guides than those that they have in the end
+    with bpy.context.temp_override(
+        active_object=first, object=first, selected_objects=objects, selected_editable_objects=objects
+    ):
+        bpy.ops.object.join()
+    bpy.context.view_layer.update()
+    return first

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Options of commands that take curves from a file: which of them, in which unit, and which axis points up."""
+
+from ..core import lazy
+from ..core.errors import HairError
+from ..core.files.curve_file import UNITS, Convention, parsed_unit
+
+blender = lazy.Package("..blender", __package__)
+
+
+def add_axis(parser):
+    """Add the option of what points up, in the mesh and in curves."""
+    parser.add_argument(
+        "--up",
+        choices=("X", "Y", "Z"),
+        help="axis that points up in an .obj, .ply or .stl [Z], else in the file of curves [as it says]",
+    )
+
+
+def add_curves(parser):
+    """Add the options of curves that come from a file."""
+    parser.add_argument(
+        "--guides-from", metavar="FILE", help="use the curves of a .blend, .usd*, .abc or .npz as guides"
+    )
+    parser.add_argument(
+        "--hair-from",
+        metavar="FILE",
+        help="use the curves of such a file as hair, as they are, with its guides, or derive --guides",
+    )
+    parser.add_argument(
+        "--object",
+        "--guides-object",
+        dest="object",
+        default="",
+        metavar="NAME",
+        help="object or group in either file [all]",
+    )
+    parser.add_argument(
+        "--unit", metavar="UNIT", help=f"unit in either file: {', '.join(UNITS)}, or meters in it [as it says]"
+    )
+
+
+def checked(given):
+    """The file that curves come from, None for none. Raises `HairError` for options that do not fit each other."""
+    came_from = given.guides_from or given.hair_from
+    if given.guides_from and given.hair_from:
+        raise HairError("--guides-from and --hair-from exclude each other.")
+    for name in ("object", "unit"):
+        if getattr(given, name) and not came_from:
+            raise HairError(f"--{name} needs --guides-from or --hair-from.")
+    is_blend = came_from is not None and came_from.suffix.lower() == ".blend"
+    if is_blend and given.unit:
+        raise HairError("--unit has no effect on a .blend file, which has its own.")
+    if given.unit:
+        parsed_unit(given.unit)
+    if given.up and not blender.io.mesh_files.asks_for_axis(given.input) and (is_blend or not came_from):
+        raise HairError(f"--up has no effect: {given.input} has its own axes.")
+    if given.up == "X" and blender.io.mesh_files.asks_for_axis(given.input):
+        raise HairError("--up X is not known for a mesh: Y or Z points up there.")
+    return came_from
+
+
+def wanted(kind, given, file_axes):
+    """What is wanted of a file of curves; file_axes: Blender's axes → those of the mesh's file."""
+    # What the mesh's file is asked, that of curves need not be.
+    is_said = given.up and not blender.io.mesh_files.asks_for_axis(given.input)
+    said = Convention(parsed_unit(given.unit) if given.unit else None, given.up if is_said else None)
+    axis = blender.io.mesh_files.axis_of(file_axes)
+    return blender.io.curve_files.Wanted(kind, given.object, said, axis)

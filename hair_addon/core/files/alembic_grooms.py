@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curves of [Alembic26] files as a `CurveFile`: where transforms put them, and what grooms say of them [UnrealGroom26].
+
+Files have no unit and no axis. Those of Vellus are in centimetres with Z up; programs are known by what they usually
+write.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import HairError
+from . import alembic_shapes, alembic_transforms, unreal_groom
+from .alembic_reader import Archive, Damaged, Property
+from .curve_file import Convention, CurveFile, CurveSet, Motion
+from .groom_curves import GUIDE_SLOTS
+
+# What programs write by default, by the beginning of their names; Y is up in all of them.
+_OF_BLENDER = Convention(1.0, "Y")
+_USUAL = {"Houdini": Convention(1.0, "Y")}
+_OF_OTHERS = Convention(0.01, "Y")
+
+_MOST_OBJECTS = 1_000_000
+
+
+@dataclass(frozen=True)
+class _Node:
+    """An object of curves: its path, its schema's properties, and the schemas' properties of the transforms that it is
+    in, by the number of objects above.
+    """
+
+    path: tuple[str, ...]
+    properties: Mapping[str, Property]
+    transforms: Mapping[int, Mapping[str, Property]]
+
+
+def read(path: Path) -> CurveFile:
+    """The curves of an Alembic file. Raises `HairError`.
+
+    Curves that move stand where they are in the file's first sample of them.
+    """
+    with _told(path), Archive(path) as archive:
+        nodes = _nodes(archive.top())
+        application = archive.metadata.get("_ai_Application", "")
+        notes: list[HairError] = []
+        sets = []
+        for node, name in zip(nodes, _names(nodes), strict=True):
+            sets += _sets_of(archive, node, name, application, notes)
+    return CurveFile(sets, _stated(application), _usual(application), notes)
+
+
+@contextmanager
+def _told(path) -> Iterator[None]:
+    try:
+        yield
+    except (Damaged, OSError, MemoryError) as error:
+        raise HairError("{path} is a damaged Alembic file.", path=path) from error
+
+
+def _stated(application):
+    if application.startswith("Vellus "):
+        return Convention(1.0 / unreal_groom.PER_METRE, "Z")
+    return _OF_BLENDER if application == "Blender" else Convention()
+
+
+def _usual(application):
+    return next((usual for name, usual in _USUAL.items() if application.startswith(name)), _OF_OTHERS)
+
+
+# ---------------------------------------------------------------------------------------------------- objects
+
+
+def _nodes(top) -> list[_Node]:
+    """All objects of curves; instances have those of what they show."""
+    found, instances, pending, count = [], [], [(top, {})], 0
+    while pending:
+        one, transforms = pending.pop()
+        count += 1
+        if count > _MOST_OBJECTS:
+            raise Damaged
+        properties, schema = one.properties, one.metadata.get("schema", "")
+        if ".instanceSource" in properties:
+            (source,) = one.archive.values(properties[".instanceSource"])[:1]
+            instances.append((one.path, transforms, tuple(source.strip("/").split("/"))))
+            continue
+        if schema.startswith("AbcGeom_Xform") and ".xform" in properties:
+            transforms = {**transforms, len(one.path): properties[".xform"].children}
+        if schema.startswith("AbcGeom_Curve") and ".geom" in properties:
+            found.append(_Node(one.path, properties[".geom"].children, transforms))
+        pending += [(child, transforms) for child in reversed([*one.children()])]
+    made = [*found]
+    for path, transforms, source in instances:
+        for node in found:
+            if node.path[: len(source)] == source:
+                # Transforms that the source stands in do not move its instances.
+                below = {
+                    depth + len(path) - len(source): t for depth, t in node.transforms.items() if depth >= len(source)
+                }
+                made.append(_Node((*path, *node.path[len(source) :]), node.properties, {**transforms, **below}))
+                if len(made) > _MOST_OBJECTS:
+                    raise Damaged
+    return made
+
+
+def _names(nodes):
+    """Names by which people choose: of the transform that has these curves alone, else of the curves; or paths."""
+    siblings = Counter(node.path[:-1] for node in nodes)
+    own = [node.path[-2] if len(node.path) > 1 and siblings[node.path[:-1]] == 1 else node.path[-1] for node in nodes]
+    counts = Counter(own)
+    return [name if counts[name] == 1 else "/".join(node.path) for node, name in zip(nodes, own, strict=True)]
+
+
+# ---------------------------------------------------------------------------------------------------- curves
+
+
+def _sets_of(archive, node, name, application, notes) -> Iterator[CurveSet]:
+    """The `CurveSet` of an object; none where it has no curves. What people are to know is added to notes."""
+    stack = [node.transforms[depth] for depth in sorted(node.transforms)]
+    shape = alembic_shapes.Shape(archive, node.properties, is_of_blender=application == "Blender")
+    drawn = shape.drawn()
+    for sentence, count in drawn.said:
+        notes.append(HairError(sentence, name=name, path=archive.path, count=count))
+    if not len(drawn.counts):
+        return
+    times = alembic_transforms.times_of([shape.points, *(one[".vals"] for one in stack if ".vals" in one)])
+    first = float(times[0]) if len(times) else 0.0
+    matrix = alembic_transforms.matrix_at(archive, stack, first)
+    scale = abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0)
+    radii = None if drawn.widths is None else (0.5 * scale * drawn.widths).astype(np.float32)
+
+    def points_at(index):
+        with _told(archive.path), Archive(archive.path) as again:
+            placed = alembic_transforms.matrix_at(again, stack, float(times[index]))
+            return _placed(shape.points_at(again, float(times[index]), drawn), placed)
+
+    motion = Motion(times, points_at) if len(times) > 1 else None
+    if motion is not None and not shape.keeps_counts:
+        motion = None
+        sentence = '"{name}" in {path} has other numbers of points at other times: only its first sample is read.'
+        notes.append(HairError(sentence, name=name, path=archive.path))
+    made = CurveSet(
+        name,
+        _placed(drawn.points, matrix),
+        drawn.counts,
+        np.full(len(drawn.counts), drawn.is_smooth),
+        radii,
+        motion=motion,
+    )
+    yield from _told_apart(made, _Said(archive, node, stack), drawn.kept)
+
+
+def _placed(points, matrix):
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+class _Said:
+    """What parameters of curves, of their transforms and of what those are in say of them; the nearest counts."""
+
+    def __init__(self, archive, node, stack):
+        self._archive, self._places = archive, []
+        for properties in (node.properties, *reversed(stack)):
+            for name in (".arbGeomParams", ".userProperties"):
+                if name in properties:
+                    self._places.append(properties[name].children)
+
+    def values(self, name, kind, width=1):
+        """(n,) or (n, width) values of a parameter, None where there is none of this kind: "iu", "f" or text, ""."""
+        for place in self._places:
+            if name not in place:
+                continue
+            values = alembic_shapes.parameter(self._archive, place[name])
+            if not kind:
+                return values if isinstance(values, list) else None
+            if not isinstance(values, list) and values.dtype.kind in kind and values.shape[1:] in ((), (width,)):
+                return values if width == 1 or values.ndim == 2 else None
+            return None
+        return None
+
+
+def _told_apart(curves, said, kept) -> Iterator[CurveSet]:
+    """The curves with all that is said of them, a set for guides and for strands, and for each group.
+
+    kept: (C,) which of the file's curves, of which it may say something, these are.
+    """
+    file_count = len(kept)
+
+    def of_curves(name, kind, width=1):
+        values = said.values(name, kind, width)
+        return None if values is None or len(values) != file_count else values[kept]
+
+    def of_all(name):
+        """(C,) int64, or None."""
+        values = said.values(name, "iu")
+        if values is None or len(values) not in (1, file_count):
+            return None
+        return np.broadcast_to(values.astype(np.int64), file_count)[kept]
+
+    is_guide, groups, names = of_all("groom_guide"), of_all("groom_group_id"), said.values("groom_group_name", "")
+    ids, uvs = of_curves("groom_id", "iu"), of_curves("groom_root_uv", "f", 2)
+    guide_ids, weights = (
+        of_curves("groom_closest_guides", "iu", GUIDE_SLOTS),
+        of_curves("groom_guide_weights", "f", GUIDE_SLOTS),
+    )
+    has_map = guide_ids is not None and weights is not None
+    whole = CurveSet(
+        curves.name,
+        curves.points,
+        curves.counts,
+        curves.is_smooth,
+        curves.radii,
+        group_name=names[0] if names else "",
+        ids=None if ids is None else ids.astype(np.int32),
+        root_uvs=None if uvs is None else uvs.astype(np.float32),
+        guide_ids=guide_ids.astype(np.int32) if has_map else None,
+        guide_weights=weights.astype(np.float32) if has_map else None,
+        motion=curves.motion,
+    )
+    guides = np.full(len(whole), -1) if is_guide is None else is_guide
+    groups = np.zeros(len(whole), np.int64) if groups is None else groups
+    for guide, group in np.unique(np.stack([guides, groups], axis=1), axis=0).tolist():
+        part = whole.some((guides == guide) & (groups == group))
+        yield replace(part, is_guide=None if is_guide is None else guide != 0, group_id=group)

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""In which unit and with which axis up the curves of a file are: as people or the file say, or where roots would lie
+on the surface.
+"""
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import HairError
+from ..geometry.closest_point import SurfaceQuery
+from ..geometry.mesh import TriMesh, positions
+from ..geometry.strands import curve_offsets
+from .curve_file import TO_Z_UP, UNITS, Convention, CurveFile, CurveSet
+
+_TRIED = 256  # curves, whose ends are taken for those of all
+_ON = 0.05  # distance of roots that lie on the surface, as a part of its size, or of that of all curves
+
+_WORDS = {
+    "m": "meters",
+    "cm": "centimeters",
+    "mm": "millimeters",
+    "in": "inches",
+    "ft": "feet",
+    "km": "kilometers",
+}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The unit and the axis that are taken, and what to tell people of them."""
+
+    metres: float
+    up: str
+    notes: list[HairError]
+
+
+def choose(file: CurveFile, sets: Sequence[CurveSet], said: Convention, mesh: TriMesh, name: str) -> Reading:
+    """The `Reading` of some sets of a file, by what people say, then by what the file states, then by the surface.
+
+    mesh: the surface in the world [m]; name: of the file. Raises `HairError` where roots would be further from the
+    surface than it is large.
+    """
+    known = said.over(file.stated)
+    ends = _Ends(sets, mesh)
+    usual = known.over(file.usual)
+    taken, notes = usual, []
+    if known.metres is None or known.up is None:
+        taken = next((one for one in _conventions(known, usual) if ends.lie_on_surface(one)), usual)
+        sentence = "{file} does not say its unit and its axis: it is read in {unit} with {up} up"
+        sentence += ", as roots lie on the surface then." if ends.lie_on_surface(taken) else ", as is usual."
+        notes.append(HairError(sentence, file=name, unit=_named(taken.metres), up=taken.up))
+    assert taken.metres is not None and taken.up is not None
+    if not ends.lie_on_surface(taken):
+        notes += ends.complaints(taken, name)
+    return Reading(taken.metres, taken.up, notes)
+
+
+def _conventions(known, usual) -> Iterator[Convention]:
+    """What may be meant where not all is known; the most usual first."""
+    units = [usual.metres, *UNITS.values()] if known.metres is None else [known.metres]
+    axes = [usual.up, "Z", "Y", "X"] if known.up is None else [known.up]
+    for metres, up in itertools.product(dict.fromkeys(units), dict.fromkeys(axes)):
+        yield Convention(metres, up)
+
+
+def _named(metres):
+    """A unit in words."""
+    return next((_WORDS[name] for name, one in UNITS.items() if one == metres), f"units of {metres:g} m")
+
+
+class _Ends:
+    """Ends of some curves, as the file has them, and how far they are from the surface in a unit and with an axis."""
+
+    def __init__(self, sets, mesh):
+        found = []
+        for one in sets:
+            if len(one):
+                chosen = np.unique(np.linspace(0, len(one) - 1, _TRIED // len(sets) + 2).astype(np.int64))
+                starts = curve_offsets(one.counts)
+                found.append(np.stack([one.points[starts[:-1][chosen]], one.points[starts[1:][chosen] - 1]], axis=1))
+        ends = np.concatenate(found) if found else np.zeros((0, 2, 3))
+        self._ends = ends[np.isfinite(ends).all(axis=(1, 2))].astype(np.float64)
+        self._query, self._mesh = SurfaceQuery(mesh), mesh
+        self._low, self._high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+        self._size = float((self._high - self._low).max())
+
+    def lie_on_surface(self, convention):
+        """Whether roots do; of curves so small that this says nothing they do not."""
+        distance, extent = self._measured(convention)
+        return distance <= _ON * min(self._size, extent)
+
+    def complaints(self, taken, name) -> Iterator[HairError]:
+        """What to say of roots that do not. Raises `HairError` where they are further than the surface is large."""
+        others = [*_conventions(Convention(), taken)]
+        distances = [self._measured(other)[0] if self.lie_on_surface(other) else np.inf for other in others]
+        best = int(np.argmin(distances))
+        distance = self._measured(taken)[0]
+        values = {"file": name, "distance": distance, "size": self._size}
+        values |= {"unit": _named(taken.metres), "up": taken.up}
+        sentence = "The roots in {file} lie {distance:.3g} m from the surface, which is {size:.3g} m large, "
+        sentence += "in {unit} with {up} up"
+        if np.isfinite(distances[best]):
+            sentence += ": they would lie on it in {other} with {other_up} up."
+            values |= {"other": _named(others[best].metres), "other_up": others[best].up}
+        elif distance > self._size:
+            sentence += ": check the unit, the axis and the surface."
+        else:
+            return
+        error = HairError(sentence, **values)
+        if distance > self._size:
+            raise error
+        yield error
+
+    def _measured(self, convention):
+        """(the median distance of roots to the surface, the size of all curves) [m]; roots are the nearer ends."""
+        if not len(self._ends):
+            return 0.0, 0.0
+        ends = self._ends @ (TO_Z_UP[convention.up] * convention.metres).T
+        extent = float(np.ptp(ends.reshape(-1, 3), axis=0).max())
+        outside = np.maximum(np.maximum(self._low - ends, ends - self._high), 0.0)
+        distances = np.linalg.norm(outside, axis=2)  # to the box, where that is far already
+        near = distances < 2.0 * self._size
+        places = ends[near].astype(np.float32)
+        if len(places):
+            found = positions(self._mesh, self._query.nearest(places))
+            distances[near] = np.linalg.norm(found - places, axis=1)
+        return float(np.median(distances.min(axis=1))), extent

@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curves of Alembic files: where transforms put them, what is said of them, and files that are damaged or hostile."""
+
+import io
+import struct
+
+import numpy as np
+import pytest
+
+from hair_addon.core.errors import HairError
+from hair_addon.core.files import alembic_grooms
+from hair_addon.core.files.alembic import AlembicWriter, Property
+from hair_addon.core.files.curve_file import Convention
+
+CURVES, TRANSFORM = {"schema": "AbcGeom_Curve_v2"}, {"schema": "AbcGeom_Xform_v3"}
+LINEAR, CUBIC, ANY_ORDER = 1, 0, 2
+BEZIER, BSPLINE, CATMULL_ROM, HERMITE = 1, 2, 3, 4
+
+
+class File:
+    """An archive that is being written by hand."""
+
+    def __init__(self, application="Maya 2026"):
+        self.bytes = io.BytesIO()
+        self.writer = AlembicWriter(self.bytes, application, 24.0)
+        self.times = self.writer.add_sampling(1.0 / 24.0, 1.0 / 24.0)
+
+    def moving(self, name, kind, extent, samples, is_array=False):
+        made = Property(name, kind, extent, "", is_array=is_array, sampling=self.times)
+        for sample in samples:
+            self.writer.add_sample(made, [np.asarray(sample, {"float32": "<f4", "float64": "<f8"}[kind])])
+        return made
+
+    def curves(self, name, points, counts, kind=LINEAR, basis=0, wrap=0, extra=(), parameters=()):
+        write = self.writer
+        place = points if isinstance(points, Property) else write.array("P", "float32", np.float32(points))
+        properties = [
+            place,
+            write.array("nVertices", "int32", counts),
+            write.scalar("curveBasisAndType", "uint8", (kind, wrap, basis, basis)),
+            *extra,
+        ]
+        if parameters:
+            properties.append(write.compound(".arbGeomParams", parameters))
+        return write.object(name, CURVES, [write.compound(".geom", properties)])
+
+    def transform(self, name, children, codes, values, inherits=True):
+        write = self.writer
+        values = values if isinstance(values, Property) else write.scalar(".vals", "float64", values)
+        properties = [
+            write.scalar(".inherits", "bool", inherits),
+            write.scalar(".ops", "uint8", [code << 4 for code in codes]),
+            values,
+        ]
+        return write.object(name, TRANSFORM, [write.compound(".xform", properties)], children)
+
+    def read(self, path, *children):
+        self.writer.close(children)
+        path.write_bytes(self.bytes.getvalue())
+        return alembic_grooms.read(path)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "curves.abc"
+
+
+def test_transforms_place_curves_and_scale_their_widths(path, rng):
+    """Operations of every kind, the last one first; a transform that does not inherit begins anew."""
+    file, points = File(), rng.normal(size=(5, 3)).astype(np.float32)
+    widths = file.writer.array("width", "float32", np.float32([0.1, 0.2]))
+    curves = file.curves("shape", points, [2, 3], extra=[widths])
+    other = file.curves("otherShape", points, [2, 3])
+    # Translate, turn about x by 90°, about z by 90°, about y by 0°, and about an axis by 120°; scale.
+    codes = [1, 4, 6, 5, 2, 0]
+    values = [1, 2, 3, 90, 90, 0, 1, 1, 1, 120, 2, 2, 2]
+    inner = file.transform("inner", [curves], codes, values)
+    free = file.transform("free", [other], [1], [7, 0, 0], inherits=False)
+    matrix = np.eye(4)
+    matrix[:3, :3] = [[0, 0, 3], [3, 0, 0], [0, 3, 0]]
+    matrix[3, :3] = [10, 20, 30]
+    found = file.read(path, file.transform("outer", [inner, free], [3], matrix.ravel()))
+    assert found.stated == Convention() and found.usual == Convention(0.01, "Y")
+    placed, moved = found.sets
+    # About (1, 1, 1) by 120°: x → y → z → x. Then about z: x → y; about x: y → z.
+    there = 2.0 * points[:, [2, 0, 1]]
+    there = np.stack([-there[:, 1], there[:, 0], there[:, 2]], axis=1)
+    there = np.stack([there[:, 0], -there[:, 2], there[:, 1]], axis=1) + np.array([1, 2, 3])
+    np.testing.assert_allclose(placed.points, there @ matrix[:3, :3] + np.array([10, 20, 30]), atol=1e-5)
+    np.testing.assert_allclose(placed.radii, 3.0 * np.repeat([0.1, 0.2], [2, 3]), rtol=1e-6)  # 6 times, half of it
+    np.testing.assert_allclose(moved.points, points + np.array([7, 0, 0]), atol=1e-6)
+    assert (placed.name, moved.name) == ("inner", "free") and moved.radii is None
+
+
+def test_curves_and_transforms_move_between_samples(path, rng):
+    file = File()
+    samples = rng.normal(size=(3, 4, 3)).astype(np.float32)
+    places = file.moving("P", "float32", 3, samples, is_array=True)
+    curves = file.curves("shape", places, [4])
+    moves = file.moving(".vals", "float64", 3, [[0, 0, 0], [0, 0, 1], [0, 0, 5]])
+    (found,) = file.read(path, file.transform("group", [curves], [1], moves)).sets
+    np.testing.assert_allclose(found.motion.times, np.arange(1, 4) / 24.0)
+    for index, lift in enumerate((0.0, 1.0, 5.0)):
+        np.testing.assert_allclose(found.motion.points_at(index), samples[index] + np.array([0, 0, lift]), atol=1e-6)
+    np.testing.assert_array_equal(found.points, samples[0])
+    placed = found.placed(0.01, "Y")
+    turned = np.stack([samples[2][:, 0], -(samples[2][:, 2] + 5.0), samples[2][:, 1]], axis=1)
+    np.testing.assert_allclose(placed.motion.points_at(2), 0.01 * turned, atol=1e-7)
+
+
+def test_splines_are_what_is_drawn(path):
+    """A uniform B-spline begins a third of the way beside its second point; Bézier and Hermite curves at their ends."""
+    file, line = File(), np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    smooth = np.concatenate([line[:1], line, line[-1:]])
+    knots = file.writer.array(".knots", "float32", np.float32([0, 0, 0, 0, 1, 1, 1, 1]))
+    orders = file.writer.array(".orders", "uint8", [4])
+    sets = file.read(
+        path,
+        file.curves("bspline", line, [4], CUBIC, BSPLINE),
+        file.curves("bezier", line, [4], CUBIC, BEZIER),
+        file.curves("hermite", [[0, 0, 0], [3, 0, 0], [1, 1, 0], [0, 3, 0]], [4], CUBIC, HERMITE),
+        file.curves("smooth", smooth, [6], CUBIC, CATMULL_ROM),
+        file.curves("catmull", line, [4], CUBIC, CATMULL_ROM),
+        file.curves("nurbs", line, [4], ANY_ORDER, BSPLINE, extra=[knots, orders]),
+        file.curves("closed", line, [4], LINEAR, wrap=1),
+    ).sets
+    ends = {one.name: one.points[[0, -1]] for one in sets}
+    np.testing.assert_allclose(ends["bspline"], [[5 / 6, 1 / 6, 0], [5 / 6, 5 / 6, 0]], atol=1e-6)
+    for name in ("bezier", "nurbs"):
+        np.testing.assert_allclose(ends[name], line[[0, -1]], atol=1e-6)
+    np.testing.assert_allclose(ends["catmull"], line[[1, 2]], atol=1e-6)
+    np.testing.assert_allclose(ends["hermite"], [[0, 0, 0], [1, 1, 0]], atol=1e-6)
+    np.testing.assert_allclose(ends["closed"], line[[0, 0]], atol=1e-6)
+    (kept,) = [one for one in sets if one.name == "smooth"]
+    np.testing.assert_array_equal(kept.points, line)
+    assert kept.is_smooth.all() and not any(one.is_smooth.any() for one in sets if one is not kept)
+
+
+def test_widths_of_splines_are_interpolated_as_their_points(path):
+    file, line = File(), np.float32([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [4, 0, 0]])
+    of_points = file.writer.array("width", "float32", np.float32([0, 1, 2, 3, 4]))
+    of_ends = file.writer.array("width", "float32", np.float32([1, 2, 3]))
+    odd = file.writer.array("width", "float32", np.float32([1, 2, 3, 4]))
+    found = file.read(
+        path,
+        file.curves("points", line, [5], CUBIC, BSPLINE, extra=[of_points]),
+        file.curves("ends", line, [5], CUBIC, BSPLINE, extra=[of_ends]),
+        file.curves("odd", line, [5], CUBIC, BSPLINE, extra=[odd]),
+    )
+    for one in found.sets[:2]:
+        np.testing.assert_allclose(2.0 * one.radii, one.points[:, 0], atol=1e-6)
+    assert found.sets[2].radii is None and ["left out" in str(note) for note in found.notes] == [True]
+
+
+def test_curves_of_one_object_are_told_apart_by_kind_and_group(path, rng):
+    file, points = File(), rng.normal(size=(8, 3))
+    write = file.writer
+    indexed = write.compound(
+        "groom_group_id",
+        [write.array(".vals", "int32", [5, 9]), write.array(".indices", "int32", [0, 1, 0, 1])],
+    )
+    parameters = [
+        write.array("groom_guide", "int16", [1, 0, 0, 0]),
+        indexed,
+        write.array("groom_id", "int32", [3, 4, 5, 6]),
+        write.array("groom_closest_guides", "int32", np.full((4, 3), 3)),
+        write.array("groom_guide_weights", "float32", np.full((4, 3), 1 / 3)),
+    ]
+    sets = file.read(path, file.curves("shape", points, [2, 2, 2, 2], parameters=parameters)).sets
+    told = [(one.is_guide, one.group_id, one.ids.tolist()) for one in sets]
+    assert told == [(False, 5, [5]), (False, 9, [4, 6]), (True, 5, [3])]
+    np.testing.assert_allclose(sets[1].points, points[[2, 3, 6, 7]], atol=1e-6)
+    np.testing.assert_array_equal(sets[1].guide_ids, np.full((2, 3), 3))
+
+
+def test_instances_show_curves_again(path):
+    file, line = File(), [[0, 0, 0], [1, 0, 0]]
+    source = file.transform("hair", [file.curves("hairShape", line, [2])], [1], [0, 0, 1])
+    outer = file.transform("first", [source], [1], [0, 5, 0])
+    instance = file.writer.object("again", {"isInstance": "1"}, [_text(file, ".instanceSource", "/first/hair")])
+    found = file.read(path, outer, file.transform("second", [instance], [1], [7, 0, 0])).sets
+    np.testing.assert_allclose(found[0].points[0], [0, 5, 1])
+    np.testing.assert_allclose(found[1].points[0], [7, 0, 1])
+
+
+def _text(file, name, text):
+    made = Property(name, "string", 1, "")
+    file.writer.add_sample(made, [text.encode() + b"\0"], 1)
+    return made
+
+
+# ------------------------------------------------------------------------------------------ damaged and hostile
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "is not an Alembic file"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(100), "HDF5"),
+        (b"Ogawa\xff\x00\x01" + bytes(8), "damaged"),
+        (b"Ogawa\x00\x00\x01" + bytes(8), "not written to its end"),
+        (b"Ogawa\xff\x00\x01" + struct.pack("<Q", 16) + struct.pack("<Q", 2**60), "damaged"),
+    ],
+)
+def test_what_is_no_archive_is_refused_in_a_sentence(path, content, said):
+    path.write_bytes(content)
+    with pytest.raises(HairError, match=said):
+        alembic_grooms.read(path)
+
+
+def small_file():
+    """The bytes of a small archive with all that is read."""
+    file = File()
+    write, line = file.writer, np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    parameters = [
+        write.array("groom_guide", "int16", [1]),
+        write.strings("groom_group_name", ["fringe"]),
+        write.compound("groom_id", [write.array(".vals", "int32", [5]), write.array(".indices", "int32", [0])]),
+    ]
+    points = file.moving("P", "float32", 3, [line, line + 1], is_array=True)
+    knots = [write.array(".knots", "float32", [0, 0, 0, 0, 1, 1, 1, 1]), write.array(".orders", "uint8", [4])]
+    shapes = [
+        file.curves("bspline", points, [4], CUBIC, BSPLINE, extra=[write.array("width", "float32", [1.0])]),
+        file.curves("nurbs", line, [4], ANY_ORDER, BSPLINE, extra=knots, parameters=parameters),
+        write.object("again", {}, [_text(file, ".instanceSource", "/group/nurbs")]),
+    ]
+    moves = file.moving(".vals", "float64", 3, [[0, 0, 0], [0, 0, 1]])
+    write.close([file.transform("group", shapes, [1], moves)])
+    return file.bytes.getvalue()
+
+
+def test_mutants_of_a_file_give_curves_or_a_sentence(path, rng):
+    """Bytes, numbers and ends that are changed: what is read is finite in number, and nothing else is raised."""
+    whole = small_file()
+    path.write_bytes(whole)
+    assert [len(one) for one in alembic_grooms.read(path).sets] == [1, 1, 1]
+    refused = 0
+    for _ in range(600):
+        mutant = bytearray(whole)
+        for _ in range(rng.integers(1, 4)):
+            place = int(rng.integers(0, len(whole) - 8))
+            if rng.random() < 0.5:
+                mutant[place] = int(rng.integers(0, 256))
+            else:
+                place = place // 8 * 8
+                number = int(rng.choice([0, 1, 2**31, 2**40, 2**63 - 1, 2**63 + 16, int(rng.integers(0, len(whole)))]))
+                mutant[place : place + 8] = struct.pack("<Q", number)
+        path.write_bytes(mutant[: int(rng.integers(8, len(whole)))] if rng.random() < 0.2 else mutant)
+        try:
+            for one in alembic_grooms.read(path).sets:
+                assert len(one.points) == one.counts.sum() < 10_000
+                if one.motion is not None:
+                    assert len(one.motion.points_at(1)) == len(one.points)
+        except HairError:
+            refused += 1
+    assert 200 < refused < 590
+
+
+def test_a_small_file_cannot_fill_the_memory(path):
+    """Objects that share one sample, and an object that holds itself."""
+    file, points = File(), np.zeros((20_000, 3), np.float32)
+    shared = [file.curves(f"c{n}", points, [20_000]) for n in range(100)]
+    with pytest.raises(HairError, match="damaged"):
+        file.read(path, *shared)

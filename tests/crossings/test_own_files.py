@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Vellus writes, it reads back: guides as guides, hair as hair, with widths, identities, weights, unit, axis."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon import api
+from hair_addon.blender.data.strands import exported_curves
+from hair_addon.blender.groom import guide_maps
+from hair_addon.blender.io import groom_files, strand_arrays
+from hair_addon.core.files.groom_curves import closest_guides
+from tests.support.dynamics.following import update
+from tests.support.reading import attribute
+
+GUIDE_COUNT, STRAND_COUNT = 12, 40
+Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+
+FILES = {
+    "exported.usdc": lambda path, _guides, hair: api.export_groom(path, [hair]),
+    "exported.usda": lambda path, _guides, hair: api.export_groom(path, [hair]),
+    "exported.abc": lambda path, _guides, hair: api.export_groom(path, [hair]),
+    "groom.npz": lambda path, guides, hair: groom_files.write(path, guides, hair, np.eye(3)),
+    "groom, Y up.npz": lambda path, guides, hair: groom_files.write(path, guides, hair, Y_UP),
+    "groom.usdc": lambda path, guides, hair: groom_files.write(path, guides, hair, np.eye(3)),
+    "groom.abc": lambda path, guides, hair: groom_files.write(path, guides, hair, np.eye(3)),
+    "groom.blend": lambda path, guides, hair: groom_files.write(path, guides, hair, np.eye(3)),
+}
+
+
+def shown(guides, hair):
+    """(guide points, guide widths, strand points, strand widths) in the world [m]."""
+    found = []
+    for curves in (guides, hair):
+        points = strand_arrays.world_points(curves)
+        radii = exported_curves.read_radii(curves, points.shape[1])(slice(0, len(points)))
+        found += [points, 2.0 * radii * strand_arrays.world_scale(curves)]
+    return found
+
+
+def assert_same(found, expected):
+    """To the last tenth of a micrometre, and to the last bits of widths."""
+    for values, wanted, tolerance in zip(found, expected, (1e-6, 1e-9, 1e-6, 1e-9), strict=True):
+        np.testing.assert_allclose(values, wanted, rtol=0.0, atol=tolerance)
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01])
+@pytest.mark.parametrize("name", FILES)
+def test_a_groom_comes_back_as_it_was(sphere, scene, tmp_path, name, unit):
+    """On a surface that is moved, turned and scaled, in a scene of meters and of centimeters."""
+    scene.unit_settings.scale_length = unit
+    sphere.location, sphere.rotation_euler = np.array([1.0, 2.0, 3.0]) / unit, (0.3, 0.2, 0.5)
+    sphere.scale = np.full(3, 0.1 / unit)
+    update()
+    settings = api.GroomSettings(
+        api.GuideSettings(guide_count=GUIDE_COUNT, length=0.05),
+        api.HairSettings(strand_count=STRAND_COUNT, radius=0.0004),
+    )
+    guides, hair = api.add_hair(sphere, settings)
+    update()
+    expected, path = shown(guides, hair), tmp_path / name
+    indices, weights = guide_maps.of(hair, bpy.context.evaluated_depsgraph_get())
+    FILES[name](path, guides, hair)
+    for one in [o for o in bpy.data.objects if o.type == "CURVES"]:
+        bpy.data.objects.remove(one)
+    bpy.data.batch_remove([*bpy.data.hair_curves])
+
+    found = api.import_curves(path, sphere, "GUIDES")
+    assert found.notes == [] and found.guides is None
+    assert [o for o in bpy.data.objects if o.type == "CURVES"] == [found.curves]
+    made = api.use_as_guides(found.curves, sphere)
+    points = strand_arrays.world_points(made)
+    assert made.vellus.kind == "GUIDES" and points.shape == (GUIDE_COUNT, 41, 3)
+    np.testing.assert_allclose(points, expected[0], rtol=0.0, atol=1e-6)
+    bpy.data.objects.remove(found.curves)
+
+    found = api.import_curves(path, sphere)
+    assert found.notes == []
+    used = api.use_as_hair(found.curves, sphere, guides=found.guides)
+    assert (used.hair.vellus.kind, used.guides.vellus.kind) == ("HAIR", "GUIDES")
+    assert_same(shown(used.guides, used.hair), expected)
+    assert used.rooted.reversed_count == used.rooted.far_count == 0 and used.hair.vellus.guide_curves == used.guides
+    if name.startswith("exported"):
+        ids, shares = closest_guides(indices, weights, 0)
+        came = closest_guides(*guide_maps.of(used.hair, bpy.context.evaluated_depsgraph_get()), 0)
+        np.testing.assert_array_equal(came[0], ids)
+        np.testing.assert_allclose(came[1], shares, atol=1e-6)
+        np.testing.assert_array_equal(attribute(found.curves, "id", 1), GUIDE_COUNT + np.arange(STRAND_COUNT))
