@@ -40,7 +40,7 @@ def group_properties(names, update):
 
     return {
         flag_of(name): bpy.props.BoolProperty(
-            name="Fit to Surface",
+            name="Fitted",
             description="Fit this to the surface and its mask. Off once it is set by hand",
             translation_context=CONTEXT,
             options=set(),

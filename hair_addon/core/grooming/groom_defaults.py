@@ -5,7 +5,8 @@ All lengths are fractions of the square root of the area that hair grows on, so 
 of twice the length and thickness, and looks the same. The shape of that area sets the fractions. Closed surfaces
 (a sphere, an animal) and flat ones (a plane) get fur: short, thick and stiff. A dome (a scalp) gets long and thin hair,
 which hangs, as on a human head. Numbers of guides and strands follow from nothing: as all lengths are fractions of one
-size, the same number covers a surface of any size equally. DECISIONS.md has the figures.
+size, the same number covers a surface of any size equally. Strands are thicker where there are fewer, so that 600 in
+brows are seen: as thick as in proportion to the mean distance of their roots. DECISIONS.md has the figures.
 """
 
 from dataclasses import dataclass, replace
@@ -24,6 +25,9 @@ FUR_RADIUS, DOME_RADIUS = 6.0e-4, 1.65e-4
 FUR_GRAVITY, DOME_GRAVITY = 0.3, 0.75
 
 TYPICAL_GUIDE_COUNT = 400
+TYPICAL_STRAND_COUNT = 60_000  # that the radii above are for
+MOST_THICKENED = 10.0  # how many times thicker few strands are
+STOUTEST = 1.0 / 50.0  # radius by length: even few strands stay slender
 INFLUENCE = 2.0  # by the mean spacing of guides
 
 _MASK_SAMPLES = 20_000  # points at which an image is read to find how much of a surface it leaves
@@ -45,12 +49,13 @@ def hair_size(
     density: np.ndarray | None = None,
     texture: Texture | None = None,
     guide_count: int = TYPICAL_GUIDE_COUNT,
+    strand_count: int = TYPICAL_STRAND_COUNT,
 ) -> HairSize:
     """The `HairSize` for a surface.
 
     mesh: `TriMesh` [m], as it stands in the world; density: (V,) weights per vertex, or None; texture: `Texture` that
     multiplies them, or None. Together they are the mask: a weight of one half counts for half of the area.
-    guide_count: the number of guides, for the influence distance. Raises `HairError` where the mesh or what is left of
+    guide_count: the number of guides, for the influence distance; strand_count: of strands, for the radius. Raises `HairError` where the mesh or what is left of
     it has no area.
     """
     check_mesh(mesh)
@@ -62,10 +67,13 @@ def hair_size(
     flatness = min(float(np.linalg.norm(weights @ mesh.scaled_normals)) / (2.0 * area), 1.0)
     dome = (4.0 * flatness * (1.0 - flatness)) ** 2
     size = np.sqrt(area)
+    length = size * _between(FUR_LENGTH, DOME_LENGTH, dome)
+    thickening = min(np.sqrt(TYPICAL_STRAND_COUNT / strand_count), MOST_THICKENED)
+    radius = min(thickening * size * _between(FUR_RADIUS, DOME_RADIUS, dome), STOUTEST * length)
     return HairSize(
-        length=_rounded(size * _between(FUR_LENGTH, DOME_LENGTH, dome)),
+        length=_rounded(length),
         gravity=_rounded(_between(FUR_GRAVITY, DOME_GRAVITY, dome)),
-        radius=_rounded(size * _between(FUR_RADIUS, DOME_RADIUS, dome)),
+        radius=_rounded(radius),
         influence_distance=_rounded(INFLUENCE * size / np.sqrt(guide_count)),
     )
 
@@ -86,7 +94,8 @@ def complete[S: Settings](
     missing = [name for name in from_surface(type(settings)) if getattr(settings, name) is None]
     if not missing:
         return settings
-    size = hair_size(mesh, density, texture, guide_count)
+    strand_count = getattr(settings, "strand_count", TYPICAL_STRAND_COUNT)
+    size = hair_size(mesh, density, texture, guide_count, strand_count)
     return replace(settings, **{name: getattr(size, name) for name in missing})
 
 

@@ -58,6 +58,28 @@ def test_a_human_scalp_grows_human_hair(head, scalp):
     assert 0.01 <= size.influence_distance <= 0.05
 
 
+def test_fewer_strands_are_thicker(head, scalp):
+    """As in proportion to the distance of their roots: a head has real hair at real counts, and few strands are seen."""
+    thickness = {
+        count: 2.0 * groom_defaults.hair_size(head, scalp, strand_count=count).radius
+        for count in (1, 600, 30_000, 60_000, 100_000, 1_000_000)
+    }
+    assert thickness[30_000] == pytest.approx(np.sqrt(2.0) * thickness[60_000], rel=0.01)
+    assert thickness[1] == thickness[600] == pytest.approx(10.0 * thickness[60_000], rel=0.01)
+    for count in (30_000, 60_000, 100_000, 1_000_000):
+        assert 17e-6 <= thickness[count] <= 180e-6
+    settings = groom_defaults.complete(HairSettings(strand_count=30_000), head, scalp)
+    assert settings.radius == 0.5 * thickness[30_000]
+
+
+def test_few_strands_of_short_hair_stay_slender(head, scalp):
+    """600 in a patch as large as two brows, on skin that is bent as these are."""
+    brows = ((np.abs(head.vertices[:, 0]) < 0.05) & (scalp > 0.5) & (head.vertices[:, 1] < -0.1)).astype(np.float32)
+    few, many = (groom_defaults.hair_size(head, brows, strand_count=count) for count in (600, 60_000))
+    assert 4.0 * many.radius < few.radius <= few.length / 50.0 * 1.01
+    assert 17e-6 <= 2.0 * many.radius and 2.0 * few.radius <= 1e-3
+
+
 def test_a_mask_and_a_mesh_of_the_same_part_grow_the_same(head, scalp):
     """A scalp that was cut out of the head, and one that is painted on it."""
     inside = (scalp[head.triangles] > 0.5).all(axis=1)
