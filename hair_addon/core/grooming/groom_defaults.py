@@ -55,8 +55,8 @@ def hair_size(
 
     mesh: `TriMesh` [m], as it stands in the world; density: (V,) weights per vertex, or None; texture: `Texture` that
     multiplies them, or None. Together they are the mask: a weight of one half counts for half of the area.
-    guide_count: the number of guides, for the influence distance; strand_count: of strands, for the radius. Raises `HairError` where the mesh or what is left of
-    it has no area.
+    guide_count: the number of guides, for the influence distance; strand_count: of strands, for the radius. Raises
+    `HairError` where the mesh or what is left of it has no area.
     """
     check_mesh(mesh)
     weights = _mean_weights(mesh, density, texture)

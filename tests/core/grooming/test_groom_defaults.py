@@ -59,7 +59,7 @@ def test_a_human_scalp_grows_human_hair(head, scalp):
 
 
 def test_fewer_strands_are_thicker(head, scalp):
-    """As in proportion to the distance of their roots: a head has real hair at real counts, and few strands are seen."""
+    """As in proportion to the distance of their roots: a head has real hair at real counts, and few are seen."""
     thickness = {
         count: 2.0 * groom_defaults.hair_size(head, scalp, strand_count=count).radius
         for count in (1, 600, 30_000, 60_000, 100_000, 1_000_000)
