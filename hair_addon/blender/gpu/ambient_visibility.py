@@ -5,11 +5,10 @@ Opacity maps are drawn from 14 directions; each point sums their transmittances.
 geometry, not with the light or the view.
 """
 
-import gpu
 import numpy as np
 
 from ...core.imaging import ambient_cube
-from . import drawing, scene_programs, seen_programs, shadows, uniforms
+from . import drawing, driver_textures, scene_programs, seen_programs, shadows, uniforms
 from .strand_textures import seen_points
 
 # Environment light is soft: its maps are coarser than a lamp's, and drawn from as many strands as they can resolve.
@@ -193,7 +192,7 @@ def _is_surface(place):
 
 
 def _texture(size, kind):
-    texture = gpu.types.GPUTexture(size, format=kind)
+    texture = driver_textures.made(size, kind)
     texture.filter_mode(True)
     texture.extend_mode("EXTEND")
     return texture

@@ -13,7 +13,7 @@ import gpu
 import numpy as np
 
 from ...core import geometry
-from . import shaders
+from . import driver_textures, shaders
 
 # Widest row of the strand texture; every driver takes 16384 texels.
 TEXTURE_WIDTH = 16384
@@ -162,10 +162,7 @@ def numbers_texture(values, row_strands):
     """A number a strand, `row_strands` a row; values: (S,)."""
     numbers = np.zeros((-(-len(values) // row_strands), row_strands), np.float32)
     numbers.ravel()[: len(values)] = values
-    data = gpu.types.Buffer("FLOAT", numbers.size, numbers.ravel())
-    texture = gpu.types.GPUTexture(numbers.shape[::-1], format="R32F", data=data)
-    texture.filter_mode(False)
-    return texture
+    return driver_textures.made(numbers.shape[::-1], "R32F", numbers)
 
 
 def row_strands_of(point_count, others=0):
@@ -243,20 +240,12 @@ def _to_steps(numbers):
 
 def _texture(texture_format, width, texels):
     channels = 2 if texture_format == "RG32F" else 1
-    texture = gpu.types.GPUTexture(
-        (width, texels.size // (channels * width)),
-        format=texture_format,
-        data=gpu.types.Buffer("FLOAT", texels.size, texels.ravel()),
-    )
-    texture.filter_mode(False)
-    return texture
+    return driver_textures.made((width, texels.size // (channels * width)), texture_format, texels)
 
 
 def like(texture):
     """A texture of the same size for other strands, with nothing in it."""
-    other = gpu.types.GPUTexture((texture.width, texture.height), format="RG32F")
-    other.filter_mode(False)
-    return other
+    return driver_textures.made((texture.width, texture.height), "RG32F")
 
 
 def seen_points(point_count):

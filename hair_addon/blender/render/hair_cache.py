@@ -5,7 +5,6 @@ It holds no reference to Blender's data, so undo, deletion and new files cannot 
 random numbers, wetness and roots are read and replaced together.
 """
 
-import sys
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -28,7 +27,8 @@ from ..host import paths
 from ..host.caches import Cache
 from ..host.notices import name_of
 from ..settings import preferences, properties, shared_wetness
-from . import made_strands
+from . import made_strands, refused_strands
+from .refused_strands import Refused
 
 # Tables of this many settings are kept: one groom and the last few positions of a slider.
 _SHADING_CAPACITY = 8
@@ -57,9 +57,7 @@ class _KeptStrands:
             require_count("wetness", len(self.wetness), len(self.points))
 
 
-_REFUSED = object()  # in place of strands that cannot be drawn
-
-strand_cache = Cache()  # session_uid of Curves → _KeptStrands or _REFUSED
+strand_cache = Cache()  # session_uid of Curves → _KeptStrands or Refused
 pose_cache = Cache()  # session_uid of an object that strands grow on → Pose
 shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
 
@@ -92,7 +90,7 @@ def strands_on_gpu(datablock):
     None where the datablock was refused. Raises `HairError`.
     """
     kept = strand_cache.get(datablock.session_uid)
-    if kept is _REFUSED:
+    if isinstance(kept, Refused):
         return None
     if kept is None or (kept.growing is not None and kept.growing.result() is not kept.points):
         kept = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
@@ -153,8 +151,7 @@ def drawn_bytes(datablock):
 
 def refuse(datablock, error):
     """Do not draw a datablock again until it changes; report the reason once."""
-    strand_cache.keep(datablock.session_uid, _REFUSED)
-    print(f"Vellus: {error}", file=sys.stderr)
+    strand_cache.keep(datablock.session_uid, refused_strands.refused(error))
 
 
 def move(session_uid, moved, bound):
@@ -211,7 +208,7 @@ def choose_makers():
 def _strands_of(session_uid):
     """The `_KeptStrands` of a datablock, None where there are none or they were refused."""
     kept = strand_cache.get(session_uid)
-    return None if kept is _REFUSED else kept
+    return None if isinstance(kept, Refused) else kept
 
 
 def is_pose_seen(surface_object):
@@ -224,7 +221,7 @@ def invalidate_pose(surface_object):
     pose_cache.invalidate(surface_object.session_uid)
     for datablock in bpy.data.hair_curves:
         # A surface that could not be read may have been repaired.
-        if datablock.surface == surface_object and strand_cache.get(datablock.session_uid) is _REFUSED:
+        if datablock.surface == surface_object and isinstance(strand_cache.get(datablock.session_uid), Refused):
             strand_cache.invalidate(datablock.session_uid)
 
 

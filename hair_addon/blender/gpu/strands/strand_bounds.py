@@ -10,7 +10,7 @@ from itertools import pairwise
 import gpu
 import numpy as np
 
-from .. import shaders
+from .. import driver_textures, shaders
 from ..strand_textures import TEXTURE_WIDTH
 
 _GROUP_SIZE = 64
@@ -59,9 +59,7 @@ def new_bounds(strand_count: int) -> StrandBounds:
 
 def _boxes_texture(count):
     in_row = min(TEXTURE_WIDTH // _BOX, count)
-    texture = gpu.types.GPUTexture((in_row * _BOX, -(-count // in_row)), format="RGBA32F")
-    texture.filter_mode(False)
-    return texture
+    return driver_textures.made((in_row * _BOX, -(-count // in_row)), "RGBA32F")
 
 
 @shaders.kept

@@ -7,6 +7,7 @@ import gpu
 import numpy as np
 
 from ....core import geometry
+from .. import driver_textures
 from ..strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, keep_strands, numbers_texture, row_strands_of
 from . import strand_bounds
 
@@ -74,16 +75,10 @@ def rows_texture(values: np.ndarray, channels: int) -> tuple[gpu.types.GPUTextur
     height = -(-len(values) // in_row)
     if height * in_row > len(values):
         values = np.concatenate([values, np.zeros((height * in_row - len(values), values.shape[1]), np.float32)])
-    data = gpu.types.Buffer("FLOAT", values.size, values.ravel())
-    texture_format = {1: "R32F", 4: "RGBA32F"}[channels]
-    texture = gpu.types.GPUTexture((in_row * texels, height), format=texture_format, data=data)
-    texture.filter_mode(False)
-    return texture, in_row
+    return driver_textures.made((in_row * texels, height), {1: "R32F", 4: "RGBA32F"}[channels], values), in_row
 
 
 def empty_rows(count: int, texels: int, texture_format: str = "RGBA32F") -> tuple[gpu.types.GPUTexture, int]:
     """The same without values."""
     in_row = min(TEXTURE_WIDTH // texels, count)
-    texture = gpu.types.GPUTexture((in_row * texels, -(-count // in_row)), format=texture_format)
-    texture.filter_mode(False)
-    return texture, in_row
+    return driver_textures.made((in_row * texels, -(-count // in_row)), texture_format), in_row

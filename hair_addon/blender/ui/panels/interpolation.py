@@ -8,8 +8,8 @@ from ...data.scene import triangle_count
 from ...data.strands.curves import is_hand_made
 from ...groom.diagnostics import parting_warnings
 from ...groom.selection import active_of_kind, guides_of, hair_of
-from ...render import hair_cache
-from ...settings.translations import interface_text
+from ...render import hair_cache, refused_strands
+from ...settings.translations import error_text, interface_text
 from .. import setting_rows
 from .tab import HairTab, draw_work, megabytes, split, write, write_status
 
@@ -32,6 +32,9 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
             return
         state = hair.vellus
         write_status(layout, context, state)
+        error = refused_strands.error_of(hair_cache.strand_cache.get(hair.session_uid))
+        if error is not None:
+            write(layout, context, error_text(error), "ERROR")
         if is_hand_made(hair):
             text = (
                 "These strands are kept as they came. Regenerate Strands replaces them with strands between the guides."

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Textures as large as hair is, which a driver may refuse."""
+
+import gpu
+import numpy as np
+
+from ...core.errors import HairError
+
+_TEXEL_BYTES = {"RGBA32F": 16, "RG32F": 8, "RGBA16F": 8, "R32F": 4, "R16": 2}
+
+
+def made(size: tuple[int, ...], texture_format: str, texels: np.ndarray | None = None) -> gpu.types.GPUTexture:
+    """A texture of `size` texels that are not filtered; texels: float32 values in it, None for nothing.
+
+    Raises `HairError` where the driver refuses it, which it does by its limits and its memory.
+    """
+    try:
+        data = {} if texels is None else {"data": gpu.types.Buffer("FLOAT", texels.size, texels.ravel())}
+        texture = gpu.types.GPUTexture(size, format=texture_format, **data)
+    except (RuntimeError, ValueError, MemoryError, OverflowError) as error:
+        megabytes = max(round(float(np.prod(size, dtype=np.float64)) * _TEXEL_BYTES.get(texture_format, 16) / 1e6), 1)
+        sentence = "The graphics driver refuses {megabytes} MB of strands: decrease Strand Count or Points per Strand."
+        raise HairError(sentence, megabytes=megabytes) from error
+    texture.filter_mode(False)
+    return texture

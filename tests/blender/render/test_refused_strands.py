@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands that a graphics driver has no room for: one sentence, in the panel too, and no further try."""
+
+import bpy
+import gpu
+import pytest
+
+from hair_addon.blender.gpu import driver_textures
+from hair_addon.blender.render import drawn_scene, hair_cache, refused_strands
+from hair_addon.core.errors import HairError
+from tests.support.interface.layout import draw
+
+
+@pytest.mark.parametrize("raised", [RuntimeError, ValueError, MemoryError])
+def test_a_driver_that_refuses_a_texture_is_one_sentence(hair, raised, monkeypatch, capsys):
+    tries, real = [], gpu.types.GPUTexture
+
+    def refuse(size, format, **data):
+        if format == "RG32F" and "data" in data:  # of strands
+            tries.append(size)
+            raise raised("gpu.texture.new(...) failed with 'GPUTexture: texture alloc failed.'")
+        return real(size, format=format, **data)
+
+    hair_cache.strand_cache.clear()
+    monkeypatch.setattr(driver_textures.gpu.types, "GPUTexture", refuse)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for _redraw in range(3):
+        drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph, None, hair_cache.refuse)
+        assert not drawn.hair
+    assert len(tries) == 1
+    said = capsys.readouterr().err
+    assert said.count("Vellus: The graphics driver refuses") == 1 and "decrease Strand Count" in said
+    assert "Traceback" not in said
+    shown = " ".join(draw(bpy.types.VELLUS_PT_interpolation).texts)
+    assert "The graphics driver refuses" in shown and "decrease Strand Count" in shown
+    with pytest.raises(HairError, match="The graphics driver refuses"):  # a picture that is asked for says it too
+        hair_cache.strand_cache.clear()
+        drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+    monkeypatch.undo()
+    hair_cache.strand_cache.clear()
+    assert drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph).hair
+    assert refused_strands.error_of(hair_cache.strand_cache.get(hair.data.session_uid)) is None
+
+
+def test_textures_beyond_what_any_driver_takes_are_refused(hair):
+    """By Blender itself: it raises errors of several kinds."""
+    with pytest.raises(HairError, match="refuses 4000000 MB"):
+        driver_textures.made((1_000_000, 1_000_000), "R32F")
