@@ -321,8 +321,8 @@ def restyle(
     styles = style_items.styles_of(target.vellus)
     read = styled_hair.read_styles(styles, target.surface, bound.surface, guide_curves, depsgraph, target)
     if not read.is_same(bound.styles.read):
-        before = bound.styles
-        styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, lambda: before.trees)
+        trees = bound.styles.lend_trees()
+        styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, trees)
         bound.restyle(styles, is_drawn(bound, styles))
     return True
 

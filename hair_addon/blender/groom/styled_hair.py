@@ -85,6 +85,13 @@ class StyledHair:
         """The clump trees of the hair; made when a style needs them."""
         return self.make_trees() if self.styling is None else self.styling.trees
 
+    def lend_trees(self) -> Callable[[], ClumpTrees]:
+        """A function that makes `trees` for other styles of the hair, and keeps nothing else of these."""
+        if self.styling is None and "trees" not in vars(self):
+            return self.make_trees
+        trees = self.trees
+        return lambda: trees
+
 
 def read_styles(
     styles: Sequence[StyleSettings],
@@ -145,7 +152,7 @@ def unstyled(
     styles: StyledHair, binding: HairBinding, guides: Strands, settings: HairSettings, surface: Surface
 ) -> StyledHair:
     """The `StyledHair` of the same strands without styles, and with as many points."""
-    return bind(ReadStyles(), binding, guides, settings, surface, lambda: styles.trees)
+    return bind(ReadStyles(), binding, guides, settings, surface, styles.lend_trees())
 
 
 def _are_same(inputs, others):

@@ -7,7 +7,7 @@ one of the next coarser level, so locks are made of whole smaller locks. One in 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,7 +22,11 @@ from .program import TreeSettings
 from .random_numbers import CROSSOVER, random_numbers
 
 MOST_SITES = 20_000  # of the finest level: they take a second to place, and 50,000 on two levels seven
+MOST_SPARE = 2  # trees that no style uses at present: of a slider that goes back, of a style switched off and on
 _HEXAGON = 0.866  # area of a site's cell by the square of the distance between sites
+
+HAIR = "hair"  # what the strands of the hair are known by; centres are by their tree and level
+Owner = str | tuple[TreeSettings, int]
 
 
 def site_count(area: float, size: float) -> int:
@@ -47,8 +51,8 @@ class ClumpTrees:
     place: Callable[[int, int], SurfacePoints]
     area: float
     _levels: dict[TreeSettings, list[HairBinding]] = field(default_factory=dict)
-    _members: dict[tuple, list[np.ndarray]] = field(default_factory=dict)
-    _parents: dict[tuple, np.ndarray] = field(default_factory=dict)
+    _members: dict[tuple[Owner, TreeSettings], list[np.ndarray]] = field(default_factory=dict)
+    _parents: dict[tuple[TreeSettings, int], np.ndarray] = field(default_factory=dict)
 
     def levels(self, tree: TreeSettings) -> list[HairBinding]:
         """The centres of each level, the coarsest first, bound to guides."""
@@ -58,7 +62,26 @@ class ClumpTrees:
                 self.binder.bind(self.place(site_count(self.area, factor * size), tree.seed + level))
                 for level, size in enumerate(tree.sizes)
             ]
+        else:
+            self._levels[tree] = self._levels.pop(tree)  # used last
         return self._levels[tree]
+
+    def keep_only(self, used: Collection[TreeSettings]) -> None:
+        """Forget trees that are not among the used ones, but for the last `MOST_SPARE`.
+
+        Otherwise every value of a slider would leave a tree behind.
+        """
+        spare = [tree for tree in self._levels if tree not in used]
+        for tree in spare[: max(len(spare) - MOST_SPARE, 0)]:
+            del self._levels[tree]
+        # Which copies of these trees for other weights share: what one of them forgets, another finds again.
+        for owner, tree in list(self._members):
+            named = {tree} if isinstance(owner, str) else {tree, owner[0]}
+            if not named <= self._levels.keys():
+                del self._members[owner, tree]
+        for tree, level in list(self._parents):
+            if tree not in self._levels:
+                del self._parents[tree, level]
 
     def weigh_again(self, settings: Any) -> "ClumpTrees":
         """The same trees where weights, limits or lengths of `HairSettings` changed: nothing is searched."""
@@ -70,7 +93,7 @@ class ClumpTrees:
             self.binder.with_settings(settings), self.place, self.area, weighed, self._members, self._parents
         )
 
-    def members(self, owner: object, strands: HairBinding, tree: TreeSettings) -> list[np.ndarray]:
+    def members(self, owner: Owner, strands: HairBinding, tree: TreeSettings) -> list[np.ndarray]:
         """(S,) int32 per level, the coarsest first: the place of each strand's centre in its level, -1 for none.
 
         owner: what the strands are known by.

@@ -8,7 +8,7 @@ before. Then all strands take the whole program in one launch.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
@@ -21,7 +21,7 @@ from ..kernels.checks import require_count, require_indices
 from . import program as programs
 from . import steps, strand_wetness
 from .base import StyleSettings
-from .clump_trees import ClumpTrees
+from .clump_trees import HAIR, ClumpTrees, Owner
 from .guide_styles import FollowedGuides, leans
 from .program import TreeSettings, mask_key
 from .program_rows import CLUMP, WEAVE, Program
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 # Nothing differentiates these kernels.
 wp.set_module_options({"enable_backward": False})
 
-HAIR = "hair"  # what the strands are known by to the clump trees
 _AGAINST = -0.5  # mean cosine between guides and normals below which hair grows on the surface's other side
 
 # Points (N, P) [m] of a level's centre strands without styles, for guides as they are followed now, and (N,) indices of
@@ -235,13 +234,15 @@ def bind(
         "centre_identities": _joined([*(bound.identities[0] for bound in bindings), guide_identities], int, device),
     }
 
-    def data_of(owner: Any, bound: HairBinding, known: int) -> StrandData:
+    def data_of(owner: Owner, bound: HairBinding, known: int) -> StrandData:
         """The `StrandData` of strands that may belong to centres of the first `known` levels."""
         rows = np.zeros((len(levels) + 1, len(bound.roots)), np.int32)
         for row in range(known):
             tree, level = levels[row]
-            is_own = owner != HAIR and owner[0] == tree and level <= owner[1]
-            rows[row] = (trees.parents(tree, owner[1]) if is_own else trees.members(owner, bound, tree))[level]
+            if not isinstance(owner, str) and owner[0] == tree and level <= owner[1]:
+                rows[row] = trees.parents(tree, owner[1])[level]
+            else:
+                rows[row] = trees.members(owner, bound, tree)[level]
         rows[-1] = bound.guide_weights.indices.numpy()[:, 0]
         weights = np.array([inputs.masks[key].of_strands(bound) for key in keys], np.float32)
         return StrandData(
@@ -256,6 +257,8 @@ def bind(
         _Level(bound, first_centres[row], _steps_before(program, made, row), data_of(levels[row], bound, row))
         for row, bound in enumerate(bindings)
     ]
+    if levels:
+        trees.keep_only({tree for tree, _level in levels})
     of_guides = {key: inputs.masks[key].of_guides(guides.roots) for key in keys}
     leaning = leans(styles, trees.binder.mesh, guides.roots, of_guides, dict(inputs.targets), mask_key)
     return Styling(
