@@ -7,6 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..data import rest_nodes, surface_space
+from ..data import rest_nodes, thin_hair
 from ..data.strands import curves_objects
 from ..groom import bindings, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
@@ -43,6 +44,7 @@ def after_depsgraph_update(scene, depsgraph):
     if not scene_time.is_shown(depsgraph):
         return
     global _is_opening, _is_undone
+    thin_hair.follow([scene])
     events.scene_changed(is_hair_only=_is_hair_only(depsgraph))
     if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
         looks.follow_guides(depsgraph.view_layer)
@@ -258,6 +260,7 @@ def before_reading(*_args):
     moving_surfaces.resume()
     stale_marks.follow_applied()
     live_hair.write_all()
+    thin_hair.follow(bpy.data.scenes)
     if bpy.app.background:  # in a window a timer repairs, and a render runs beside it
         composite.repair()
     composite.follow_all()
@@ -296,6 +299,7 @@ def after_load(*_args):
     invalidation.clear()
     older_files.renew()
     stale_marks.follow_applied()
+    thin_hair.follow(bpy.data.scenes)
     _hide_drawn_hair()
     composite.follow_all()  # of linked hair a file does not store that it is hidden from engines
 
@@ -310,6 +314,7 @@ def _hide_drawn_hair():
 def _take_over():
     """Draw what Blender drew while the add-on was disabled."""
     older_files.renew()
+    thin_hair.follow(bpy.data.scenes)
     _hide_drawn_hair()
     composite.follow_all()
     looks.follow_guides(bpy.context.view_layer)

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from .. import rest_nodes, surface_collections
+from .. import rest_nodes, surface_collections, thin_hair
 from . import follow_nodes
 
 _UNMOVED = Matrix()
@@ -29,16 +29,10 @@ def link_object(name, curves, surface_object, is_rendered=True):
     curves_object.parent = surface_object
     render(curves_object, is_rendered)
     if is_rendered:
-        show_thin(bpy.context.scene)
+        thin_hair.show_thin(bpy.context.scene)
     surface_collections.collection_of(surface_object).objects.link(curves_object)
     follow_nodes.add_modifier(curves_object)
     return curves_object
-
-
-def show_thin(blender_scene):
-    """Let EEVEE draw strands as thin as they are: by Blender's default it draws lines a pixel wide or wider."""
-    if blender_scene.render.hair_type == "STRAND":
-        blender_scene.render.hair_type = "STRIP"
 
 
 def render(curves_object, is_rendered):

@@ -22,7 +22,7 @@ from ....core.grooming.groom import HairSettings
 from ....core.grooming.rooted_curves import RootedCurves
 from ....core.long_work import Work, part_of
 from ....core.params import Param, declared, plain_value
-from ...data import scene
+from ...data import scene, thin_hair
 from ...data.scene import Surface
 from ...data.strands import attributes, curves, curves_objects, exported_curves, kept_shapes
 from ...host.datablocks import Remembered
@@ -160,7 +160,7 @@ def _write_hair(hair, guides, surface, placed, settings, guide_map):
     state.root_key = staleness.root_key(settings, None)
     state.followed = staleness.guides_digest(guides)
     state.is_stale = False
-    curves_objects.show_thin(bpy.context.scene)
+    thin_hair.show_thin(bpy.context.scene)
     looks.evaluate_shading(hair)
     looks.evaluate_guides(guides)
 

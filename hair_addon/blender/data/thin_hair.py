@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""EEVEE's width of strands, a setting of scenes: set once in each scene that shows hair, and the artist's from then on.
+
+By Blender's default EEVEE draws lines a pixel wide or wider. A scene that appends, links or instances hair has that
+default, whatever the scene had that the hair was made in.
+"""
+
+import bpy
+
+_SET = "vellus_thin_hair"  # custom property of scenes in which it was set, or left as it was found
+
+
+def show_thin(blender_scene):
+    """Let EEVEE draw strands as thin as they are, unless that was done in this scene before."""
+    if blender_scene.library is not None or _SET in blender_scene:
+        return
+    blender_scene[_SET] = True
+    if blender_scene.render.hair_type == "STRAND":
+        blender_scene.render.hair_type = "STRIP"
+
+
+def follow(blender_scenes):
+    """Do it in those of some scenes that show hair of ours: in their own objects, in instances or in the background."""
+    waiting = [one for one in blender_scenes if one.library is None and _SET not in one]
+    if waiting and any(curves.vellus.kind == "HAIR" for curves in bpy.data.hair_curves):
+        for blender_scene in waiting:
+            if _shows_hair(blender_scene):
+                show_thin(blender_scene)
+
+
+def _shows_hair(blender_scene):
+    seen, waiting = set(), [blender_scene]
+    while waiting:
+        shown = waiting.pop()
+        if shown is None or shown in seen:
+            continue
+        seen.add(shown)
+        if isinstance(shown, bpy.types.Scene):
+            waiting.append(shown.background_set)
+        for one in shown.objects if isinstance(shown, bpy.types.Scene) else shown.all_objects:
+            if one.type == "CURVES" and one.data.vellus.kind == "HAIR":
+                return True
+            waiting.append(one.instance_collection)
+    return False
