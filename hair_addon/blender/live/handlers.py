@@ -54,6 +54,8 @@ def after_depsgraph_update(scene, depsgraph):
         bpy.app.timers.register(composite.repair)
     if _is_opening:
         _is_opening = False
+        animated.follow(depsgraph)
+        _evaluate(depsgraph, {})  # what a script has set since
         return
     deformed = _deformed(depsgraph)
     moving_surfaces.shape_changed(deformed & _surfaces())
@@ -284,6 +286,7 @@ def before_saving(*_args):
 def after_import(*_args):
     """Make the names of styles readable, which Blender passes to a rename; what was saved paused goes on."""
     moving_surfaces.resume()
+    animated.remember(is_made_with=True)
     for hair in _of_kind("HAIR"):
         style_items.make_names_readable(hair.vellus)
 
@@ -297,6 +300,7 @@ def after_load(*_args):
     after_import()
     live_hair.cancel_writing()
     invalidation.clear()
+    animated.remember(is_made_with=True)
     older_files.renew()
     stale_marks.follow_applied()
     thin_hair.follow(bpy.data.scenes)
@@ -328,6 +332,7 @@ def after_undo(*_args):
     live_hair.cancel_writing()
     moving_surfaces.resume()  # which may have been kept paused
     invalidation.data_replaced()
+    animated.remember(is_made_with=True)
 
 
 @persistent

@@ -4,6 +4,8 @@
 Blender animates properties without calling their `update`, so their values are compared with the previous ones.
 """
 
+import contextlib
+
 import bpy
 
 from ...core.dynamics.rod.settings import DynamicsSettings
@@ -13,7 +15,7 @@ from ...core.shading.tables import lookup_tables
 from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import text_of
-from . import setting_properties, style_items
+from . import setting_properties, style_items, style_keys
 
 _GROUPS = {
     "guides": setting_properties.names_of(GuideSettings),
@@ -23,7 +25,10 @@ _GROUPS = {
     "marschner": [n for n in setting_properties.names_of(lookup_tables.Settings) if n not in appearance.TABLE_FIELDS],
 }
 
-value_cache = Cache()  # session_uid of Curves → values of all settings when they were looked at last
+_RADII = {diameter: radius for radius, diameter in setting_properties.diameters(HairSettings)}
+
+# session_uid of Curves → (values of all settings when they were looked at last, paths that were keyed or driven then)
+value_cache = Cache()
 
 
 def are_keyed(datablock):
@@ -32,29 +37,35 @@ def are_keyed(datablock):
     return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
 
 
-def remember():
-    """Store setting values before a frame change."""
+def remember(is_made_with=False):
+    """Store setting values before a frame change; is_made_with: whether strands were made with what keys give now."""
     for datablock in _keyed():
-        value_cache.keep(datablock.session_uid, _values(datablock.vellus))
+        known = value_cache.get(datablock.session_uid)
+        paths = style_keys.keyed_paths(datablock) if is_made_with else set() if known is None else known[1]
+        value_cache.keep(datablock.session_uid, (_values(datablock.vellus), paths))
 
 
 def follow(depsgraph):
-    """Mark Curves as stale whose settings were animated; returns whether any were. A render has its own values."""
+    """Mark Curves as stale whose settings were animated; returns whether any were. A render has its own values.
+
+    Of a key or driver that is new nobody knows what strands were made with: its first value counts as a change.
+    """
     is_render = scene_time.is_rendered(depsgraph)
     is_outdated = False
     for datablock in _keyed():
         state = datablock.vellus
         # Blender animates the original values only for viewports.
         values = _values(datablock.evaluated_get(depsgraph).vellus if is_render else state)
-        before = value_cache.get(datablock.session_uid) or values
-        if values == before:
+        paths = style_keys.keyed_paths(datablock)
+        before, known = value_cache.get(datablock.session_uid) or (values, set())
+        if values == before and paths <= known:
             continue
-        value_cache.keep(datablock.session_uid, values)
-        is_outdated = True
+        value_cache.keep(datablock.session_uid, (values, paths))
+        is_outdated, new = True, _at(datablock, paths - known)
         for key, group in _groups(state).items():
-            known = before.get(key, values[key])
+            of_group = before.get(key, values[key])
             for name, value in values[key].items():
-                if value != known[name]:
+                if value != of_group[name] or (group, name) in new:
                     setattr(group, name, value)  # whose `update` marks it
     return is_outdated
 
@@ -72,6 +83,16 @@ def _groups(state):
     """{key in `_values`: property group}."""
     groups = {name: getattr(state, name) for name in _GROUPS}
     return groups | {_key(item): style_items.group_of(item) for item in state.styles}
+
+
+def _at(datablock, paths):
+    """[(property group, name)] of the settings at some data paths; of a diameter, its radius."""
+    found = []
+    for path in paths:
+        owner, _, name = path.rpartition(".")
+        with contextlib.suppress(ValueError):  # of a path that leads nowhere, which Blender keeps
+            found.append((datablock.path_resolve(owner), _RADII.get(name, name)))
+    return found
 
 
 def _key(item):

@@ -184,7 +184,7 @@ def given_settings(operator, settings_class, skip=()):
     errors as in `to_settings`.
     """
     is_given = operator.properties.is_property_set
-    for radius, diameter in _diameters(settings_class):
+    for radius, diameter in diameters(settings_class):
         if is_given(diameter) and not is_given(radius):
             setattr(operator, radius, _radius_of(getattr(operator, diameter)))
     names = [name for name in from_surface(settings_class) if name not in skip]
@@ -195,11 +195,12 @@ def given_settings(operator, settings_class, skip=()):
 def show(operator, group, settings_class):
     """Show sizes in an operator's redo panel. Fitted ones are fitted again when another setting changes."""
     fitted_sizes.show(operator, group, settings_class)
-    for radius, diameter in _diameters(settings_class):
+    for radius, diameter in diameters(settings_class):
         setattr(operator, diameter, shortest(_millimeters_of(shortest(getattr(group, radius)))))
 
 
-def _diameters(settings_class):
+def diameters(settings_class):
+    """[(name of a radius, name of the diameter that is shown in its place)] of a class."""
     return [(name, details.diameter[0]) for name, _default, details in declared(settings_class) if details.diameter]
 
 

@@ -5,11 +5,15 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon import api
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import pipeline
+from hair_addon.blender.live import handlers
 from hair_addon.blender.materials import looks, materials
 from hair_addon.core.shading import appearance
 from tests.support.guide_tools import grown_from_nothing, lengths_of
 from tests.support.reading import points
+from tests.support.rendering import add_orthographic_camera
 
 
 @pytest.fixture
@@ -99,3 +103,99 @@ def test_an_animation_renders_as_its_frames_do(keyed_hair, tmp_path):
 def pixels(path):
     image = bpy.data.images.load(str(path))
     return np.array(image.pixels[:])
+
+
+def drive(hair, path, expression="0.01 * x"):
+    """Drive a setting by a property of the surface, which is 2."""
+    surface = bpy.data.objects["Sphere"]
+    surface["x"] = 2.0
+    surface.update_tag()
+    driver = hair.data.driver_add(path).driver
+    variable = driver.variables.new()
+    variable.name, variable.targets[0].id, variable.targets[0].data_path = "x", surface, '["x"]'
+    driver.expression = expression
+
+
+def root_radius(hair):
+    return hair.data.attributes["radius"].data[0].value
+
+
+@pytest.mark.parametrize("path, expression", [("vellus.hair.radius", "0.01 * x"), ("vellus.hair.thickness", "20 * x")])
+def test_the_first_value_of_a_driver_counts(hair, path, expression):
+    drive(hair, path, expression)
+    bpy.context.view_layer.update()
+    assert root_radius(hair) == pytest.approx(0.02)
+    bpy.data.objects["Sphere"]["x"] = 3.0
+    bpy.data.objects["Sphere"].update_tag()
+    bpy.context.view_layer.update()
+    assert root_radius(hair) == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize("path", ["vellus.styles[0].trim.factor", 'vellus.styles["Trim"].trim.factor'])
+def test_so_does_that_of_a_style_s_driver(hair, path):
+    api.set_styles(hair, [api.Trim(factor=1.0)])
+    bpy.context.view_layer.update()
+    long = lengths_of(points(hair))
+    drive(hair, path, "0.25 * x")
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(lengths_of(points(hair)), 0.5 * long, rtol=0.02)
+
+
+@pytest.fixture
+def rendered():
+    """A function that renders a frame: (N, 3) points of the hair that the render is given, and their radii."""
+    seen = []
+
+    class Look(bpy.types.RenderEngine):
+        bl_idname, bl_label = "VELLUS_TEST_LOOK", "Look"
+
+        def render(self, depsgraph):
+            shown = depsgraph.objects["Hair"].data
+            radii = np.empty(len(shown.points), np.float32)
+            shown.attributes["radius"].data.foreach_get("value", radii)
+            seen.append((curves.read_points(shown), radii))
+
+    def render(frame):
+        scene = bpy.context.scene
+        scene.render.engine, scene.frame_start, scene.frame_end = Look.bl_idname, frame, frame
+        scene.render.resolution_x = scene.render.resolution_y = 8
+        add_orthographic_camera(scene)
+        bpy.ops.render.render(animation=True)
+        return seen[-1]
+
+    bpy.utils.register_class(Look)
+    yield render
+    bpy.utils.unregister_class(Look)
+
+
+def test_what_a_script_keys_and_drives_is_in_its_first_render(hair, rendered):
+    """With no update in between: Blender changes to the frame of a render first."""
+    drive(hair, "vellus.hair.radius")
+    for frame, length in ((1, 0.2), (11, 0.4)):
+        bpy.data.objects["Guides"].data.vellus.guides.length = length
+        bpy.data.objects["Guides"].data.keyframe_insert("vellus.guides.length", frame=frame)
+    strands, radii = rendered(11)
+    assert lengths_of(strands.reshape(points(hair).shape)).mean() == pytest.approx(0.4, rel=0.05)
+    assert radii[0] == pytest.approx(0.02)
+
+
+def test_a_driver_that_a_file_has_computes_nothing_again_when_it_is_opened(hair, tmp_path, monkeypatch):
+    drive(hair, "vellus.hair.radius")
+    bpy.context.view_layer.update()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "driven.blend"))
+    monkeypatch.setattr(pipeline, "interpolate_hair", lambda *args: pytest.fail("hair is computed again"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "driven.blend"))
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(2)
+
+
+def test_what_a_script_sets_before_a_window_shows_its_file_is_in_the_hair(hair, monkeypatch):
+    """The first update of a file in a window reports all of it."""
+    monkeypatch.setattr(handlers, "_is_opening", True)
+    hair.data.vellus.hair.radius = 0.025
+    drive(hair, "vellus.appearance.melanin", "0.1 * x")
+    bpy.context.view_layer.update()
+    assert not handlers._is_opening
+    assert root_radius(hair) == pytest.approx(0.025)
+    wanted = appearance.principled_sockets(appearance.Appearance(melanin=0.2))["Absorption Coefficient"]
+    np.testing.assert_allclose(absorption(hair), wanted, rtol=1e-5)
