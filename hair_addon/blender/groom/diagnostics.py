@@ -7,10 +7,9 @@ Panels call this with every redraw, so it reads no geometry.
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import bpy
 from bpy.types import Curves, Object
 
-from ..data import rest_nodes, usable_surfaces
+from ..data import named_objects, rest_nodes, usable_surfaces
 from ..data.strands import follow_nodes
 from ..data.strands.curves import followers
 from ..host.notices import name_of, text_of
@@ -38,7 +37,7 @@ def parting_warnings(hair: Curves) -> list[Warning]:
     """Return [Warning] about missing part lines and region groups of a hair Curves datablock."""
     lines, group = (text_of(hair.vellus.hair, name) for name in ("part_lines", "region_group"))
     found = []
-    if lines and lines not in bpy.data.objects:
+    if lines and named_objects.find(lines) is None:
         found.append(Warning(interface_text('No object "{name}": pick another part line.', name=lines)))
     if hair.surface is not None and group and group not in hair.surface.vertex_groups:
         text = 'No vertex group "{name}": pick another for regions.'
@@ -49,7 +48,7 @@ def parting_warnings(hair: Curves) -> list[Warning]:
 def flow_warnings(guides: Curves) -> list[Warning]:
     """Return [Warning] about missing flow lines of a guide Curves datablock."""
     name = text_of(guides.vellus.guides, "flow_lines")
-    if not name or name in bpy.data.objects:
+    if not name or named_objects.find(name) is not None:
         return []
     return [Warning(interface_text('No object "{name}": pick other flow lines.', name=name))]
 

@@ -9,7 +9,7 @@ from bpy.app.handlers import persistent
 from ..data import rest_nodes, surface_space
 from ..data import rest_nodes, thin_hair
 from ..data.strands import curves_objects
-from ..groom import bindings, paused_hair, pipeline, staleness
+from ..groom import bindings, followed_names, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import running, scene_time
 from ..host.notices import name_of
@@ -45,6 +45,7 @@ def after_depsgraph_update(scene, depsgraph):
         return
     global _is_opening, _is_undone
     thin_hair.follow([scene])
+    followed_names.follow()
     events.scene_changed(is_hair_only=_is_hair_only(depsgraph))
     if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
         looks.follow_guides(depsgraph.view_layer)
@@ -263,6 +264,7 @@ def before_reading(*_args):
     stale_marks.follow_applied()
     live_hair.write_all()
     thin_hair.follow(bpy.data.scenes)
+    followed_names.follow()
     if bpy.app.background:  # in a window a timer repairs, and a render runs beside it
         composite.repair()
     composite.follow_all()
@@ -286,6 +288,7 @@ def before_saving(*_args):
 def after_import(*_args):
     """Make the names of styles readable, which Blender passes to a rename; what was saved paused goes on."""
     moving_surfaces.resume()
+    followed_names.follow()
     animated.remember(is_made_with=True)
     for hair in _of_kind("HAIR"):
         style_items.make_names_readable(hair.vellus)

@@ -8,7 +8,7 @@ from ....core import dynamics
 from ....core.dynamics.collision.collider_settings import ColliderSettings, contact_of
 from ....core.errors import HairError
 from ...host import scene_time
-from ...host.notices import name_of
+from ...host.notices import name_of, text_of
 from ...settings import setting_properties
 from .. import scene
 from . import force_fields
@@ -51,6 +51,35 @@ def _obstacle(mesh_object, vertices, triangles, settings, metres):
     friction, distance = contact_of(own, settings)
     name = f"{name_of(mesh_object)} {mesh_object.session_uid}"
     return dynamics.simulation.Obstacle(name, vertices, triangles, friction, metres * distance, own.is_double_sided)
+
+
+def require_colliders(settings, depsgraph):
+    """Raise `HairError` where guides with these `DynamicsSettings` would not collide with what they name."""
+    problem = collider_problem(settings)
+    if problem is not None:
+        raise problem
+    for collider in colliders(settings.colliders):
+        if not collider.evaluated_get(depsgraph).is_evaluated:
+            sentence = (
+                'The collider "{name}" is hidden in viewports or is not in this scene: show it, link it, or remove it '
+                'from the collection "{collection}".'
+            )
+            raise HairError(sentence, name=name_of(collider), collection=settings.colliders)
+
+
+def collider_problem(settings):
+    """The `HairError` of a collection that is missing or has nothing to collide with; None where all is well.
+
+    settings: `DynamicsSettings`, or properties. No geometry is read.
+    """
+    name = text_of(settings, "colliders")
+    if name and bpy.data.collections.get(name) is None:
+        sentence = 'There is no collection "{name}" of colliders: pick another collection, or clear the field.'
+        return HairError(sentence, name=name)
+    if name and not colliders(name):
+        sentence = 'The collection "{name}" has no meshes to collide with: add some, or clear the field.'
+        return HairError(sentence, name=name)
+    return None
 
 
 def colliders(collection_name):

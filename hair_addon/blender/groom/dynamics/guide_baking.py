@@ -23,7 +23,7 @@ from ...host import memory, scene_time
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...settings import properties
-from .. import quiet_hair
+from .. import followed_names, quiet_hair
 from ..guides import guide_regions
 from . import bake_resuming, frame_folders, guide_simulation
 from .bake_resuming import Task
@@ -128,6 +128,7 @@ def baking(
     """
     global _baking
     memory.require(memory_of(guides_list))
+    followed_names.follow()
     present, its_scene = scene_time.frame_of(scene), Remembered(scene)
     _baking = True
     with contextlib.ExitStack() as stack:

@@ -123,6 +123,7 @@ def _are_same(one, other):
 def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation:
     """The simulation of guides from the frame that a depsgraph was evaluated for. Raises `HairError`."""
     settings = simulated(properties.dynamics_of(guides.vellus))
+    simulated_world.require_colliders(settings, depsgraph)
     masks: dict[tuple[str, str, bool], np.ndarray] = {}
     frame = read(guides, scene, depsgraph, settings, masks)
     pose, metres = frame.pose, simulated_world.metres_of(scene, settings)

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ...data.simulation import simulated_world
 from ...data.strands import delivered_hair
 from ...groom.dynamics import dynamics_notes, frame_folders
 from ...groom.selection import guides_of, hair_of, object_of
@@ -147,7 +148,11 @@ class VELLUS_PT_dynamics_collision(_OfDynamics, bpy.types.Panel):
     bl_idname = "VELLUS_PT_dynamics_collision"
 
     def draw(self, context):
-        setting_rows.collision_rows(*_settings_column(self.layout, context))
+        column, settings = _settings_column(self.layout, context)
+        setting_rows.collision_rows(column, settings)
+        problem = simulated_world.collider_problem(settings)
+        if problem is not None:
+            write(column, context, error_text(problem), "ERROR")
 
 
 class VELLUS_PT_dynamics_hair(_OfDynamics, bpy.types.Panel):
