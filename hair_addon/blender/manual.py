@@ -35,6 +35,7 @@ _OPERATORS = {
     "surface": (
         *("add_hair", "comb_guides", "select_guides", "select_hair", "pick_hair", "delete_hair"),
         *("check_uvs", "use_uv_map", "make_uv_map", "attach_to_surface", "apply_scale", "restore_guides"),
+        "make_own_guides",
     ),
     "guides": ("distribute_guides",),
     "guide_tools": (

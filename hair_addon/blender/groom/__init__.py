@@ -8,9 +8,11 @@ from ...core.lazy import submodules
 if TYPE_CHECKING:
     from . import (
         bindings,
+        copied_hair,
         diagnostics,
         edited_surfaces,
         edits,
+        followed_names,
         grown_guides,
         guide_maps,
         hair_systems,

@@ -11,9 +11,10 @@ from bpy.types import Curves, Object
 
 from ..data import named_objects, rest_nodes, usable_surfaces
 from ..data.strands import follow_nodes
-from ..data.strands.curves import followers
 from ..host.notices import name_of, text_of
 from ..settings.translations import interface_text
+from . import copied_hair
+from .selection import has_object, is_shown
 
 
 @dataclass(frozen=True)
@@ -103,13 +104,19 @@ def _of_uv_map(surface, parts):
 
 
 def _of_guides(parts):
-    hair = [part.vellus for part in parts if part.vellus.kind == "HAIR"]
-    if any(state.guide_curves is None for state in hair):
+    hair = [part for part in parts if part.vellus.kind == "HAIR" and is_shown(part)]
+    if any(part.vellus.guide_curves is None for part in hair):
         yield Warning(interface_text("The hair has no guides: pick some."))
-    elif any(_is_without_object(state.guide_curves) for state in hair):
+    elif not all(has_object(part.vellus.guide_curves) for part in hair):
         yield Warning(interface_text("The guides' object was deleted."), "vellus.restore_guides")
+    elsewhere = next((part for part in hair if copied_hair.are_elsewhere(part)), None)
+    if elsewhere is not None:
+        values = {"hair": name_of(elsewhere), "name": name_of(elsewhere.vellus.guide_curves.surface)}
+        sentence = '"{hair}" follows guides that grow on "{name}": give it guides of its own.'
+        yield Warning(interface_text(sentence, **values), "vellus.make_own_guides")
 
 
-def _is_without_object(guides):
-    """Whether nothing uses guides but the hair that follows them."""
-    return guides.users - guides.use_fake_user <= len(followers(guides))
+def sharing_note(hair: Curves) -> str:
+    """Which other hair follows the same guides, as a translated sentence; empty where none does."""
+    names = ", ".join(name_of(other) for other in copied_hair.sharing(hair))
+    return interface_text("The same guides are followed by: {names}", names=names) if names else ""

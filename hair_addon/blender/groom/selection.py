@@ -12,6 +12,21 @@ from ..host.notices import text_of
 from ..settings import style_items
 
 
+def is_shown(hair: Curves) -> bool:
+    """Whether an object has hair Curves: when it is deleted Blender keeps its Curves until the file is saved."""
+    return hair.users > hair.use_fake_user
+
+
+def followers_shown(guides: Curves) -> list[Curves]:
+    """The hair Curves that follow some guides and have an object."""
+    return [hair for hair in followers(guides) if is_shown(hair)]
+
+
+def has_object(guides: Curves) -> bool:
+    """Whether anything uses guide Curves but the hair that follows them."""
+    return guides.users - guides.use_fake_user > len(followers(guides))
+
+
 def active_of_kind(active: Object | None, kind: str) -> Curves | None:
     """The Curves of the active object if they are ours and of this kind, GUIDES or HAIR; else None."""
     if active is not None and active.type == "CURVES" and active.data.vellus.kind == kind:
@@ -59,7 +74,7 @@ def hair_of(active: Object | None) -> Curves | None:
     if active.type == "MESH":
         return painted_hair(active) or _newest(curves_on(active, "HAIR"))
     guides = active_of_kind(active, "GUIDES")
-    return active_of_kind(active, "HAIR") if guides is None else _newest(followers(guides))
+    return active_of_kind(active, "HAIR") if guides is None else _newest(followers_shown(guides))
 
 
 def painted_hair(active: Object) -> Curves | None:
@@ -114,8 +129,11 @@ def _density_masks(hair):
 
 
 def curves_on(surface: Object, kind: str) -> list[Curves]:
-    """Every guide or hair Curves datablock on a mesh object."""
-    return [c for c in bpy.data.hair_curves if c.vellus.kind == kind and c.surface == surface]
+    """Every guide or hair Curves datablock on a mesh object but those that were deleted, guides with their hair."""
+    found = [c for c in bpy.data.hair_curves if c.vellus.kind == kind and c.surface == surface]
+    if kind == "HAIR":
+        return [hair for hair in found if is_shown(hair)]
+    return [guides for guides in found if has_object(guides) or followers_shown(guides)]
 
 
 def parts_of(active: Object | None) -> list[Curves]:
@@ -124,9 +142,9 @@ def parts_of(active: Object | None) -> list[Curves]:
     hair, guides = active_of_kind(active, "HAIR"), active_of_kind(active, "GUIDES")
     if hair is not None:
         its_guides = hair.vellus.guide_curves
-        return [hair] if its_guides is None or followers(its_guides) != [hair] else [hair, its_guides]
+        return [hair] if its_guides is None or followers_shown(its_guides) != [hair] else [hair, its_guides]
     if guides is not None:
-        return [guides, *followers(guides)]
+        return [guides, *followers_shown(guides)]
     if active is None or active.type != "MESH":
         return []
     return curves_on(active, "GUIDES") + curves_on(active, "HAIR")

@@ -9,7 +9,7 @@ from bpy.app.handlers import persistent
 from ..data import rest_nodes, surface_space
 from ..data import rest_nodes, thin_hair
 from ..data.strands import curves_objects
-from ..groom import bindings, followed_names, paused_hair, pipeline, staleness
+from ..groom import bindings, copied_hair, followed_names, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import running, scene_time
 from ..host.notices import name_of
@@ -46,6 +46,7 @@ def after_depsgraph_update(scene, depsgraph):
     global _is_opening, _is_undone
     thin_hair.follow([scene])
     followed_names.follow()
+    copied_hair.follow()
     events.scene_changed(is_hair_only=_is_hair_only(depsgraph))
     if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
         looks.follow_guides(depsgraph.view_layer)
@@ -290,6 +291,7 @@ def after_import(*_args):
     moving_surfaces.resume()
     followed_names.follow()
     animated.remember(is_made_with=True)
+    copied_hair.remember()
     for hair in _of_kind("HAIR"):
         style_items.make_names_readable(hair.vellus)
 
@@ -304,6 +306,7 @@ def after_load(*_args):
     live_hair.cancel_writing()
     invalidation.clear()
     animated.remember(is_made_with=True)
+    copied_hair.remember()
     older_files.renew()
     stale_marks.follow_applied()
     thin_hair.follow(bpy.data.scenes)
@@ -336,6 +339,7 @@ def after_undo(*_args):
     moving_surfaces.resume()  # which may have been kept paused
     invalidation.data_replaced()
     animated.remember(is_made_with=True)
+    copied_hair.remember()
 
 
 @persistent

@@ -9,7 +9,7 @@ from ..data import guide_map_readers, scene, subdivided_surfaces
 from ..data.pictures import drawn_meshes
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, surface_textures, world_texture
-from ..groom import bindings, paused_hair
+from ..groom import bindings, copied_hair, paused_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..host import notices
 from ..render import hair_cache
@@ -33,6 +33,7 @@ COPIES = (
     reported.painting_cache,
     reported.place_cache,
     paused_hair.paused_cache,
+    copied_hair.known_cache,
     moving_surfaces.moved_cache,
     moving_surfaces.unchecked_cache,
     guide_map_readers.reading_cache,

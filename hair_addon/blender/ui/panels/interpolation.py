@@ -6,7 +6,7 @@ import bpy
 from ....core.grooming import cost
 from ...data.scene import triangle_count
 from ...data.strands.curves import is_hand_made
-from ...groom.diagnostics import parting_warnings
+from ...groom.diagnostics import parting_warnings, sharing_note
 from ...groom.selection import active_of_kind, guides_of, hair_of
 from ...render import hair_cache, refused_strands
 from ...settings.translations import error_text, interface_text
@@ -41,6 +41,10 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
             )
             write(layout, context, interface_text(text), "INFO")
         setting_rows.row(layout, state, "guide_curves")
+        shared = sharing_note(hair)
+        if shared:
+            write(layout, context, shared, "INFO")
+            layout.operator("vellus.make_own_guides")
         setting_rows.strand_rows(layout, state.hair, hair.surface)
         setting_rows.row(layout, state, "is_live")
         _draw_cost(layout, state.hair, hair_cache.drawn_bytes(hair))

@@ -7,6 +7,7 @@ from .delete_hair import VELLUS_OT_delete_hair
 from .delete_system import VELLUS_OT_delete_system
 from .distribute_guides import VELLUS_OT_distribute_guides
 from .interpolate_hair import VELLUS_OT_interpolate_hair
+from .make_own_guides import VELLUS_OT_make_own_guides
 from .pick_hair import VELLUS_OT_pick_hair
 from .restore_guides import VELLUS_OT_restore_guides
 from .select_guides import VELLUS_OT_select_guides
@@ -23,4 +24,5 @@ CLASSES = (
     VELLUS_OT_delete_hair,
     VELLUS_OT_delete_system,
     VELLUS_OT_restore_guides,
+    VELLUS_OT_make_own_guides,
 )

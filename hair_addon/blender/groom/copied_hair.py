@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Copies of hair: what a copy grows on and follows, and guides that several hairs share.
+
+Where objects are duplicated together Blender lets each copy point to the others. Make Single User copies data alone:
+copies then point to the originals, though their objects are on a surface of their own and beside guides of their own.
+"""
+
+from collections.abc import Sequence
+
+import bpy
+from bpy.types import Curves, Depsgraph, Object
+
+from ...core.errors import HairError
+from ..data import scene
+from ..data.strands import curves, curves_objects
+from ..host.caches import Cache
+from ..host.notices import name_of
+from . import staleness
+from .selection import followers_shown
+
+known_cache = Cache()  # "Curves" → session UIDs of the guides and hair that were looked at last
+
+
+def remember() -> None:
+    """Take the Curves that there are now as they are: those of a file, of a library, or of an undo step."""
+    known_cache.keep("Curves", frozenset(datablock.session_uid for datablock in _ours()))
+
+
+def follow() -> None:
+    """Let Curves that were copied since grow on the surface that their objects are on, and follow its guides."""
+    known, ours = known_cache.get("Curves"), _ours()
+    if known == frozenset(datablock.session_uid for datablock in ours):
+        return
+    remember()
+    new = [] if known is None else [datablock for datablock in ours if datablock.session_uid not in known]
+    if not new:
+        return
+    users = _users()
+    for datablock in new:
+        surface = _surface_beside(datablock, users.get(datablock, ()))
+        if surface is not None:
+            datablock.surface = surface
+            datablock.update_tag()
+    for hair in ours:
+        if hair.vellus.kind == "HAIR" and hair.vellus.guide_curves is not None:
+            guides = _guides_beside(hair, new, users)
+            if guides is not None:
+                _let_follow(hair, guides)
+
+
+def _ours() -> list[Curves]:
+    return [one for one in bpy.data.hair_curves if one.vellus.kind != "NONE" and one.library is None]
+
+
+def _users() -> dict[Curves, list[Object]]:
+    found: dict[Curves, list[Object]] = {}
+    for user in bpy.data.objects:
+        if user.type == "CURVES":
+            found.setdefault(user.data, []).append(user)
+    return found
+
+
+def _surface_beside(datablock, users):
+    """The mesh object that all objects of Curves are on, where it is a copy of their surface; else None."""
+    parents, surface = {user.parent for user in users}, datablock.surface
+    if len(parents) != 1 or surface is None or surface in parents or surface.type != "MESH":
+        return None
+    (parent,) = parents
+    if parent is None or parent.type != "MESH":
+        return None
+    sizes = [(len(one.data.vertices), len(one.data.loops), len(one.data.polygons)) for one in (parent, surface)]
+    return parent if sizes[0] == sizes[1] else None
+
+
+def _guides_beside(hair, new, users):
+    """Guides on the surface of hair that are a copy of those it follows, which are not there or not its own."""
+    followed = hair.vellus.guide_curves
+    if hair not in new and followed.surface == hair.surface:
+        return None
+    if followed in new:
+        return None
+    beside = [
+        one
+        for one in users
+        if one.vellus.kind == "GUIDES" and one.surface == hair.surface and one not in (followed, None)
+    ]
+    copies = [one for one in beside if one in new or not curves.followers(one)]
+    digest = staleness.guides_digest(followed) if copies else ""
+    alike = [one for one in copies if staleness.guides_digest(one) == digest]
+    return min(alike, key=lambda one: (one not in new, one.session_uid), default=None)
+
+
+def _let_follow(hair, guides):
+    """Let hair follow guides that are where those were that it was made with: nothing is to be made again."""
+    was_stale = hair.vellus.is_stale
+    hair.vellus.guide_curves = guides
+    hair.vellus.is_stale = was_stale
+
+
+def sharing(hair: Curves) -> list[Curves]:
+    """The other hair Curves in scenes that follow the guides of one."""
+    guides = hair.vellus.guide_curves
+    return [] if guides is None else [one for one in followers_shown(guides) if one != hair]
+
+
+def are_elsewhere(hair: Curves) -> bool:
+    """Whether hair follows guides that grow on another surface than its own."""
+    guides = hair.vellus.guide_curves
+    return guides is not None and None not in (guides.surface, hair.surface) and guides.surface != hair.surface
+
+
+def make_own_guides(hair_list: Sequence[Curves], depsgraph: Depsgraph) -> list[Curves]:
+    """Copy the guides of hair to its surface, and let it follow the copies; returns these. Raises `HairError`.
+
+    Hair that shared guides on another surface shares their copy.
+    """
+    for hair in hair_list:
+        curves.require_editable(hair)
+        if hair.vellus.guide_curves is None:
+            raise HairError('"{name}" has no guides: pick them in the Strands panel.', name=name_of(hair))
+        if hair.surface is None:
+            raise HairError("The surface is missing: pick a mesh.")
+    surfaces = {hair.surface: scene.read_surface(hair.surface, depsgraph) for hair in hair_list}
+    made: dict[tuple[Curves, Object], Curves] = {}
+    for hair in hair_list:
+        key = hair.vellus.guide_curves, hair.surface
+        if key not in made:
+            made[key] = _copied(*key, surfaces[hair.surface])
+        _let_follow(hair, made[key])
+    return list(made.values())
+
+
+def _copied(guides, surface_object, surface):
+    own = guides.copy()
+    own.surface = surface_object
+    own.vellus.cache_identity = own.vellus.delivered_key = ""  # of frames that are baked of the first
+    curves_objects.link_object(name_of(guides), own, surface_object, is_rendered=False)
+    roots = curves.read_roots(own, surface, surface.from_local(curves.first_points(own)))
+    curves.write_roots(own, surface, roots)
+    curves.keep_surface(own, surface)
+    return own
