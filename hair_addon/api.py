@@ -172,9 +172,8 @@ def distribute_guides(
     if are_arrays(surface):
         require_no_names(settings)
         return dynamics.draped_growth.grow(mesh_of(surface), settings, progress=progress)
-    return run_now(
-        blender.groom.pipeline.distributing_guides(_surface_object(surface), settings, _depsgraph()), progress
-    )
+    work = blender.groom.pipeline.distributing_guides(_grown_on(surface), settings, _depsgraph())
+    return run_now(work, progress)
 
 
 def interpolate_hair(
@@ -230,7 +229,7 @@ def add_hair(
     """
     settings = GroomSettings() if settings is None else settings
     require_class(settings, GroomSettings, "settings")
-    work = blender.groom.transfer.groom_settings.adding_hair(_surface_object(surface), settings, _depsgraph())
+    work = blender.groom.transfer.groom_settings.adding_hair(_grown_on(surface), settings, _depsgraph())
     return run_now(work, heard(progress))
 
 
@@ -319,8 +318,13 @@ def _curves(given, kind=None):
     return blender.data.arguments.curves_of(given, kind)
 
 
-def _surface_object(given):
-    return blender.data.arguments.surface_object(given)
+def _grown_on(given):
+    """The mesh object that hair is to grow on; what is wrong with it is printed."""
+    surface = blender.data.arguments.surface_object(given)
+    said = blender.data.orientation.warning(surface)
+    if said is not None:
+        blender.host.notices.say(said[0].format(**said[1]))
+    return surface
 
 
 def _depsgraph():

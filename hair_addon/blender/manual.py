@@ -36,6 +36,7 @@ _OPERATORS = {
         *("add_hair", "comb_guides", "select_guides", "select_hair", "pick_hair", "delete_hair"),
         *("check_uvs", "use_uv_map", "make_uv_map", "attach_to_surface", "apply_scale", "restore_guides"),
         "make_own_guides",
+        "flip_normals",
     ),
     "guides": ("distribute_guides",),
     "guide_tools": (

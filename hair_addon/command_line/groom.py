@@ -5,7 +5,6 @@ import time
 from contextlib import contextmanager
 from dataclasses import replace
 
-from .. import api
 from ..core import lazy
 from ..core.errors import HairError
 from ..core.grooming.derived_guides import DerivationSettings
@@ -72,7 +71,7 @@ def run(given, console):
     elif given.hair_from:
         guides, hair = _keep_curves(given, surface, settings, file_axes, console)
     else:
-        guides, hair = api.add_hair(surface, settings, progress=console.progress)
+        guides, hair = _grow(surface, settings, console)
     seconds = time.perf_counter() - started
     console.progress("Writing", 1.0)
     blender.io.groom_files.write(given.out, guides, hair, file_axes)
@@ -93,6 +92,16 @@ def _styled(given, settings, surface):
         raise HairError("--no-style-fit needs --style or --style-preset.")
     styled = style_options.styled(given, settings, None if given.no_style_fit else fit)
     return options.changed_groom(styled, given)
+
+
+def _grow(surface, settings, console):
+    """Return (guides, hair) that grow on a mesh object."""
+    said = blender.data.orientation.warning(surface)
+    if said is not None:
+        console.warn(said[0].format(**said[1]))
+    depsgraph = blender.data.scene.present_depsgraph()
+    work = blender.groom.transfer.groom_settings.adding_hair(surface, settings, depsgraph)
+    return run_now(work, console.progress)
 
 
 def _from_library(given, surface, console):

@@ -179,7 +179,7 @@ def _rest_positions(mesh, posed):
 
 def faces_of(mesh):
     """The `Faces` of a mesh."""
-    return _faces_of_corners(mesh, _corner_values(mesh, ".corner_vert"))
+    return _faces_of_corners(mesh, corner_values(mesh, ".corner_vert"))
 
 
 def faces_read_again(mesh_object, mesh):
@@ -188,8 +188,8 @@ def faces_read_again(mesh_object, mesh):
     Blender takes longer to say where polygons begin than all else. Corners at the same vertices and edges, of as many
     polygons, are of the same ones: the last edge of each leads back to its first vertex.
     """
-    uid, vertices = mesh_object.session_uid, _corner_values(mesh, ".corner_vert")
-    edges, known = _corner_values(mesh, ".corner_edge"), faces_cache.get(uid)
+    uid, vertices = mesh_object.session_uid, corner_values(mesh, ".corner_vert")
+    edges, known = corner_values(mesh, ".corner_edge"), faces_cache.get(uid)
     if known is not None:
         faces, known_edges = known
         is_as_long = len(faces.starts) == len(mesh.polygons) + 1
@@ -200,7 +200,7 @@ def faces_read_again(mesh_object, mesh):
     return faces
 
 
-def _corner_values(mesh, name):
+def corner_values(mesh, name):
     """(C,) int32 of an attribute that each mesh has; two hundred times as fast as by `mesh.loops`."""
     values = np.empty(len(mesh.loops), np.int32)
     if len(values):

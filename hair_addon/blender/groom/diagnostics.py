@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Problems with a surface or its hair, each with the operator that fixes it.
 
-Panels call this with every redraw, so it reads no geometry.
+Panels call this with every redraw, so it reads no geometry but of an edited mesh, once.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import bpy
 from bpy.types import Curves, Object
 
-from ..data import named_objects, rest_nodes, usable_surfaces
+from ..data import orientation, rest_nodes, usable_surfaces
 from ..data.strands import follow_nodes
 from ..host.notices import name_of, text_of
 from ..settings.translations import interface_text
@@ -38,7 +39,7 @@ def parting_warnings(hair: Curves) -> list[Warning]:
     """Return [Warning] about missing part lines and region groups of a hair Curves datablock."""
     lines, group = (text_of(hair.vellus.hair, name) for name in ("part_lines", "region_group"))
     found = []
-    if lines and named_objects.find(lines) is None:
+    if lines and lines not in bpy.data.objects:
         found.append(Warning(interface_text('No object "{name}": pick another part line.', name=lines)))
     if hair.surface is not None and group and group not in hair.surface.vertex_groups:
         text = 'No vertex group "{name}": pick another for regions.'
@@ -49,7 +50,7 @@ def parting_warnings(hair: Curves) -> list[Warning]:
 def flow_warnings(guides: Curves) -> list[Warning]:
     """Return [Warning] about missing flow lines of a guide Curves datablock."""
     name = text_of(guides.vellus.guides, "flow_lines")
-    if not name or named_objects.find(name) is not None:
+    if not name or name in bpy.data.objects:
         return []
     return [Warning(interface_text('No object "{name}": pick other flow lines.', name=name))]
 
@@ -80,6 +81,8 @@ def _of_surface(surface, parts):
         return
     if any(abs(component - 1.0) > 1e-4 for component in surface.scale):
         yield Warning(interface_text("The scale is not applied."), "vellus.apply_scale")
+    if orientation.is_inside_out(surface):
+        yield Warning(interface_text("The mesh is inside out: hair grows inward."), "vellus.flip_normals")
     lost = rest_nodes.lost_copies(surface)
     if lost is not None:
         text = '"{name}" copies faces that are deformed already: move it up, or apply it.'

@@ -114,6 +114,20 @@ def check_uvs(surface_object: Object, depsgraph: Depsgraph) -> float:
     return share
 
 
+def flip_normals(surface_object: Object, view_layer: ViewLayer) -> None:
+    """Turn the faces of a mesh object over; guides that nobody has combed grow again, on the other side."""
+    curves.require_overridable(surface_object)
+    curves.require_editable(surface_object.data)
+    grown = [guides for guides in curves_on(surface_object, "GUIDES") if not curves.is_combed(guides)]
+    surface_object.data.flip_normals()
+    surface_object.data.update()
+    view_layer.update()  # which roots guides again
+    for guides in grown:
+        guides.vellus.is_stale = True
+        guides.update_tag()
+    view_layer.update()
+
+
 def apply_scale(surface_object: Object, view_layer: ViewLayer) -> None:
     """Apply a mesh object's scale, and keep its guides in place; hair follows them again."""
     curves.require_overridable(surface_object)

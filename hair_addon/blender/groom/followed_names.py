@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Names in settings that follow what they name: images, objects and collections that are renamed.
 
-Settings hold names. Beside them Curves keep a pointer for each, as a custom property, which Blender updates itself: it
-also brings what is named along where hair is appended, under another name if there is one of that name. Vertex groups,
-UV maps and attributes have no pointers: where they are missing, a sentence says so.
+Settings hold names. Beside them Curves keep a pointer for images and collections, as a custom property, which Blender
+updates itself: it also brings what is named along where hair is appended, under another name if there is one of that
+name. A pointer would keep an object that is deleted, so objects are known by their session UID, while a file is open.
+Vertex groups, UV maps and attributes have neither: where they are missing, a sentence says so.
 """
 
 from collections.abc import Iterator
@@ -11,16 +12,19 @@ from dataclasses import replace
 from typing import Any
 
 import bpy
-from bpy.types import ID, Curves, PropertyGroup
+from bpy.types import Curves, PropertyGroup
 
 from ...core.errors import HairError
 from ...core.grooming.groom import GuideSettings, HairSettings
-from ..data import masks, named_objects, scene
+from ..data import masks, scene
+from ..host.caches import Cache
 from ..host.notices import name_of, text_of
 from ..settings import setting_properties, style_items
 from . import staleness
 
 _POINTERS = "vellus_named"  # custom property of Curves: {setting: {"name": as it was, "to": what it names}}
+
+object_cache = Cache()  # (session UID of Curves, setting) → (name as it was, session UID of the object it names)
 
 _SETTINGS = {
     "GUIDES": (
@@ -48,19 +52,36 @@ def _follow(datablock: Curves) -> None:
         name = text_of(group, field)
         if not name:
             continue
-        before = kept.get(key, {})
-        to = _there(before.get("to")) if before.get("name") == name else None
+        found = getattr(bpy.data, source).get(name)
+        if source == "objects":
+            to = _object(datablock, key, name, found)
+        else:
+            before = kept.get(key, {})
+            to = before.get("to") if before.get("name") == name else None
         if to is None:
-            to = _find(source, name)
+            to = found
         elif name_of(to) != name:
             _rename(datablock, group, field, to)
             name = name_of(to)
-        now[key] = {"name": name} if to is None else {"name": name, "to": to}
+        if isinstance(to, bpy.types.Object):
+            object_cache.keep((datablock.session_uid, key), (name, to.session_uid))
+        elif to is not None:
+            now[key] = {"name": name, "to": to}
     if now != kept:
         if _POINTERS in datablock:
             del datablock[_POINTERS]
         if now:
             datablock[_POINTERS] = now
+
+
+def _object(datablock, key, name, found):
+    """The object that a setting has named by this name since it was set, whatever its name is now; None if unknown."""
+    place = datablock.session_uid, key
+    known_name, uid = object_cache.get(place) or ("", 0)
+    if known_name != name or (found is not None and found.session_uid == uid):
+        return found
+    object_cache.invalidate(place)  # so that one that was deleted is sought once
+    return next((one for one in bpy.data.objects if one.session_uid == uid), None)
 
 
 def _named(datablock: Curves) -> Iterator[tuple[str, PropertyGroup, str, str]]:
@@ -73,15 +94,6 @@ def _named(datablock: Curves) -> Iterator[tuple[str, PropertyGroup, str, str]]:
         for field, source in _OF_STYLES:
             if field in group.bl_rna.properties:
                 yield f"{text_of(item, 'name')}.{item.kind}.{field}", group, field, source
-
-
-def _find(source: str, name: str) -> ID | None:
-    return named_objects.find(name) if source == "objects" else getattr(bpy.data, source).get(name)
-
-
-def _there(to: ID | None) -> ID | None:
-    """What a pointer leads to; None of an object that was deleted, which only the pointer keeps in the file."""
-    return None if isinstance(to, bpy.types.Object) and named_objects.find(name_of(to)) != to else to
 
 
 def _rename(datablock, group, field, to):

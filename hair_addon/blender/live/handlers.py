@@ -8,6 +8,7 @@ from bpy.app.handlers import persistent
 
 from ..data import rest_nodes, surface_space
 from ..data import rest_nodes, thin_hair
+from ..data import orientation, rest_nodes, thin_hair
 from ..data.strands import curves_objects
 from ..groom import bindings, copied_hair, followed_names, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
@@ -85,6 +86,8 @@ def after_depsgraph_update(scene, depsgraph):
     _mark_painted(painted, depsgraph)
     combed = {}
     for datablock in changed:
+        if isinstance(datablock, bpy.types.Mesh):
+            orientation.mesh_changed(datablock)
         if isinstance(datablock, bpy.types.Curves):
             events.curves_reported(datablock)
             if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):

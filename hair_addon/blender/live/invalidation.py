@@ -5,11 +5,11 @@ What makes single ones stale is in `events`. Functions of their arguments alone,
 stale.
 """
 
-from ..data import guide_map_readers, scene, subdivided_surfaces
+from ..data import guide_map_readers, orientation, scene, subdivided_surfaces
 from ..data.pictures import drawn_meshes
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, surface_textures, world_texture
-from ..groom import bindings, copied_hair, paused_hair
+from ..groom import bindings, copied_hair, followed_names, paused_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..host import notices
 from ..render import hair_cache
@@ -28,6 +28,7 @@ COPIES = (
     world_texture.light_cache,
     lights.frame_cache,
     animated.value_cache,
+    orientation.inside_out_cache,
     simulated_guides.point_cache,
     reported.guide_cache,
     reported.painting_cache,
@@ -55,6 +56,7 @@ OTHERS = (
     unlocked_renders.noted_cache,
     composite.refused_cache,
     frame_folders.folder_cache,
+    followed_names.object_cache,
     guide_simulation.stiffness_cache,
     shaders.complaint_cache,
     surface_shading.texture_cache,

@@ -8,6 +8,7 @@ import bpy
 from ...core.errors import HairError
 from ..data import masks, scene
 from ..data import masks, named_objects
+from ..data import masks
 from ..data.strands import curves, drawn_lines
 from ..groom import applied_transforms, bindings, edited_surfaces, staleness
 from ..host.notices import text_of
@@ -152,7 +153,7 @@ def follow_styles(changed):
         if state.kind != "HAIR" or not state.is_live or not state.styles:
             continue
         named = style_items.objects_named(state)
-        if named and (hair.surface in changed or any(named_objects.find(name) in changed for name in named)):
+        if named and (hair.surface in changed or any(bpy.data.objects.get(name) in changed for name in named)):
             state.is_stale = True
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         landmark_warp,
         mesh,
         nearest_rotation,
+        orientation,
         packed_strands,
         resampling,
         root_frames,

@@ -127,6 +127,12 @@ def join_to_cube(sphere):
     make_active("Hair")
 
 
+def turn_over(sphere):
+    sphere.data.flip_normals()
+    sphere.data.update()
+    bpy.context.view_layer.update()
+
+
 WARNINGS = {
     "no UV map": (lambda sphere: sphere.data.uv_layers.remove(sphere.data.uv_layers[0]), "vellus.make_uv_map"),
     "a renamed UV map": (lambda sphere: setattr(sphere.data.uv_layers[0], "name", "Other"), "vellus.use_uv_map"),
@@ -134,6 +140,7 @@ WARNINGS = {
     "a lost surface": (lambda sphere: bpy.data.objects.remove(sphere), "vellus.attach_to_surface"),
     "a deleted surface": (delete, "vellus.attach_to_surface"),
     "a surface joined to another": (join_to_cube, "vellus.attach_to_surface"),
+    "normals inward": (lambda sphere: turn_over(sphere), "vellus.flip_normals"),
     "no guides' object": (lambda _: bpy.data.objects.remove(bpy.data.objects["Guides"]), "vellus.restore_guides"),
 }
 

@@ -3,11 +3,12 @@
 
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 
 from ....core.errors import HairError
 from ....core.geometry.mesh import TriMesh
-from .. import named_objects, scene
+from .. import scene
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ def read_cutter(name, surface_object, depsgraph):
     """The `Cutter` that an object of this name is for guides on a mesh object. Raises `HairError`."""
     if not name:
         raise HairError("Pick the object that cuts: a mesh, or an empty whose +Z side is cut off.")
-    found = named_objects.find(name)
+    found = bpy.data.objects.get(name)
     if found is None:
         raise HairError('There is no object "{name}": pick another object.', name=name)
     if found == surface_object:

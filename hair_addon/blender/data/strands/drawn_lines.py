@@ -3,11 +3,11 @@
 
 import hashlib
 
+import bpy
 import numpy as np
 
 from ....core import interpolation
 from ....core.errors import HairError
-from .. import named_objects
 from .curves import curve_offsets
 
 _POINT_LIMIT = 10_000  # each strand reads all
@@ -20,7 +20,7 @@ def read(surface_object, surface, name, depsgraph):
     """
     if not name:
         return None
-    drawn = named_objects.find(name)
+    drawn = bpy.data.objects.get(name)
     if drawn is None:
         raise HairError('There is no object "{name}": pick a curve for the lines, or clear the field.', name=name)
     if drawn.type not in {"CURVE", "CURVES", "MESH"} or (drawn.type == "CURVES" and drawn.data.vellus.kind != "NONE"):
@@ -44,7 +44,7 @@ def key(lines):
 
 def is_among(name, changed):
     """Whether the object of a name, or its data, is among changed datablocks."""
-    drawn = named_objects.find(name)
+    drawn = bpy.data.objects.get(name) if name else None
     return drawn is not None and (drawn in changed or drawn.data in changed)
 
 

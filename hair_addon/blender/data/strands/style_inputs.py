@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 
+import bpy
 import numpy as np
 
 from ....core.errors import HairError
@@ -12,7 +13,7 @@ from ....core.styling.masks import Mask
 from ....core.styling.program import Cutter, mask_keys
 from ....core.styling.style_inputs import Inputs
 from ...host.notices import name_of
-from .. import named_objects, scene
+from .. import scene
 from . import attributes
 
 # Luminance of linear colours, Rec. 709.
@@ -38,7 +39,7 @@ def read(surface_object, surface, guide_curves, styles: Sequence[StyleSettings],
 
 def _matrix_of(name, label):
     """(4, 4) float64: an object's place in the world. Raises `HairError`."""
-    found = named_objects.find(name)
+    found = bpy.data.objects.get(name)
     if found is None:
         sentence = 'There is no object "{name}" for the style {style}: pick another object, or clear the field.'
         raise HairError(sentence, name=name, style=label)

@@ -12,7 +12,6 @@ from bpy.types import Curves, PropertyGroup
 from ....core.styling import clump_trees, program
 from ....core.styling.base import ProfiledSettings
 from ....core.styling.kinds import KINDS
-from ...data import named_objects
 from ...host.notices import text_of
 from ...settings import style_items
 from ...settings.translations import interface_text
@@ -57,7 +56,7 @@ def _missing_data(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     name = text_of(group, _OBJECTS[item.kind]) if item.kind in _OBJECTS else ""
     mask, image = style_items.masks_of(item)
     is_used = item.kind != "LEAN" or group.direction == "OBJECT"
-    if is_used and name and named_objects.find(name) is None:
+    if is_used and name and name not in bpy.data.objects:
         yield interface_text('No object "{name}": pick another.', name=name)
     if is_used and item.kind == "LEAN" and not name:
         yield interface_text("Pick an object to lean along.")
