@@ -10,7 +10,7 @@ from hair_addon.blender.data.simulation import simulated_world
 from hair_addon.blender.data.strands import simulated_guides
 from hair_addon.blender.groom import diagnostics, pipeline, staleness
 from hair_addon.blender.groom.dynamics import guide_baking
-from hair_addon.blender.live import handlers
+from hair_addon.blender.live import file_changes
 from hair_addon.core.errors import HairError
 from tests.support.dynamics.swung import simulate
 from tests.support.reading import points
@@ -69,7 +69,7 @@ def test_a_bake_without_its_colliders_is_refused(guides, collider, lose, sentenc
 def test_so_is_one_whose_collider_is_not_evaluated(guides, collider, monkeypatch):
     """Where nothing but a name leads to it, as from a library override: it would stand still, or at the origin."""
     del guides.data["vellus_named"]
-    for module in (handlers, guide_baking):
+    for module in (file_changes, guide_baking):
         monkeypatch.setattr(module.followed_names, "follow", lambda: None)
     collider.hide_viewport = True
     bpy.context.view_layer.update()

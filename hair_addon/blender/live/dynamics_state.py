@@ -13,6 +13,7 @@ from ..host import notices, running, scene_time
 from ..host.caches import Cache
 from ..settings import properties, shared_wetness
 
+_BAKED_OTHERWISE = "Frames {first} to {last} are baked with other settings or guides: bake again"
 _OTHER = {
     frame_animation.SURFACE: "Frames from {frame} on are baked with another animation of the surface: bake again",
     frame_animation.SURROUNDINGS: "Frames from {frame} on are baked with other colliders, forces or keys: bake again",
@@ -51,6 +52,13 @@ def note(guides, blender_scene, played):
     else:
         marks, said = (), _unknown() if played is None else _of_played(played, scene_time.frame_of(blender_scene))
     state_cache.keep(guides.session_uid, _State(marks, *said))
+
+
+def note_combed(guides, blender_scene, played):
+    """Find it out of guides that were combed, once in a stroke: they are others than those that were baked."""
+    known = state_cache.get(guides.session_uid)
+    if known is None or known.sentence != _BAKED_OTHERWISE:
+        note(guides, blender_scene, played)
 
 
 def check_animation(guides, frame, blender_scene, depsgraph):
@@ -123,7 +131,7 @@ def _of_baked(manifest, guides, blender_scene):
     if manifest.guide_count != len(guides.curves):
         return "The baked frames are of other guides: bake again", {}
     if guide_baking.changed_parts(guides, blender_scene, manifest):
-        return "Frames {first} to {last} are baked with other settings or guides: bake again", values
+        return _BAKED_OTHERWISE, values
     change = _first_change(guides)
     if change is not None:
         return _OTHER[change[1]], {"frame": change[0]}

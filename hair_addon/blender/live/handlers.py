@@ -9,8 +9,9 @@ from bpy.app.handlers import persistent
 from ..data import rest_nodes, surface_space
 from ..data import rest_nodes, thin_hair
 from ..data import orientation, rest_nodes, thin_hair
+from ..data import orientation, rest_nodes
 from ..data.strands import curves_objects
-from ..groom import bindings, copied_hair, followed_names, paused_hair, pipeline, staleness
+from ..groom import bindings, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import running, scene_time
 from ..host.notices import name_of
@@ -20,6 +21,7 @@ from ..settings import animated, style_items
 from . import (
     events,
     every_frame,
+    file_changes,
     invalidation,
     live_hair,
     moving_surfaces,
@@ -45,9 +47,7 @@ def after_depsgraph_update(scene, depsgraph):
     if not scene_time.is_shown(depsgraph):
         return
     global _is_opening, _is_undone
-    thin_hair.follow([scene])
-    followed_names.follow()
-    copied_hair.follow()
+    file_changes.follow([scene])
     events.scene_changed(is_hair_only=_is_hair_only(depsgraph))
     if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
         looks.follow_guides(depsgraph.view_layer)
@@ -96,6 +96,7 @@ def after_depsgraph_update(scene, depsgraph):
     animated.follow(depsgraph)
     simulated_hair.follow_settings(scene, depsgraph)
     _evaluate(depsgraph, combed)
+    simulated_hair.note_combed(combed, scene)
     if running.job() is None:
         stored_guide_maps.follow(depsgraph)
         live_hair.follow_masks(_painted(depsgraph), depsgraph)
@@ -168,7 +169,10 @@ def _mark_painted(images, depsgraph):
     painting = set()
     for datablock in bpy.data.hair_curves:
         surface, used = datablock.surface, stale_marks.images_of(datablock)
-        if surface is None or not (datablock.vellus.is_live and used):
+        if surface is None or not used:
+            continue
+        if not datablock.vellus.is_live:
+            datablock.vellus.is_stale = datablock.vellus.is_stale or bool(used & names)
             continue
         uid = surface.session_uid
         if surface.mode == "TEXTURE_PAINT":
@@ -216,7 +220,8 @@ def _evaluate_hair(hair, depsgraph, combed):
     state = hair.vellus
     follows = state.guide_curves in combed
     if not (state.is_live and _is_surface_at_rest(hair)):
-        state.is_stale = state.is_stale or follows
+        # Guides that are reported for the first time may be those that the hair was made with.
+        state.is_stale = state.is_stale or (follows and staleness.is_left_by_undo(hair))
     elif state.is_stale and not live_hair.is_ahead(hair):
         live_hair.make_again(hair, depsgraph)
     elif follows:
@@ -267,8 +272,7 @@ def before_reading(*_args):
     moving_surfaces.resume()
     stale_marks.follow_applied()
     live_hair.write_all()
-    thin_hair.follow(bpy.data.scenes)
-    followed_names.follow()
+    file_changes.follow(bpy.data.scenes)
     if bpy.app.background:  # in a window a timer repairs, and a render runs beside it
         composite.repair()
     composite.follow_all()
@@ -292,9 +296,7 @@ def before_saving(*_args):
 def after_import(*_args):
     """Make the names of styles readable, which Blender passes to a rename; what was saved paused goes on."""
     moving_surfaces.resume()
-    followed_names.follow()
-    animated.remember(is_made_with=True)
-    copied_hair.remember()
+    file_changes.take_as_it_is()
     for hair in _of_kind("HAIR"):
         style_items.make_names_readable(hair.vellus)
 
@@ -308,11 +310,11 @@ def after_load(*_args):
     after_import()
     live_hair.cancel_writing()
     invalidation.clear()
-    animated.remember(is_made_with=True)
-    copied_hair.remember()
+    file_changes.take_as_it_is()
     older_files.renew()
     stale_marks.follow_applied()
     thin_hair.follow(bpy.data.scenes)
+    file_changes.follow(bpy.data.scenes)
     _hide_drawn_hair()
     composite.follow_all()  # of linked hair a file does not store that it is hidden from engines
 
@@ -327,7 +329,7 @@ def _hide_drawn_hair():
 def _take_over():
     """Draw what Blender drew while the add-on was disabled."""
     older_files.renew()
-    thin_hair.follow(bpy.data.scenes)
+    file_changes.follow(bpy.data.scenes)
     _hide_drawn_hair()
     composite.follow_all()
     looks.follow_guides(bpy.context.view_layer)
@@ -341,8 +343,7 @@ def after_undo(*_args):
     live_hair.cancel_writing()
     moving_surfaces.resume()  # which may have been kept paused
     invalidation.data_replaced()
-    animated.remember(is_made_with=True)
-    copied_hair.remember()
+    file_changes.take_as_it_is()
 
 
 @persistent

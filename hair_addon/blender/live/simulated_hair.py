@@ -85,11 +85,22 @@ def follow_settings(blender_scene, depsgraph):
             _note_change(guides, blender_scene, depsgraph)
 
 
+def note_combed(combed, blender_scene):
+    """Note that guides have moved, for the panel: frames that are there are of guides as they were."""
+    for guides in frame_folders.simulating() if combed and not guide_baking.is_baking() else ():
+        if guides in combed:
+            try:
+                dynamics_state.note_combed(guides, blender_scene, _played_now(guides))
+            except HairError as error:
+                guides.vellus.dynamics_status = str(error)
+
+
 def follow_undo(blender_scene, depsgraph):
     """After an undo, a redo or a load, which show guides as they are combed: show them where they were simulated."""
     for guides in frame_folders.simulating() if running.has_window() else ():
         try:
             live_hair.show_guides(guides, _known(guides, blender_scene), depsgraph)
+            _note_state(guides, blender_scene)
         except HairError as error:
             guides.vellus.dynamics_status = str(error)
 

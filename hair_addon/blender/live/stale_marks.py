@@ -25,6 +25,9 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         state = guides.vellus
         if guides.surface != surface_object or not _is_carried(guides):
             continue
+        if not state.is_live:
+            state.is_stale = state.is_stale or is_mesh_edited
+            continue
         try:
             place = reported.place_before(guides)
             was_edited = edited_surfaces.follow_surface(guides, depsgraph, place, state.is_live)
@@ -42,7 +45,10 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
     edited_surfaces.follow_alone(surface_object, depsgraph, reported.place_before)
     for hair in bpy.data.hair_curves if is_mesh_edited else ():
         state = hair.vellus
-        if hair.surface != surface_object or state.kind != "HAIR" or not state.is_live:
+        if hair.surface != surface_object or state.kind != "HAIR":
+            continue
+        if not state.is_live:
+            state.is_stale = True
             continue
         with _refusal_as_status(state):
             if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):
@@ -94,7 +100,10 @@ def follow_partings(changed, depsgraph):
     """Mark hair as stale whose part lines or guide regions are among some datablocks and have changed."""
     for hair in bpy.data.hair_curves:
         state = hair.vellus
-        if state.kind != "HAIR" or not state.is_live or not _parts_by(state, changed):
+        if state.kind != "HAIR" or not _parts_by(state, changed):
+            continue
+        if not state.is_live:
+            state.is_stale = True
             continue
         with _refusal_as_status(state):
             if staleness.has_other_parting(hair, depsgraph):
@@ -106,7 +115,10 @@ def follow_flow(changed, depsgraph):
     for guides in bpy.data.hair_curves:
         state = guides.vellus
         lines = text_of(state.guides, "flow_lines")
-        if state.kind != "GUIDES" or not state.is_live or not drawn_lines.is_among(lines, changed):
+        if state.kind != "GUIDES" or not drawn_lines.is_among(lines, changed):
+            continue
+        if not state.is_live:
+            state.is_stale = True
             continue
         with _refusal_as_status(state):
             if staleness.has_other_flow(guides, depsgraph):
@@ -150,7 +162,7 @@ def follow_styles(changed):
     """Mark hair as stale whose styles read some of the objects that changed, or whose surface moved among them."""
     for hair in bpy.data.hair_curves:
         state = hair.vellus
-        if state.kind != "HAIR" or not state.is_live or not state.styles:
+        if state.kind != "HAIR" or not state.styles:
             continue
         named = style_items.objects_named(state)
         if named and (hair.surface in changed or any(bpy.data.objects.get(name) in changed for name in named)):

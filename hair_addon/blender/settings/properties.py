@@ -230,6 +230,7 @@ class VellusCurves(bpy.types.PropertyGroup):
         description="Update automatically when settings or inputs change",
         translation_context=CONTEXT,
         default=True,
+        update=mark_shown,
     )
     simulates: bpy.props.BoolProperty(
         name="Simulate",

@@ -11,7 +11,7 @@ from ...groom.foreign.foreign_curves import is_foreign
 from ...groom.selection import guides_again, guides_of, surface_of
 from ...settings.translations import interface_text
 from .. import menus, setting_rows
-from .tab import HairTab, draw_work, split, write, write_status
+from .tab import HairTab, draw_work, split, write, write_stale, write_status
 
 
 class VELLUS_PT_guides(HairTab, bpy.types.Panel):
@@ -39,6 +39,7 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
         group = guides.vellus.guides
         setting_rows.guide_rows(layout, group, surface)
         setting_rows.row(layout, guides.vellus, "is_live")
+        write_stale(layout, context, guides.vellus)
         if len(guides.curves) != group.guide_count:  # some were added or removed
             layout.label(text=interface_text("{count} guides", count=len(guides.curves)), icon="INFO", translate=False)
         if surface is not None:
@@ -56,6 +57,7 @@ def _draw_hand_made(layout, context, guides):
     write(layout, context, said, "INFO")
     layout.label(text=interface_text("{count} guides", count=len(guides.curves)), translate=False)
     setting_rows.row(layout, guides.vellus, "is_live")
+    write_stale(layout, context, guides.vellus)
     if guides_again(context.object) is None:
         layout.operator("vellus.distribute_guides", text="New Guide Set", icon="ADD")
 

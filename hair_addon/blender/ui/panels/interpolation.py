@@ -11,7 +11,7 @@ from ...groom.selection import active_of_kind, guides_of, hair_of
 from ...render import hair_cache, refused_strands
 from ...settings.translations import error_text, interface_text
 from .. import setting_rows
-from .tab import HairTab, draw_work, megabytes, split, write, write_status
+from .tab import HairTab, draw_work, megabytes, split, write, write_stale, write_status
 
 
 class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
@@ -47,6 +47,7 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
             layout.operator("vellus.make_own_guides")
         setting_rows.strand_rows(layout, state.hair, hair.surface)
         setting_rows.row(layout, state, "is_live")
+        write_stale(layout, context, state)
         _draw_cost(layout, state.hair, hair_cache.drawn_bytes(hair))
         if hair.surface is not None:
             face_count = triangle_count(hair.surface, context.view_layer)

@@ -47,6 +47,13 @@ def write_status(layout, context, state, name="status"):
         write(layout, context, status_text(status), "ERROR")
 
 
+def write_stale(layout, context, state):
+    """That guides or hair wait for an update, where they are not updated automatically, and the button that does it."""
+    if state.is_stale and not state.is_live:
+        write(layout, context, interface_text("Out of date: settings or inputs have changed."), "INFO")
+        layout.operator("vellus.update_hair", icon="FILE_REFRESH")
+
+
 def megabytes(count):
     """Bytes as an artist reads them."""
     return f"{count / 1e6:.0f} MB" if count >= 1e7 else f"{count / 1e6:.1f} MB"

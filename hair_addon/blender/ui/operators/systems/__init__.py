@@ -12,6 +12,7 @@ from .pick_hair import VELLUS_OT_pick_hair
 from .restore_guides import VELLUS_OT_restore_guides
 from .select_guides import VELLUS_OT_select_guides
 from .select_hair import VELLUS_OT_select_hair
+from .update_hair import VELLUS_OT_update_hair
 
 CLASSES = (
     VELLUS_OT_add_hair,
@@ -25,4 +26,5 @@ CLASSES = (
     VELLUS_OT_delete_system,
     VELLUS_OT_restore_guides,
     VELLUS_OT_make_own_guides,
+    VELLUS_OT_update_hair,
 )
