@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from . import (
         foreign_curves,
         hand_made_guides,
+        joined_curves,
         kept_following,
         kept_hair,
         particle_hair,

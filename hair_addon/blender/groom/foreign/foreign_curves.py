@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Evaluated curves not created by Vellus, as polylines or Catmull-Rom splines."""
 
+from collections.abc import Iterable
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -36,6 +37,11 @@ def is_foreign(curves_object: Object) -> bool:
     return curves_object.type == "CURVE" or (
         curves_object.type == "CURVES" and curves_object.data.vellus.kind == "NONE"
     )
+
+
+def chosen(active: Object, selected: Iterable[Object]) -> list[Object]:
+    """The objects with such curves among the active and the selected ones; the active one first."""
+    return [one for one in dict.fromkeys((active, *selected)) if is_foreign(one)]
 
 
 def require_foreign(curves_object: Object) -> None:

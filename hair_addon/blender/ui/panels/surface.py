@@ -5,7 +5,7 @@ import bpy
 
 from ...groom.diagnostics import warnings_of
 from ...groom.foreign import particle_hair
-from ...groom.foreign.foreign_curves import is_foreign
+from ...groom.foreign.foreign_curves import chosen, is_foreign
 from ...groom.selection import active_of_kind, guides_of, hair_of, parts_of, surface_of
 from ...host.notices import name_of, text_of
 from ...settings.translations import interface_text
@@ -57,6 +57,9 @@ def _draw_foreign(layout, context):
     layout.operator("vellus.use_as_guides", icon="OUTLINER_OB_CURVES")
     write(layout, context, interface_text("Or keep them as the hair itself, strand by strand."), "INFO")
     layout.operator("vellus.use_as_hair", icon="CURVES")
+    count = len(chosen(context.object, context.selected_objects))
+    if count > 1:
+        write(layout, context, interface_text("The {count} selected objects become one.", count=count), "INFO")
 
 
 def _draw_tools(layout):

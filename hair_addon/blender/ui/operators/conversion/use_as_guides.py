@@ -7,8 +7,9 @@ from .....core.errors import HairError
 from .....core.grooming import cost
 from .....core.grooming.groom import HairSettings
 from ....data import scene
-from ....groom.foreign import hand_made_guides
-from ....groom.foreign.foreign_curves import is_foreign, require_foreign
+from ....groom.foreign import hand_made_guides, joined_curves
+from ....groom.foreign.foreign_curves import chosen, is_foreign, require_foreign
+from ....groom.selection import make_active, object_of
 from ....settings import properties, setting_properties
 from ....settings.translations import report_text
 from ... import setting_rows
@@ -16,7 +17,7 @@ from ..base.modal import LongOperator
 
 
 class VELLUS_OT_use_as_guides(LongOperator, bpy.types.Operator):
-    """Use the active curves as guides, unchanged, and grow hair that follows them"""
+    """Use the selected curves as guides, unchanged, and grow hair that follows them. Several objects become one"""
 
     bl_idname = "vellus.use_as_guides"
     bl_label = "Use as Guides"
@@ -54,14 +55,20 @@ class VELLUS_OT_use_as_guides(LongOperator, bpy.types.Operator):
 
     def work(self, context):
         require_foreign(context.object)
-        return hand_made_guides.using_as_guides(
-            context.object,
-            self._surface(context),
-            context.evaluated_depsgraph_get(),
-            every=self.every,
-            applies_modifiers=self.applies_modifiers,
-            hair_settings=self._hair_settings() if self.grows_hair else None,
-        )
+        surface, hair_settings = self._surface(context), self._hair_settings() if self.grows_hair else None
+
+        def use(curves_object, applies_modifiers):
+            return hand_made_guides.using_as_guides(
+                curves_object,
+                surface,
+                context.evaluated_depsgraph_get(),
+                every=self.every,
+                applies_modifiers=applies_modifiers,
+                hair_settings=hair_settings,
+            )
+
+        objects = chosen(context.object, context.selected_objects)
+        return joined_curves.using(objects, surface, use, self.applies_modifiers)
 
     def message(self, made):
         if made.hair is None:
@@ -72,6 +79,9 @@ class VELLUS_OT_use_as_guides(LongOperator, bpy.types.Operator):
     def after(self, context, made):
         if made.hair is not None:
             setting_properties.show(self, made.hair.vellus.hair, HairSettings)
+        shown = object_of(made.guides, context.view_layer)
+        if shown is not None and context.object is None:  # one object of several
+            make_active(shown, context.view_layer)
         for sentence, values in made.notes():
             self.report({"WARNING"}, report_text(sentence, **values))
 

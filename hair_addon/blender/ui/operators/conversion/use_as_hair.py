@@ -4,8 +4,8 @@
 import bpy
 
 from .....core.grooming.derived_guides import DerivationSettings
-from ....groom.foreign import hand_made_guides, kept_hair
-from ....groom.foreign.foreign_curves import is_foreign, require_foreign
+from ....groom.foreign import hand_made_guides, joined_curves, kept_hair
+from ....groom.foreign.foreign_curves import chosen, is_foreign, require_foreign
 from ....groom.selection import make_active, object_of
 from ....settings import properties, setting_properties
 from ....settings.translations import report_text
@@ -14,7 +14,7 @@ from ..base.modal import LongOperator
 
 
 class VELLUS_OT_use_as_hair(LongOperator, bpy.types.Operator):
-    """Use the active curves as hair, unchanged, and derive guides from them"""
+    """Use the selected curves as hair, unchanged, and derive guides from them. Several objects become one"""
 
     bl_idname = "vellus.use_as_hair"
     bl_label = "Use as Hair"
@@ -44,14 +44,20 @@ class VELLUS_OT_use_as_hair(LongOperator, bpy.types.Operator):
 
     def work(self, context):
         require_foreign(context.object)
-        return kept_hair.using_as_hair(
-            context.object,
-            self._surface(context),
-            context.evaluated_depsgraph_get(),
-            setting_properties.given_settings(self, DerivationSettings),
-            applies_modifiers=self.applies_modifiers,
-            follows_guides=self.follows_guides,
-        )
+        surface, settings = self._surface(context), setting_properties.given_settings(self, DerivationSettings)
+
+        def use(curves_object, applies_modifiers):
+            return kept_hair.using_as_hair(
+                curves_object,
+                surface,
+                context.evaluated_depsgraph_get(),
+                settings,
+                applies_modifiers=applies_modifiers,
+                follows_guides=self.follows_guides,
+            )
+
+        objects = chosen(context.object, context.selected_objects)
+        return joined_curves.using(objects, surface, use, self.applies_modifiers)
 
     def message(self, made):
         sentence = "{strand_count} strands, {guide_count} guides. Error: {mean:.1f}% of the length (95%: {high:.1f}%)"

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Several objects with curves that become guides or hair together, as one object: one hair system."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.types import Object
+
+from ....core.long_work import Work
+from ...data.strands import attributes
+from ...host.datablocks import Remembered
+from ...host.notices import name_of
+from . import foreign_curves, hand_made_guides
+
+
+def using(
+    objects: Sequence[Object],
+    surface_object: Object,
+    use: Callable[[Object, bool], Work[Any]],
+    applies_modifiers: bool,
+) -> Work[Any]:
+    """Use the curves of objects as one, whose name and coordinates are those of the first; the others are gone then.
+
+    use: a function of (object, whether its modifiers are to be applied) that gives the work. The objects stay as they
+    are until it is done, and where it is stopped or raises `HairError`.
+    """
+    if len(objects) == 1:
+        return (yield from use(objects[0], applies_modifiers))
+    for one in objects:
+        hand_made_guides.require_usable(one, surface_object)
+    used, copy = [Remembered(one) for one in objects], Remembered(_joined(objects, applies_modifiers))
+    try:
+        made = yield from use(copy.find(), True)
+    except BaseException:  # Esc too
+        _remove(copy.find())
+        raise
+    name = name_of(used[0].find())
+    for one in used:
+        _remove(one.find())
+    copy.find().name = copy.find().data.name = name
+    return made
+
+
+def _joined(objects, applies_modifiers):
+    """A new object with the curves of all, in the coordinates of the first, where that is."""
+    copies, before = [], {data.session_uid for data in _all_data()}
+    try:
+        for one in objects:
+            copies.append(_copy(one))
+            foreign_curves.take(copies[-1], applies_modifiers)
+    except BaseException:
+        for copy in copies:
+            _remove(copy)
+        raise
+    _unite_radii(copies)
+    first = copies[0]
+    with bpy.context.temp_override(
+        active_object=first, object=first, selected_objects=copies, selected_editable_objects=copies
+    ):
+        bpy.ops.object.join()
+    # Blender keeps the data of what it has converted and joined, and counts users that are gone.
+    used = {one.data for one in bpy.data.objects}
+    bpy.data.batch_remove([data for data in _all_data() if data.session_uid not in before and data not in used])
+    bpy.context.view_layer.update()
+    return first
+
+
+def _all_data():
+    return [*bpy.data.curves, *bpy.data.hair_curves]
+
+
+def _copy(curves_object):
+    copy = curves_object.copy()
+    copy.data = curves_object.data.copy()
+    for collection in curves_object.users_collection:
+        collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    return copy
+
+
+def _unite_radii(copies):
+    """Give all curves radii if some have them, which are as wide in the world when they are joined.
+
+    Blender takes radii as they are, and 1 m where there are none.
+    """
+    found = [attributes.read(copy.data, "radius", "FLOAT", "POINT") for copy in copies]
+    if all(radii is None for radii in found):
+        return
+    sizes = [abs(copy.matrix_world.to_3x3().determinant()) ** (1.0 / 3.0) for copy in copies]
+    for copy, radii, size in zip(copies, found, sizes, strict=True):
+        if radii is None:
+            radii = np.full(len(copy.data.points), attributes.RADIUS, np.float32)
+        attributes.write(copy.data, "radius", "FLOAT", "POINT", radii * np.float32(size / (sizes[0] or 1.0)))
+
+
+def _remove(curves_object):
+    data = curves_object.data
+    bpy.data.objects.remove(curves_object)
+    if data.users == 0:
+        bpy.data.batch_remove([data])
