@@ -73,7 +73,7 @@ def test_so_is_one_whose_collider_is_not_evaluated(guides, collider, monkeypatch
         monkeypatch.setattr(module.followed_names, "follow", lambda: None)
     collider.hide_viewport = True
     bpy.context.view_layer.update()
-    with pytest.raises(HairError, match='The collider "Icosphere" is hidden in viewports'):
+    with pytest.raises(HairError, match='The collider "Icosphere" is not evaluated'):
         api.bake_dynamics(guides, LAST)
 
 

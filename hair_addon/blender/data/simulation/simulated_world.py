@@ -60,10 +60,7 @@ def require_colliders(settings, depsgraph):
         raise problem
     for collider in colliders(settings.colliders):
         if not collider.evaluated_get(depsgraph).is_evaluated:
-            sentence = (
-                'The collider "{name}" is hidden in viewports or is not in this scene: show it, link it, or remove it '
-                'from the collection "{collection}".'
-            )
+            sentence = 'The collider "{name}" is not evaluated: show it in viewports, or remove it from "{collection}".'
             raise HairError(sentence, name=name_of(collider), collection=settings.colliders)
 
 
