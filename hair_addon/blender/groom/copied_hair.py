@@ -11,7 +11,7 @@ import bpy
 from bpy.types import Curves, Depsgraph, Object
 
 from ...core.errors import HairError
-from ..data import scene
+from ..data import scene, surface_space
 from ..data.strands import curves, curves_objects
 from ..host.caches import Cache
 from ..host.notices import name_of
@@ -40,6 +40,7 @@ def follow() -> None:
         surface = _surface_beside(datablock, users.get(datablock, ()))
         if surface is not None:
             datablock.surface = surface
+            surface_space.remember_place(datablock)
             datablock.update_tag()
     for hair in ours:
         if hair.vellus.kind == "HAIR" and hair.vellus.guide_curves is not None:
@@ -137,5 +138,5 @@ def _copied(guides, surface_object, surface):
     curves_objects.link_object(name_of(guides), own, surface_object, is_rendered=False)
     roots = curves.read_roots(own, surface, surface.from_local(curves.first_points(own)))
     curves.write_roots(own, surface, roots)
-    curves.keep_surface(own, surface)
+    surface_space.keep_surface(own, surface)
     return own

@@ -6,10 +6,7 @@ import contextlib
 import bpy
 from bpy.app.handlers import persistent
 
-from ..data import rest_nodes, surface_space
-from ..data import rest_nodes, thin_hair
-from ..data import orientation, rest_nodes, thin_hair
-from ..data import orientation, rest_nodes
+from ..data import orientation, rest_nodes, surface_space
 from ..data.strands import curves_objects
 from ..groom import bindings, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
@@ -313,7 +310,6 @@ def after_load(*_args):
     file_changes.take_as_it_is()
     older_files.renew()
     stale_marks.follow_applied()
-    thin_hair.follow(bpy.data.scenes)
     file_changes.follow(bpy.data.scenes)
     _hide_drawn_hair()
     composite.follow_all()  # of linked hair a file does not store that it is hidden from engines

@@ -7,8 +7,6 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import masks, scene
-from ..data import masks, named_objects
-from ..data import masks
 from ..data.strands import curves, drawn_lines
 from ..groom import applied_transforms, bindings, edited_surfaces, staleness
 from ..host.notices import text_of
@@ -21,17 +19,17 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
 
     is_mesh_edited: whether its mesh has changed, not modifiers alone, so that its weights may have too.
     """
+    applied = set()  # guides that are not live, and were carried by a transform that was applied
     for guides in bpy.data.hair_curves:
         state = guides.vellus
         if guides.surface != surface_object or not _is_carried(guides):
-            continue
-        if not state.is_live:
-            state.is_stale = state.is_stale or is_mesh_edited
             continue
         try:
             place = reported.place_before(guides)
             was_edited = edited_surfaces.follow_surface(guides, depsgraph, place, state.is_live)
             if not state.is_live:
+                state.is_stale = state.is_stale or (is_mesh_edited and not was_edited)
+                applied |= {guides} if was_edited else set()
                 continue
             is_placed = not curves.is_hand_made(guides)  # where its mask says
             if is_mesh_edited and not was_edited and is_placed and _may_be_painted(guides, depsgraph):
@@ -48,7 +46,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         if hair.surface != surface_object or state.kind != "HAIR":
             continue
         if not state.is_live:
-            state.is_stale = True
+            state.is_stale = state.is_stale or state.guide_curves not in applied
             continue
         with _refusal_as_status(state):
             if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):

@@ -30,17 +30,21 @@ def using(
         return (yield from use(objects[0], applies_modifiers))
     for one in objects:
         hand_made_guides.require_usable(one, surface_object)
-    used, copy = [Remembered(one) for one in objects], Remembered(_joined(objects, applies_modifiers))
+    name, used, joined = name_of(objects[0]), [Remembered(one) for one in objects], _joined(objects, applies_modifiers)
+    copy = Remembered(joined)
     try:
-        made = yield from use(copy.find(), True)
+        made = yield from use(joined, True)
     except BaseException:  # Esc too
         _remove(copy.find())
         raise
-    name = name_of(used[0].find())
     for one in used:
         _remove(one.find())
-    copy.find().name = copy.find().data.name = name
+    _rename(copy.find(), name)
     return made
+
+
+def _rename(curves_object, name):
+    curves_object.name = curves_object.data.name = name
 
 
 def _joined(objects, applies_modifiers):
