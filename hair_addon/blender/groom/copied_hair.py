@@ -23,13 +23,15 @@ known_cache = Cache()  # "Curves" → session UIDs of the guides and hair that w
 
 def remember() -> None:
     """Take the Curves that there are now as they are: those of a file, of a library, or of an undo step."""
-    known_cache.keep("Curves", frozenset(datablock.session_uid for datablock in _ours()))
+    known_cache.clear()
+    if uids := frozenset(datablock.session_uid for datablock in _ours()):
+        known_cache.keep("Curves", uids)
 
 
 def follow() -> None:
     """Let Curves that were copied since grow on the surface that their objects are on, and follow its guides."""
     known, ours = known_cache.get("Curves"), _ours()
-    if known == frozenset(datablock.session_uid for datablock in ours):
+    if (known or frozenset()) == frozenset(datablock.session_uid for datablock in ours):
         return
     remember()
     new = [] if known is None else [datablock for datablock in ours if datablock.session_uid not in known]
@@ -135,6 +137,7 @@ def _copied(guides, surface_object, surface):
     own = guides.copy()
     own.surface = surface_object
     own.vellus.cache_identity = own.vellus.delivered_key = ""  # of frames that are baked of the first
+    surface_space.forget_applied(own)
     curves_objects.link_object(name_of(guides), own, surface_object, is_rendered=False)
     roots = curves.read_roots(own, surface, surface.from_local(curves.first_points(own)))
     curves.write_roots(own, surface, roots)
