@@ -20,6 +20,7 @@ import numpy as np
 from ...core.files import groom_curves
 from ...core.files.groom_curves import Check
 from ...core.files.unreal_groom import VERSION
+from ...core.files.whole_file import new_partial_of
 from ...core.shading import appearance
 from . import hair_file
 
@@ -126,8 +127,11 @@ def writing(path: Path, final_path: Path, tool, properties, rate=24.0, first_fra
     hair_file.require_usd()
     from pxr import Tf, Usd, UsdGeom
 
+    # USD writes a whole text file anew at each save, so that it would take a time as the square of its frames.
+    is_text = path.suffix.lower() == ".usda"
+    binary = new_partial_of(path.with_suffix(".usdc")) if is_text else path
     try:
-        stage = Usd.Stage.CreateNew(str(path))
+        stage = Usd.Stage.CreateNew(str(binary))
         UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
         UsdGeom.SetStageMetersPerUnit(stage, 1.0 / PER_METRE)
         stage.SetTimeCodesPerSecond(rate)
@@ -135,8 +139,13 @@ def writing(path: Path, final_path: Path, tool, properties, rate=24.0, first_fra
         stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, _ROOT).GetPrim())
         yield UsdGroomWriter(stage, final_path, tool, properties, first_frame)
         stage.GetRootLayer().Save()
+        if is_text:
+            stage.GetRootLayer().Export(str(path))
     except Tf.ErrorException as error:
         raise hair_file.failed(final_path, error) from error
+    finally:
+        if is_text:
+            binary.unlink(missing_ok=True)
 
 
 def _write_primvars(prim, curves):

@@ -7,6 +7,8 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon.blender.data.strands import curves
+from hair_addon.blender.io import usd_groom
+from hair_addon.core.files.groom_curves import GroomCurves
 from tests.support.dynamics.following import update
 from tests.support.exchange import alembic_reader
 from tests.support.exchange.exported import LAST, export, shape, widths, world
@@ -138,3 +140,21 @@ def test_blender_takes_usd_back(hair, tmp_path):
     came = {len(o.data.curves): o for o in set(bpy.data.objects) - before if o.type == "CURVES"}
     assert sorted(came) == [60, 500]
     np.testing.assert_allclose(world(came[500]), wanted, atol=1e-5)
+
+
+@pytest.mark.parametrize("ending", [".usda", ".usdc"])
+def test_a_text_file_is_written_once_whatever_its_number_of_frames(rng, tmp_path, ending):
+    """USD writes all of a text file at each save: by the frame it would take a time as their square."""
+    path = tmp_path / f"groom{ending}"
+    frames = rng.random((3, 10, 3), np.float32)
+    made = GroomCurves(0, "Long", False, np.int32([4, 6]), 0, lambda _some: np.ones(10, np.float32))
+    with usd_groom.writing(path, path, "Vellus", "", first_frame=5) as writer:
+        number = writer.add(made, moves=True)
+        for points in frames:
+            writer.write_points(number, lambda _some, of=points: of)
+        assert path.exists() == (ending == ".usdc")
+    assert [one.name for one in tmp_path.iterdir()] == [path.name]
+    stage = stage_of(path)
+    points = stage.GetPrimAtPath("/groom/Long/strands").GetAttribute("points")
+    for time, wanted in enumerate(frames, 5):
+        np.testing.assert_array_equal(points.Get(time), wanted)
