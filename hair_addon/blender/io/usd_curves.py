@@ -62,7 +62,7 @@ def _sets_of(path, prim, name, timing, notes) -> Iterator[CurveSet]:
     """The `CurveSet` of a prim; none where it has no curves. What people are to know is added to notes."""
     times = usd_stage.times_of(prim, usd_shapes.moving_attributes(prim), timing.within)
     time = usd_stage.time_code(times[0] if times else None)
-    drawn = usd_shapes.drawn(prim, time)
+    drawn = usd_shapes.drawn(prim, time, keeps_splines=len(times) < 2)  # Blender plays polylines
     left_out = len(drawn.is_kept) - int(drawn.is_kept.sum())
     if left_out:
         sentence = "curves have too few points, or some that belong to no segment, and are left out."
@@ -109,7 +109,7 @@ def _placed(points, matrix):
 def _moved(path, prim, name, time, first):
     """Points at another time than that of the first `Drawn`, divided as it is. Raises `HairError`."""
     with usd_stage.errors_named(path):
-        drawn = usd_shapes.drawn(prim, time, first.lines)
+        drawn = usd_shapes.drawn(prim, time, first.lines, keeps_splines=False)
         if not np.array_equal(drawn.counts, first.counts):
             sentence = f"has another number of points at the time {time.GetValue():g}: export as many at all times."
             raise HairError(f'"{name}" in {path} {sentence}')

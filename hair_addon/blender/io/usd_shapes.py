@@ -71,8 +71,12 @@ def moving_attributes(prim):
     return [prim.GetAttribute(name) for name in names if prim.HasAttribute(name)]
 
 
-def drawn(prim, time, lines=None) -> Drawn:
-    """The `Drawn` of a prim at a time; lines: into how many to divide each segment. Raises `HairError`."""
+def drawn(prim, time, lines=None, keeps_splines=True) -> Drawn:
+    """The `Drawn` of a prim at a time. Raises `HairError`.
+
+    lines: into how many to divide each segment, None for as many as it needs; keeps_splines: whether Catmull-Rom
+    splines may stay such.
+    """
     from pxr import UsdGeom
 
     points = _array(prim, "points", time, np.float64, 3)
@@ -87,14 +91,18 @@ def drawn(prim, time, lines=None) -> Drawn:
         return _linear(prim, time, points, counts, wrap == "periodic")
     if basis not in bezier_segments.BASES:
         raise HairError(f"{prim.GetPath()} has the basis {basis}, which USD does not define.")
-    return _cubic(prim, time, points, counts, basis, wrap, lines)
+    return _cubic(prim, time, points, counts, basis, wrap, lines, keeps_splines)
 
 
 def _array(prim, name, time, kind, width=1):
     """An attribute's values (N,) or (N, width), none where there are none."""
     value = prim.GetAttribute(name).Get(time) if prim.HasAttribute(name) else None
-    values = np.empty(0, kind) if value is None or not len(value) else np.asarray(value).astype(kind)
-    return values.reshape(-1, width) if width > 1 else values
+    shape = (width,) if width > 1 else ()
+    values = np.asarray([] if value is None else value)
+    if not values.size:
+        return np.empty((0, *shape), kind)
+    _require(prim, values.dtype.kind in "iuf" and values.shape[1:] == shape and values.ndim, name, "type")
+    return values.astype(kind)
 
 
 def _require(prim, is_valid, name, other):
@@ -111,12 +119,12 @@ def _linear(prim, time, points, counts, is_closed):
     return _unchanged(curves, starts[own] + along % kept[own], kept + is_closed, _widths(prim, time, curves))
 
 
-def _cubic(prim, time, points, counts, basis, wrap, lines):
+def _cubic(prim, time, points, counts, basis, wrap, lines, keeps_splines):
     is_closed, is_pinned = wrap == "periodic", wrap == "pinned" and basis != "bezier"
     is_kept = bezier_segments.is_cubic(counts, basis, wrap)
     curves = _Curves(points, counts, is_kept, bezier_segments.segment_counts(counts, basis, wrap), is_closed)
     widths = _widths(prim, time, curves, np.maximum(counts - 4, 0) + 2 if is_pinned else None)
-    if basis == "catmullRom" and wrap == "nonperiodic" and _ends_twice(curves):
+    if keeps_splines and basis == "catmullRom" and wrap == "nonperiodic" and _ends_twice(curves):
         own, along = each(curves.kept_counts - 2)
         rows = curve_offsets(counts)[:-1][is_kept][own] + along + 1
         return _unchanged(curves, rows, curves.kept_counts - 2, widths, is_smooth=True)
@@ -211,7 +219,10 @@ def _widths(prim, time, curves, short_ends=None):
         scope, values = str(shape.GetWidthsInterpolation()), shape.GetWidthsAttr().Get(time)
     if values is None or not len(values):
         return _Widths()
-    values, counts, kept = np.asarray(values, np.float64).ravel(), curves.counts, curves.is_kept
+    values, counts, kept = np.asarray(values).ravel(), curves.counts, curves.is_kept
+    if values.dtype.kind not in "iuf":
+        return _Widths(is_odd=True)
+    values = values.astype(np.float64)
     ends = np.maximum(curves.segments, 1) + (not curves.is_closed)
     sizes = {"constant": 1, "vertex": counts.sum(), "varying": ends.sum(), "uniform": len(counts)}
     if short_ends is not None:

@@ -75,7 +75,9 @@ def _cause_of(error):
     if line is not None:
         return f"it is not valid in line {line[1]}"
     causes = re.findall(r": '(.*?)'\s*$", text, re.MULTILINE | re.DOTALL)
-    return " ".join(causes[0].split()).rstrip(".") if causes else "it is damaged"
+    if not causes:
+        return "it is damaged"
+    return " ".join(re.sub(r",? while reading @[^@]*@", "", causes[0]).split()).rstrip(".")
 
 
 def _missing(stage):

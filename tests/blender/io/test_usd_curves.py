@@ -283,17 +283,18 @@ def test_primvars_of_grooms_are_read_for_the_curves_that_are_kept(rng, tmp_path)
     assert len(read.notes) == 1 and "1 curves" in str(read.notes[0])
 
 
-def test_what_moves_is_where_the_file_begins_and_has_all_its_times(rng, tmp_path):
+@pytest.mark.parametrize(("basis", "wrap"), [("bspline", "pinned"), ("catmullRom", "nonperiodic")])
+def test_what_moves_is_where_the_file_begins_and_has_all_its_times(rng, tmp_path, basis, wrap):
     from pxr import UsdGeom, Vt
 
-    points = wandering(rng, 8)
+    points = np.repeat(wandering(rng, 6), [2, 1, 1, 1, 1, 2], axis=0)
     stage = stage_at(tmp_path / "a.usdc")
     stage.SetTimeCodesPerSecond(25.0)
     stage.SetStartTimeCode(1001.0)
     stage.SetEndTimeCode(1003.0)
     top = UsdGeom.Xform.Define(stage, "/top")
     place = top.AddTranslateOp()
-    made = add(stage, "/top/hair", points, [8])
+    made = add(stage, "/top/hair", points, [8], "cubic", basis, wrap)
     for time in (1001, 1002, 1003):
         place.Set((time - 1001.0, 0.0, 0.0), time)
         made.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points * np.float32(time - 1000)), time)
@@ -303,6 +304,7 @@ def test_what_moves_is_where_the_file_begins_and_has_all_its_times(rng, tmp_path
     (one,) = usd_curves.read(tmp_path / "a.usdc").sets
     np.testing.assert_allclose(one.points[[0, -1]], points[[0, -1]], atol=1e-7)
     np.testing.assert_allclose(one.motion.times, np.array([1001, 1002, 1003]) / 25.0)
+    assert not one.is_smooth.any()  # Blender plays polylines
     for index, grown in ((0, 1.0), (2, 3.0)):
         moved = one.motion.points_at(index)
         assert len(moved) == len(one.points)
@@ -328,12 +330,16 @@ def damaged(stage, what, rng):
         nurbs.CreateKnotsAttr([float(k) for k in range(12, 0, -1)])
     elif what == "tangents":
         fill(UsdGeom.HermiteCurves.Define(stage, "/hair"), points, [8])
+    elif what == "types":
+        lines = "int[] curveVertexCounts = [2]", 'string[] points = ["a", "b"]'
+        text = "\n".join(("#usda 1.0", 'def BasisCurves "hair"', "{", *lines, "}", ""))
+        stage.GetRootLayer().ImportFromString(text)
     elif what == "units":
         add(stage, "/hair", points, [8])
         UsdGeom.SetStageMetersPerUnit(stage, 0.0)
 
 
-@pytest.mark.parametrize("what", ["counts", "negative", "knots", "falling", "tangents", "units"])
+@pytest.mark.parametrize("what", ["counts", "negative", "knots", "falling", "tangents", "types", "units"])
 def test_damaged_files_are_refused_in_one_sentence(rng, tmp_path, what):
     stage = stage_at(tmp_path / "a.usda")
     damaged(stage, what, rng)
