@@ -25,7 +25,7 @@ test: export LP_NUM_THREADS = 0
 test: export OPENBLAS_NUM_THREADS = 1
 
 # All tests load kernels that are compiled once, in place of each process compiling them.
-test: $(installed) ## all tests except long benchmarks and tests in a window, in up to four processes
+test: $(installed) ## all tests except benchmarks and tests in a window, in up to four processes
 	$(if $(ARGS),,$(python) tools/build_extension.py --kernels)
 	$(python) -m pytest -m "not long and not desktop and not farm" --ignore tests/desktop --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 

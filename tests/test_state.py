@@ -40,7 +40,7 @@ PURE = {
     "core/dynamics/rod/stiffness_advice.py: tip_sink",
     "core/geometry/bspline.py: basis_matrix",
     "core/geometry/bspline.py: _device_matrix",
-    "core/geometry/bspline.py: _flat_matrix",
+    "core/geometry/bspline.py: _controls_matrix",
     "core/kernels/compiled_kernels.py: _fitting",
     "core/params.py: _declared",
     "core/shading/appearance.py: _mean_reflectance",

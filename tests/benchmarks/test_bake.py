@@ -8,7 +8,7 @@ import pytest
 import warp as wp
 
 from hair_addon.core.shading import appearance
-from hair_addon.core.shading.tables import absorption_slices, lookup_tables, strand_tables, texel_kernels
+from hair_addon.core.shading.tables import absorption_slices, lookup_tables, strand_tables
 
 MODES = ["classic", "energy"]
 
@@ -43,14 +43,3 @@ def test_bake(mode):
         print(f"\n{mode:8} {name:8} tables {1e3 * tables:7.1f} ms  {tables / numpy_time:5.2f} × NumPy", end="")
         print(f"   {absorption_slices.SLICE_COUNT} slices {1e3 * slices:7.1f} ms", end="")
         print(f"   strands that differ {1e3 * strands:7.1f} ms", end="")
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_all_texels_are_launched_at_once(mode, monkeypatch):
-    settings, launches = lookup_tables.Settings(mode=mode), []
-    launch = wp.launch
-    monkeypatch.setattr(wp, "launch", lambda *args, **kwargs: (launches.append(args), launch(*args, **kwargs)))
-    edges, cosines = lookup_tables.phi_edges(settings), lookup_tables.row_cosines(settings)
-    spread = np.eye(settings.size, dtype=np.float32) if mode == "energy" else None
-    texel_kernels.azimuthal_means(edges, cosines, settings, settings.sigma_a, spread, "cpu")
-    assert len(launches) == (1 if mode == "classic" else 4)

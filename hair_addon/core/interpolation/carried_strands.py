@@ -22,9 +22,6 @@ from .guide_weights import frame
 # No fused multiply-add: the cross product of a vector with itself is zero.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-# By this power of its lean a course turns about the normal: one at 30° above the surface does, one at 60° swings over.
-_LEAN = 4.0
-
 
 def carried(
     points: np.ndarray,
@@ -96,6 +93,12 @@ def _least_rotation(unit: wp.vec3, other: wp.vec3):
 
 
 @wp.func
+def _leaning(part: float):
+    """By this power of its lean a course turns about the normal: one at 30° above the surface does, one at 60° not."""
+    return part * part * part * part
+
+
+@wp.func
 def _turn_at_root(before: wp.array2d[wp.vec3], now: wp.array2d[wp.vec3], strand: int, normal: wp.vec3):
     """The rotation about the normal by which a course that lies along the surface comes closest to what it is now."""
     tangent, bitangent = frame(normal)
@@ -111,10 +114,14 @@ def _turn_at_root(before: wp.array2d[wp.vec3], now: wp.array2d[wp.vec3], strand:
     lying = wp.length(turned)
     if lying == 0.0:
         return wp.quat_identity()
-    level = wp.pow(lying / (lying + upright), wp.static(_LEAN))
-    rest = wp.pow(upright / (lying + upright), wp.static(_LEAN))
+    level = _leaning(lying / (lying + upright))
     turned *= level / lying
-    return wp.quat_from_axis_angle(normal, wp.atan2(turned[1], turned[0] + rest))
+    x, y = turned[0] + _leaning(upright / (lying + upright)), turned[1]
+    # By the tangent of half the angle, without functions that each system's library rounds in its own way.
+    size = wp.length(wp.vec2(x, y))
+    if x < 0.0:
+        return wp.normalize(wp.quat((size - x) * normal, y))
+    return wp.normalize(wp.quat(y * normal, size + x))
 
 
 @wp.kernel

@@ -8,9 +8,13 @@ struct vector {
   CUDA_CALLABLE vector operator-(const vector& b) const { return {x - b.x, y - b.y, z - b.z}; }
   CUDA_CALLABLE vector operator*(lanes factor) const { return {x * factor, y * factor, z * factor}; }
 };
-const auto dot = [&](const vector& a, const vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
+// a + b factor, rounded once.
+const auto plus = [&](const vector& a, const vector& b, lanes factor) {
+  return vector{fused(b.x, factor, a.x), fused(b.y, factor, a.y), fused(b.z, factor, a.z)};
+};
+const auto dot = [&](const vector& a, const vector& b) { return fused(a.x, b.x, fused(a.y, b.y, a.z * b.z)); };
 const auto cross = [&](const vector& a, const vector& b) {
-  return vector{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  return vector{fused(a.y, b.z, -(a.z * b.y)), fused(a.z, b.x, -(a.x * b.z)), fused(a.x, b.y, -(a.y * b.x))};
 };
 const auto chosen = [&](auto condition, const vector& a, const vector& b) {
   return vector{condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z};

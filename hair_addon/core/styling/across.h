@@ -33,14 +33,14 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v, const 
     lanes w_u = to_u - before_u, w_v = to_v - before_v;
     before_u = to_u;
     before_v = to_v;
-    const lanes square = w_u * w_u + w_v * w_v, most = 0.9604f * d * d;
+    const lanes square = fused(w_u, w_u, w_v * w_v), most = 0.9604f * d * d;
     const auto is_far = square > most;
     if (any_of(is_far)) {
       const lanes held = is_far ? sqrt_of(most / (is_far ? square : lanes(1.0f))) : lanes(1.0f);
       w_u *= held;
       w_v *= held;
     }
-    lanes forward = sqrt_of(higher_of(d * d - (w_u * w_u + w_v * w_v), lanes(0.0f)));
+    lanes forward = sqrt_of(higher_of(fused(d, d, -fused(w_u, w_u, w_v * w_v)), lanes(0.0f)));
     lanes size = d;
     if (keep_length != 1.0f) {
       forward = (1.0f - keep_length) * d + keep_length * forward;
@@ -72,8 +72,8 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v, const 
     const lanes part = clamped(
         is_between ? (middle - below) / (is_between ? range : lanes(1.0f)) : lanes(0.0f), lanes(0.0f), lanes(1.0f)
     );
-    vector t_between = t_below + (t_above - t_below) * part;
-    vector u_between = u_below + (u_above - u_below) * part;
+    vector t_between = plus(t_below, t_above - t_below, part);
+    vector u_between = plus(u_below, u_above - u_below, part);
     // Opposite directions cancel each other: from a right angle on the frame halfway takes part.
     const lanes facing = dot(t_below, t_above);
     if (any_of(facing < 0.0f)) {
@@ -86,13 +86,13 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v, const 
       u_between = u_between + turned(u_below, t_below, half) * bulge;
     }
     const vector forwards = unit_or(t_between, lanes(1.0e-6f), t_below);
-    const vector sideways = unit_or(u_between - forwards * dot(u_between, forwards), lanes(1.0e-6f), u_below);
+    const vector sideways = unit_or(plus(u_between, forwards, -dot(u_between, forwards)), lanes(1.0e-6f), u_below);
     const vector upward = cross(forwards, sideways);
-    const vector made = forwards * forward + sideways * w_u + upward * w_v;
+    const vector made = plus(plus(forwards * forward, sideways, w_u), upward, w_v);
     const auto has_length = d > 1.0e-12f;
     const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));
     // Unit but for rounding, which a step of Newton's method takes away.
-    const vector direction = nearly * (1.5f - 0.5f * dot(nearly, nearly));
+    const vector direction = nearly * fused(lanes(-0.5f), dot(nearly, nearly), lanes(1.5f));
     next[i] = any_of(!has_length) ? chosen(has_length, direction, t[i]) : direction;
     if (keep_length != 1.0f) next_length[i] = has_length ? size : d;
     passed(progress, forward, forwards, sideways, upward);

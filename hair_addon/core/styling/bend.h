@@ -24,6 +24,6 @@ for (int i = 1; i < point_count; ++i) {
   arc += length[i];
   lanes sin_angle, cos_angle;
   sine_and_cosine(base * angle * profile(arc * per_total), sin_angle, cos_angle);
-  const vector sideways = u[i] * cos_psi + cross(t[i], u[i]) * sin_psi;
-  t[i] = unit_or(t[i] * cos_angle + sideways * sin_angle, lanes(1.0e-6f), t[i]);
+  const vector sideways = plus(u[i] * cos_psi, cross(t[i], u[i]), sin_psi);
+  t[i] = unit_or(plus(t[i] * cos_angle, sideways, sin_angle), lanes(1.0e-6f), t[i]);
 }

@@ -74,7 +74,7 @@ const auto keep_beside = [&](
 ) {
   const lanes ahead = progress + lead;
   vector segment = kept(SEGMENT), segment_below = kept(SEGMENT_BELOW), frame_below = kept(FRAME);
-  vector away = kept(AWAY) + forwards * forward;
+  vector away = plus(kept(AWAY), forwards, forward);
   lanes size = size_of(segment), size_below = size_of(segment_below), arc = spare[ARC];
   vector axis_above = segment * (1.0f / size), axis_below = segment_below * (1.0f / size_below);
   for (;;) {
@@ -100,7 +100,7 @@ const auto keep_beside = [&](
   const lanes between = clamped(
       (ahead - arc + 0.5f * size_below) / (0.5f * (size_below + size)), lanes(0.0f), lanes(1.0f)
   );
-  const vector axis = unit_or(axis_below + (axis_above - axis_below) * between, lanes(1.0e-6f), axis_below);
+  const vector axis = unit_or(plus(axis_below, axis_above - axis_below, between), lanes(1.0e-6f), axis_below);
   const vector frame = turned(frame_below, axis_below, axis);
   const lanes facing = in_lock * smoothstep(dot(forwards, axis));
   const lanes part = facing * lower_of(forward * per_settling, lanes(0.45f));

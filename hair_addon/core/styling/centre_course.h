@@ -40,5 +40,5 @@ const auto middle_at = [&](centre_course& course, lanes ahead) {
   const lanes range = course.above - course.below;
   const auto has_range = range > 1.0e-12f;
   const lanes part = has_range ? (ahead - course.below) / (has_range ? range : lanes(1.0f)) : lanes(0.0f);
-  return course.low + (course.high - course.low) * part;
+  return plus(course.low, course.high - course.low, part);
 };

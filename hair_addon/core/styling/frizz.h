@@ -61,11 +61,11 @@ const auto put_noise = [&](auto octaves) {
       const float sense = first % 2 ? -1.0f : 1.0f;
 #pragma unroll
       for (int wave = first; wave < COUNT; wave += WAVES) {
-        to_u += evens[wave] * cosine - odds[wave] * sine;
-        to_v += sense * (evens[wave] * sine + odds[wave] * cosine);
+        to_u = fused(evens[wave], cosine, fused(-odds[wave], sine, to_u));
+        to_v = fused(lanes(sense) * evens[wave], sine, fused(lanes(sense) * odds[wave], cosine, to_v));
         // The next octave has twice the angle.
         const lanes twice = 2.0f * sine * cosine;
-        cosine = 1.0f - 2.0f * sine * sine;
+        cosine = fused(-2.0f * sine, sine, lanes(1.0f));
         sine = twice;
       }
     }

@@ -19,7 +19,7 @@ const auto gather = [&](float thickness, float twist, lanes joined) {
   for (int i = 1; i < point_count; ++i) {
     const lanes d = length[i];
     arc += d;
-    point = point + t[i] * d;
+    point = plus(point, t[i], d);
     // Corrections are made per length, that of a fortieth of the strand: finer segments correct less each. The same
     // corrections at each of many points would be chaotic, as differences of near points are mostly rounding.
     const lanes share = lower_of(40.0f * d * per_total, lanes(1.0f));
@@ -29,11 +29,11 @@ const auto gather = [&](float thickness, float twist, lanes joined) {
     const lanes x = arc * per_total;
     lanes wanted = profile(x);
     // Where the strand is level with its progress along the centre: by its direction over about that length.
-    own_run = own_run + (t[i] - own_run) * share;
-    vector away = point - own_run * (arc - ahead) - middle;
+    own_run = plus(own_run, t[i] - own_run, share);
+    vector away = plus(point, own_run, ahead - arc) - middle;
     if (twist != 0.0f) {
       // The centre's direction over about that length, which has no steps.
-      run = run + (middle - middle_before - run) * share;
+      run = plus(run, middle - middle_before - run, share);
       const vector axis = unit_or(run, lanes(1.0e-12f), axis_before);
       middle_before = middle;
       axis_before = axis;
@@ -52,7 +52,7 @@ const auto gather = [&](float thickness, float twist, lanes joined) {
       pull = is_steep ? pull_before + clamped(change, -most_change, most_change) : pull;
     }
     pull_before = pull;
-    const vector drawn = middle + away * (1.0f - pull * (1.0f - thickness));
+    const vector drawn = plus(middle, away, 1.0f - pull * (1.0f - thickness));
     // Along the curve, and back onto it from beside it, the more the nearer to the centre it is drawn: by degrees where
     // that is far away.
     weight = pull * pull;
@@ -66,13 +66,13 @@ const auto gather = [&](float thickness, float twist, lanes joined) {
     const lanes off_square = dot(off, off);
     const auto is_lost = off_square > spacing * spacing;
     if (any_of(is_lost)) off = off * (is_lost ? spacing / sqrt_of(is_lost ? off_square : lanes(1.0f)) : lanes(1.0f));
-    const vector beside = off - forwards * dot(off, forwards);
+    const vector beside = plus(off, forwards, -dot(off, forwards));
     const lanes square = dot(beside, beside), most = 0.25f * spacing * spacing;
     const auto is_off = square > most;
     lanes back = 0.7f * share;
     if (any_of(is_off)) back *= is_off ? sqrt_of(most / (is_off ? square : lanes(1.0f))) : lanes(1.0f);
-    t[i] = chosen(is_far, unit_or(way_on + beside * (back * weight), lanes(1.0e-18f), t[i]), t[i]);
-    place = place + t[i] * d;
+    t[i] = chosen(is_far, unit_or(plus(way_on, beside, back * weight), lanes(1.0e-18f), t[i]), t[i]);
+    place = plus(place, t[i], d);
     drawn_before = drawn;
     // The strand's progress along the centre: as far as its length goes along the curve.
     const auto has_moved = distance > 0.5f * advance;

@@ -32,7 +32,7 @@ for (int pass = 0; pass < 2; ++pass) {
     const lanes range = run.above - run.below;
     const auto has_range = range > 1.0e-12f;
     const lanes part = has_range ? (arc - run.below) / (has_range ? range : lanes(1.0f)) : lanes(0.0f);
-    return run.start + (run.end - run.start) * part;
+    return plus(run.start, run.end - run.start, part);
   };
   for (int i = 1; i < point_count; ++i) {
     const lanes middle = 0.5f * (along[i - 1] + along[i]);
@@ -45,5 +45,5 @@ lanes arc = 0.0f;
 for (int i = 1; i < point_count; ++i) {
   arc += length[i];
   const lanes amount = base * profile(arc * per_total);
-  t[i] = unit_or(old[i] * (1.0f - amount) + t[i] * amount, lanes(1.0e-3f), old[i]);
+  t[i] = unit_or(plus(old[i] * (1.0f - amount), t[i], amount), lanes(1.0e-3f), old[i]);
 }

@@ -25,9 +25,6 @@
 // turns segments keeps roots and lengths.
 
 {
-#if !defined(__CUDA_ARCH__)
-  #pragma clang fp contract(fast)
-#endif
 #include "lanes.h"
 #include "lane_rows.h"
 #include "vectors.h"
@@ -104,7 +101,7 @@ const auto put_points = [&]() {
   place[0] = {};
   along[0] = 0.0f;
   for (int i = 1; i < point_count; ++i) {
-    place[i] = place[i - 1] + t[i] * length[i];
+    place[i] = plus(place[i - 1], t[i], length[i]);
     along[i] = along[i - 1] + length[i];
   }
 };
@@ -221,7 +218,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
 // Strands that no style has touched keep their bits.
 vector from_root = {};
 write_points(rows, is_touched, [&](int i) {
-  if (i > 0) from_root = from_root + t[i] * length[i];
+  if (i > 0) from_root = plus(from_root, t[i], length[i]);
   return root + from_root;
 });
 }

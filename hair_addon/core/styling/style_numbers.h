@@ -19,7 +19,14 @@ const auto turned = [&](const vector& u, const vector& a, const vector& b) {
   const lanes facing = 1.0f + dot(a, b);
   const auto is_facing = facing > 1.0e-6f;
   const lanes lean = is_facing ? dot(u, b) / (is_facing ? facing : lanes(1.0f)) : lanes(0.0f);
-  return u - (a + b) * lean;
+  return plus(u, a + b, -lean);
+};
+
+// c0 x^n + c1 x^(n-1) + … of the coefficients c0, c1 ….
+const auto polynomial = [&](lanes x, float first, auto... others) {
+  lanes sum = first;
+  ((sum = fused(sum, x, lanes(others))), ...);
+  return sum;
 };
 
 // Sine and cosine of whole turns: by a GPU's own instructions, 4e-7, or polynomials of least error over a turn, 1e-7,
@@ -31,11 +38,9 @@ const auto sine_and_cosine = [&](lanes turns, lanes& sine, lanes& cosine) {
   cosine = __cosf(6.28318530718f * x);
 #else
   const lanes z = x * x;
-  sine = x * (0.25f - z)
-      * (25.13273048f + z * (-64.83467865f + z * (67.04389954f + z * (-38.12319565f + z * 12.23330116f))));
+  sine = x * (0.25f - z) * polynomial(z, 12.23330116f, -38.12319565f, 67.04389954f, -64.83467865f, 25.13273048f);
   cosine = (0.0625f - z)
-      * (16.0f
-         + z * (-59.82727432f + z * (81.78964233f + z * (-58.57185364f + z * (25.56709099f - z * 6.54000998f)))));
+      * polynomial(z, -6.54000998f, 25.56709099f, -58.57185364f, 81.78964233f, -59.82727432f, 16.0f);
 #endif
 };
 
@@ -49,16 +54,13 @@ const auto power = [&](lanes x, lanes e) {
   const lanes m = lanes_of_bits((shifted & 0x007fffff) + 0x3f3504f3);
   const lanes z = (m - 1.0f) / (m + 1.0f);
   const lanes z2 = z * z;
-  const lanes series = z * (2.8853900818f + z2 * (0.9617966939f + z2 * (0.5770780164f + z2 * 0.4121985831f)));
+  const lanes series = z * polynomial(z2, 0.4121985831f, 0.5770780164f, 0.9617966939f, 2.8853900818f);
   const lanes y = higher_of(e * (to_lanes(n) + series), lanes(-126.0f));
   const lanes nearest = floor_of(y + 0.5f);
   const lanes f = y - nearest;
-  lanes result = 1.5403530e-4f * f + 1.3333558e-3f;
-  result = result * f + 9.6181291e-3f;
-  result = result * f + 5.5504109e-2f;
-  result = result * f + 2.4022651e-1f;
-  result = result * f + 6.9314718e-1f;
-  result = result * f + 1.0f;
+  lanes result = polynomial(
+      f, 1.5403530e-4f, 1.3333558e-3f, 9.6181291e-3f, 5.5504109e-2f, 2.4022651e-1f, 6.9314718e-1f, 1.0f
+  );
   result *= lanes_of_bits((to_ints(nearest) + 127) << 23);
   return is_positive ? result : lanes(0.0f);
 };

@@ -44,7 +44,7 @@ lanes arc = 0.0f, ahead = 0.0f, pull = 0.0f;
 for (int i = 1; i < point_count; ++i) {
   const lanes d = length[i];
   arc += d;
-  point = point + t[i] * d;
+  point = plus(point, t[i], d);
   // Directions are averaged over a fortieth of the strand.
   const lanes x = arc * per_total, share = lower_of(40.0f * d * per_total, lanes(1.0f));
   lanes wanted = profile(x);
@@ -52,8 +52,8 @@ for (int i = 1; i < point_count; ++i) {
   ahead += d * rate_at(ahead + 0.5f * d * rate_at(ahead, pull), pull);  // the midpoint method
   const vector middle = middle_at(course, ahead);
   // Where the strand is level with its progress along the centre.
-  own_run = own_run + (t[i] - own_run) * share;
-  const vector away = point - own_run * (arc - ahead) - middle;
+  own_run = plus(own_run, t[i] - own_run, share);
+  const vector away = plus(point, own_run, ahead - arc) - middle;
   // No faster than the strand can follow, however steep the profile is.
   const lanes most_change = d / higher_of(sqrt_of(dot(away, away)) + radius, lanes(1.0e-9f));
   pull += clamped(base * wanted - pull, -most_change, most_change);

@@ -9,7 +9,6 @@ import os
 import shutil
 import signal
 import subprocess
-import time
 from pathlib import Path
 
 import bpy
@@ -27,11 +26,12 @@ COUNT = 5
 
 HOLD = """
 import sys, time
-from hair_addon.core.files import file_lock as claims
+from pathlib import Path
 from hair_addon.core.files.file_lock import claim
 with claim(sys.argv[1]):
     print(flush=True)
     time.sleep(2)
+    Path(sys.argv[2]).touch()
 """
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
 
@@ -212,12 +212,18 @@ def test_a_failing_worker_reports_its_error_once(turning, tmp_path):
 def test_it_waits_for_frames_of_other_processes(tmp_path):
     """A frame that another process has claimed is made here if that ends without it."""
     pattern = tmp_path / "f_#.png"
-    line = [*command()[:1], "-c", HOLD, str(frames.path_of(pattern, 1))]
+    left = tmp_path / "left"
+    line = [*command()[:1], "-c", HOLD, str(frames.path_of(pattern, 1)), left]
+    is_left = {}
+
+    def make(path, number):
+        is_left[number] = left.exists()
+        path.write_text(str(number))
+
     with subprocess.Popen(line, stdout=subprocess.PIPE, env=ENVIRONMENT) as holder:
         holder.stdout.readline()
-        started = time.monotonic()
-        made = [n for n, _ in sequence.make(pattern, [1, 2], lambda path, number: path.write_text(str(number)))]
-        assert made == [2, 1] and time.monotonic() - started > 1.0
+        assert [number for number, _ in sequence.make(pattern, [1, 2], make)] == [2, 1]
+    assert is_left[1]
 
 
 def test_sequences_are_started_by_one_process_at_a_time(tmp_path):

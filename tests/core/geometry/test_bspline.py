@@ -90,16 +90,25 @@ def test_matrix_equals_recursion(rng, device):
     expected = bspline.evaluate_recursive(controls, np.linspace(0.0, 1.0, 41))
     size = np.abs(controls).max()
     np.testing.assert_allclose(bspline.basis_matrix(6, 41) @ controls, expected, atol=1e-12)
-    np.testing.assert_allclose(bspline.evaluate(controls, 41, device).numpy(), expected, atol=1e-6 * size)
-    np.testing.assert_allclose(bspline.evaluate_on_warp(controls, 41, device).numpy(), expected, atol=1e-6 * size)
+    found = bspline.evaluate(controls, 41, device).numpy()
+    np.testing.assert_allclose(found, expected, atol=1e-6 * size)
+    np.testing.assert_array_equal(bspline.evaluate(controls[7:9], 41, device).numpy(), found[7:9])
 
 
 @pytest.mark.parametrize(("control_count", "point_count", "degree"), [(4, 2, 3), (5, 16, 2), (9, 100, 5)])
 def test_matrix_of_any_shape(rng, device, control_count, point_count, degree):
     controls = rng.random((3, control_count, 3), dtype=np.float32)
     expected = bspline.evaluate_recursive(controls, np.linspace(0.0, 1.0, point_count), degree)
-    for evaluate in (bspline.evaluate, bspline.evaluate_on_warp):
-        np.testing.assert_allclose(evaluate(controls, point_count, device, degree).numpy(), expected, atol=1e-6)
+    np.testing.assert_allclose(bspline.evaluate(controls, point_count, device, degree).numpy(), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("count", [4, 6, 16])
+def test_controls_of_curves_through_points(rng, count):
+    points = rng.random((5, count, 3), dtype=np.float32)
+    controls = bspline.controls_through(points)
+    at_points = bspline.evaluate_recursive(controls, bspline.greville_abscissae(count))
+    np.testing.assert_allclose(at_points, points, atol=1e-5)
+    np.testing.assert_array_equal(bspline.controls_through(points[3:]), controls[3:])
 
 
 @pytest.mark.parametrize(("control_count", "degree"), [(3, 3), (1, 1), (6, 0), (6, 6)])

@@ -47,9 +47,6 @@
 // Constants: WIDTH, GROUP, MOST segments, and those that rod_solver.py explains.
 
 {
-#if !defined(__CUDA_ARCH__)
-  #pragma clang fp contract(fast)
-#endif
 // On a GPU, loops over rows of small matrices: an index that is not known would put these in memory.
 #if defined(__CUDA_ARCH__)
 #define UNROLLED _Pragma("unroll")

@@ -120,9 +120,9 @@ class Rods:
             require_count(name, getattr(material, name).size, self.strand_count * self.segment_count)
         if not (np.isfinite(rest.lengths).all() and (rest.lengths > 0.0).all()):
             raise HairError("Simulated strands have segments without length.")
-        # In units near the mean mass, so that nothing nears the ends of single precision; powers of two, which round
-        # nothing: no strand depends on the masses of others.
-        unit = float(2.0 ** np.round(np.log2(material.masses.mean())))
+        # In units near the mean mass, so that nothing nears the ends of single precision; powers of four, which round
+        # nothing, nor do the solver's roots of them: no strand depends on the masses of others.
+        unit = float(4.0 ** np.round(0.5 * np.log2(material.masses.mean())))
         self.arrays.multipliers.assign(self.arrays.multipliers.numpy() * np.float32(self._mass_unit / unit))
         self._mass_unit = unit
         self._put("lengths", rest.lengths)

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 from hair_addon.core.shading.fibre.azimuthal import roughening
 from hair_addon.core.shading.fibre.principled import scale_from_radial_roughness
@@ -35,3 +36,14 @@ def test_kernels_give_the_same_texels_to_single_precision(details, device):
     np.testing.assert_allclose(
         texel_kernels.longitudinal_texels(theta, settings, device), expected.m, rtol=2e-6, atol=1e-30
     )
+
+
+@pytest.mark.parametrize("mode", ["classic", "energy"])
+def test_all_texels_are_launched_at_once(mode, monkeypatch):
+    settings, launches = lookup_tables.Settings(mode=mode), []
+    launch = wp.launch
+    monkeypatch.setattr(wp, "launch", lambda *args, **kwargs: (launches.append(args), launch(*args, **kwargs)))
+    edges, cosines = lookup_tables.phi_edges(settings), lookup_tables.row_cosines(settings)
+    spread = np.eye(settings.size, dtype=np.float32) if mode == "energy" else None
+    texel_kernels.azimuthal_means(edges, cosines, settings, settings.sigma_a, spread, "cpu")
+    assert len(launches) == (1 if mode == "classic" else 4)
