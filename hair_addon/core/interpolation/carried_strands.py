@@ -117,6 +117,8 @@ def _turn_at_root(before: wp.array2d[wp.vec3], now: wp.array2d[wp.vec3], strand:
     level = _leaning(lying / (lying + upright))
     turned *= level / lying
     x, y = turned[0] + _leaning(upright / (lying + upright)), turned[1]
+    if y == 0.0 and x >= 0.0:
+        return wp.quat_identity()  # to the last bit: courses rest
     # By the tangent of half the angle, without functions that each system's library rounds in its own way.
     size = wp.length(wp.vec2(x, y))
     if x < 0.0:

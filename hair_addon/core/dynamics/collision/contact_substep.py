@@ -31,7 +31,7 @@ from .contact import Contacts, asking_of
 from .contact_queries import WIDTH, Asking, Samples, any_moved, find_in
 from .nearest_surface import Surface
 
-# Nothing differentiates this kernel; the solver's part fuses multiply-add, as it says itself.
+# Nothing differentiates this kernel; the solver's part says itself what it fuses (`fused` of lanes.h).
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _ROUNDS = 4
