@@ -66,4 +66,5 @@ def wanted(kind, given, file_axes):
     is_said = given.up and not blender.io.mesh_files.asks_for_axis(given.input)
     said = Convention(parsed_unit(given.unit) if given.unit else None, given.up if is_said else None)
     axis = blender.io.mesh_files.axis_of(file_axes)
-    return blender.io.curve_files.Wanted(kind, given.object, said, axis)
+    plays = kind == "HAIR" and given.out.suffix.lower() == ".blend"
+    return blender.io.curve_files.Wanted(kind, given.object, said, axis, plays)

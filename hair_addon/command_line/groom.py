@@ -160,9 +160,19 @@ def _keep_curves(given, surface, settings, file_axes, console):
     if found.guides is None:
         error, high = 100.0 * made.mean_error, 100.0 * made.high_error
         console.warn(f"The guides reproduce the strands to {error:.1f}% (95%: {high:.1f}%) of their length.")
+    if found.motion is not None:
+        _play(given, made, found, console)
     blender.groom.transfer.groom_settings.assign_look(made.hair, settings.appearance)
     blender.groom.transfer.groom_settings.assign_dynamics(made.guides, settings.dynamics)
     return made.guides, made.hair
+
+
+def _play(given, made, found, console):
+    """Let kept hair play the frames of its file, from one beside the .blend that is written."""
+    path = blender.io.played_hair.path_beside(given.out, made.hair)
+    order = made.rooted.point_order(found.starts)
+    count = blender.io.played_hair.playing(made.hair, found.motion, order, path)(console.progress)
+    console.warn(f"{given.hair_from} moves: the hair plays its {count} frames from {path}, and does not follow guides.")
 
 
 def _warn_of_useless(names, reason, console):

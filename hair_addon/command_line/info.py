@@ -30,6 +30,8 @@ def run(given, console):
     if describe is None:
         opening.open_file(given, console)
         values = blender.io.inspection.open_file()
+        if given.input.suffix.lower() in blender.io.curve_files.OF_OTHERS:
+            values["curves"] = blender.io.curve_files.summary(given.input)
     else:
         values = describe(given.input)
     values = {"verb": "info", "input": str(given.input), **values}

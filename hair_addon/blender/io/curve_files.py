@@ -10,8 +10,9 @@ import numpy as np
 
 from ...core.errors import HairError, cause_of
 from ...core.files import alembic_grooms, array_grooms, curve_file, curve_units
-from ...core.files.curve_file import Convention
+from ...core.files.curve_file import Convention, Motion
 from ...core.geometry.mesh import TriMesh
+from ...core.geometry.strands import curve_offsets
 from ..data import scene
 from ..host import scene_time
 from . import curve_objects, strand_arrays, usd_curves
@@ -25,6 +26,7 @@ _READERS = {
     ".npz": array_grooms.read,
 }
 ENDINGS = (".blend", *_READERS)
+OF_OTHERS = (*_USD, ".abc")  # that other programs write too
 
 _OTHER = {"GUIDES": "HAIR", "HAIR": "GUIDES"}
 
@@ -33,22 +35,29 @@ _OTHER = {"GUIDES": "HAIR", "HAIR": "GUIDES"}
 class Wanted:
     """What is wanted of a file: kind "GUIDES" or "HAIR", of the objects or groups of a name, of all for "".
 
-    said: the unit and the axis of its coordinates, where people say them; axis: of arrays that do not say.
+    said: the unit and the axis of its coordinates, where people say them; axis: of arrays that do not say; plays:
+    whether curves that move are to, where they can.
     """
 
     kind: str
     name: str = ""
     said: Convention = field(default_factory=Convention)
     axis: str = "Z"
+    plays: bool = False
 
 
 @dataclass(frozen=True)
 class Found:
-    """An object of the wanted curves, one of the guides that the file has for them, and what to tell people."""
+    """An object of the wanted curves, one of the guides that the file has for them, and what to tell people.
+
+    motion: of the curves in metres with Z up, where they are to play; starts: (C+1,) of the curves among its points.
+    """
 
     curves: bpy.types.Object
     guides: bpy.types.Object | None = None
     notes: list[HairError] = field(default_factory=list)
+    motion: Motion | None = None
+    starts: np.ndarray | None = None
 
 
 def require_readable(path):
@@ -59,6 +68,31 @@ def require_readable(path):
     if path.suffix.lower() not in ENDINGS:
         sentence = "{path} has a format that curves cannot be read from: use {endings}."
         raise HairError(sentence, path=path, endings=", ".join(ENDINGS))
+
+
+def read(path, axis="Z"):
+    """The `CurveFile` of a file that is no .blend; axis: of arrays that do not say. Raises `HairError`."""
+    path = Path(path)
+    require_readable(path)
+    reader = _READERS[path.suffix.lower()]
+    return reader(path, axis) if reader is array_grooms.read else reader(path)
+
+
+def summary(path):
+    """[{name: value}] of the objects of curves in a file that is no .blend. Raises `HairError`."""
+    kinds = {True: "guides", False: "strands", None: "curves"}
+    return [
+        {
+            "name": one.name,
+            "kind": kinds[one.is_guide],
+            "group": one.group_name or None,
+            "curves": len(one),
+            "points": len(one.points),
+            "has_widths": one.radii is not None,
+            "samples": 1 if one.motion is None else len(one.motion.times),
+        }
+        for one in read(path).sets
+    ]
 
 
 @contextmanager
@@ -102,21 +136,22 @@ def curves_of(path, wanted, surface_object, is_open=False):
 
 def _made(path, wanted, surface_object):
     """What is `Found` in a file of another program, or of arrays."""
-    reader = _READERS[path.suffix.lower()]
-    file = reader(path, wanted.axis) if reader is array_grooms.read else reader(path)
+    file = read(path, wanted.axis)
     chosen, guides = _chosen_sets(path, file.sets, wanted)
     reading = curve_units.choose(file, [*chosen, *guides], wanted.said, _mesh(surface_object), str(path))
     notes = [*file.notes, *reading.notes, *_notes_on_groups(path, chosen)]
     curves, its_guides = ([_now(one.placed(reading.metres, reading.up)) for one in sets] for sets in (chosen, guides))
-    if any(one.motion is not None for one in chosen):
-        notes.append(HairError("{path} moves: its curves are read at the present frame alone.", path=path))
     joined, made_guides, guide_ids = curve_file.join(curves), None, None
+    # Blender plays polylines.
+    motion = joined.motion if wanted.plays and not joined.is_smooth.any() else None
+    if motion is None and any(one.motion is not None for one in chosen):
+        notes.append(HairError("{path} moves: its curves are read at the present frame alone.", path=path))
     if guides:
         joined_guides = curve_file.join(its_guides)
         made_guides = curve_objects.new_object("Guides", joined_guides, surface_object)
         guide_ids = joined_guides.ids
     made = curve_objects.new_object(_name(path, chosen), joined, surface_object, guide_ids)
-    return Found(made, made_guides, notes)
+    return Found(made, made_guides, notes, motion, curve_offsets(joined.counts))
 
 
 def _name(path, chosen):

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
+from ...core.files import alembic_reader
 
 # The keyword of an .obj line, and the number of values that must follow.
 _OBJ_WORDS = {"v": 3, "vn": 3, "vt": 1, "f": 3}
@@ -33,7 +34,7 @@ def require_stl(path):
 
 
 def require_alembic(path):
-    """Raise `HairError` for a truncated Alembic file, on which Blender's importer crashes.
+    """Raise `HairError` for a truncated or damaged Alembic file, on which Blender's importer crashes.
 
     An Ogawa file names the place of its root group, which is written last: a count, and as many places.
     """
@@ -47,6 +48,7 @@ def require_alembic(path):
         count = file.read(8)
     if header[5] != 0xFF or len(count) < 8 or root + 8 + 8 * struct.unpack("<Q", count)[0] > size:
         raise HairError(f"{path} is not a complete Alembic file: it is truncated.")
+    alembic_reader.require_whole(path)
 
 
 def require_usd(path):

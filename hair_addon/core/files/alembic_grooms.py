@@ -219,8 +219,11 @@ def _told_apart(curves, said, kept) -> Iterator[CurveSet]:
         guide_weights=weights.astype(np.float32) if has_map else None,
         motion=curves.motion,
     )
+    if is_guide is None and groups is None:
+        yield whole
+        return
     guides = np.full(len(whole), -1) if is_guide is None else is_guide
     groups = np.zeros(len(whole), np.int64) if groups is None else groups
-    for guide, group in np.unique(np.stack([guides, groups], axis=1), axis=0).tolist():
+    for guide, group in sorted(set(zip(guides.tolist(), groups.tolist(), strict=True))):
         part = whole.some((guides == guide) & (groups == group))
         yield replace(part, is_guide=None if is_guide is None else guide != 0, group_id=group)

@@ -185,6 +185,13 @@ class Archive:
         elements = np.frombuffer(content, target.kind)
         return elements if target.extent == 1 else elements.reshape(-1, target.extent)
 
+    def require_there(self, properties: Mapping[str, Property]) -> None:
+        """Raise `Damaged` unless all samples of properties, and of those in them, are in the file."""
+        for one in properties.values():
+            self.require_there(one.children)
+            for address in one.addresses:
+                self._size_of(address)
+
     def _property(self, headers, address, depth):
         """A property and all in it; headers: at the place of its own, which is passed."""
         bits = headers.number("I")
@@ -264,13 +271,20 @@ class Archive:
         return struct.unpack(f"<{count}Q", self._bytes(address + 8, 8 * count))
 
     def _content(self, address):
+        size = self._size_of(address)
+        return self._bytes((address & ~_DATA) + 8, size) if size else b""
+
+    def _size_of(self, address):
+        """The number of bytes of a content, all of which are in the file."""
         if not address & _DATA:
             raise Damaged
         place = address & ~_DATA
         if not place:
-            return b""
+            return 0
         (size,) = struct.unpack("<Q", self._bytes(place, 8))
-        return self._bytes(place + 8, size)
+        if size > self._size - place - 8:
+            raise Damaged
+        return size
 
     def _bytes(self, place, size):
         if place + size > self._size or size > self._left:
@@ -281,6 +295,19 @@ class Archive:
         if len(data) < size:
             raise Damaged
         return data
+
+
+def require_whole(path: Path) -> None:
+    """Raise `HairError` unless everything that an archive names is within it, as other readers take for granted."""
+    try:
+        with Archive(path) as archive:
+            pending = [archive.top()]
+            while pending:
+                one = pending.pop()
+                pending += one.children()
+                archive.require_there(one.properties)
+    except (Damaged, OSError) as error:
+        raise HairError("{path} is a damaged Alembic file.", path=path) from error
 
 
 class _Bytes:

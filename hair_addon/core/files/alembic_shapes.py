@@ -173,6 +173,8 @@ class Shape:
             )
         elif self._kind != _CUBIC:
             closes = self._is_closed and not self._trim
+            if kept.all() and not closes and not self._trim:
+                return values, counts, None, None
             starts, made = curve_offsets(counts)[:-1][kept] + self._trim, counts[kept] - 2 * self._trim
             own, along = each(made + closes)
             return values[starts[own] + along % made[own]], made + closes, None, None

@@ -65,7 +65,7 @@ def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) 
     """`RootedCurves` of points (N, 3) [m], curve after curve, on a `TriMesh` as it is now.
 
     starts (C+1,): where each curve begins, the last entry being N; every: keep every n-th of the usable curves. Raises
-    `HairError` where the mesh cannot carry hair or no curve can be a guide.
+    `HairError` where the mesh cannot carry hair, no curve can be a guide, or most lie further away than it is large.
     """
     check_mesh(mesh)
     every = checked_every(every)
@@ -85,7 +85,15 @@ def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) 
     is_reversed = _run_backwards(at_first, at_last, _sizes(points, starts)[kept])
     chosen = np.arange(len(kept)) + np.where(is_reversed, len(kept), 0)
     distances = distances[chosen]
-    is_far = distances > _FAR * float(np.ptp(mesh.vertices, axis=0).max())
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    distance = float(np.median(distances))
+    if distance > size:
+        raise HairError(
+            "Roots lie {distance:.3g} m from the surface, which is {size:.3g} m large: check unit and axis.",
+            distance=distance,
+            size=size,
+        )
+    is_far = distances > _FAR * size
     return RootedCurves(kept, is_reversed, found[chosen], distances, is_far, len(starts) - 1 - len(usable))
 
 

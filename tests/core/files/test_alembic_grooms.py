@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Curves of Alembic files: where transforms put them, what is said of them, and files that are damaged or hostile."""
 
-import io
 import struct
 
 import numpy as np
@@ -9,55 +8,13 @@ import pytest
 
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import alembic_grooms
-from hair_addon.core.files.alembic import AlembicWriter, Property
 from hair_addon.core.files.curve_file import Convention
-
-CURVES, TRANSFORM = {"schema": "AbcGeom_Curve_v2"}, {"schema": "AbcGeom_Xform_v3"}
-LINEAR, CUBIC, ANY_ORDER = 1, 0, 2
-BEZIER, BSPLINE, CATMULL_ROM, HERMITE = 1, 2, 3, 4
+from tests.support.exchange.alembic_files import ANY_ORDER, BEZIER, BSPLINE, CATMULL_ROM, CUBIC, HERMITE, LINEAR, File
 
 
-class File:
-    """An archive that is being written by hand."""
-
-    def __init__(self, application="Maya 2026"):
-        self.bytes = io.BytesIO()
-        self.writer = AlembicWriter(self.bytes, application, 24.0)
-        self.times = self.writer.add_sampling(1.0 / 24.0, 1.0 / 24.0)
-
-    def moving(self, name, kind, extent, samples, is_array=False):
-        made = Property(name, kind, extent, "", is_array=is_array, sampling=self.times)
-        for sample in samples:
-            self.writer.add_sample(made, [np.asarray(sample, {"float32": "<f4", "float64": "<f8"}[kind])])
-        return made
-
-    def curves(self, name, points, counts, kind=LINEAR, basis=0, wrap=0, extra=(), parameters=()):
-        write = self.writer
-        place = points if isinstance(points, Property) else write.array("P", "float32", np.float32(points))
-        properties = [
-            place,
-            write.array("nVertices", "int32", counts),
-            write.scalar("curveBasisAndType", "uint8", (kind, wrap, basis, basis)),
-            *extra,
-        ]
-        if parameters:
-            properties.append(write.compound(".arbGeomParams", parameters))
-        return write.object(name, CURVES, [write.compound(".geom", properties)])
-
-    def transform(self, name, children, codes, values, inherits=True):
-        write = self.writer
-        values = values if isinstance(values, Property) else write.scalar(".vals", "float64", values)
-        properties = [
-            write.scalar(".inherits", "bool", inherits),
-            write.scalar(".ops", "uint8", [code << 4 for code in codes]),
-            values,
-        ]
-        return write.object(name, TRANSFORM, [write.compound(".xform", properties)], children)
-
-    def read(self, path, *children):
-        self.writer.close(children)
-        path.write_bytes(self.bytes.getvalue())
-        return alembic_grooms.read(path)
+def read(file, path, *children):
+    file.write(path, *children)
+    return alembic_grooms.read(path)
 
 
 @pytest.fixture
@@ -79,7 +36,7 @@ def test_transforms_place_curves_and_scale_their_widths(path, rng):
     matrix = np.eye(4)
     matrix[:3, :3] = [[0, 0, 3], [3, 0, 0], [0, 3, 0]]
     matrix[3, :3] = [10, 20, 30]
-    found = file.read(path, file.transform("outer", [inner, free], [3], matrix.ravel()))
+    found = read(file, path, file.transform("outer", [inner, free], [3], matrix.ravel()))
     assert found.stated == Convention() and found.usual == Convention(0.01, "Y")
     placed, moved = found.sets
     # About (1, 1, 1) by 120°: x → y → z → x. Then about z: x → y; about x: y → z.
@@ -98,7 +55,7 @@ def test_curves_and_transforms_move_between_samples(path, rng):
     places = file.moving("P", "float32", 3, samples, is_array=True)
     curves = file.curves("shape", places, [4])
     moves = file.moving(".vals", "float64", 3, [[0, 0, 0], [0, 0, 1], [0, 0, 5]])
-    (found,) = file.read(path, file.transform("group", [curves], [1], moves)).sets
+    (found,) = read(file, path, file.transform("group", [curves], [1], moves)).sets
     np.testing.assert_allclose(found.motion.times, np.arange(1, 4) / 24.0)
     for index, lift in enumerate((0.0, 1.0, 5.0)):
         np.testing.assert_allclose(found.motion.points_at(index), samples[index] + np.array([0, 0, lift]), atol=1e-6)
@@ -114,7 +71,8 @@ def test_splines_are_what_is_drawn(path):
     smooth = np.concatenate([line[:1], line, line[-1:]])
     knots = file.writer.array(".knots", "float32", np.float32([0, 0, 0, 0, 1, 1, 1, 1]))
     orders = file.writer.array(".orders", "uint8", [4])
-    sets = file.read(
+    sets = read(
+        file,
         path,
         file.curves("bspline", line, [4], CUBIC, BSPLINE),
         file.curves("bezier", line, [4], CUBIC, BEZIER),
@@ -141,7 +99,8 @@ def test_widths_of_splines_are_interpolated_as_their_points(path):
     of_points = file.writer.array("width", "float32", np.float32([0, 1, 2, 3, 4]))
     of_ends = file.writer.array("width", "float32", np.float32([1, 2, 3]))
     odd = file.writer.array("width", "float32", np.float32([1, 2, 3, 4]))
-    found = file.read(
+    found = read(
+        file,
         path,
         file.curves("points", line, [5], CUBIC, BSPLINE, extra=[of_points]),
         file.curves("ends", line, [5], CUBIC, BSPLINE, extra=[of_ends]),
@@ -166,7 +125,7 @@ def test_curves_of_one_object_are_told_apart_by_kind_and_group(path, rng):
         write.array("groom_closest_guides", "int32", np.full((4, 3), 3)),
         write.array("groom_guide_weights", "float32", np.full((4, 3), 1 / 3)),
     ]
-    sets = file.read(path, file.curves("shape", points, [2, 2, 2, 2], parameters=parameters)).sets
+    sets = read(file, path, file.curves("shape", points, [2, 2, 2, 2], parameters=parameters)).sets
     told = [(one.is_guide, one.group_id, one.ids.tolist()) for one in sets]
     assert told == [(False, 5, [5]), (False, 9, [4, 6]), (True, 5, [3])]
     np.testing.assert_allclose(sets[1].points, points[[2, 3, 6, 7]], atol=1e-6)
@@ -177,16 +136,10 @@ def test_instances_show_curves_again(path):
     file, line = File(), [[0, 0, 0], [1, 0, 0]]
     source = file.transform("hair", [file.curves("hairShape", line, [2])], [1], [0, 0, 1])
     outer = file.transform("first", [source], [1], [0, 5, 0])
-    instance = file.writer.object("again", {"isInstance": "1"}, [_text(file, ".instanceSource", "/first/hair")])
-    found = file.read(path, outer, file.transform("second", [instance], [1], [7, 0, 0])).sets
+    instance = file.writer.object("again", {"isInstance": "1"}, [file.text(".instanceSource", "/first/hair")])
+    found = read(file, path, outer, file.transform("second", [instance], [1], [7, 0, 0])).sets
     np.testing.assert_allclose(found[0].points[0], [0, 5, 1])
     np.testing.assert_allclose(found[1].points[0], [7, 0, 1])
-
-
-def _text(file, name, text):
-    made = Property(name, "string", 1, "")
-    file.writer.add_sample(made, [text.encode() + b"\0"], 1)
-    return made
 
 
 # ------------------------------------------------------------------------------------------ damaged and hostile
@@ -222,7 +175,7 @@ def small_file():
     shapes = [
         file.curves("bspline", points, [4], CUBIC, BSPLINE, extra=[write.array("width", "float32", [1.0])]),
         file.curves("nurbs", line, [4], ANY_ORDER, BSPLINE, extra=knots, parameters=parameters),
-        write.object("again", {}, [_text(file, ".instanceSource", "/group/nurbs")]),
+        write.object("again", {}, [file.text(".instanceSource", "/group/nurbs")]),
     ]
     moves = file.moving(".vals", "float64", 3, [[0, 0, 0], [0, 0, 1]])
     write.close([file.transform("group", shapes, [1], moves)])
@@ -235,7 +188,7 @@ def test_mutants_of_a_file_give_curves_or_a_sentence(path, rng):
     path.write_bytes(whole)
     assert [len(one) for one in alembic_grooms.read(path).sets] == [1, 1, 1]
     refused = 0
-    for _ in range(600):
+    for _ in range(250):
         mutant = bytearray(whole)
         for _ in range(rng.integers(1, 4)):
             place = int(rng.integers(0, len(whole) - 8))
@@ -253,7 +206,7 @@ def test_mutants_of_a_file_give_curves_or_a_sentence(path, rng):
                     assert len(one.motion.points_at(1)) == len(one.points)
         except HairError:
             refused += 1
-    assert 200 < refused < 590
+    assert 80 < refused < 245
 
 
 def test_a_small_file_cannot_fill_the_memory(path):
@@ -261,4 +214,4 @@ def test_a_small_file_cannot_fill_the_memory(path):
     file, points = File(), np.zeros((20_000, 3), np.float32)
     shared = [file.curves(f"c{n}", points, [20_000]) for n in range(100)]
     with pytest.raises(HairError, match="damaged"):
-        file.read(path, *shared)
+        read(file, path, *shared)

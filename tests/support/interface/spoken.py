@@ -70,9 +70,13 @@ def _spoken(node):
         if name in _SPEAKING:
             texts += node.args[:1]
         return _literals(texts)
-    if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple) and isinstance(node.value.elts[-1], ast.Dict):
+    if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple) and _ends_in_dict(node.value):
         return _literals(node.value.elts[:1])  # an operator's message
     return []
+
+
+def _ends_in_dict(values):
+    return bool(values.elts) and isinstance(values.elts[-1], ast.Dict)
 
 
 def _literals(nodes):

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kept hair that moves as the curves of its file do: frames in a USD file beside the .blend, which Blender plays."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.files.whole_file import whole_file
+from ..data.strands import curves, delivered_hair
+from ..groom import selection
+from ..host import scene_time
+from ..host.notices import name_of
+from . import hair_file, strand_arrays
+
+
+def path_beside(blend_path, hair):
+    """The file that hair of a .blend plays."""
+    return blend_path.with_name(f"{blend_path.stem}_{name_of(hair)}.usdc")
+
+
+def playing(hair, motion, order, path: Path):
+    """A function of (progress) that writes all samples of a `Motion` and lets hair play them; returns their number.
+
+    motion: in metres with Z up; order: (N,) of its points, those of the strands. Raises `HairError`.
+    """
+    hair_file.require_ours(path)
+    blender_scene, shown = bpy.context.scene, selection.object_of(hair, bpy.context.view_layer)
+    rate, scale = scene_time.frame_rate(blender_scene), strand_arrays.metres_per_unit(blender_scene)
+    matrix, radii, counts = np.array(shown.matrix_world, np.float64), curves.read_radii(hair), curves.point_counts(hair)
+    back = np.linalg.inv(matrix)
+
+    def write(progress):
+        with whole_file(path) as partial:
+            with hair_file.HairFile(partial, path, rate, scale) as file:
+                place = file.add(name_of(hair), counts)
+                for index, time in enumerate(motion.times):
+                    progress(f"Frame {time * rate:g}", index / len(motion.times))
+                    points = motion.points_at(index)[order].astype(np.float64) / scale
+                    local = points @ back[:3, :3].T + back[:3, 3]
+                    # Rounded, as frames are the whole numbers that they are meant to be.
+                    in_file = round(float(time) * rate, 6)
+                    file.write(in_file, place, local.astype(np.float32), radii, matrix)
+                    file.save(in_file)
+            delivered_hair.close_files(path)
+        cache_file = delivered_hair.open_file(path)
+        if not bpy.data.filepath:  # a new .blend, which is written beside the file
+            cache_file.filepath = f"//{path.name}"
+        delivered_hair.deliver(hair, cache_file, place)
+        return len(motion.times)
+
+    return write
