@@ -147,3 +147,24 @@ def test_too_little_memory_is_told(shot, monkeypatch):
 
 def test_free_memory_is_what_the_system_says():
     assert memory.free_bytes() > 50e6
+
+
+def test_without_the_colliders_that_guides_name_nothing_is_baked(shot, tmp_path):
+    """A collection that was renamed is followed; one that is gone is missed."""
+    guides = bpy.data.objects["Guides"].data
+    body = bpy.data.collections.new("Body")
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=1, radius=0.3, location=(1.2, 0.0, 0.0))
+    body.objects.link(bpy.context.object)
+    guides.vellus.dynamics.colliders = "Body"
+    bpy.context.view_layer.update()
+    body.name = "COL body"
+    bpy.ops.wm.save_mainfile()
+    assert run_here("simulate", shot, "--last-frame", "2").status == 0
+    bpy.data.collections.remove(bpy.data.collections["COL body"])
+    bpy.ops.wm.save_mainfile()
+    refused = run_here("simulate", shot, "--last-frame", "4")
+    assert refused.status == 1
+    assert (
+        'There is no collection "COL body" of colliders: pick another collection, or clear the field.' in refused.errors
+    )
+    assert not list((tmp_path / "frames").rglob("+00000004.npz"))

@@ -16,10 +16,11 @@ from bpy.types import Curves, PropertyGroup
 
 from ...core.errors import HairError
 from ...core.grooming.groom import GuideSettings, HairSettings
+from ...core.styling.kinds import KINDS
 from ..data import masks, scene
 from ..host.caches import Cache
 from ..host.notices import name_of, text_of
-from ..settings import setting_properties, style_items
+from ..settings import setting_properties
 from . import staleness
 
 _POINTERS = "vellus_named"  # custom property of Curves: {setting: {"name": as it was, "to": what it names}}
@@ -34,7 +35,11 @@ _SETTINGS = {
     ),
     "HAIR": (("hair", "density_image", "images"), ("hair", "part_lines", "objects")),
 }
-_OF_STYLES = (("mask_image", "images"), ("cutter", "objects"), ("target", "objects"))
+_SOURCES = {"mask_image": "images", "cutter": "objects", "target": "objects"}
+_OF_STYLES = {
+    kind: [(name, _SOURCES[name]) for name in setting_properties.names_of(settings_class) if name in _SOURCES]
+    for kind, settings_class in KINDS.items()
+}
 
 
 def follow() -> None:
@@ -50,8 +55,6 @@ def _follow(datablock: Curves) -> None:
     now: dict[str, dict[str, Any]] = {}
     for key, group, field, source in _named(datablock):
         name = text_of(group, field)
-        if not name:
-            continue
         found = getattr(bpy.data, source).get(name)
         if source == "objects":
             to = _object(datablock, key, name, found)
@@ -87,13 +90,16 @@ def _object(datablock, key, name, found):
 def _named(datablock: Curves) -> Iterator[tuple[str, PropertyGroup, str, str]]:
     """(key, property group, field, collection of `bpy.data`) of the settings that name something."""
     state = datablock.vellus
-    for group, field, source in _SETTINGS[state.kind]:
-        yield f"{group}.{field}", getattr(state, group), field, source
+    for owner, field, source in _SETTINGS[state.kind]:
+        group = getattr(state, owner)
+        if text_of(group, field):
+            yield f"{owner}.{field}", group, field, source
     for item in state.styles:
-        group = style_items.group_of(item)
-        for field, source in _OF_STYLES:
-            if field in group.bl_rna.properties:
-                yield f"{text_of(item, 'name')}.{item.kind}.{field}", group, field, source
+        kind = item.kind
+        group = getattr(item, kind.lower())
+        for field, source in _OF_STYLES[kind]:
+            if text_of(group, field):
+                yield f"{text_of(item, 'name')}.{kind}.{field}", group, field, source
 
 
 def _rename(datablock, group, field, to):

@@ -15,11 +15,15 @@ def is_closed(corner_edges: np.ndarray, edge_count: int) -> bool:
 
 def signed_volume(vertices: np.ndarray, faces: Faces) -> float:
     """The volume inside a closed mesh, negative where faces are wound to point inward; (V, 3) of any unit."""
-    centred = vertices.astype(np.float64) - vertices.mean(axis=0, dtype=np.float64)  # rounding grows with the distance
-    corners = faces.corner_vertices
-    sizes, firsts, lasts = np.diff(faces.starts), faces.starts[:-1], faces.starts[1:] - 1
-    following = np.arange(1, len(corners) + 1)
-    following[lasts] = firsts
-    across = np.cross(centred[corners], centred[corners[following]])
-    apexes = centred[np.repeat(corners[firsts], sizes)]
-    return float(np.einsum("cx,cx->", apexes, across)) / 6.0  # the sum of tetrahedra over the origin
+    if len(faces.starts) < 2:
+        return 0.0
+    # Rounding grows with the distance from the origin. Columns, as np.cross takes five times as long.
+    x, y, z = np.ascontiguousarray((vertices.astype(np.float64) - vertices.mean(axis=0, dtype=np.float64)).T)
+    here, firsts = faces.corner_vertices, faces.starts[:-1]
+    following = np.append(here[1:], here[:1])
+    following[faces.starts[1:] - 1] = here[firsts]
+    apexes, total = here[firsts], 0.0
+    for a, b, c in ((x, y, z), (y, z, x), (z, x, y)):
+        across = b[here] * c[following] - c[here] * b[following]
+        total += float(a[apexes] @ np.add.reduceat(across, firsts))
+    return total / 6.0  # the sum of tetrahedra over the origin
