@@ -12,9 +12,9 @@ import numpy as np
 from . import strands
 
 # How close a polyline comes to its curve: that of a strand of 20 cm to 40 µm, half a hair's thickness. An angle
-# keeps its length within its square / 24 of the curve's, 0.04 %.
+# keeps its length within its square / 24 of the curve's, 0.1 %.
 SAGITTA = 2e-4  # largest distance from the curve, as a part of its length
-TURN = 0.1  # largest angle between neighbouring lines [rad]
+TURN = 0.15  # largest angle between neighbouring lines [rad]
 
 _MOST_LINES = 128  # of a segment
 _AT_ONCE = 2048  # segments, which fit caches
