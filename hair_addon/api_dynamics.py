@@ -59,7 +59,7 @@ def set_dynamics(
     it is.
 
     >>> guides = bpy.data.objects["Guides"]
-    >>> api.set_dynamics(guides, "STYLED", simulates=True, colliders="Body").hold
+    >>> api.set_dynamics(guides, "STYLED", simulates=True, friction=0.4).hold
     20.0
     """
     target = blender.data.arguments.curves_of(guides, "GUIDES")

@@ -303,7 +303,8 @@ def test_a_keyed_amount_marks_its_hair(state):
     bpy.app.handlers.depsgraph_update_pre.append(lambda *_: marked.append(state.is_stale))
     scene.frame_set(6)
     assert state.styles[1].curl.amount == pytest.approx(0.5, abs=0.01)
-    assert animated.value_cache.get(state.id_data.session_uid)["CURL", "Curl"]["amount"] == state.styles[1].curl.amount
+    values, _paths = animated.value_cache.get(state.id_data.session_uid)
+    assert values["CURL", "Curl"]["amount"] == state.styles[1].curl.amount
 
 
 def test_labels_are_names_of_new_styles(state):
