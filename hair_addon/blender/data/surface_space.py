@@ -9,10 +9,12 @@ import bpy
 import numpy as np
 
 from ...core.geometry.affine import Affine
+from ..host.notices import name_of
 
 # Properties of Curves. In groups, because Blender's USD exporter warns about bare arrays.
 _STOOD_ON = "vellus_stood_on"  # the surface, when strands were rooted on it
 _APPLIED = "vellus_applied"
+_KNOWN_AS = "vellus_known_as"
 
 
 def to_world(an_object, depsgraph=None):
@@ -21,17 +23,38 @@ def to_world(an_object, depsgraph=None):
     return Affine.of(placed.matrix_world)
 
 
+def between(an_object, surface_object):
+    """The `Affine` from an object's local coordinates to those of a surface."""
+    return to_world(surface_object).inverse @ to_world(an_object)
+
+
 def keep_surface(curves, surface):
     """Store a `Surface` at rest and where its object is: strands are transformed from there after an edit."""
     matrix = np.eye(4) if curves.surface is None else np.array(curves.surface.matrix_world)
-    _keep(curves, _STOOD_ON, {"rest": surface.rest.ravel(), "to_world": matrix.ravel()})
+    _keep(curves, _STOOD_ON, {"rest": surface.rest.ravel(), "to_world": matrix.ravel(), "name": surface.name})
 
 
 def remember_place(curves):
     """Store where the surface's object is now, before a file is saved: transforms are applied elsewhere, too."""
     kept = curves.get(_STOOD_ON)
-    if kept is not None and curves.surface is not None and curves.library is None:
-        kept["to_world"] = np.array(curves.surface.matrix_world).ravel()
+    if kept is not None and curves.surface is not None and curves.library is None and not has_other_surface(curves):
+        kept["to_world"], kept["name"] = np.array(curves.surface.matrix_world).ravel(), name_of(curves.surface)
+
+
+def has_other_surface(curves):
+    """Whether a surface was picked for Curves that they do not stand on yet: they are children of no such object."""
+    kept = curves.get(_STOOD_ON)
+    stored = None if kept is None else kept.get("name")
+    if curves.surface is None or not isinstance(stored, str) or stored == name_of(curves.surface):
+        return False
+    return not any(user.parent == curves.surface for user in bpy.data.objects if user.data == curves)
+
+
+def surface_before(curves):
+    """The object that Curves stand on, whichever was picked for them since; None where it is gone, or unknown."""
+    if not has_other_surface(curves):
+        return curves.surface
+    return bpy.data.objects.get(curves[_STOOD_ON]["name"])
 
 
 def rest_before(curves):
@@ -60,6 +83,19 @@ def note_applied(curves, change):
     _keep(curves, _APPLIED, {"matrix": (change @ applied(curves)).matrix.ravel()})
 
 
+def note_same(curves, before, now):
+    """Note that what had one digest has another in the coordinates of now, and is the same in the world."""
+    known = dict(curves.get(_KNOWN_AS, {}))
+    first = known.pop(before, before)
+    _keep(curves, _KNOWN_AS, known | {now: first})
+
+
+def known_as(curves, digest):
+    """The digest, before any `note_same`, of what has a digest now."""
+    found = curves.get(_KNOWN_AS, {}).get(digest, digest)
+    return found if isinstance(found, str) else digest
+
+
 def is_turned(surface_object):
     """Whether a mirroring scale was applied to a mesh object on which hair grows, as then Blender turns its faces."""
     grown = (datablock for datablock in bpy.data.hair_curves if datablock.surface == surface_object)
@@ -68,8 +104,9 @@ def is_turned(surface_object):
 
 def forget_applied(curves):
     """Count from the present local coordinates on, as for Curves that were copied to another surface."""
-    if _APPLIED in curves:
-        del curves[_APPLIED]
+    for name in (_APPLIED, _KNOWN_AS):
+        if name in curves:
+            del curves[name]
 
 
 def _keep(curves, name, values):

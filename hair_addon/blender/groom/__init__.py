@@ -7,9 +7,12 @@ from ...core.lazy import submodules
 
 if TYPE_CHECKING:
     from . import (
+        applied_transforms,
+        attached_hair,
         bindings,
         copied_hair,
         diagnostics,
+        edited_faces,
         edited_surfaces,
         edits,
         followed_names,

@@ -11,6 +11,7 @@ import numpy as np
 from bpy.types import Curves, Depsgraph
 
 from ...core.errors import HairError
+from ...core.files import frame_manifest
 from ...core.geometry.affine import Affine
 from ..data import surface_space
 from ..data.scene import Surface
@@ -18,6 +19,7 @@ from ..data.strands import (
     attributes,
     curves,
     curves_objects,
+    delivered_hair,
     kept_shapes,
     simulated_guides,
     stored_roots,
@@ -67,6 +69,8 @@ def note(strands: list[Curves], surface: Surface, change: Affine) -> None:
     for one in strands:
         if change.is_mirroring and one.vellus.topology == surface.turned_topology:
             stored_roots.turn(one)
+            before, now = (frame_manifest.digest(key) for key in (one.vellus.topology, surface.topology))
+            surface_space.note_same(one, before, now)
             one.vellus.topology = surface.topology
         surface_space.note_applied(one, change)
 
@@ -77,7 +81,7 @@ def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgra
     Guides before their hair, and all when `note` has noted it.
     """
     firsts, followed = curves.first_points(strands), staleness.guides_digest(strands)
-    left = _left(strands, surface, change, firsts)
+    left, baked_as = _left(strands, surface, change, firsts), _baked_as(strands)
     shown = simulated_guides.point_cache.get(strands.session_uid)
     if left is not change and _is_as_made(strands, surface, left, depsgraph):
         strands.vellus.written = staleness.guides_digest(strands)
@@ -86,6 +90,8 @@ def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgra
     if shown is not None:
         simulated_guides.show(strands, rooted_as(change.points(shown), shown, firsts, curves.first_points(strands)))
     for user in curves_objects.objects_of(strands):
+        if delivered_hair.modifier_of(user) is not None:
+            continue  # its frames stay in the coordinates of before
         if user.parent == strands.surface:
             curves_objects.stand_on(user, strands.surface)
         else:  # its place in the world is the artist's
@@ -94,6 +100,8 @@ def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgra
     stored = stored_roots.points(strands, surface)
     if stored is not None:
         curves.write_roots(strands, surface, stored)  # whose normals are in local coordinates
+    for before, now in zip(baked_as, _baked_as(strands), strict=True):
+        surface_space.note_same(strands, before, now)
     for hair in curves.followers(strands):
         if hair.vellus.followed == followed:
             hair.vellus.followed = staleness.guides_digest(strands)
@@ -154,6 +162,13 @@ def _left(strands, surface, change, firsts):
     return best
 
 
+def _baked_as(strands):
+    """Digests by which baked frames know guides: of their points, which `follow` moves."""
+    if strands.vellus.kind != "GUIDES" or not len(strands.curves):
+        return []
+    return [frame_manifest.digest(curves.even_local_points(strands))]
+
+
 def _is_as_made(hair, surface, left, depsgraph):
     """Whether nobody but Blender, which applied a transform to it too, has moved hair: it is as its guides make it."""
     if hair.vellus.kind != "HAIR" or curves.is_hand_made(hair):
@@ -198,12 +213,7 @@ def _tolerance(surface):
 
 def _widen(strands, change):
     """Multiply what strands store of widths and distances in local units."""
-    scale = change.scale
-    radii = attributes.read(strands, "radius", "FLOAT", "POINT")
-    if radii is not None:
-        attributes.write(strands, "radius", "FLOAT", "POINT", change.widths(radii))
-    elif abs(scale - 1.0) > _ROUNDING and len(strands.points):
-        attributes.write(strands, "radius", "FLOAT", "POINT", change.widths(curves.read_radii(strands)))
+    curves.widen(strands, change)
     apart = attributes.read(strands, "root_distance", "FLOAT", "CURVE")
     if apart is not None:
         attributes.write(strands, "root_distance", "FLOAT", "CURVE", change.widths(apart))

@@ -30,6 +30,8 @@ def follow_surface(
     follows_edits: not transforms alone that were applied. Raises `HairError`, for linked guides only if they would
     change.
     """
+    if surface_space.has_other_surface(guide_curves):
+        return False  # to which they are about to be attached
     state = guide_curves.vellus
     surface = scene.read_surface(guide_curves.surface, depsgraph)
     if state.topology == surface.turned_topology:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operations on existing hair: deletion, attachment to a surface, UV maps, repairs."""
+"""Operations on existing hair: deletion, UV maps, repairs."""
 
 from collections.abc import Iterable
 
@@ -47,21 +47,6 @@ def restore_object(guides: Curves) -> Object:
     if guides.surface is None:
         raise HairError("The surface is missing: pick a mesh.")
     return curves_objects.link_object(guides.name, guides, guides.surface, is_rendered=False)
-
-
-def attach(parts: Iterable[Curves], surface_object: Object) -> None:
-    """Attach guides and hair to a mesh object: as its children, in its coordinates."""
-    for part in parts:
-        curves.require_editable(part)
-    for part in parts:
-        part.surface = surface_object
-        for user in bpy.data.objects:
-            if user.data == part:
-                user.parent = surface_object
-                user.matrix_parent_inverse.identity()
-                user.matrix_basis.identity()
-        part.vellus.is_stale = True
-        part.update_tag()
 
 
 def make_uv_map(surface_object: Object, view_layer: ViewLayer) -> None:

@@ -70,7 +70,7 @@ def check_animation(guides, frame, blender_scene, depsgraph):
     try:
         settings = properties.dynamics_of(guides.vellus)
         now = frame_animation.digest_of(guides, blender_scene, depsgraph, settings)
-        what = frame_animation.change(frame.digest, now)
+        what = frame_animation.change(frame.digest, now, frame.is_carried)
     except HairError:  # of the surface: baked frames are shown nevertheless
         what = frame_animation.SURFACE
     if what is None:

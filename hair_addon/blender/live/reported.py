@@ -36,7 +36,7 @@ def points_of(guide_curves):
 def remember_places():
     """Store where all surfaces are, after an update."""
     for datablock in bpy.data.hair_curves:
-        if datablock.surface is not None:
+        if datablock.surface is not None and not surface_space.has_other_surface(datablock):
             place_cache.keep(datablock.session_uid, surface_space.to_world(datablock.surface))
 
 

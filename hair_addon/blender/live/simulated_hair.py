@@ -152,7 +152,7 @@ def _points_at(guides, time, checked_in=None):
         for error in baked.take_complaints():
             print(f"Vellus: {error}", file=sys.stderr)
         if points is not None:
-            return points
+            return frame_folders.rooted(guides, points)
     played = _played_now(guides)
     return None if played is None else played.frames.get(time)
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import HairError, cause_of
+from ..geometry.affine import Affine
 from . import array_file, frame_manifest, plain_file
 from .file_lock import claim, claim_of
 from .frame_manifest import Manifest
@@ -31,12 +32,14 @@ _IDENTITY = re.compile(r"[0-9a-f]{16}", re.ASCII)
 class Frame:
     """One frame: points (G, P, 3) float32 [m], the guides as combed ones would be, at rest.
 
-    key: of the simulation; digest: of the animation it was simulated in (`frame_manifest.digest`).
+    key: of the simulation; digest: of the animation it was simulated in (`frame_manifest.digest`); is_carried: whether
+    the guides' coordinates have changed since, to which points were brought.
     """
 
     points: np.ndarray
     key: str
     digest: str
+    is_carried: bool = False
 
 
 def new_identity() -> str:
@@ -59,6 +62,7 @@ class FrameCache:
         self._told: set[str] = set()
         self._complaints: list[HairError] = []
         self.manifest: Manifest | None = None
+        self.space = Affine.identity()  # from the coordinates that guides were made in to those that they are in now
         self.read_manifest()
 
     def read_manifest(self) -> Manifest | None:
@@ -86,7 +90,10 @@ class FrameCache:
         arrays = self._read(self.manifest, _name(number, False), self.manifest.frame_layout, number)
         if arrays is None:
             return None
-        return Frame(arrays["points"], arrays["key"].tobytes().hex(), arrays["digest"].tobytes().hex())
+        key = arrays["key"].tobytes().hex()
+        change = self.space @ Affine.of(self.manifest.space_of(key)).inverse
+        points, digest = change.points(arrays["points"]), arrays["digest"].tobytes().hex()
+        return Frame(points, key, digest, not change.is_identity)
 
     def read_state(self, number: int) -> dict[str, np.ndarray] | None:
         """Return the arrays of the state after a frame of the present simulation, None for a missing one."""

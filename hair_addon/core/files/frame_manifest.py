@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import HairError
+from ..geometry.affine import Affine
 from ..params import is_text
 from . import array_file, plain_file
 from .whole_file import whole_file
@@ -41,8 +42,9 @@ class Manifest:
 
     keys: for each simulation that frames here may be of, {part: digest of it} (`digests_of`); the last is what is
     baked now. guide_count, point_count: of each frame; state_layout: the arrays of a state. notes: (name, reason) of
-    who was left out; parted_by: digest of what parts the hair between guides. Raises `HairError` for values that no
-    simulation has.
+    who was left out; parted_by: digest of what parts the hair between guides; spaces: for each of the keys the matrix
+    from the coordinates that guides were made in to those of its frames, 16 numbers, none where these are the same.
+    Raises `HairError` for values that no simulation has.
     """
 
     keys: tuple[Mapping[str, str], ...]
@@ -55,6 +57,7 @@ class Manifest:
     state_layout: array_file.Layout = field(default_factory=dict)
     notes: tuple[tuple[str, str], ...] = ()
     parted_by: str = ""
+    spaces: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         if not (0 < self.guide_count <= MOST_GUIDES and 2 <= self.point_count <= MOST_POINTS):
@@ -69,6 +72,8 @@ class Manifest:
             raise HairError("The cache's frame rate or state is invalid.")
         if not 0 < len(self.keys) <= MOST_KEYS or any(len(parts) > _MOST_PARTS for parts in self.keys):
             raise HairError("The cache holds frames of too many simulations: free it.")
+        if len(self.spaces) not in {0, len(self.keys)} or not all(map(_is_space, self.spaces)):
+            raise HairError("The cache's coordinates are invalid.")
         array_file.require_layout(self.state_layout)
         if len(self.state_layout) > _MOST_PARTS or not _MARKS.keys().isdisjoint(self.state_layout):
             raise HairError("The cache's states are not those of any simulation.")
@@ -79,6 +84,13 @@ class Manifest:
     def key(self) -> str:
         """Key of what is baked now."""
         return key_of(self.keys[-1])
+
+    def space_of(self, key: str) -> tuple[float, ...]:
+        """The one of `spaces` that frames of a key are in; that of the identity for an unknown one."""
+        for parts, space in zip(self.keys, self.spaces, strict=False):
+            if key_of(parts) == key:
+                return space
+        return UNMOVED
 
     @property
     def frame_layout(self) -> array_file.Layout:
@@ -106,8 +118,17 @@ class Manifest:
         """
         if (before.guide_count, before.point_count) != (self.guide_count, self.point_count):
             raise HairError("The cache has frames of other guides: free it, or bake to another folder.")
-        others = [parts for parts in before.keys if key_of(parts) != self.key]
-        return dataclasses.replace(self, keys=(*others[1 - MOST_KEYS :], self.keys[-1]))
+        others = [parts for parts in before.keys if key_of(parts) != self.key][1 - MOST_KEYS :]
+        spaces = (*(before.space_of(key_of(parts)) for parts in others), self.space_of(self.key))
+        spaces = () if set(spaces) == {UNMOVED} else spaces
+        return dataclasses.replace(self, keys=(*others, self.keys[-1]), spaces=spaces)
+
+
+UNMOVED = tuple(float(row == column) for row in range(4) for column in range(4))
+
+
+def _is_space(numbers):
+    return len(numbers) == 16 and Affine.of(numbers).is_valid
 
 
 _MARKS = {"key": ("|u1", (_DIGEST,)), "frame": ("<i8", ())}
@@ -153,6 +174,7 @@ def parsed(data: bytes, path: Path) -> Manifest:
         found = json.loads(data.decode("utf-8"))
         if type(found) is not dict or (found.pop("format"), found.pop("version")) != (FORMAT, VERSION):
             raise ValueError("it is of another program or version")
+        found.setdefault("spaces", [])  # of older versions
         if set(found) != {field.name for field in dataclasses.fields(Manifest)}:
             raise ValueError("entries are missing")
         return _from_json(found)
@@ -176,8 +198,13 @@ def _from_json(found):
     notes = [_note(note) for note in _require(found["notes"], list)[: _MOST_NOTES + 1]]
     if len(notes) > _MOST_NOTES:
         raise ValueError("there are too many notes")
-    read = {"keys": keys, "state_layout": layout, "notes": tuple(notes)}
+    spaces = tuple(tuple(_number(part) for part in _require(one, list)) for one in _require(found["spaces"], list))
+    read = {"keys": keys, "state_layout": layout, "notes": tuple(notes), "spaces": spaces}
     return Manifest(**(found | read))
+
+
+def _number(value):
+    return float(value) if type(value) is int and abs(value) < 2**53 else _require(value, float)
 
 
 def _note(note):

@@ -66,6 +66,11 @@ class Affine:
         """Whether it changes nothing beyond rounding."""
         return np.allclose(self.matrix, np.eye(4), rtol=0.0, atol=_ROUNDING)
 
+    @property
+    def is_as_wide(self) -> bool:
+        """Whether it leaves widths as they are, beyond rounding."""
+        return abs(self.scale - 1.0) <= _ROUNDING
+
     def points(self, points: np.ndarray) -> np.ndarray:
         """(..., 3) points as float32; as they are, to the last bit, where nothing changes."""
         if self.is_identity:
@@ -75,8 +80,7 @@ class Affine:
 
     def widths(self, widths: np.ndarray) -> np.ndarray:
         """Widths, radii or lengths as float32; as they are where they do not change."""
-        scale = self.scale
-        if abs(scale - 1.0) <= _ROUNDING:
+        if self.is_as_wide:
             return np.asarray(widths, np.float32)
         with np.errstate(invalid="ignore", over="ignore"):
-            return (np.asarray(widths, np.float64) * scale).astype(np.float32)
+            return (np.asarray(widths, np.float64) * self.scale).astype(np.float32)

@@ -44,9 +44,12 @@ def digest_of(guides, blender_scene, depsgraph, settings):
     return frame_manifest.digest(carrying)[:_HALF] + frame_manifest.digest(acting)[:_HALF]
 
 
-def change(baked, now):
-    """What moves otherwise than in the digest of a baked frame, in a few words; None where nothing does."""
-    if baked == now:
+def change(baked, now, is_carried=False):
+    """What moves otherwise than in the digest of a baked frame, in a few words; None where nothing does.
+
+    is_carried: whether the surface has other coordinates since, by which its half of the digest tells nothing.
+    """
+    if baked == now or (is_carried and baked[_HALF:] == now[_HALF:]):
         return None
     return SURROUNDINGS if baked[:_HALF] == now[:_HALF] else SURFACE
 

@@ -189,6 +189,16 @@ def read_radii(curves):
     return attributes.valid_radii(radii)
 
 
+def widen(curves, change):
+    """Multiply radii as an `Affine` scales widths; those of Blender's own default where curves carry none."""
+    radii = attributes.read(curves, "radius", "FLOAT", "POINT")
+    if radii is None and change.is_as_wide:
+        return
+    radii = np.full(len(curves.points), attributes.RADIUS, np.float32) if radii is None else radii
+    if len(radii):
+        attributes.write(curves, "radius", "FLOAT", "POINT", change.widths(radii))
+
+
 def read_randoms(curves):
     """(S,) random numbers, float32 in [0, 1], of strands; by index for curves without them."""
     randoms = attributes.read(curves, "strand_random", "FLOAT", "CURVE")
@@ -251,10 +261,14 @@ def read_roots(curves, surface, first_points):
     return stored
 
 
-def nearest_roots(surface, places):
-    """`SurfacePoints` on a `Surface` at rest, each nearest to one of (S, 3) places [m]."""
-    mesh_math.check_mesh(surface.mesh)
-    return geometry.closest_point.SurfaceQuery(surface.mesh).nearest(places)
+def nearest_roots(surface, places, mesh=None):
+    """`SurfacePoints` on a `Surface`, each nearest to one of (S, 3) places [m].
+
+    mesh: the `TriMesh` of its triangles that they are nearest on, None: the surface at rest.
+    """
+    mesh = surface.mesh if mesh is None else mesh
+    mesh_math.check_mesh(mesh)
+    return geometry.closest_point.SurfaceQuery(mesh).nearest(places)
 
 
 def read_guides(curves, surface, device, known=None, local=None):
@@ -301,6 +315,11 @@ def even_points(points, offsets, are_smooth):
     if (np.diff(offsets) == groom.POINT_COUNT).all():
         return points.reshape(-1, groom.POINT_COUNT, 3)
     return geometry.resampling.resample(points, offsets, groom.POINT_COUNT, are_smooth())
+
+
+def even_local_points(curves):
+    """(G, POINT_COUNT, 3) float32 of guides of any point counts, in local coordinates."""
+    return even_points(read_points(curves), curve_offsets(curves), lambda: attributes.are_smooth(curves))
 
 
 def followers(guide_curves):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from . import follow_nodes
+from . import curves_objects, follow_nodes
 
 ROOT = "vellus_hair"  # of a file's hierarchy, by which the modifier is known whatever its name is
 
@@ -67,6 +67,8 @@ def take_off(hair_object):
     following = follow_nodes.modifier_of(hair_object)
     if following is not None:
         following.show_viewport = following.show_render = True
+    if hair_object.parent is not None and hair_object.parent == hair_object.data.surface:
+        curves_objects.stand_on(hair_object, hair_object.parent)  # where frames stood when transforms were applied
     return True
 
 

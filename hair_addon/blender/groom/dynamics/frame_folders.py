@@ -6,16 +6,20 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
+import numpy as np
 from bpy.types import Curves
 
 from ....core.errors import HairError
 from ....core.files import frame_cache, frame_manifest
 from ....core.files.frame_cache import FrameCache
-from ...data.strands import attributes, delivered_hair
+from ...data import surface_space
+from ...data.strands import attributes, curves, delivered_hair
 from ...data.strands.curves import followers
 from ...host import paths, scene_time
 from ...host.caches import Cache
 from ...host.notices import name_of
+
+_CLOSE = 1e-5  # parts of coordinates
 
 folder_cache = Cache()  # session_uid of guide Curves → (folder, FrameCache): what was read of it
 
@@ -64,7 +68,23 @@ def frames_of(guides: Curves) -> FrameCache | None:
             known = folder_cache.keep(guides.session_uid, (folder, _read(guides, folder)))
     except HairError:
         return None
+    if known[1] is not None:
+        known[1].space = surface_space.applied(guides)
     return known[1]
+
+
+def rooted(guides: Curves, points: np.ndarray) -> np.ndarray:
+    """(G, P, 3) points of a frame, whose roots are to the last bit those of the guides where these were not slid.
+
+    Hair is bound to guides by their roots, which are rounded where coordinates change.
+    """
+    roots = curves.first_points(guides)
+    if surface_space.applied(guides).is_identity or len(roots) != len(points):
+        return points
+    is_close = np.linalg.norm(points[:, 0] - roots, axis=1) <= _CLOSE * abs(roots).max(initial=0.0)
+    points = points.copy()
+    points[is_close, 0] = roots[is_close]
+    return points
 
 
 def _leads_somewhere(guides):

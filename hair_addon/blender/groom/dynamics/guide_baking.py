@@ -18,6 +18,7 @@ from ....core.files.frame_manifest import Manifest
 from ....core.grooming import cost
 from ....core.long_work import Stage, Work
 from ...data import scene as scenes
+from ...data import surface_space
 from ...data.simulation import wet_guides
 from ...host import memory, scene_time
 from ...host.datablocks import Remembered
@@ -94,7 +95,9 @@ def changed_parts(guides: Curves, scene: Scene, manifest: Manifest) -> list[str]
     the hair is parted as it was: guides are baked with the regions of their first frame.
     """
     now, baked = key_of(guides, scene), manifest.keys[-1]
-    changed = sorted(part for part in {*now, *baked} if now.get(part) != baked.get(part))
+    # Guides that are where they were in the world count as they were when other coordinates were applied.
+    as_before = {part: surface_space.known_as(guides, digest) for part, digest in now.items()}
+    changed = sorted(part for part in {*now, *baked} if baked.get(part) not in {now.get(part), as_before.get(part)})
     if _PARTING in changed and manifest.parted_by == _parted_by(guides) and not isinstance(_regions(guides), str):
         changed.remove(_PARTING)
     return changed
@@ -197,7 +200,11 @@ def _begin(guides, last, scene, starts_over, stack):
     guide_count, point_count = combed.shape[:2]
     keys = (key_of(guides, scene),)
     parted_by = _parted_by(guides)
-    manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout, parted_by=parted_by)
+    space = tuple(surface_space.applied(guides).matrix.ravel().tolist())
+    spaces = () if space == frame_manifest.UNMOVED else (space,)
+    manifest = Manifest(
+        keys, guide_count, point_count, start, last, rate, "baking", layout, parted_by=parted_by, spaces=spaces
+    )
     writer = stack.enter_context(frame_cache.baking(folder, manifest))
     guides_named, there = Remembered(guides), FrameCache(folder)
     numbers = {number for number in there.state_numbers() if start < number <= last + _BEYOND}

@@ -17,7 +17,7 @@ from ....core.errors import HairError
 from ....core.params import given
 from ...data.simulation import guide_poses, simulated_world, wet_guides
 from ...data.simulation.guide_poses import GuidePose
-from ...data.strands import attributes, curves
+from ...data.strands import curves
 from ...host import scene_time
 from ...host.caches import Cache
 from ...settings import preferences, properties
@@ -222,9 +222,9 @@ def in_metres(settings: DynamicsSettings, metres: float) -> DynamicsSettings:
 
 def combed_points(guides: Curves) -> np.ndarray:
     """(G, POINT_COUNT, 3) float32: guides as combed, local coordinates at rest."""
-    points, offsets = curves.read_points(guides), curves.curve_offsets(guides)
-    if len(offsets) < 2:
+    if not len(guides.curves):
         raise HairError('"{name}" has no guides to simulate.', name=guides.name)
+    points = curves.even_local_points(guides)
     if not np.isfinite(points).all():
         raise HairError('"{name}" has non-finite coordinates: undo, or delete those guides.', name=guides.name)
-    return curves.even_points(points, offsets, lambda: attributes.are_smooth(guides))
+    return points

@@ -16,6 +16,7 @@ from bpy.types import Depsgraph, Object, ViewLayer
 from ....core import grooming, placement
 from ....core.errors import HairError
 from ....core.geometry import strands
+from ....core.geometry.affine import Affine
 from ....core.geometry.mesh import SurfacePoints, TriMesh, positions
 from ....core.grooming.groom import HairSettings
 from ....core.grooming.rooted_curves import RootedCurves, reversal
@@ -60,12 +61,16 @@ class HandMade:
 
 @dataclass(frozen=True)
 class PlacedCurves:
-    """Curves as they are to be written: (N, 3) float32 local points at rest, (C,) point counts, (C,) bool."""
+    """Curves as they are to be written: (N, 3) float32 local points at rest, (C,) point counts, (C,) bool.
+
+    to_surface: what has taken the curves' own coordinates to the surface's, and is to take their widths there.
+    """
 
     points: np.ndarray
     counts: np.ndarray
     is_smooth: np.ndarray
     rooted: RootedCurves
+    to_surface: Affine
 
     @property
     def starts(self) -> np.ndarray:
@@ -138,7 +143,7 @@ def using_as_guides(
     seen = foreign_curves.read(curves_object, applies_modifiers)
     if len(seen.starts) < 2:
         raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
-    to_surface = np.linalg.inv(np.array(surface_object.matrix_world)) @ np.array(curves_object.matrix_world)
+    to_surface = surface_space.between(curves_object, surface_object)
     is_unmasked = hair_settings is not None and not masks.own(hair_settings)
     grow = None if hair_settings is None else pipeline.hair_between(surface_object, surface, hair_settings, depsgraph)
     place, its_surface, device = Remembered(curves_object), Remembered(surface_object), preferences.device()
@@ -176,13 +181,9 @@ def require_usable(curves_object: Object, surface_object: Object) -> None:
         ancestor = ancestor.parent
 
 
-def on_surface(surface: Surface, seen: SeenCurves, to_surface: np.ndarray, every: int = 1) -> PlacedCurves:
-    """`PlacedCurves` of curves whose coordinates a (4, 4) matrix takes to the surface's."""
-
-    points = seen.points
-    if not np.allclose(to_surface, np.eye(4), rtol=0.0, atol=1e-6):  # else they stay as they are, to the last bit
-        with np.errstate(invalid="ignore", over="ignore"):
-            points = (points @ to_surface[:3, :3].T + to_surface[:3, 3]).astype(np.float32)
+def on_surface(surface: Surface, seen: SeenCurves, to_surface: Affine, every: int = 1) -> PlacedCurves:
+    """`PlacedCurves` of curves whose coordinates an `Affine` takes to the surface's."""
+    points = to_surface.points(seen.points)
     mesh = surface.mesh
     if surface.is_deformed:
         mesh = TriMesh(surface.from_local(surface.posed), mesh.triangles)
@@ -194,7 +195,7 @@ def on_surface(surface: Surface, seen: SeenCurves, to_surface: np.ndarray, every
         places = surface.places(rooted.roots)
         motion = posed_strands.pose_of(surface).motion_at(places[0])
         points = posed_strands.carried(points, motion, places, counts, is_back=True)
-    return PlacedCurves(points, counts, seen.is_smooth[rooted.kept], rooted)
+    return PlacedCurves(points, counts, seen.is_smooth[rooted.kept], rooted, to_surface)
 
 
 def _coverage(mesh, roots):
@@ -255,6 +256,8 @@ def write(
     datablock.surface = surface_object
     datablock.vellus.kind = kind
     attributes.write(datablock, "position", "FLOAT_VECTOR", "POINT", placed.points)
+    if attributes.has(datablock, "radius", "FLOAT", "POINT"):
+        curves.widen(datablock, placed.to_surface)
     datablock.vellus.written = curves.BY_HAND
     curves.write_roots(datablock, surface, rooted.roots)
     # Distance in local units up to which first points are up to date (`curves.read_roots`).

@@ -22,7 +22,7 @@ from ....core.grooming.groom import HairSettings
 from ....core.grooming.rooted_curves import RootedCurves
 from ....core.long_work import Work, part_of
 from ....core.params import Param, declared, plain_value
-from ...data import scene, thin_hair
+from ...data import scene, surface_space, thin_hair
 from ...data.scene import Surface
 from ...data.strands import attributes, curves, curves_objects, exported_curves, kept_shapes
 from ...host.datablocks import Remembered
@@ -76,10 +76,9 @@ def using_as_hair(
     seen = foreign_curves.read(curves_object, applies_modifiers)
     if len(seen.starts) < 2:
         raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
-    from_world = np.linalg.inv(np.array(surface_object.matrix_world))
-    to_surface = from_world @ np.array(curves_object.matrix_world)
+    to_surface = surface_space.between(curves_object, surface_object)
     place, its_surface = Remembered(curves_object), Remembered(surface_object)
-    given = None if guides_object is None else _given_guides(guides_object, surface_object, from_world)
+    given = None if guides_object is None else _given_guides(guides_object, surface_object)
     its_guides = None if guides_object is None else Remembered(guides_object)
 
     def compute(progress):
@@ -97,7 +96,7 @@ def using_as_hair(
                 placed.rooted.roots,
                 wanted,
                 strands.from_numpy(guides.even(surface), guides.rooted.roots),
-                is_mirrored=surface.is_mirrored,
+                is_mirrored=surface.names_otherwise,
                 progress=part_of(progress, 0.1, 1.0),
             )
             return placed, wanted, derived, guides
@@ -133,10 +132,10 @@ def using_as_hair(
     return KeptHair(hair, guides, placed.rooted, derived.mean_error, derived.high_error)
 
 
-def _given_guides(guides_object, surface_object, from_world):
-    """(`SeenCurves`, (4, 4) matrix to the surface's coordinates) of guides that came with hair."""
+def _given_guides(guides_object, surface_object):
+    """(`SeenCurves`, `Affine` to the surface's coordinates) of guides that came with hair."""
     hand_made_guides.require_usable(guides_object, surface_object)
-    return foreign_curves.read(guides_object, True), from_world @ np.array(guides_object.matrix_world)
+    return foreign_curves.read(guides_object, True), surface_space.between(guides_object, surface_object)
 
 
 def _among(kept, indices, weights):

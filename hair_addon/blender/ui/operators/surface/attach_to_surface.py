@@ -3,8 +3,9 @@
 
 import bpy
 
-from ....groom import edits
+from ....groom import attached_hair
 from ....groom.selection import mesh_to_attach_to, parts_of
+from ....live import reported
 from ..base.hair_operator import HairOperator
 
 
@@ -20,4 +21,5 @@ class VELLUS_OT_attach_to_surface(HairOperator, bpy.types.Operator):
         return context.mode == "OBJECT" and mesh_to_attach_to(context) is not None
 
     def change(self, context):
-        edits.attach(parts_of(context.object), mesh_to_attach_to(context))
+        parts, depsgraph = parts_of(context.object), context.evaluated_depsgraph_get()
+        attached_hair.attach(parts, mesh_to_attach_to(context), depsgraph, reported.place_before)
