@@ -368,3 +368,15 @@ def test_files_that_are_missing_are_named(rng, tmp_path):
     with pytest.raises(HairError) as raised:
         usd_curves.read(tmp_path / "a.usda")
     assert all(name in str(raised.value) for name in ("layer.usda", "tuft.usda", "load.usda"))
+
+
+def test_a_package_is_read(rng, tmp_path):
+    from pxr import Sdf, UsdUtils
+
+    points = wandering(rng, 4)
+    stage = stage_at(tmp_path / "a.usdc")
+    add(stage, "/hair", points, [4], "linear")
+    stage.Save()
+    assert UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(tmp_path / "a.usdc")), str(tmp_path / "a.usdz"))
+    (tmp_path / "a.usdc").unlink()
+    np.testing.assert_array_equal(usd_curves.read(tmp_path / "a.usdz").sets[0].points, points)
