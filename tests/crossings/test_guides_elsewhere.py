@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Use as Guides for scripts and on the command line, and brushes that add to guides of any length."""
 
+import io
 import json
+import zipfile
 from pathlib import Path
 
 import bpy
@@ -192,3 +194,13 @@ def test_combing_fits_the_brushes_that_add_to_the_guides(guides, shipped):
     assert not guides.data.use_sculpt_collision
     shipped()
     bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_arrays_that_claim_more_than_their_file_holds_take_no_memory(scene, tmp_path):
+    mesh = write_obj(tmp_path / "mesh.obj", *TETRAHEDRON)
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f4", "fortran_order": False, "shape": (10**9, 41, 3)})
+    with zipfile.ZipFile(tmp_path / "guides.npz", "w") as archive:
+        archive.writestr("guide_points.npy", header.getvalue() + bytes(100))
+    ended = run_here("groom", mesh, "--guides-from", tmp_path / "guides.npz", "--out", tmp_path / "out.npz")
+    assert ended.status == 1 and "cannot be read: it is damaged" in ended.errors

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Vellus writes, it reads back: guides as guides, hair as hair, with widths, identities, weights, unit, axis."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -86,3 +88,38 @@ def test_a_groom_comes_back_as_it_was(sphere, scene, tmp_path, name, unit):
         np.testing.assert_array_equal(came[0], ids)
         np.testing.assert_allclose(came[1], shares, atol=1e-6)
         np.testing.assert_array_equal(attribute(found.curves, "id", 1), GUIDE_COUNT + np.arange(STRAND_COUNT))
+
+
+@pytest.mark.parametrize("name", ["exported.usdc", "exported.abc", "groom.blend"])
+def test_groups_come_together_or_one_by_its_name(sphere, tmp_path, name):
+    """Strands keep to the guides of their own group."""
+    settings = api.GroomSettings(
+        api.GuideSettings(guide_count=GUIDE_COUNT), api.HairSettings(strand_count=STRAND_COUNT)
+    )
+    every = [api.add_hair(sphere, replace(settings, guides=replace(settings.guides, seed=seed))) for seed in (0, 1)]
+    update()
+    points = [np.concatenate([strand_arrays.world_points(one) for one in pair]) for pair in zip(*every, strict=True)]
+    if name.endswith(".blend"):
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / name), copy=True)
+    else:
+        api.export_groom(tmp_path / name)
+    for one in [o for o in bpy.data.objects if o.type == "CURVES"]:
+        bpy.data.objects.remove(one)
+    bpy.data.batch_remove([*bpy.data.hair_curves])
+
+    found = api.import_curves(tmp_path / name, sphere)
+    assert [str(note).split(" (")[0] for note in found.notes] == (
+        [f"{tmp_path / name} has 2 groups"] if "exp" in name else []
+    )
+    used = api.use_as_hair(found.curves, sphere, guides=found.guides)
+    for curves, expected in zip((used.guides, used.hair), points, strict=True):
+        np.testing.assert_allclose(strand_arrays.world_points(curves), expected, rtol=0.0, atol=1e-6)
+    if name.startswith("exported"):
+        indices, weights = guide_maps.of(used.hair, bpy.context.evaluated_depsgraph_get())
+        is_second = np.arange(2 * STRAND_COUNT)[:, None] >= STRAND_COUNT
+        assert ((indices >= GUIDE_COUNT) == is_second)[weights > 0.0].all() and (weights > 0.0).any(axis=1).all()
+
+    one = api.import_curves(tmp_path / name, sphere, name="Hair.001" if name.endswith(".blend") else "Hair_001")
+    second = api.use_as_hair(one.curves, sphere, guides=one.guides).hair
+    expected = points[1][STRAND_COUNT:]
+    np.testing.assert_allclose(strand_arrays.world_points(second), expected, rtol=0.0, atol=1e-6)

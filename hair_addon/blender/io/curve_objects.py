@@ -17,13 +17,14 @@ def new_object(name, placed, surface_object, guide_ids=None):
     to_world = np.array(surface_object.matrix_world, np.float64) * strand_arrays.metres_per_unit(bpy.context.scene)
     to_world[3, 3] = 1.0
     back, scale = np.linalg.inv(to_world), abs(np.linalg.det(to_world[:3, :3])) ** (1.0 / 3.0)
-    points = placed.points.astype(np.float64) @ back[:3, :3].T + back[:3, 3]
+    with np.errstate(over="ignore", invalid="ignore"):
+        points = (placed.points.astype(np.float64) @ back[:3, :3].T + back[:3, 3]).astype(np.float32)
     datablock = bpy.data.hair_curves.new(name)
     datablock.add_curves(np.asarray(placed.counts).tolist())
     datablock.set_types(type="POLY")
     if placed.is_smooth.any():
         datablock.set_types(type="CATMULL_ROM", indices=np.flatnonzero(placed.is_smooth).tolist())
-    attributes.write(datablock, "position", "FLOAT_VECTOR", "POINT", points.astype(np.float32))
+    attributes.write(datablock, "position", "FLOAT_VECTOR", "POINT", points)
     if placed.radii is not None:
         attributes.write(datablock, "radius", "FLOAT", "POINT", placed.radii / np.float32(scale))
     if placed.ids is not None:

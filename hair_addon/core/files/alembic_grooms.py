@@ -56,7 +56,9 @@ def read(path: Path) -> CurveFile:
 @contextmanager
 def _told(path) -> Iterator[None]:
     try:
-        yield
+        # Curves of non-finite points are left out where they are used, with a sentence.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            yield
     except (Damaged, OSError, MemoryError) as error:
         raise HairError("{path} is a damaged Alembic file.", path=path) from error
 

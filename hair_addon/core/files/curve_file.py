@@ -95,12 +95,14 @@ class CurveSet:
         turn, motion = TO_Z_UP[up] * metres, self.motion
 
         def turned(points):
-            return (np.asarray(points, np.float64) @ turn.T).astype(np.float32)
+            with np.errstate(over="ignore", invalid="ignore"):  # such points are left out later, with a sentence
+                return (np.asarray(points, np.float64) @ turn.T).astype(np.float32)
 
         if motion is not None:
             points_at = motion.points_at
             motion = Motion(motion.times, lambda index: turned(points_at(index)))
-        radii = None if self.radii is None else (self.radii.astype(np.float64) * metres).astype(np.float32)
+        with np.errstate(over="ignore", invalid="ignore"):
+            radii = None if self.radii is None else (self.radii.astype(np.float64) * metres).astype(np.float32)
         return replace(self, points=turned(self.points), radii=radii, motion=motion)
 
     def some(self, is_chosen: np.ndarray) -> "CurveSet":

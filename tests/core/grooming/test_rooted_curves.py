@@ -90,3 +90,15 @@ def test_what_cannot_be_used_is_one_sentence(curves, said):
 def test_what_is_no_curves_is_one_sentence(curves):
     with pytest.raises(HairError, match="sequence of arrays"):
         rooted_curves.polylines(curves)
+
+
+def test_curves_further_away_than_the_surface_is_large_are_refused(rng):
+    """A hundred times too large, or beside another surface; a few strays alone are counted."""
+    points, starts = grass(rng)
+    for far in (100.0 * points + 500.0, points + np.float32([0.0, 0.0, 11.0])):
+        with pytest.raises(HairError, match="large: check unit and axis"):
+            rooted_curves.root(GROUND, far, starts)
+    assert rooted_curves.root(GROUND, points + np.float32([0.0, 0.0, 9.0]), starts).far_count == 40
+    strays = points.copy()
+    strays[: starts[15]] += np.float32([0.0, 0.0, 50.0])
+    assert rooted_curves.root(GROUND, strays, starts).far_count == 15
