@@ -210,7 +210,7 @@ def test_mutants_of_a_file_give_curves_or_a_sentence(path, rng):
 
 
 def test_a_small_file_cannot_fill_the_memory(path):
-    """Objects that share one sample, and an object that holds itself."""
+    """A hundred objects that share one sample."""
     file, points = File(), np.zeros((20_000, 3), np.float32)
     shared = [file.curves(f"c{n}", points, [20_000]) for n in range(100)]
     with pytest.raises(HairError, match="damaged"):
