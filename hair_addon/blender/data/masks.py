@@ -21,7 +21,7 @@ class Mask:
 
     def read(self, surface_object, surface, depsgraph):
         """Weights (V,) and `Texture` on the `Surface` of a mesh object, each None without a name."""
-        weights = scene.read_vertex_group(surface_object, depsgraph, self.group)
+        weights = scene.read_weights(surface_object, surface, depsgraph, self.group)
         return weights, scene.read_texture(surface, self.image)
 
 

@@ -8,13 +8,14 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ...core import geometry
 from ...core.errors import HairError
-from ...core.geometry.mesh import Faces, TriMesh
+from ...core.geometry.mesh import Faces, TriMesh, interpolate
 from ...core.geometry.texture import Texture
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn, name_of
 from . import subdivided_surfaces, surface_space
-from .surfaces import Surface, transformed
+from .surfaces import Surface, cage_of, transformed
 
 _MOST_CORNERS = 100_000  # of a face: the time to triangulate one grows faster than its corners
 
@@ -63,11 +64,12 @@ def read_surface(surface_object, depsgraph):
     cage_corners = 0
     if read.has_rest and np.isfinite(rest).all():
         cage_corners = subdivided_surfaces.cage_corners(surface_object, depsgraph, faces)
-    if known is not None and known[1].cage_corners == cage_corners:
+    undivided = subdivided_surfaces.undivided_corners(surface_object, depsgraph, faces)
+    if known is not None and (known[1].cage_corners, known[1].undivided_corners) == (cage_corners, undivided):
         return known[1].posed_at(posed if read.has_rest else known[1].rest)
     if known is not None:
         corners = known[2]
-    surface = _surface_of(read, posed, corners, cage_corners)
+    surface = _surface_of(read, posed, corners, cage_corners, undivided)
     surface_cache.keep(surface_object.session_uid, (read, surface, corners))
     return surface
 
@@ -109,7 +111,7 @@ def _turned_order(faces):
     return 2 * firsts + np.repeat(counts, counts) - 1 - np.arange(len(firsts))
 
 
-def _surface_of(read, posed, corners, cage_corners):
+def _surface_of(read, posed, corners, cage_corners, undivided):
     """The `Surface` of a `_Reading` whose triangles have (F, 3) corners."""
     smooth_rest = subdivided_surfaces.smooth_positions(read.rest, read.faces, cage_corners)
     triangles = read.faces.corner_vertices[corners]
@@ -133,6 +135,7 @@ def _surface_of(read, posed, corners, cage_corners):
         is_mirrored,
         cage_corners,
         smooth_rest,
+        undivided,
         read.is_turned,
     )
 
@@ -258,6 +261,24 @@ def read_vertex_group(surface_object, depsgraph, name):
         return weights_in_group(mesh, group.index)
     finally:
         evaluated.to_mesh_clear()
+
+
+def read_weights(surface_object, surface, depsgraph, name):
+    """`read_vertex_group` on a `Surface` of an object, which may have been read at another level of subdivision."""
+    weights = read_vertex_group(surface_object, depsgraph, name)
+    if weights is None or len(weights) == len(surface.rest):
+        return weights
+    present = read_surface(surface_object, depsgraph)
+    if cage_of(present.topology) != cage_of(surface.topology):
+        return weights
+    nearest = geometry.closest_point.SurfaceQuery(present.local_mesh).nearest(surface.rest)
+    return interpolate(weights, present.local_mesh, nearest)
+
+
+def read_cage_weights(surface_object, depsgraph, name):
+    """`read_vertex_group` at the vertices of a `Surface.of_cage`, the same at every level of subdivision."""
+    weights = read_vertex_group(surface_object, depsgraph, name)
+    return None if weights is None else read_surface(surface_object, depsgraph).of_cage(weights)
 
 
 def weights_in_group(mesh, index):

@@ -23,16 +23,26 @@ def cage_corners(surface_object, depsgraph, faces):
     smoothing = [modifier for modifier in surface_object.modifiers if _is_smoothing(modifier)]
     if not smoothing:
         return 0
-    levels = sum(_levels(modifier, depsgraph) for modifier in smoothing)
+    return _corners_before(smoothing, depsgraph, faces) or len(faces.corner_vertices)
+
+
+def undivided_corners(surface_object, depsgraph, faces):
+    """The same of the mesh before modifiers subdivide it in any way; 0 where none does, as this depsgraph has it."""
+    return _corners_before(filter(_is_dividing, surface_object.modifiers), depsgraph, faces)
+
+
+def _corners_before(modifiers, depsgraph, faces):
+    levels = sum(_levels(modifier, depsgraph) for modifier in modifiers)
     # The first level makes a quad of each corner, the others make four of each.
-    return len(faces.corner_vertices) if levels == 0 else (len(faces.starts) - 1) // 4 ** (levels - 1)
+    return 0 if levels == 0 else (len(faces.starts) - 1) // 4 ** (levels - 1)
 
 
 def _is_smoothing(modifier):
-    is_shown = modifier.show_viewport or modifier.show_render
-    return is_shown and (
-        modifier.type == "MULTIRES" or (modifier.type == "SUBSURF" and modifier.subdivision_type == "CATMULL_CLARK")
-    )
+    return _is_dividing(modifier) and getattr(modifier, "subdivision_type", "CATMULL_CLARK") == "CATMULL_CLARK"
+
+
+def _is_dividing(modifier):
+    return modifier.type in {"MULTIRES", "SUBSURF"} and (modifier.show_viewport or modifier.show_render)
 
 
 def _levels(modifier, depsgraph):

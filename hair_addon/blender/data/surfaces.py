@@ -12,7 +12,7 @@ from ...core.geometry.mesh import Faces, TriMesh, check_mesh
 from ...core.kernels.checks import require_indices
 
 # What does not follow from where vertices are posed, and is kept in another pose.
-_AT_REST = ("to_local_axes", "local_mesh", "shape", "extent", "topology")
+_AT_REST = ("to_local_axes", "local_mesh", "shape", "extent", "topology", "cage_vertices")
 
 _MOST_TURNINGS = 8  # of a surface: of the hair and the guides on it
 
@@ -37,6 +37,7 @@ class Surface:
     is_mirrored: bool  # negative scale: triangles are wound the other way than in Blender
     cage_corners: int  # of the faces that modifiers subdivide to a smooth surface, 0 for none
     smooth_rest: np.ndarray  # (V, 3) float32, vertices on the smooth surface at rest; `rest` itself where none is
+    undivided_corners: int  # of the faces that modifiers subdivide in any way, 0 where none does
     is_turned: bool = (
         False  # whether Blender has turned its faces since hair grew: triangles are in the order of before
     )
@@ -75,8 +76,24 @@ class Surface:
         """The same surface with its vertices at (V, 3) float32 local positions."""
         other = replace(self, posed=posed)
         known = {name: self.__dict__[name] for name in _AT_REST if name in self.__dict__}
-        other.__dict__.update(known, _turnings=self._turnings)  # which is one for all poses
+        other.__dict__.update(known, _turnings=self._turnings, _nearest=self._nearest)  # which are one for all poses
         return other
+
+    @cached_property
+    def _nearest(self):
+        """{bits of places: what `nearest_places` found}."""
+        return {}
+
+    def nearest_places(self, points):
+        """`places` nearest to (N, 3) float32 local points at rest; found once for all poses. Raises `HairError`."""
+        asked = hashlib.blake2b(points.tobytes(), digest_size=16).digest()
+        if asked not in self._nearest:
+            while len(self._nearest) >= _MOST_TURNINGS:
+                self._nearest.pop(next(iter(self._nearest)))
+            # In local coordinates, as the nodes of follow_nodes.py find it, whatever the scale of the object becomes.
+            found = geometry.closest_point.SurfaceQuery(self.local_mesh).nearest(points)
+            self._nearest[asked] = self.places(found)
+        return self._nearest[asked]
 
     @cached_property
     def _turnings(self):
@@ -99,7 +116,15 @@ class Surface:
     def is_at_rest_as(self, other):
         """Whether strands generated on one also fit the other."""
         mine, its = ((s.rest, s.mesh.triangles, s.to_world_axes) for s in (self, other))
-        return self.cage_corners == other.cage_corners and all(map(np.array_equal, mine, its))
+        are_divided_alike = (self.cage_corners, self.undivided_corners) == (other.cage_corners, other.undivided_corners)
+        return are_divided_alike and all(map(np.array_equal, mine, its))
+
+    def is_same_cage(self, other):
+        """Whether another surface is this one at rest, at another level of subdivision."""
+        if cage_of(self.topology) != cage_of(other.topology) or self.cage_corners != other.cage_corners:
+            return False
+        mine, its = ((s.of_cage(s.rest), s.to_world_axes) for s in (self, other))
+        return all(map(np.array_equal, mine, its))
 
     def is_same(self, other):
         """Whether another surface equals this one, so that cached results are valid."""
@@ -107,7 +132,7 @@ class Surface:
             (s.rest, s.posed, s.mesh.triangles, s.faces.corner_vertices, s.faces.starts, s.to_world_axes, s.corner_uvs)
             for s in (self, other)
         )
-        named = [(s.name, s.uv_map, s.cage_corners) for s in (self, other)]
+        named = [(s.name, s.uv_map, s.cage_corners, s.undivided_corners) for s in (self, other)]
         return named[0] == named[1] and all(map(np.array_equal, mine, its))
 
     @property
@@ -154,10 +179,17 @@ class Surface:
         """The longest side of the box around its vertices at rest, in local coordinates."""
         return float(np.ptp(self.rest, axis=0).max())
 
+    def of_cage(self, values):
+        """Values of vertices, None for none: those of the cage, which are the same at every level of subdivision."""
+        return values if values is None else values[: self.cage_size]
+
     @cached_property
     def topology(self):
-        """A key of the faces by their corners, in their order, whichever triangles they are cut into."""
-        return _key_of(self.faces.corner_vertices, self.faces.starts)
+        """A key of the faces by their corners, in their order, whichever triangles they are cut into.
+
+        Its first half is that of the faces before modifiers subdivide them, the same at every level.
+        """
+        return _half_key(self.cage_vertices) + _half_key(self.faces.corner_vertices, self.faces.starts)
 
     @cached_property
     def turned_topology(self):
@@ -166,7 +198,27 @@ class Surface:
         first, size = np.repeat(starts, sizes), np.repeat(sizes, sizes)
         corner = np.arange(len(first)) - first
         turned = self.faces.corner_vertices[first + (size - corner) % np.maximum(size, 1)]
-        return _key_of(turned, self.faces.starts)
+        return _half_key(turned) + _half_key(turned, self.faces.starts)
+
+    @cached_property
+    def cage_vertices(self):
+        """(C,) int32: the vertices at the corners of faces before modifiers subdivide them, face after face.
+
+        A subdivided mesh has the vertices of its cage first, and each corner of the cage is one of its own, in order.
+        """
+        vertices, count = self.faces.corner_vertices, self.undivided_corners
+        if count:
+            up_to = np.cumsum(np.bincount(vertices))
+            last = int(np.searchsorted(up_to, count))
+            if last < len(up_to) and up_to[last] == count:
+                return vertices[vertices <= last]
+        return vertices
+
+    @property
+    def cage_size(self):
+        """The number of vertices of the cage, which are the first; of all where nothing is subdivided."""
+        is_divided = self.cage_vertices is not self.faces.corner_vertices
+        return int(self.cage_vertices.max()) + 1 if is_divided else len(self.rest)
 
     def points_at(self, polygons, vertices, barycentric):
         """(`SurfacePoints`, (N,) bool: which are none) of places in polygons, as `places` gives them."""
@@ -200,9 +252,23 @@ class Surface:
         return points.wound_otherwise() if self.is_mirrored else points
 
 
-def _key_of(corner_vertices, starts):
-    key = hashlib.blake2b(np.ascontiguousarray(corner_vertices, np.int32).tobytes(), digest_size=16)
-    key.update(starts.tobytes())
+_HALF = 16  # digits of a topology's key
+
+
+def cage_of(topology):
+    """The part of a `Surface.topology` that subdivision leaves as it is."""
+    return topology[:_HALF]
+
+
+def faces_of(topology):
+    """The part of a `Surface.topology` that tells the faces that stored roots refer to."""
+    return topology[_HALF:]
+
+
+def _half_key(*arrays):
+    key = hashlib.blake2b(digest_size=_HALF // 2)
+    for array in arrays:
+        key.update(np.ascontiguousarray(array, np.int32).tobytes())
     return key.hexdigest()
 
 

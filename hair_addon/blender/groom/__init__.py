@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         mask_suggestions,
         paused_hair,
         pipeline,
+        read_surfaces,
         reweighed_hair,
         selection,
         size_fitting,

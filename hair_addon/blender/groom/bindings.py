@@ -11,15 +11,18 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from bpy.types import Curves
+from bpy.types import Curves, Depsgraph
 
 from ...core import interpolation
 from ...core.geometry.strands import Strands
 from ...core.grooming import following, groom
 from ...core.grooming.groom import HairSettings
 from ...core.interpolation.hair_binding import HairBinding
+from ..data import scene
 from ..data.scene import Surface
+from ..data.surfaces import cage_of
 from ..host.caches import Cache
+from ..settings import style_items
 from . import styled_hair
 from .size_fitting import Fits
 from .styled_hair import StyledHair
@@ -235,6 +238,16 @@ def grow_in_place_of(datablock: Curves | None, bound: BoundHair) -> None:
 def of(datablock: Curves) -> BoundHair | None:
     """The `BoundHair` of a hair Curves datablock, or None."""
     return binding_cache.get(datablock.session_uid)
+
+
+def can_read_masks(bound: BoundHair, target: Curves, depsgraph: Depsgraph) -> bool:
+    """Whether masks of styles are not to be read at another level of subdivision than hair is bound at."""
+    if target.surface is None or target.surface.type != "MESH":
+        return False
+    if not any(any(style_items.masks_of(item)) for item in target.vellus.styles):
+        return True
+    present, known = scene.read_surface(target.surface, depsgraph).topology, bound.surface.topology
+    return present == known or cage_of(present) != cage_of(known)
 
 
 def invalidate(datablock: Curves) -> None:

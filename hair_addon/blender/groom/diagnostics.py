@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.types import Curves, Object
 
-from ..data import orientation, rest_nodes, usable_surfaces
+from ..data import orientation, rest_nodes, rest_sources, usable_surfaces
 from ..data.strands import follow_nodes
 from ..host.notices import name_of, text_of
 from ..settings.translations import interface_text
@@ -87,6 +87,9 @@ def _of_surface(surface, parts):
     if lost is not None:
         text = '"{name}" copies faces that are deformed already: move it up, or apply it.'
         yield Warning(interface_text(text, name=name_of(lost)))
+    elif parts and rest_sources.lacks(surface, bpy.context.view_layer.depsgraph):
+        text = 'Modifiers of "{name}" make faces without rest positions: hair does not follow where they deform.'
+        yield Warning(interface_text(text, name=name_of(surface)))
     if surface.mode != "OBJECT" and any(part.vellus.is_stale for part in parts):
         yield Warning(interface_text("Hair updates when you leave this mode."))
 

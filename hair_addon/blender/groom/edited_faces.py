@@ -6,20 +6,21 @@ where they were when strands were rooted. Roots whose face is gone move to the n
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from bpy.types import Curves, Depsgraph
 
 from ...core import geometry
-from ...core.geometry.mesh import SurfacePoints, require_finite
+from ...core.geometry.mesh import SurfacePoints, TriMesh, require_finite
 from ..data import surface_space
 from ..data.scene import Surface
 from ..data.strands import attributes, curves, kept_shapes, posed_strands, stored_roots
-from . import staleness
+from ..data.surfaces import cage_of, faces_of
+from ..host.caches import Cache
+from . import bindings, staleness
 
-if TYPE_CHECKING:
-    from ...core.geometry.surface_deform import SurfaceMotion
+# (`Surface.topology`, fingerprint of where strands begin) → (triangles, barycentric coordinates) that were stored.
+left_cache = Cache(capacity=32)
 
 
 @dataclass(frozen=True)
@@ -39,24 +40,84 @@ def root_again(strands: Curves, surface: Surface, depsgraph: Depsgraph) -> tuple
     """
     edit = _edit(surface_space.rest_before(strands), surface)
     places, stored = _rooted(strands, edit)
-    lost = ~places[1].any(axis=1)
-    if not np.array_equal(edit.before, surface.rest):
-        roots = places[0][~lost]
-        motion = geometry.surface_deform.motion(edit.before, surface.rest, surface.faces, roots)
-        carry(strands, surface, motion, places, stored)
-    lost_between = 0
-    for hair in curves.followers(strands):
-        if curves.is_hand_made(hair) or attributes.is_from_library(hair) or not len(hair.curves):
-            continue
+    is_moved, lost_between = not np.array_equal(edit.before, surface.rest), 0
+    if is_moved:
+        _carry(strands, surface, edit.before, places, stored)
+    for hair in _between(strands):
         between, on_surface = _rooted(hair, edit)
+        if is_moved and _is_edited(hair):
+            _carry(hair, surface, edit.before, between, on_surface)
         _write(hair, edit, on_surface, depsgraph)
         lost_between += int((~between[1].any(axis=1)).sum())
     _write(strands, edit, stored, depsgraph)
     surface_space.keep_surface(strands, surface)
-    return int(lost.sum()), lost_between
+    return int((~places[1].any(axis=1)).sum()), lost_between
 
 
-def carry(strands: Curves, surface: Surface, motion: "SurfaceMotion", places: tuple, roots: SurfacePoints) -> None:
+def follow_moved(strands: Curves, surface: Surface, before: np.ndarray) -> None:
+    """Carry guides or kept hair, and strands between guides that an artist has edited, with vertices that were moved.
+
+    before: (V, 3) where they were.
+    """
+    root_on_present_level(strands, surface, before)
+    for target in (strands, *filter(_is_edited, _between(strands))):
+        places, roots = stored_roots.places(target, len(surface.rest)), stored_roots.points(target, surface)
+        if places is not None and roots is not None and faces_of(target.vellus.topology) == faces_of(surface.topology):
+            _carry(target, surface, before, places, roots)
+            curves.write_roots(target, surface, roots)
+
+
+def _between(strands):
+    """The hair between guides that can be written."""
+    followers = (hair for hair in curves.followers(strands) if not curves.is_hand_made(hair) and len(hair.curves))
+    return [hair for hair in followers if not attributes.is_from_library(hair)]
+
+
+def _is_edited(hair):
+    """Whether an artist has edited strands between guides, which do not grow again then."""
+    bound = bindings.of(hair)
+    return (bound is None or bound.is_written) and curves.is_combed(hair)
+
+
+def change_level(strands: Curves, surface: Surface) -> None:
+    """Root guides or kept hair on a surface that is subdivided otherwise now, at the nearest points.
+
+    No strand changes, and none between guides is rooted again: renders have their own levels. At a level that was
+    left before, roots are those that they were, to the bit, as long as strands begin where they did.
+    """
+    state, digest = strands.vellus, geometry.fingerprint.fingerprint(curves.first_points(strands))
+    triangle, barycentric = stored_roots.raw(strands)
+    if triangle is not None and barycentric is not None:
+        left_cache.keep((state.topology, digest), (triangle, barycentric))
+    known = left_cache.get((surface.topology, digest))
+    if known is None:
+        roots = curves.nearest_roots(surface, _firsts(strands, surface))
+    else:
+        roots = surface.swap_winding(SurfacePoints(*known))
+    curves.write_roots(strands, surface, roots)
+    surface_space.keep_surface(strands, surface)
+    for hair in _between(strands):
+        curves.write_smoothness(hair, surface)
+
+
+def root_on_present_level(strands: Curves, surface: Surface, before: np.ndarray) -> None:
+    """Root hair between guides that is rooted at another level of subdivision on the faces of now, before it moves.
+
+    before: (V, 3) where vertices of the surface were when strands began where they do.
+    """
+    for hair in _between(strands):
+        topology = hair.vellus.topology
+        if topology != surface.topology and cage_of(topology) == cage_of(surface.topology):
+            mesh = TriMesh(surface.from_local(before), surface.mesh.triangles)
+            firsts = _firsts(hair, surface)
+            curves.write_roots(hair, surface, geometry.closest_point.SurfaceQuery(mesh).nearest(firsts))
+
+
+def _firsts(strands, surface):
+    return surface.from_local(curves.first_points(strands))
+
+
+def _carry(strands, surface, before, places, roots):
     """Carry strands as their surface was moved; those without a place stay.
 
     places: (S, 3) vertices and (S, 3) weights; roots: `SurfacePoints` of the same, which lie apart where a face is cut
@@ -64,8 +125,9 @@ def carry(strands: Curves, surface: Surface, motion: "SurfaceMotion", places: tu
     """
     vertices, weights = places
     counts, is_lost = curves.point_counts(strands), ~weights.any(axis=1)
+    motion = geometry.surface_deform.motion(before, surface.rest, surface.faces, vertices[~is_lost])
     its_vertices, its_weights = surface.places(roots)
-    slide = _between(motion.after, its_vertices, its_weights) - _between(motion.after, vertices, weights)
+    slide = _at(surface.rest, its_vertices, its_weights) - _at(surface.rest, vertices, weights)
     slide[is_lost | (its_vertices == vertices).all(axis=1)] = 0.0
 
     def carried(points):
@@ -75,7 +137,7 @@ def carry(strands: Curves, surface: Surface, motion: "SurfaceMotion", places: tu
     kept_shapes.move(strands, carried)
 
 
-def _between(positions, vertices, weights):
+def _at(positions, vertices, weights):
     return (weights[..., None] * positions[vertices]).sum(axis=1)
 
 
@@ -110,7 +172,7 @@ def _rooted(strands, edit):
     triangle, barycentric = np.empty(len(vertices), np.int32), np.empty((len(vertices), 3), np.float32)
     triangle[known], barycentric[known] = found.triangle, found.barycentric
     if is_lost.any():
-        nearest = curves.nearest_roots(surface, surface.from_local(curves.first_points(strands)[is_lost]))
+        nearest = curves.nearest_roots(surface, _firsts(strands, surface)[is_lost])
         triangle[is_lost], barycentric[is_lost] = nearest.triangle, nearest.barycentric
     return (vertices, weights), SurfacePoints(triangle, barycentric)
 

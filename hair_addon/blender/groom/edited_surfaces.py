@@ -6,12 +6,12 @@ from collections.abc import Callable
 import numpy as np
 from bpy.types import Curves, Depsgraph, Object
 
-from ...core import geometry
 from ...core.errors import HairError
 from ...core.geometry.affine import Affine
 from ...core.geometry.mesh import require_finite
 from ..data import scene, surface_space
-from ..data.strands import curves, stored_roots
+from ..data.strands import attributes, curves, stored_roots
+from ..data.surfaces import cage_of, faces_of
 from . import applied_transforms, edited_faces
 
 _ROOTED_AGAIN = {
@@ -39,9 +39,14 @@ def follow_surface(
         if change is not None and change.is_mirroring:
             _carry(guide_curves, surface, change, depsgraph)
             return True
+    before, is_same = surface_space.rest_before(guide_curves), state.topology == surface.topology
+    if not is_same and _is_divided_alone(guide_curves, surface, before):
+        if follows_edits:
+            edited_faces.change_level(guide_curves, surface)
+        return False
     roots = stored_roots.places(guide_curves, len(surface.rest))
     stored = stored_roots.points(guide_curves, surface)
-    if state.topology != surface.topology or roots is None or stored is None:
+    if faces_of(state.topology) != faces_of(surface.topology) or roots is None or stored is None:
         if not follows_edits:
             return False
         curves.require_not_linked(guide_curves)
@@ -51,22 +56,32 @@ def follow_surface(
             sentence = _ROOTED_AGAIN[state.kind]
             state.status = sentence.format(name=surface.name, guides=lost, strands=strand_count)
         return True
-    before = surface_space.rest_before(guide_curves)
-    if before is not None and (before.shape != surface.rest.shape or np.array_equal(before, surface.rest)):
+    if before is not None and before.shape != surface.rest.shape:
+        before = surface.rest
+    if is_same and before is not None and np.array_equal(before, surface.rest):
         return False
     change = applied_transforms.find(guide_curves, surface, to_world_before)
     if change is not None:
+        if before is not None:
+            edited_faces.root_on_present_level(guide_curves, surface, before)
         _carry(guide_curves, surface, change, depsgraph)
         return True
     if before is not None and follows_edits:
         curves.require_not_linked(guide_curves)
         require_finite(surface.rest)
-        motion = geometry.surface_deform.motion(before, surface.rest, surface.faces, roots[0])
-        edited_faces.carry(guide_curves, surface, motion, roots, stored)
-        curves.write_roots(guide_curves, surface, stored)
+        edited_faces.follow_moved(guide_curves, surface, before)
         surface_space.keep_surface(guide_curves, surface)
         return True
     return False
+
+
+def _is_divided_alone(guide_curves, surface, before):
+    """Whether the faces of before are there, where they were, and are subdivided otherwise."""
+    if before is None or cage_of(guide_curves.vellus.topology) != cage_of(surface.topology):
+        return False
+    if faces_of(guide_curves.vellus.topology) == faces_of(surface.topology) or attributes.is_from_library(guide_curves):
+        return False
+    return np.array_equal(before[: surface.cage_size], surface.rest[: surface.cage_size])
 
 
 def _carry(guide_curves, surface, change, depsgraph):

@@ -116,7 +116,7 @@ def _renewed_key(datablock, group, image):
     try:
         settings = setting_properties.to_settings(group, settings_class)
         group_name = masks.of_curves(datablock).group
-        density = scene.read_vertex_group(datablock.surface, scene.present_depsgraph(), group_name)
+        density = scene.read_cage_weights(datablock.surface, scene.present_depsgraph(), group_name)
         values = scene.read_image(name_of(image))
     except HairError:
         return None

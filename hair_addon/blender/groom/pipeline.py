@@ -18,11 +18,12 @@ from ...core.long_work import Work, part_of, run_now
 from ...core.styling.base import StyleSettings
 from ..data import masks, scene
 from ..data.scene import Surface
-from ..data.strands import curves, curves_objects, drawn_lines, partings, stored_roots
+from ..data.strands import curves, drawn_lines, partings, stored_roots
+from ..data.surfaces import cage_of
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items
-from . import bindings, grown_guides, size_fitting, styled_hair, writing
+from . import bindings, grown_guides, read_surfaces, size_fitting, styled_hair, writing
 from .bindings import BoundHair
 from .styled_hair import ReadStyles, StyledHair
 
@@ -51,7 +52,7 @@ def distributing_guides(
     may_drape: bool = False,
 ) -> Work[Curves]:
     """`distribute_guides` as work in steps (core/long_work.py); may_drape: as in `adding_hair`."""
-    surface = _read_surface(surface_object, depsgraph)
+    surface = read_surfaces.read(surface_object, depsgraph)
     mask = masks.own(settings).read(surface_object, surface, depsgraph)
     sized = size_fitting.of_guides(settings, surface, mask, target if keeps_roots else None, may_drape)
     settings, key = sized.settings, sized.root_key
@@ -100,8 +101,10 @@ def bind_hair(
 
 def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     """The `BoundHair` that is to grow between guides, as work in steps."""
-    surface = _read_surface(guide_curves.surface, depsgraph, target)
-    guides = curves.read_guides(guide_curves, surface, preferences.device())
+    surface = read_surfaces.read(guide_curves.surface, depsgraph, target)
+    bound = None if target is None else bindings.of(target)
+    its_guides = bound.guides if bound is not None and bound.surface is surface else None
+    guides = curves.read_guides(guide_curves, surface, preferences.device(), its_guides)
     mask = masks.of_strands(settings, guide_curves.vellus.guides).read(guide_curves.surface, surface, depsgraph)
     sized = size_fitting.of_hair(settings, surface, mask, len(guides.roots), target)
     settings, key = sized.settings, sized.root_key
@@ -145,7 +148,7 @@ def complete(
     surface_object: Object, guide_settings: GuideSettings, hair_settings: HairSettings, depsgraph: Depsgraph
 ) -> tuple[GuideSettings, HairSettings]:
     """`GuideSettings` and `HairSettings` with open settings computed from a mesh object. Raises `HairError`."""
-    _check_surface(surface_object)
+    read_surfaces.require_mesh(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)
     sized, _masks = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
     return sized[0].settings, sized[1].settings
@@ -175,7 +178,7 @@ def adding_hair(
     say.
     No object is made before all of it is computed.
     """
-    surface = _read_surface(surface_object, depsgraph)
+    surface = read_surfaces.read(surface_object, depsgraph)
     sized, read = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph, may_drape)
     (of_guides, of_hair), (mask, hair_mask) = sized, read
     guide_settings, hair_settings = of_guides.settings, of_hair.settings
@@ -288,14 +291,17 @@ def _known_by(bound, progress):
 
 
 def _kept_roots(target, surface, key, count):
-    """The `SurfacePoints` that Curves store, if they were placed by this `root_key` on these triangles; else None.
+    """The `SurfacePoints` that Curves store, if they were placed by this `root_key` on these faces; else None.
 
-    count: how many are wanted. Somebody may have deleted some, or all.
+    Those nearest to where strands begin, if these faces were subdivided otherwise. count: how many are wanted. Somebody
+    may have deleted some, or all.
     """
-    if target is None or (target.vellus.root_key, target.vellus.topology) != (key, surface.topology):
+    if target is None or target.vellus.root_key != key or len(target.curves) != count:
         return None
-    if len(target.curves) != count:
+    if cage_of(target.vellus.topology) != cage_of(surface.topology):
         return None
+    if target.vellus.topology != surface.topology:
+        return curves.nearest_roots(surface, surface.from_local(curves.first_points(target)))
     return stored_roots.points(target, surface, is_complete=True)
 
 
@@ -311,7 +317,7 @@ def restyle(
     guide_curves, settings = inputs_of(target)
     if bound is None or bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
-    if target.surface is None:  # deleted: what binds the hair again says so
+    if not bindings.can_read_masks(bound, target, depsgraph):  # what binds the hair again says what is wrong
         return False
     device = bound.binding.positions.device
     guides = curves.read_shown_guides(guide_curves, bound.surface, device, bound.guides)
@@ -372,24 +378,3 @@ def inputs_of(target: Curves) -> tuple[Curves, HairSettings]:
     if state.guide_curves is None:
         raise HairError('"{name}" has no guides: pick them in the Strands panel.', name=name_of(target))
     return state.guide_curves, setting_properties.to_settings(state.hair, groom.HairSettings)
-
-
-def _read_surface(surface_object, depsgraph, target=None):
-    """The `Surface` of a mesh object that may be changed.
-
-    The surface that `target` is bound to, if that is the same: of which normals and areas are known. That of hair
-    that follows a library only carries it.
-    """
-    if target is None or not curves.follows_library(target):
-        _check_surface(surface_object)
-        curves_objects.keep_rest(surface_object)
-    surface, bound = scene.read_surface(surface_object, depsgraph), target and bindings.of(target)
-    if bound is not None and bound.surface.is_same(surface):
-        surface = bound.surface
-    return surface
-
-
-def _check_surface(surface_object):
-    if surface_object is None or surface_object.type != "MESH":
-        raise HairError("Hair needs a mesh object to grow on: select one.")
-    curves.require_overridable(surface_object)

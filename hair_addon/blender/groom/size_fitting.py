@@ -44,7 +44,7 @@ def of_guides(
 
     may_drape: drape guides as `grown_guides.draped_if_new`, whatever the settings say.
     """
-    key = root_key(given, mask)
+    key = root_key(given, surface, mask)
     kept = _kept(target and target.vellus.guides, given)
     is_refitted = target is not None and target.vellus.fit_key != key
     opened = fitted_sizes.opened(given, kept) if is_refitted else given
@@ -63,7 +63,7 @@ def of_hair(
     given: HairSettings, surface: Surface, mask: Mask, guide_count: int, target: Curves | None = None
 ) -> Sized[HairSettings]:
     """`HairSettings` with open sizes computed; target: as for `of_guides`."""
-    key = root_key(given, mask)
+    key = root_key(given, surface, mask)
     fit_key = f"{key} {guide_count}"
     kept = _kept(target and target.vellus.hair, given)
     is_refitted = target is not None and target.vellus.fit_key != fit_key
@@ -72,10 +72,10 @@ def of_hair(
     return Sized(completed, key, Fits(frozenset(kept | fitted_sizes.open_names(given)), fit_key))
 
 
-def root_key(settings: Settings, mask: Mask) -> str:
+def root_key(settings: Settings, surface: Surface, mask: Mask) -> str:
     """The `staleness.root_key` of settings and their mask."""
     density, texture = mask
-    return staleness.root_key(settings, density, None if texture is None else texture.values)
+    return staleness.root_key(settings, surface.of_cage(density), None if texture is None else texture.values)
 
 
 def keep(target: Curves, fits: Fits) -> None:

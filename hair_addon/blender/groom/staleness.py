@@ -20,6 +20,8 @@ _HALF = 16  # digits of a root key that are of settings
 def root_key(settings: Settings, density: np.ndarray | None, image: np.ndarray | None = None) -> str:
     """Key of the inputs of root placement, apart from the surface. image: its values, if there is one.
 
+    density: of the vertices of a `Surface.of_cage`, which are the same at every level of subdivision.
+
     Its first half is that of the settings, its second that of what is painted.
     """
     names = (
@@ -48,7 +50,7 @@ def keep_roots(target: Curves, depsgraph: Depsgraph, matching: np.ndarray) -> No
     if not state.root_key:
         return
     settings, density, image = _placing(target, depsgraph)
-    if density is not None and (matching >= 0).all():
+    if density is not None and ((matching >= 0) & (matching < len(density))).all():
         as_before = root_key(settings, density[matching], image)
         if as_before[_HALF:] != state.root_key[_HALF:]:
             return
@@ -102,5 +104,5 @@ def _placing(target, depsgraph):
         (state.guides, groom.GuideSettings) if state.kind == "GUIDES" else (state.hair, groom.HairSettings)
     )
     settings = setting_properties.to_settings(group, settings_class)
-    density = scene.read_vertex_group(target.surface, depsgraph, mask.group)
+    density = scene.read_cage_weights(target.surface, depsgraph, mask.group)
     return settings, density, scene.read_image(mask.image)

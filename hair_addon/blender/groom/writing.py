@@ -14,6 +14,7 @@ from ...core.styling.base import StyleSettings
 from ..data import guide_map_readers, surface_space
 from ..data.scene import Surface
 from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots
+from ..data.surfaces import cage_of
 from ..host.notices import name_of
 from ..materials import looks
 from ..settings import animated, setting_properties, style_items
@@ -167,6 +168,9 @@ def _store_roots(guide_curves, bound):
     if guide_curves is None or attributes.is_from_library(guide_curves) or guide_curves.session_uid != bound.guide_uid:
         return
     roots, surface = bound.guides.roots, bound.surface
+    present = guide_curves.vellus.topology
+    if present != surface.topology and cage_of(present) == cage_of(surface.topology):
+        return  # they are rooted on the surface as it is subdivided now
     stored = stored_roots.places(guide_curves, len(surface.rest))
     if stored is None or not all(map(np.array_equal, stored, surface.places(roots))):
         curves.write_roots(guide_curves, surface, roots)

@@ -76,7 +76,8 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
         points, counts = local.reshape(-1, 3), np.full(*local.shape[:2])
     pose = posed_strands.read_pose(datablock.surface, bpy.context.evaluated_depsgraph_get())
     starts, stored = strands.curve_offsets(counts), stored_roots.places(datablock, np.inf)
-    places = pose.rooted(datablock.vellus.topology, stored, points[starts[:-1]])
+    may_float = stored_roots.may_float(datablock)
+    places = pose.rooted(datablock.vellus.topology, stored, points[starts[:-1]], may_float)
 
     def carried(some):
         its = points[starts[some.start] : starts[some.stop]]

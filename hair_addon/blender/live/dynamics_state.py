@@ -6,6 +6,7 @@ from typing import Any
 
 from ...core.errors import HairError
 from ..data.simulation import frame_animation
+from ..data.surfaces import cage_of
 from ..groom import staleness
 from ..groom.dynamics import frame_folders, guide_baking
 from ..groom.guides import guide_regions
@@ -101,7 +102,7 @@ def _inputs(guides, blender_scene):
     parted = guide_regions.parting_keys(guides)
     wet_places = () if shared_wetness.is_keyed(state) else tuple(shared_wetness.masked_styles(state))
     digest = staleness.guides_digest(guides)
-    return properties.dynamics_of(state), digest, state.topology, rate, units, parted, wet_places
+    return properties.dynamics_of(state), digest, cage_of(state.topology), rate, units, parted, wet_places
 
 
 def _unknown():

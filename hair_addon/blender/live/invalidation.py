@@ -9,7 +9,7 @@ from ..data import guide_map_readers, orientation, scene, subdivided_surfaces
 from ..data.pictures import drawn_meshes
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, surface_textures, world_texture
-from ..groom import bindings, copied_hair, followed_names, paused_hair
+from ..groom import bindings, copied_hair, edited_faces, followed_names, paused_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..host import notices
 from ..render import hair_cache
@@ -46,6 +46,7 @@ OTHERS = (
     scene.faces_cache,
     scene.surface_cache,
     drawn_meshes.layout_cache,
+    edited_faces.left_cache,
     subdivided_surfaces.smooth_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,

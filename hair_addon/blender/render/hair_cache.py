@@ -44,6 +44,7 @@ class _KeptStrands:
     wetness: np.ndarray | None  # (S,) float32, None where strands do not differ
     places: tuple | None  # roots as `stored_roots.places` returns them, None for none
     rooted_on: tuple  # (session_uid of the surface, its topology)
+    may_float: bool  # whether strands may begin apart from it
     growing: Future | None = None  # of these points, which other threads may be computing; None where they are read
     on_gpu: strand_textures.StrandsOnGPU | None = None  # where `pose` carried them
     pose: posed_strands.Pose | None = None  # None where no surface carries them
@@ -129,7 +130,7 @@ def _carried(kept, pose, chosen=slice(None)):
     """Points (M, P, 3) of some kept strands where a pose carries them; at rest where nothing deforms the surface."""
     if pose is None or not pose.is_deformed:
         return kept.points[chosen]
-    return pose.carry(kept.points, kept.rooted_on[1], kept.places, chosen)
+    return pose.carry(kept.points, kept.rooted_on[1], kept.places, chosen, kept.may_float)
 
 
 def _pose_of(surface_object):
@@ -253,9 +254,8 @@ def invalidate_unless_same(datablock):
 
 def _is_same(datablock, kept, bound):
     """Whether kept strands are those of a datablock, and its surface would carry them as it did."""
-    is_known = kept.points is bound.shown.points if bound is not None else _are_points(datablock, kept.points)
     return (
-        is_known
+        (kept.points is bound.shown.points if bound is not None else _are_points(datablock, kept.points))
         and np.array_equal(kept.radii.ravel(), curves.read_radii(datablock))
         and np.array_equal(kept.randoms, curves.read_randoms(datablock))
         and made_strands.are_equal(kept.wetness, curves.read_wetness(datablock))
@@ -265,8 +265,7 @@ def _is_same(datablock, kept, bound):
 
 
 def _rooted_on(datablock, topology):
-    surface = datablock.surface
-    return None if surface is None else surface.session_uid, topology
+    return datablock.surface and datablock.surface.session_uid, topology
 
 
 def _are_places(places, others):
@@ -294,7 +293,8 @@ def _read(datablock, bound, shown):
     """
     if bound is None:
         places = None if datablock.surface is None else stored_roots.places(datablock, np.inf)
-        return _KeptStrands(*_shown_strands(datablock), places, _rooted_on(datablock, datablock.vellus.topology))
+        rooted = places, _rooted_on(datablock, datablock.vellus.topology), stored_roots.may_float(datablock)
+        return _KeptStrands(*_shown_strands(datablock), *rooted)
     if bound.is_written or bound.has_moved_only:
         randoms, wetness = curves.read_randoms(datablock), curves.read_wetness(datablock)
     else:
@@ -302,7 +302,7 @@ def _read(datablock, bound, shown):
     # Roots too are those of the binding: the datablock may store those of earlier strands.
     places, rooted_on = bound.surface.places(bound.binding.roots), _rooted_on(datablock, bound.surface.topology)
     radii = np.tile(bound.radii, (len(shown.points), 1))
-    return _KeptStrands(shown.points, radii, randoms, wetness, places, rooted_on, shown.growing)
+    return _KeptStrands(shown.points, radii, randoms, wetness, places, rooted_on, False, shown.growing)
 
 
 def _shown_strands(datablock):

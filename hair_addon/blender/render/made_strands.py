@@ -136,7 +136,9 @@ class Making:
             return False
         if surface is None or not self.may_carry or (is_behind and self.due is None and _is_deformed(kept.pose)):
             return False
-        places = pose.rooted(kept.rooted_on[1], kept.places, kept.points[:, 0])
+        places = pose.rooted(kept.rooted_on[1], kept.places, kept.points[:, 0], kept.may_float)
+        if len(places) > 2:  # rooted at another level of subdivision
+            return False
         drawn = kept.on_gpu
         if _is_deformed(kept.pose):
             rest = strand_textures.packed_texture(kept.points, drawn.row_strands)

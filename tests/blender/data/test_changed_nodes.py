@@ -123,6 +123,12 @@ def make_third(group):
     for node in (carried, paused, in_viewport):
         nodes.remove(node)
     group.links.new(before, output.inputs[0])
+    floats = next(n for n in nodes if "Name" in n.inputs and n.inputs["Name"].default_value == "root_distance")
+    start = next(link.to_node for link in group.links if link.from_node == floats)
+    nearest, used = start.inputs["True"].links[0].from_socket, start.outputs[0].links[0].to_socket
+    group.links.new(nearest, used)
+    for node in (floats, start):
+        nodes.remove(node)
     group.interface.remove(group.interface.items_tree["Paused"])
     group["vellus_version"] = 3
 

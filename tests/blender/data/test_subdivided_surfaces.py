@@ -9,6 +9,8 @@ from mathutils import Matrix
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import follow_nodes
 from hair_addon.blender.live import older_files
+from hair_addon.core.geometry import closest_point
+from hair_addon.core.geometry.mesh import TriMesh, positions
 from tests.support.dynamics.following import assert_follows, drawn_points, grow, update
 from tests.support.reading import evaluated_points, points, vertex_positions, write_points
 
@@ -138,3 +140,158 @@ def test_smooth_positions_are_computed_once(cube, monkeypatch):
     first, second = (scene.read_surface(cube, bpy.context.evaluated_depsgraph_get()) for _ in range(2))
     assert first.smooth_rest is second.smooth_rest and first.is_same(second)
     drawn_points(bpy.data.objects["Hair"])
+
+
+def set_levels(surface, levels):
+    surface.modifiers[0].levels = levels
+
+
+def set_simplify(surface, levels):
+    surface.modifiers[0].levels = 2
+    render = bpy.context.scene.render
+    render.use_simplify, render.simplify_subdivision, render.simplify_subdivision_render = levels == 0, 0, 6
+
+
+def set_eye(surface, levels):
+    surface.modifiers[0].show_viewport = levels > 0
+
+
+class Probe(bpy.types.RenderEngine):
+    """Keeps what a render shows."""
+
+    bl_idname, bl_label = "VELLUS_PROBE", "Probe"
+    seen = {}
+
+    def render(self, depsgraph):
+        Probe.seen.clear()
+        for shown in depsgraph.objects:
+            if shown.type == "CURVES":
+                Probe.seen[shown.name] = read_points(shown.data)
+            elif shown.type == "MESH":
+                Probe.seen[shown.name] = read_mesh(shown.data)
+
+
+def read_points(curves):
+    found = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", found.ravel())
+    return found.reshape(len(curves.curves), -1, 3)
+
+
+def read_mesh(mesh):
+    vertices = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", vertices.ravel())
+    mesh.calc_loop_triangles()
+    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    return TriMesh(vertices, triangles)
+
+
+@pytest.fixture
+def rendered(cube):
+    """A function that renders, and returns the strands and the largest distance of a root from the surface."""
+    scene_now = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene_now.collection.objects.link(camera)
+    scene_now.camera = camera
+    scene_now.render.resolution_x = scene_now.render.resolution_y = 4
+    bpy.utils.register_class(Probe)
+
+    def render():
+        scene_now.render.engine = Probe.bl_idname
+        bpy.ops.render.render()
+        scene_now.render.engine = "CYCLES"
+        strands, mesh = Probe.seen["Hair"], Probe.seen[cube.name]
+        nearest = closest_point.SurfaceQuery(mesh).nearest(strands[:, 0])
+        return strands, np.linalg.norm(positions(mesh, nearest) - strands[:, 0], axis=1).max()
+
+    yield render
+    bpy.utils.unregister_class(Probe)
+
+
+def bulge(cube):
+    """Bend the cage's faces and deform them, so that levels differ in where they are."""
+    for vertex in cube.data.vertices[:3]:
+        vertex.co *= 1.3
+    cube.shape_key_add(name="Basis")
+    key = cube.shape_key_add(name="Key")
+    key.data[0].co.z += 0.4
+    key.value = 1.0
+    update()
+
+
+@pytest.mark.parametrize("kind", ["SUBSURF", "MULTIRES"])
+def test_renders_do_not_depend_on_the_levels_of_viewports(cube, rendered, kind):
+    """Nothing that is stored changes, and neither does what is computed again meanwhile."""
+    if kind == "MULTIRES":
+        cube.modifiers.clear()
+        cube.modifiers.new("Multires", "MULTIRES")
+        for _ in range(3):
+            bpy.ops.object.multires_subdivide(modifier="Multires")
+        cube.modifiers[0].levels = cube.modifiers[0].render_levels = 2
+    bulge(cube)
+    guides, hair = grow(cube, guide_count=40, strand_count=200)
+    stood, combed = points(hair), points(guides)
+    before = {}
+    for render_levels in (0, 1, 2, 3):
+        cube.modifiers[0].render_levels = render_levels
+        before[render_levels], apart = rendered()
+        assert apart < 2e-6
+    for change in (set_levels, set_eye, set_simplify):
+        for levels in (0, 1, 2, 3):
+            change(cube, levels)
+            update()
+            cube.modifiers[0].render_levels = 3 - levels
+            np.testing.assert_array_equal(points(hair), stood)
+            np.testing.assert_array_equal(points(guides), combed)
+            np.testing.assert_array_equal(rendered()[0], before[3 - levels])
+            shown = evaluated_points(hair)[:, 0]
+            there = evaluated_mesh(cube)
+            nearest = closest_point.SurfaceQuery(there).nearest(shown)
+            assert np.linalg.norm(positions(there, nearest) - shown, axis=1).max() < 2e-6
+            np.testing.assert_allclose(drawn_points(hair), evaluated_points(hair), atol=1e-5)
+            assert guides.data.vellus.status == hair.data.vellus.status == ""
+    set_levels(cube, 0)
+    update()
+    write_points(guides, combed + np.linspace(0.0, 0.1, combed.shape[1])[:, None] * np.float32([0.6, 0.0, 0.8]))
+    at_none = points(hair)
+    set_levels(cube, 2)
+    update()
+    write_points(guides, combed)
+    np.testing.assert_allclose(points(hair), stood, atol=1e-6)
+    write_points(guides, combed + np.linspace(0.0, 0.1, combed.shape[1])[:, None] * np.float32([0.6, 0.0, 0.8]))
+    np.testing.assert_allclose(points(hair), at_none, atol=1e-6)
+
+
+def evaluated_mesh(surface):
+    evaluated = surface.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    found = read_mesh(evaluated.to_mesh())
+    evaluated.to_mesh_clear()
+    return found
+
+
+def test_strands_follow_what_is_moved_at_another_level(cube):
+    """The cage is edited with the modifier's eye off, and shown again: they are where they are on the faces."""
+    guides, hair = grow(cube, guide_count=40, strand_count=200)
+    before = points(hair)[:, 0]
+    set_eye(cube, 0)
+    update()
+    for vertex in cube.data.vertices:
+        vertex.co.x += 0.5 if vertex.co.x > 0.0 else 0.0
+    cube.data.update()
+    update()
+    set_eye(cube, 2)
+    update()
+    moved = before.copy()
+    moved[:, 0] += 0.25 * (1.0 + before[:, 0])  # all faces stretch
+    np.testing.assert_allclose(points(hair)[:, 0], moved, atol=1e-5)
+    assert guides.data.vellus.status == ""
+
+
+def test_an_applied_subdivision_leaves_strands_where_they_were_seen(cube):
+    guides, _hair = grow_straight(cube)
+    seen = evaluated_points(guides)
+    bpy.context.view_layer.objects.active = cube
+    bpy.ops.object.modifier_apply(modifier="Subdivision")
+    update()
+    np.testing.assert_allclose(points(guides)[:, 0], seen[:, 0], atol=1e-5)
+    assert guides.data.vellus.status == ""

@@ -201,3 +201,28 @@ def test_a_quad_that_is_cut_otherwise_keeps_its_strands(scene):
         assert is_first.sum() > 5
         assert (y >= np.where(x < 0.3, 2.0 * x, 0.6 + (x - 0.3) / 1.75) - 1e-6).all()  # in what is left of the quad
     assert guides.data.vellus.status == ""
+
+
+def test_strands_that_were_edited_by_hand_are_carried_too(hair):
+    """They do not grow again between their guides: one edit moves vertices, another makes faces as well."""
+    edited = points(hair)
+    edited[:, :, 1] += np.linspace(0.0, 0.2, edited.shape[1]) ** 2
+    write_points(hair, edited)
+    skin = bpy.data.objects["Skin"]
+    for vertex in skin.data.vertices:
+        vertex.co = (vertex.co.x, -vertex.co.z, vertex.co.y + 0.5)
+    skin.data.update_tag()
+    bpy.context.view_layer.update()
+    turned = np.stack([edited[..., 0], -edited[..., 2], edited[..., 1] + np.float32(0.5)], axis=-1)
+    np.testing.assert_allclose(points(hair), turned, atol=2e-5)
+    select(0)
+    with edit_mode():
+        bpy.ops.mesh.extrude_region_move()
+        moved = bmesh.from_edit_mesh(skin.data)
+        moved.verts.ensure_lookup_table()
+        for vertex in moved.verts[20:60]:
+            vertex.co.x += 0.25
+    corners = np.array([attribute(hair, name) for name in stored_roots.VERTICES])
+    is_moved = ((corners >= 30) & (corners < 50)).all(axis=0)  # with all of their faces
+    assert is_moved.sum() > 20
+    np.testing.assert_allclose(points(hair)[is_moved, 0], turned[is_moved, 0] + (0.25, 0.0, 0.0), atol=2e-5)

@@ -19,6 +19,7 @@ from ..strands import stored_roots
 from . import force_fields, simulated_world
 
 _HALF = 16  # digits of a digest, for what carries guides, and for what else acts on them
+_LEVEL = 4  # of these, for how far the surface is subdivided
 
 SURFACE, SURROUNDINGS = "the surface", "colliders, force fields, gravity or keyed settings"
 
@@ -41,17 +42,20 @@ def digest_of(guides, blender_scene, depsgraph, settings):
     roots = np.einsum("nc,ncx->nx", places[1].astype(np.float64), vertices[places[0]])
     carrying = np.float32(np.concatenate([roots, *_bounds(vertices), _matrix(surface, depsgraph)[:3, :3]]))
     acting = _acting(guides, blender_scene, depsgraph, settings, metres)
-    return frame_manifest.digest(carrying)[:_HALF] + frame_manifest.digest(acting)[:_HALF]
+    of_surface = frame_manifest.digest([len(vertices)])[:_LEVEL] + frame_manifest.digest(carrying)
+    return of_surface[:_HALF] + frame_manifest.digest(acting)[:_HALF]
 
 
 def change(baked, now, is_carried=False):
     """What moves otherwise than in the digest of a baked frame, in a few words; None where nothing does.
 
-    is_carried: whether the surface has other coordinates since, by which its half of the digest tells nothing.
+    is_carried: whether the surface has other coordinates since, by which its half of the digest tells nothing. Nor does
+    it where the surface is subdivided otherwise now; other faces are known by `guide_baking.key_of`.
     """
-    if baked == now or (is_carried and baked[_HALF:] == now[_HALF:]):
+    is_other = is_carried or baked[:_LEVEL] != now[:_LEVEL]
+    if baked == now or (is_other and baked[_HALF:] == now[_HALF:]):
         return None
-    return SURROUNDINGS if baked[:_HALF] == now[:_HALF] else SURFACE
+    return SURROUNDINGS if is_other or baked[:_HALF] == now[:_HALF] else SURFACE
 
 
 def _acting(guides, blender_scene, depsgraph, settings, metres):

@@ -14,6 +14,7 @@ from ....core.geometry import mesh as mesh_math
 from ....core.geometry import strands
 from ....core.grooming import groom
 from ...host.notices import name_of
+from ..surfaces import cage_of
 from . import attributes, follow_nodes, simulated_guides, stored_roots
 
 _GUIDE_MAP = ("guide_index", "guide_weight")
@@ -110,6 +111,13 @@ def write_roots(curves, surface, roots, normals=None):
             is_combed = curves.vellus.kind == "GUIDES" and surface.corner_uvs is not None
             follow_nodes.set_surface(user, curves.surface, len(surface.rest), is_combed, surface.cage_corners)
     curves.update_tag()
+
+
+def write_smoothness(curves, surface):
+    """Write only how smooth modifiers make the surface now."""
+    for user in bpy.data.objects:
+        if user.data == curves and user.library is None:
+            follow_nodes.set_smoothness(user, surface.cage_corners)
 
 
 def write_uvs(curves, surface):
@@ -246,8 +254,8 @@ def read_roots(curves, surface, first_points):
     Roots of curves that were added or slid in sculpt mode are outdated, and all roots if the triangles changed.
     """
     mesh_math.check_mesh(surface.mesh)
-    stored = stored_roots.points(curves, surface)
-    if stored is None or curves.vellus.topology != surface.topology:
+    stored = stored_roots.points(curves, surface) if curves.vellus.topology == surface.topology else None
+    if stored is None:
         return nearest_roots(surface, first_points)
     distance = np.linalg.norm(mesh_math.positions(surface.mesh, stored) - first_points, axis=1)
     apart = attributes.read(curves, "root_distance", "FLOAT", "CURVE")
@@ -291,9 +299,9 @@ def read_guides(curves, surface, device, known=None, local=None):
     points = surface.from_local(local)
     offsets = np.concatenate([[0], np.cumsum(counts)])
     firsts = points[offsets[:-1]]
-    has_known_roots = (
-        known is not None and curves.vellus.topology == surface.topology and np.array_equal(firsts, known.numpy()[:, 0])
-    )
+    has_known_roots = known is not None and np.array_equal(firsts, known.numpy()[:, 0])
+    # They may be stored on faces that are subdivided otherwise now.
+    has_known_roots = has_known_roots and cage_of(curves.vellus.topology) == cage_of(surface.topology)
     roots = None if has_known_roots else read_roots(curves, surface, firsts)
     points = even_points(points, offsets, lambda: attributes.are_smooth(curves))
     return known.moved(points) if has_known_roots else strands.from_numpy(points, roots, device)

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from .. import rest_nodes, surface_collections, thin_hair
+from .. import rest_nodes, rest_sources, surface_collections, thin_hair
 from . import follow_nodes
 
 _UNMOVED = Matrix()
@@ -91,6 +91,8 @@ def keep_rest(surface_object):
         surface_object.add_rest_position_attribute = True
     if rest_nodes.tell_apart(surface_object) or is_new:
         # Blender reports this as a change of the mesh: update before there is hair that would react to it.
+        bpy.context.view_layer.update()
+    if rest_sources.keep(surface_object):
         bpy.context.view_layer.update()
 
 

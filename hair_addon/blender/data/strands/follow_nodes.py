@@ -3,7 +3,7 @@
 
 Hair follows an armature in every frame that Cycles renders or an exporter writes, in linked files, and without the
 add-on. Nodes find a root by its stored vertices, and need no UV map; on a surface with another number of vertices, such
-as a finer subdivision for renders, by the nearest point of the surface at rest.
+as a finer subdivision for renders, by the nearest point of the surface at rest, on which they begin.
 """
 
 from collections import Counter
@@ -17,10 +17,14 @@ from . import stored_roots
 _NAME = "Vellus Follow Surface"
 # Of the nodes below. Groups of other versions, from older files, are not changed: on surfaces without subdivision they
 # do the same. Hair takes a new one where strands would turn from the faces of a cage, as they do in groups before
-# `_SMOOTH_SINCE`, and where `_PAUSING` is all that a group lacks.
-_VERSION = 4
+# `_SMOOTH_SINCE`, and where `_ADDED` nodes are all that a group lacks.
+_VERSION = 5
 _SMOOTH_SINCE = 3
-_PAUSING = ("GeometryNodeIsViewport", "FunctionNodeBooleanMath", "GeometryNodeSwitch")
+# Nodes that versions added: a group that lacks no others is taken for a new one.
+_ADDED = {
+    4: ("GeometryNodeIsViewport", "FunctionNodeBooleanMath", "GeometryNodeSwitch"),
+    5: ("GeometryNodeInputNamedAttribute", "GeometryNodeSwitch"),
+}
 # Of the group: identifiers, which stay when an artist renames inputs, and types.
 _INPUTS = {
     "Surface": ("Socket_1", "NodeSocketObject"),
@@ -44,29 +48,34 @@ def set_surface(curves_object, surface_object, vertex_count, is_combed, cage_cor
     vertex_count: of the evaluated surface that the strands' root vertices count in; is_combed: whether brushes are to
     move strands where the surface has carried them, which needs a UV map; cage_corners: of a `Surface`.
     """
+    inputs = {"Surface": surface_object, "Vertices": vertex_count, "Combed": is_combed, "Cage Corners": cage_corners}
+    _set(curves_object, inputs)
+
+
+def set_smoothness(curves_object, cage_corners):
+    """Set only how smooth the surface is that an object's strands follow."""
+    _set(curves_object, {"Cage Corners": cage_corners})
+
+
+def _set(curves_object, inputs):
     for modifier in curves_object.modifiers:
         if modifier.type == "NODES" and _is_ours(modifier.node_group):
             group = modifier.node_group
-            if (cage_corners and _is_before(group, _SMOOTH_SINCE)) or _lacks_pausing(group):
+            if (inputs["Cage Corners"] and _is_before(group, _SMOOTH_SINCE)) or _lacks_only_new(group):
                 modifier.node_group = _group()
-            inputs = {
-                "Surface": surface_object,
-                "Vertices": vertex_count,
-                "Combed": is_combed,
-                "Cage Corners": cage_corners,
-            }
             for name in inputs.keys() & set(_intact_inputs(modifier.node_group)):
                 socket = getattr(modifier.properties.inputs, _INPUTS[name][0])
                 if socket.value != inputs[name]:
                     socket.value = inputs[name]
 
 
-def _lacks_pausing(group):
-    """Whether a group is as version 3 made it; one that an artist has added nodes to is to stay."""
+def _lacks_only_new(group):
+    """Whether a group is as an earlier version made it; one that an artist has added nodes to is to stay."""
     if not _is_before(group, _VERSION) or _is_before(group, _SMOOTH_SINCE):
         return False
+    added = Counter(kind for since, kinds in _ADDED.items() if group["vellus_version"] < since for kind in kinds)
     kinds = Counter(node.bl_idname for node in group.nodes)
-    return kinds + Counter(_PAUSING) == Counter(node.bl_idname for node in _group().nodes)
+    return kinds + added == Counter(node.bl_idname for node in _group().nodes)
 
 
 def is_paused(curves_object):
@@ -278,8 +287,9 @@ class _Tree:
         first = self._node("GeometryNodePointsOfCurve", {"Sort Index": 0}).outputs[0]
         root = self._on_domain(self._at_index(position, first), "FLOAT_VECTOR", "CURVE")
         at_rest = self._node("GeometryNodeSetPosition", {"Geometry": surface, "Position": self._rest(position)})
+        floats = self._node("GeometryNodeInputNamedAttribute", {"Name": "root_distance"}, data_type="FLOAT")
 
-        def at_root(value):
+        def at_root(value, is_start=False):
             parts = [
                 self._vector("SCALE", self._sample(surface, value, corner), scale=weight)
                 for corner, weight in zip(corners, weights, strict=True)
@@ -290,9 +300,12 @@ class _Tree:
                 {"Mesh": at_rest.outputs[0], "Value": value, "Sample Position": root},
                 data_type="FLOAT_VECTOR",
             ).outputs[0]
+            if is_start:  # faces at another level of subdivision do not lie in those of a bent cage
+                nearest = self._switch(floats.outputs["Exists"], root, nearest)
             return self._switch(is_other, known, nearest)
 
-        return [at_root(value) for value in values]
+        before, *others = values
+        return [at_root(before, is_start=True), *map(at_root, others)]
 
     def _rest(self, position):
         """Rest positions of vertices; current positions if Blender does not store them."""

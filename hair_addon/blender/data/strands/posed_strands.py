@@ -14,6 +14,7 @@ from ....core import geometry
 from ....core.geometry.mesh import require_finite
 from .. import scene
 from ..scene import Surface
+from ..surfaces import cage_of
 
 
 @dataclass(frozen=True)
@@ -41,17 +42,19 @@ class Pose:
             self._motions[id(turning)] = turning, moved
         return self._motions[id(turning)][1]
 
-    def carry(self, points, topology, places, chosen=slice(None)):
+    def carry(self, points, topology, places, chosen=slice(None), may_float=False):
         """Return (M, P, 3) float32: the chosen strands on the deformed surface; unchanged if it is not deformed.
 
         points: (S, P, 3) float32 of all strands at rest, in local coordinates; topology: of the surface that they were
         rooted on; places: their roots there, as `Surface.places` or `stored_roots.places` returns them, or None.
-        Strands are rooted at the nearest place where the surface has other triangles now, or what is stored is damaged.
+        Strands are rooted at the nearest place where the surface has other faces now, or what is stored is damaged;
+        may_float: whether they may begin apart from the surface, and are to.
         """
         if not self.is_deformed:
             return points[chosen]
-        places = self.rooted(topology, places, points[:, 0])
-        return carried(points[chosen], self.motion_at(places[0]), (places[0][chosen], places[1][chosen]))
+        vertices, barycentric, *slides = self.rooted(topology, places, points[:, 0], may_float)
+        points = points[chosen] + slides[0][chosen][:, None] if slides else points[chosen]
+        return carried(points, self.motion_at(vertices), (vertices[chosen], barycentric[chosen]))
 
     def carry_rooted(self, points, counts, places, chosen):
         """The same of points (N, 3) of chosen strands that have counts (M,) each, and whose places `rooted` gave.
@@ -60,10 +63,17 @@ class Pose:
         """
         if not self.is_deformed:
             return points
-        return carried(points, self.motion_at(places[0]), (places[0][chosen], places[1][chosen]), counts)
+        vertices, barycentric, *slides = places
+        if slides:
+            points = points + np.repeat(slides[0][chosen], counts, axis=0)
+        return carried(points, self.motion_at(vertices), (vertices[chosen], barycentric[chosen]), counts)
 
-    def rooted(self, topology, places, firsts):
-        """Root places on this surface, as `carry` takes them; firsts: (S, 3) local first points."""
+    def rooted(self, topology, places, firsts, may_float=False):
+        """Root places on this surface, as `carry_rooted` takes them; firsts: (S, 3) local first points.
+
+        A third array where strands were rooted at another level of subdivision: (S, 3) from where they begin to their
+        places at rest. Faces at another level do not lie in those of a bent cage.
+        """
         surface = self.surface
         if not self.is_deformed:
             return places
@@ -74,10 +84,11 @@ class Pose:
         if not len(lost):
             return places
         vertices, barycentric = vertices.copy(), barycentric.copy()
-        # In local coordinates, as the nodes of follow_nodes.py find it, and whatever the scale of the object becomes.
-        nearest = geometry.closest_point.SurfaceQuery(surface.local_mesh).nearest(firsts[lost])
-        vertices[lost], barycentric[lost] = surface.places(nearest)
-        return vertices, barycentric
+        vertices[lost], barycentric[lost] = surface.nearest_places(firsts[lost])
+        if may_float or topology == surface.topology or cage_of(topology) != cage_of(surface.topology):
+            return vertices, barycentric
+        at_rest = sum(barycentric[:, corner, None] * surface.rest[vertices[:, corner]] for corner in range(3))
+        return vertices, barycentric, at_rest - firsts
 
 
 def read_pose(surface_object, depsgraph):

@@ -14,12 +14,11 @@ VERTICES = ("root_vertex_0", "root_vertex_1", "root_vertex_2")
 
 
 def points(curves, surface, is_complete=False):
-    """`SurfacePoints` of roots on faces as they were stored; impossible ones become a corner of triangle 0.
+    """`SurfacePoints` of roots on a surface with the faces that they were stored on; impossible ones become a corner.
 
     is_complete: None if any of them is impossible; None too if none are stored.
     """
-    barycentric = attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
-    triangle = attributes.read(curves, "root_triangle", "INT", "CURVE")
+    triangle, barycentric = raw(curves)
     if barycentric is None or triangle is None:
         return None
     # Curves that sculpt mode adds carry zeros; a surface that lost faces leaves indices out of range.
@@ -28,7 +27,10 @@ def points(curves, surface, is_complete=False):
     found = surface.swap_winding(SurfacePoints(triangle, barycentric))
     vertices = _vertices(curves)
     if vertices is not None:
-        cut_otherwise = np.flatnonzero(known & (vertices != surface.root_vertices(found)).any(axis=1))
+        are_vertices = ((vertices >= 0) & (vertices < len(surface.rest))).all(axis=1)
+        is_other = (vertices != surface.root_vertices(found)).any(axis=1)
+        cut_otherwise = np.flatnonzero(known & is_other & are_vertices)
+        known &= are_vertices
         if len(cut_otherwise):
             polygons = geometry.face_places.owners(surface.faces)[triangle[cut_otherwise]]
             its_places = vertices[cut_otherwise], barycentric[cut_otherwise]
@@ -40,6 +42,12 @@ def points(curves, surface, is_complete=False):
     found.triangle[~known] = 0
     found.barycentric[~known] = (1.0, 0.0, 0.0)
     return found
+
+
+def raw(curves):
+    """(S,) int32 triangles and (S, 3) float32 barycentric coordinates as they are stored, each None if it is not."""
+    triangle = attributes.read(curves, "root_triangle", "INT", "CURVE")
+    return triangle, attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
 
 
 def places(curves, vertex_count):
@@ -63,6 +71,11 @@ def turn(curves):
     attributes.write(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE", barycentric[:, [0, 2, 1]])
     for name, column in zip(VERTICES, (0, 2, 1), strict=True):
         attributes.write(curves, name, "INT", "CURVE", vertices[:, column])
+
+
+def may_float(curves):
+    """Whether strands may begin apart from their surface, as curves that came from elsewhere do."""
+    return attributes.has(curves, "root_distance", "FLOAT", "CURVE")
 
 
 def are_barycentric(coordinates):

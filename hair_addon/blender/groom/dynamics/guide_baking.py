@@ -20,6 +20,7 @@ from ....core.long_work import Stage, Work
 from ...data import scene as scenes
 from ...data import surface_space
 from ...data.simulation import wet_guides
+from ...data.surfaces import cage_of
 from ...host import memory, scene_time
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
@@ -79,7 +80,7 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
         "solver": SOLVER_VERSION,
         "settings": guide_simulation.unkeyed(guides, settings),
         "guides": guide_simulation.combed_points(guides),
-        "surface": guides.vellus.topology,
+        "surface": cage_of(guides.vellus.topology),
         "frame rate": scene_time.animation_rate(scene),
         "units": scene.unit_settings.scale_length,
     }

@@ -210,13 +210,13 @@ def test_other_faces_root_guides_again_and_say_so(sphere):
     combed = points(guides)
     combed[:5, 20:] += np.float32([0.1, 0.2, 0.0])
     write_points(guides, combed)
-    sphere.modifiers.new("Finer", "SUBSURF").levels = 1
+    sphere.modifiers.new("Coarser", "DECIMATE").ratio = 0.5
     update()
     assert "faces" in guides.data.vellus.status
     np.testing.assert_allclose(points(guides), combed, atol=1e-6)
     assert len(hair.data.curves) == 200 and np.isfinite(points(hair)).all()
     for curves_object in (guides, hair):
-        np.testing.assert_allclose(evaluated_points(curves_object)[:, 0], surface_points(curves_object), atol=5e-3)
+        np.testing.assert_allclose(evaluated_points(curves_object)[:, 0], surface_points(curves_object), atol=0.02)
 
 
 def test_moving_the_object_computes_and_uploads_nothing(sphere, monkeypatch):

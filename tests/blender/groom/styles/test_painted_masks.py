@@ -185,13 +185,24 @@ def test_hair_follows_in_a_file_that_was_just_opened(styled, tmp_path):
 def test_a_mesh_that_changes_in_the_paint_mode_is_said_and_followed_afterwards(styled):
     bpy.ops.vellus.paint_style_mask()
     weigh("Trim Mask", right)
-    sphere().modifiers.new("Subdivision", "SUBSURF")
+    sphere().modifiers.new("Twice", "ARRAY")
     weigh("Trim Mask", right, 0.5)
     assert "has changed" in styled.data.vellus.status
     bpy.ops.vellus.paint_style_mask()
     bpy.context.view_layer.update()
     assert styled.data.vellus.status == ""
     assert len(bindings.of(styled.data).surface.rest) > 642
+
+
+def test_a_mask_is_painted_on_a_surface_that_is_subdivided_in_the_paint_mode(styled):
+    bpy.ops.vellus.paint_style_mask()
+    weigh("Trim Mask", right)
+    sphere().modifiers.new("Subdivision", "SUBSURF")
+    weigh("Trim Mask", right, 0.5)
+    assert styled.data.vellus.status == ""
+    bpy.ops.vellus.paint_style_mask()
+    bpy.context.view_layer.update()
+    assert styled.data.vellus.status == ""
 
 
 def test_painting_and_its_group_are_undone(styled):

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The surface that guides and hair are made on: as it is now, or as hair is bound to it."""
+
+from bpy.types import Curves, Depsgraph, Object
+
+from ...core.errors import HairError
+from ..data import scene
+from ..data.scene import Surface
+from ..data.strands import curves, curves_objects, partings
+from ..settings import style_items
+from . import bindings
+from .bindings import BoundHair
+
+
+def read(surface_object: Object | None, depsgraph: Depsgraph, target: Curves | None = None) -> Surface:
+    """The `Surface` of a mesh object that may be changed.
+
+    The surface that `target` is bound to, if that is the same: of which normals and areas are known. That of hair
+    that follows a library only carries it. Raises `HairError`.
+    """
+    if target is None or not curves.follows_library(target):
+        require_mesh(surface_object)
+        curves_objects.keep_rest(surface_object)
+    surface, bound = scene.read_surface(surface_object, depsgraph), target and bindings.of(target)
+    if bound is not None and (bound.surface.is_same(surface) or _is_as_bound(bound, surface, target)):
+        surface = bound.surface
+    return surface
+
+
+def _is_as_bound(bound: BoundHair, surface: Surface, target: Curves) -> bool:
+    """Whether only the level of subdivision is another than when hair was bound, and it reads nothing of faces.
+
+    Strands are then as at that level: viewports have other levels than renders.
+    """
+    state = target.vellus
+    reads_faces = partings.is_wanted(state.hair) or any(any(style_items.masks_of(item)) for item in state.styles)
+    return not reads_faces and bound.surface.is_same_cage(surface)
+
+
+def require_mesh(surface_object: Object | None) -> None:
+    """Raise `HairError` unless hair may grow on an object."""
+    if surface_object is None or surface_object.type != "MESH":
+        raise HairError("Hair needs a mesh object to grow on: select one.")
+    curves.require_overridable(surface_object)
