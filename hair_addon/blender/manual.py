@@ -38,12 +38,12 @@ _OPERATORS = {
         "make_own_guides",
         "flip_normals",
     ),
-    "guides": ("distribute_guides",),
+    "guides": ("distribute_guides", "draw_flow"),
     "guide_tools": (
         *("guide_length", "trim_guides", "change_guide_count", "mirror_guides", "copy_guide_shape"),
         *("smooth_guides", "lift_guides", "attract_guides", "drape_guides"),
     ),
-    "strands": ("interpolate_hair", "update_hair"),
+    "strands": ("interpolate_hair", "draw_parting", "update_hair"),
     "dynamics": (
         *("play_dynamics", "bake_dynamics", "free_dynamics", "apply_dynamics_preset", "stiffen_dynamics"),
         *("deliver_dynamics", "remove_delivery"),

@@ -258,6 +258,24 @@ class VisibilityBuffer:
         within = [placed.first <= segment < placed.first + placed.segment_count for placed in self._hair]
         return within.index(True) if any(within) else None
 
+    def hair_near(self, x, y, reach):
+        """Which of the hair is seen nearest to a sample, as far as `reach` samples away; as `hair_at`."""
+        left, bottom = max(x - reach, 0), max(y - reach, 0)
+        width, height = min(x + reach + 1, self.size[0]) - left, min(y + reach + 1, self.size[1]) - bottom
+        if width <= 0 or height <= 0:
+            return None
+        with self._strips.bind():
+            read = self._strips.read_color(left, bottom, width, height, 1, 0, "UINT")
+        segments = np.array(read, np.int64).reshape(height, width)
+        rows, columns = np.indices(segments.shape)
+        away = np.hypot(rows + bottom - y, columns + left - x)
+        found = np.full(segments.shape, -1)
+        for index, placed in enumerate(self._hair):
+            found[(placed.first <= segments) & (segments < placed.first + placed.segment_count)] = index
+        away[(found < 0) | (away > reach)] = np.inf
+        nearest = np.unravel_index(np.argmin(away), away.shape)
+        return int(found[nearest]) if np.isfinite(away[nearest]) else None
+
     def _find(self):
         """Find the nearest segments by a compute program: first depths, then indices."""
         self._copy_depths(is_start=True)

@@ -5,9 +5,12 @@ A system is identified by its Curves datablock, of the hair or of guides without
 the edited system are computed from the objects of a view layer and the active object.
 """
 
+import re
+
 import bpy
 from bpy.types import Curves, Object, ViewLayer
 
+from ..data.strands.curves import followers
 from ..settings import computed_properties, properties
 from . import mask_suggestions
 from .selection import active_of_kind, make_active, object_of, painted_hair, surface_of
@@ -74,10 +77,27 @@ def edit(system: Curves, view_layer: ViewLayer) -> None:
 
 
 def rename(curves_object: Object, name: str) -> None:
-    """Give an object and its Curves a name; guides keep theirs, which other hair may follow too."""
-    if name.strip() and curves_object.library is None:
-        curves_object.name = name
-        curves_object.data.name = curves_object.name
+    """Give an object and its Curves a name, and its guides one after it, unless they have a name of their own."""
+    if not name.strip() or curves_object.library is not None:
+        return
+    before = curves_object.name
+    curves_object.name = name
+    curves_object.data.name = curves_object.name
+    name_guides(curves_object, before)
+
+
+def name_guides(hair_object: Object, before: str = "") -> None:
+    """Name guides after the hair that follows them, *Fringe Guides*, unless an artist has named them.
+
+    before: the name that the hair had. Other hair may follow them too: then they keep theirs.
+    """
+    guides = hair_object.data.vellus.guide_curves
+    if guides is None or guides.library is not None or len(followers(guides)) > 1:
+        return
+    automatic = rf"Guides(\.\d+)?|{re.escape(before)} Guides(\.\d+)?"
+    for shown in [guides, *(o for o in bpy.data.objects if o.data == guides)]:
+        if re.fullmatch(automatic, shown.name):
+            shown.name = f"{hair_object.name} Guides"
 
 
 def _edited_index(view_layer):

@@ -369,7 +369,9 @@ def require_uncombed(target: Curves) -> None:
         raise HairError("Hand-edited: these settings no longer apply. Regenerate Strands discards the edits.")
     if curves.is_hand_made(target):
         raise HairError("Hand-made: these settings do not apply. Regenerate Guides replaces the guides.")
-    raise HairError("Hand-edited: these settings no longer apply. Regenerate Guides discards the edits.")
+    raise HairError(
+        "Hand-edited: these settings no longer apply. Use Guide Tools; Regenerate Guides discards the edits."
+    )
 
 
 def inputs_of(target: Curves) -> tuple[Curves, HairSettings]:

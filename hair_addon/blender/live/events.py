@@ -5,6 +5,7 @@ After an event nothing is drawn or computed from what was cached before it.
 """
 
 from ..gpu import world_texture
+from ..groom.guides import guide_states
 from ..render import hair_cache
 from ..render.viewport import viewport
 
@@ -17,11 +18,13 @@ def scene_changed(is_hair_only=False):
 def curves_reported(datablock):
     """Blender reports a Curves datablock as changed, which it may be: its strands, and what binds them."""
     hair_cache.invalidate_unless_same(datablock)
+    guide_states.state_cache.invalidate(datablock.session_uid)
 
 
 def strands_made(datablock):
     """Guides or hair were computed again: strands of the datablock."""
     hair_cache.strand_cache.invalidate(datablock.session_uid)
+    guide_states.state_cache.invalidate(datablock.session_uid)
 
 
 def surface_moved(surface_object):

@@ -11,6 +11,7 @@ from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, surface_textures, world_texture
 from ..groom import bindings, copied_hair, edited_faces, followed_names, paused_hair
 from ..groom.dynamics import frame_folders, guide_simulation
+from ..groom.guides import guide_states
 from ..host import notices
 from ..render import hair_cache
 from ..render.frames import composite
@@ -25,6 +26,7 @@ COPIES = (
     viewport.view_cache,
     bindings.binding_cache,
     bindings.kept_cache,
+    guide_states.state_cache,
     world_texture.light_cache,
     lights.frame_cache,
     animated.value_cache,

@@ -56,7 +56,7 @@ def row(layout, owner, name, size=""):
         return
     sides = value_side.row(align=True)
     sides.prop(owner, name, text="")
-    sides.prop(owner, flag, text="", icon="AUTO")
+    sides.prop(owner, flag, text="", icon="LINKED")
 
 
 def _below_name(layout, owner, name):
@@ -99,9 +99,14 @@ def others(settings_class, *shown):
     return tuple(name for name, _default, _details in declared(settings_class) if name not in names)
 
 
-def guide_rows(layout, owner, surface):
-    """Number, length and masks of guides; owner: has properties of `GuideSettings`; surface: object or None."""
-    rows(layout, owner, GuideSettings, others(GuideSettings, _GROWTH, _FLOW, _PLACEMENT, _MASKS))
+def guide_rows(layout, owner, surface, are_combed=False):
+    """Number, length and masks of guides; owner: has properties of `GuideSettings`; surface: object or None.
+
+    are_combed: gray out what has no effect on combed guides. Masks have, on the strands.
+    """
+    column = layout.column()
+    column.active = not are_combed
+    rows(column, owner, GuideSettings, others(GuideSettings, _GROWTH, _FLOW, _PLACEMENT, _MASKS))
     _density_rows(layout, owner, surface)
 
 

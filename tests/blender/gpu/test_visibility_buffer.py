@@ -60,6 +60,14 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL, 
     for y, x in np.argwhere(covered)[::97]:
         assert buffer.hair_at(int(x), int(y)) == np.searchsorted(np.cumsum(counts), segments[y, x], side="right")
     assert covered.all() or buffer.hair_at(*map(int, np.argwhere(~covered)[0][::-1])) is None
+    owners = np.where(covered, np.searchsorted(np.cumsum(counts), segments, side="right"), -1)
+    for x, y in np.random.default_rng(1).integers(0, owners.shape, (20, 2))[:, ::-1]:
+        rows, columns = np.nonzero(covered)
+        away = np.hypot(rows - y, columns - x)
+        wanted = {owners[rows[n], columns[n]] for n in np.flatnonzero(away == away.min(initial=np.inf))}
+        for reach in (0, 3, 40):
+            found = buffer.hair_near(int(x), int(y), reach)
+            assert found in wanted if away.min(initial=np.inf) <= reach else found is None
     return np.where(covered, segments, -1), depths
 
 

@@ -53,7 +53,7 @@ def test_the_list_shows_the_systems_of_the_active_mesh_and_the_panel_draws_them(
 
 
 def test_the_row_follows_the_active_object(systems):
-    for active, row in (("Long", "Long"), ("Brows", "Brows"), ("Guides.001", "Long"), ("Sphere", "Brows")):
+    for active, row in (("Long", "Long"), ("Brows", "Brows"), ("Long Guides", "Long"), ("Sphere", "Brows")):
         activate(active)
         assert listed()[1] == row, active
 
@@ -120,7 +120,7 @@ def test_deleting_a_row_leaves_the_others_alone(systems):
 
 def test_guides_that_other_hair_follows_survive_a_system(systems):
     guides = systems[1].data.vellus.guide_curves
-    activate(bpy.data.objects["Guides.002"].name)
+    activate(bpy.data.objects["Brows Guides"].name)
     bpy.ops.vellus.interpolate_hair(strand_count=9)
     activate("Brows")
     bpy.ops.vellus.delete_system()
@@ -131,7 +131,7 @@ def test_hair_deleted_by_other_means_leaves_the_list(systems):
     bpy.data.objects.remove(systems[1])
     bpy.context.view_layer.update()
     activate("Sphere")
-    assert listed() == (["Guides.002", "Long"], "Long")
+    assert listed() == (["Brows Guides", "Long"], "Long")
 
 
 def test_another_view_layer_lists_what_it_has(systems):

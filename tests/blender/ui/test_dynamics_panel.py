@@ -2,15 +2,18 @@
 """The Dynamics panel: a row for each setting that matters, and what the settings mean in a sentence."""
 
 import bpy
+import numpy as np
 import pytest
 
 from hair_addon.blender.groom.dynamics import dynamics_notes, frame_folders
+from hair_addon.blender.groom.guides import guide_tools
 from hair_addon.blender.ui import panels
 from hair_addon.core.dynamics.collision.collider_settings import ColliderSettings
 from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.dynamics.rod.stiffness_advice import bend_under_weight
 from hair_addon.core.params import declared
 from tests.support.interface.layout import draw, draw_all
+from tests.support.reading import points, write_points
 
 OURS = [panel for panel in panels.CLASSES if panel.bl_idname.startswith("VELLUS_PT_dynamics")]
 
@@ -150,5 +153,29 @@ def test_hand_made_guides_have_a_length_of_their_own(imported):
     bpy.ops.vellus.use_as_guides()
     guides = imported.data
     guides.vellus.guides.length = 4.0
-    assert sentence(guides.vellus).startswith("A 10 cm guide")
+    length = guide_tools.median_length(guides)
+    assert sentence(guides.vellus).startswith(f"A {100 * length:.2g} cm guide")
     assert dynamics_notes.size_note(guides, bpy.context.scene) == ""
+
+
+def test_combed_guides_bend_by_the_length_that_they_have(state):
+    """And panels say before a slider is moved that it is dead, and how long guides are."""
+    guides = bpy.data.objects["Guides"]
+    bpy.context.view_layer.objects.active = guides
+    before = draw(bpy.types.VELLUS_PT_guides)
+    assert not any("Combed" in text for text in before.texts)
+    curves = guides.data
+    xyz = points(guides)
+    write_points(guides, xyz[:, :1] + np.float32(0.3) * (xyz - xyz[:, :1]))
+    bpy.context.view_layer.update()
+    length = guide_tools.median_length(curves)
+    assert length == pytest.approx(0.3 * state.guides.length, rel=0.1)
+    assert sentence(state).startswith(f"A {100 * length:.2g} cm guide")
+    drawn = draw(bpy.types.VELLUS_PT_guides)
+    said = " ".join(drawn.texts)
+    assert "Guide Tools change guides" in said and f"Median length: {100 * length:.3g}" in said
+    assert drawn.drawn["length"] == drawn.drawn["guide_count"] == 1  # gray, as they are for guides to come
+    assert curves.vellus.status == ""
+    bpy.ops.vellus.distribute_guides()
+    bpy.context.view_layer.update()
+    assert not any("Combed" in text for text in draw(bpy.types.VELLUS_PT_guides).texts)

@@ -26,6 +26,8 @@ def read(surface_object, surface, name, depsgraph):
     if drawn.type not in {"CURVE", "CURVES", "MESH"} or (drawn.type == "CURVES" and drawn.data.vellus.kind != "NONE"):
         raise HairError('"{name}" cannot be used as lines: pick a curve, or clear the field.', name=name)
     points, edges = _read_curves(drawn.data) if drawn.type == "CURVES" else _read_edges(drawn, depsgraph)
+    if not len(edges) and drawn.type == "CURVE" and drawn.mode == "EDIT":
+        return None  # the first line is about to be drawn
     if not len(edges):
         raise HairError('"{name}" has no lines: draw a line of at least two points, without bevel.', name=name)
     if len(edges) > _POINT_LIMIT:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the settings of dynamics mean for guides of the present length.
 
-Panels ask with every redraw, so geometry is not read.
+Panels ask with every redraw, so geometry is read once after each change.
 """
 
 import math
@@ -15,10 +15,10 @@ from ...data.simulation import simulated_world
 from ...data.strands.curves import is_hand_made
 from ...settings import properties
 from ...settings.translations import error_text, interface_text
+from ..guides import guide_states
 from . import frame_folders, guide_simulation
 
 LONGEST = 1.5  # [m]: longer hair is probably of a character that is not modeled to scale
-TYPICAL_LENGTH = 0.1  # [m], of hand-made guides: the setting does not apply to them
 
 
 def bend_note(guides: Curves, blender_scene: Scene) -> str:
@@ -28,8 +28,8 @@ def bend_note(guides: Curves, blender_scene: Scene) -> str:
     except HairError as error:
         return error_text(error)
     gravity = blender_scene.gravity.length * abs(settings.gravity) if blender_scene.use_gravity else 0.0
-    length = TYPICAL_LENGTH if is_hand_made(guides) else _length(guides, blender_scene)
-    if gravity == 0.0:
+    length = _length(guides, blender_scene)
+    if gravity == 0.0 or length == 0.0:
         return ""
     return interface_text(
         "A {length} guide of this material bends by {sink} under its weight.",
@@ -83,8 +83,10 @@ def is_delivery_outdated(hair: Curves) -> bool:
 
 
 def _length(guides, blender_scene):
-    """Of guides as they are grown [m]."""
-    return guides.vellus.guides.length * simulated_world.metres_of(blender_scene, guides.vellus.dynamics)
+    """Of guides as they are grown, the median of those that are combed [m]."""
+    state = guide_states.of(guides)
+    length = state.length if state.is_combed else guides.vellus.guides.length
+    return length * simulated_world.metres_of(blender_scene, guides.vellus.dynamics)
 
 
 def _in_words(metres, blender_scene):

@@ -10,7 +10,9 @@ if TYPE_CHECKING:
         brushes,
         guide_additions,
         guide_regions,
+        guide_states,
         guide_tools,
+        line_drawing,
     )
 else:
     __getattr__ = submodules(__name__)

@@ -106,7 +106,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         known, refused, done, in_all = {}, {}, 0, sum(frame.pass_count for frame in frames.values()) * len(offsets)
         for index in scene_time.visit(blender_scene, offsets, self.frame_set):
             said = interface_text("Motion step {number} of {count}", number=index + 1, count=len(offsets))
-            self.update_stats("", said)
+            self.update_stats("", f"{said} | {interface_text('Reading the scene')}")
             with drawing.ALONE:
                 drawn = drawn_scene.read_render(depsgraph, known, refused.__setitem__)
             for view, frame in frames.items():
@@ -122,6 +122,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
                     if not bpy.app.background:
                         time.sleep(_TURN)
                     self.update_progress(done / in_all)
+                    samples = interface_text("Pass {number} of {count}", number=done, count=in_all)
+                    self.update_stats("", f"{said} | {samples}")
                     if self.test_break() or _is_stopped(done / in_all):
                         return
                 if index + 1 == len(offsets) or not bpy.app.background:

@@ -156,6 +156,11 @@ class HairPicture:
         places = [(side * (x - left) + i, side * (y - bottom) + j) for j in range(side) for i in range(side)]
         return next((found for place in places if (found := self._pass.hair_at(*place)) is not None), None)
 
+    def hair_near(self, x, y, reach):
+        """Which of the hair is seen nearest to the middle of a pixel, as far as `reach` pixels away; as `hair_at`."""
+        (left, bottom, _width, _height), side = self._detail.tile, self._detail.per_side
+        return self._pass.hair_near(side * (x - left) + side // 2, side * (y - bottom) + side // 2, side * reach)
+
     def read(self):
         """(height, width, 4) float32: premultiplied linear light, first row at the bottom."""
         pixels = self._sum.read_color(0, 0, *self.size, 4, 0, "FLOAT")

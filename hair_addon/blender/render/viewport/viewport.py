@@ -27,6 +27,7 @@ from . import hair_picture, region_pictures, selected_hair
 from .outline import HairOutline
 
 # Pixels: guides are lines of constant width.
+_PICK_REACH = 5  # pixels, beside which a click meets hair: strands are thinner than a pixel
 _GUIDE_WIDTH = 2.0
 
 _handles = []  # of draw handlers
@@ -139,7 +140,7 @@ def is_ours(context):
 
 
 def hair_at(context, x, y):
-    """The hair object that the context's viewport shows at a pixel of its region, or None."""
+    """The hair object that the context's viewport shows at a pixel of its region or a few pixels beside it, or None."""
     kept = region_pictures.known_picture(context.region, hair_picture.HairPicture)
     width, height = kept.picture.size if kept else (0, 0)
     if context.space_data.shading.type == "RENDERED" or not (0 <= x < width and 0 <= y < height):
@@ -147,7 +148,7 @@ def hair_at(context, x, y):
     view = view_cache.get(context.space_data.as_pointer())
     if view is None or kept.drawn is not view.drawn:
         return None  # the picture is outdated and about to be redrawn
-    index = kept.picture.hair_at(x, y)
+    index = kept.picture.hair_near(x, y, round(_PICK_REACH * context.preferences.system.ui_scale))
     uid = None if index is None else kept.drawn.owners[index]
     return next((o for o in context.view_layer.objects if o.session_uid == uid), None)
 

@@ -8,6 +8,7 @@ from ....core.grooming.groom import GuideSettings
 from ...data.scene import triangle_count
 from ...data.strands.curves import is_hand_made
 from ...groom.foreign.foreign_curves import is_foreign
+from ...groom.guides import guide_states
 from ...groom.selection import guides_again, guides_of, surface_of
 from ...settings.translations import interface_text
 from .. import menus, setting_rows
@@ -37,7 +38,9 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
             _draw_hand_made(layout, context, guides)
             return
         group = guides.vellus.guides
-        setting_rows.guide_rows(layout, group, surface)
+        if guide_states.of(guides).is_combed:
+            _draw_combed(layout, context, guides)
+        setting_rows.guide_rows(layout, group, surface, are_combed=guide_states.of(guides).is_combed)
         setting_rows.row(layout, guides.vellus, "is_live")
         write_stale(layout, context, guides.vellus)
         if len(guides.curves) != group.guide_count:  # some were added or removed
@@ -50,6 +53,15 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
             column.label(text="(Discards Combing)", icon="BLANK1")
         else:
             layout.operator("vellus.distribute_guides", text="New Guide Set", icon="ADD")
+
+
+def _draw_combed(layout, context, guides):
+    """Say, before a slider is moved, which ones have no effect."""
+    said = interface_text("Combed: gray settings have no effect. Guide Tools change guides and keep their combing.")
+    write(layout, context, said, "INFO")
+    length = guide_states.of(guides).length / context.scene.unit_settings.scale_length
+    shown = bpy.utils.units.to_string("METRIC", "LENGTH", length, precision=3)
+    layout.label(text=interface_text("Median length: {length}", length=shown), icon="BLANK1", translate=False)
 
 
 def _draw_hand_made(layout, context, guides):
@@ -79,6 +91,13 @@ class _OfGuides(HairTab):
         return guides is not None and not is_hand_made(guides)
 
 
+def _column(layout, context):
+    """A column for settings that combed guides do not follow."""
+    column = split(layout).column()
+    column.active = not guide_states.of(guides_of(context.object)).is_combed
+    return column
+
+
 class VELLUS_PT_guides_growth(_OfGuides, bpy.types.Panel):
     """Length and direction of the guides"""
 
@@ -86,7 +105,9 @@ class VELLUS_PT_guides_growth(_OfGuides, bpy.types.Panel):
     bl_idname = "VELLUS_PT_guides_growth"
 
     def draw(self, context):
-        setting_rows.growth_rows(split(self.layout), guides_of(context.object).vellus.guides)
+        column = _column(self.layout, context)
+        setting_rows.growth_rows(column, guides_of(context.object).vellus.guides)
+        column.operator("vellus.draw_flow", icon="GREASEPENCIL")
 
 
 class VELLUS_PT_guides_placement(_OfGuides, bpy.types.Panel):
@@ -96,7 +117,7 @@ class VELLUS_PT_guides_placement(_OfGuides, bpy.types.Panel):
     bl_idname = "VELLUS_PT_guides_placement"
 
     def draw(self, context):
-        setting_rows.placement_rows(split(self.layout), guides_of(context.object).vellus.guides)
+        setting_rows.placement_rows(_column(self.layout, context), guides_of(context.object).vellus.guides)
 
 
 class VELLUS_PT_guides_tools(HairTab, bpy.types.Panel):

@@ -85,6 +85,7 @@ class VELLUS_PT_interpolation_parting(HairTab, bpy.types.Panel):
         layout = split(self.layout)
         hair = hair_of(context.object)
         setting_rows.parting_rows(layout, hair.vellus.hair, hair.surface)
+        layout.operator("vellus.draw_parting", icon="GREASEPENCIL")
         for warning in parting_warnings(hair):
             write(layout, context, warning.text, "ERROR")
 

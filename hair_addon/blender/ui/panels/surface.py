@@ -6,11 +6,12 @@ import bpy
 from ...groom.diagnostics import warnings_of
 from ...groom.foreign import particle_hair
 from ...groom.foreign.foreign_curves import chosen, is_foreign
+from ...groom.guides import line_drawing
 from ...groom.selection import active_of_kind, guides_of, hair_of, parts_of, surface_of
 from ...host.notices import name_of, text_of
 from ...settings.translations import interface_text
 from ..setting_rows import row
-from .tab import HairTab, split, write
+from .tab import HairTab, draw_combing, split, write
 
 
 class VELLUS_PT_surface(HairTab, bpy.types.Panel):
@@ -21,6 +22,13 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
 
     def draw(self, context):
         layout = split(self.layout)
+        drawn = line_drawing.drawn_for(context.object)
+        if drawn is not None:
+            said = "Draw lines on the surface. They are used at once."
+            write(layout, context, interface_text(said), "INFO")
+            name = "vellus.draw_parting" if drawn.vellus.kind == "HAIR" else "vellus.draw_flow"
+            layout.operator(name, text="Stop Drawing", icon="CHECKMARK")
+            return
         if is_foreign(context.object):
             _draw_foreign(layout, context)
             return
@@ -41,7 +49,7 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
         if particle_hair.systems_of(context.object):
             layout.operator("vellus.convert_particles", icon="PARTICLES")
         if parts:
-            _draw_tools(layout)
+            _draw_tools(layout, context)
             _draw_combing(layout, context)
 
 
@@ -62,9 +70,9 @@ def _draw_foreign(layout, context):
         write(layout, context, interface_text("The {count} selected objects become one.", count=count), "INFO")
 
 
-def _draw_tools(layout):
+def _draw_tools(layout, context):
     column = layout.column(align=True)
-    column.operator("vellus.comb_guides", icon="SCULPTMODE_HLT")
+    draw_combing(column, context)
     column.operator("vellus.select_guides", text="Select Guides", icon="RESTRICT_SELECT_OFF")
     column.operator("vellus.select_hair", text="Select Hair", icon="RESTRICT_SELECT_OFF")
     column.operator("vellus.transfer_groom", icon="DUPLICATE")

@@ -6,7 +6,8 @@ import bpy
 from ...groom.hair_systems import edited_system, guides_of_system, systems_of
 from ...groom.selection import object_of, surface_of
 from .. import setting_rows
-from .tab import HairTab
+from ..operators.systems.comb_guides import is_combing
+from .tab import HairTab, draw_combing
 
 _ROWS = 3  # of a list that holds less
 
@@ -61,6 +62,8 @@ class VELLUS_PT_systems(HairTab, bpy.types.Panel):
         column.operator("vellus.delete_system", text="", icon="REMOVE")
         system = edited_system(context.view_layer)
         guides = None if system is None else guides_of_system(system)
+        if is_combing(context):  # at the top of a long tab
+            draw_combing(layout, context)
         if guides is not None and guides != system:
             layout.prop(guides.vellus, "show_guides")
 

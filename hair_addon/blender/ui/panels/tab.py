@@ -5,6 +5,7 @@ import textwrap
 
 from ...host.notices import text_of
 from ...settings.translations import CONTEXT, interface_text, status_text
+from ..operators.systems.comb_guides import is_combing
 
 _CHARACTER_WIDTH = 6.8  # pixels of Blender's interface font on average, at a scale of one
 _ICON_AND_MARGINS = 66.0
@@ -52,6 +53,12 @@ def write_stale(layout, context, state):
     if state.is_stale and not state.is_live:
         write(layout, context, interface_text("Out of date: settings or inputs have changed."), "INFO")
         layout.operator("vellus.update_hair", icon="FILE_REFRESH")
+
+
+def draw_combing(layout, context):
+    """The button that starts combing, or stops it."""
+    text, icon = ("Stop Combing", "CHECKMARK") if is_combing(context) else ("Comb Guides", "SCULPTMODE_HLT")
+    layout.operator("vellus.comb_guides", text=text, icon=icon)
 
 
 def megabytes(count):

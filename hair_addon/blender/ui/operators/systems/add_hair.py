@@ -7,6 +7,7 @@ from .....core.grooming import cost
 from .....core.grooming.groom import GuideSettings, HairSettings
 from ....data import scene
 from ....groom import mask_suggestions, pipeline
+from ....groom.hair_systems import name_guides
 from ....groom.selection import make_active, object_of, surface_of
 from ....settings import fitted_sizes, setting_properties
 from ... import setting_rows
@@ -63,7 +64,10 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
         setting_properties.show(self, guides.vellus.guides, GuideSettings)
         setting_properties.show(self, hair.vellus.hair, HairSettings)
         context.view_layer.update()  # to evaluate the new objects
-        make_active(object_of(hair, context.view_layer), context.view_layer)
+        hair_object = object_of(hair, context.view_layer)
+        if guides.name != "Guides":  # there were others before
+            name_guides(hair_object)
+        make_active(hair_object, context.view_layer)
 
     def _settings(self):
         """The seed is asked for once; strands take the mask of their guides."""

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Part lines and flow lines that are drawn with Blender's Draw tool, on the surface."""
+
+import bpy
+from bpy.types import Context, Curves, Object
+
+from ....core.errors import HairError
+from ...data.strands import curves
+from ...host.notices import name_of, text_of
+from .. import selection
+from . import guide_states
+
+# Of the Draw tool: corners as they were drawn, on the surface and nothing else. A Bézier curve would cut through it.
+_TOOL = {
+    "curve_type": "POLY",
+    "depth_mode": "SURFACE",
+    "surface_offset": 0.0,
+    "use_offset_absolute": True,
+    "use_stroke_endpoints": False,
+    "use_project_only_selected": True,
+    "error_threshold": 1,
+}
+
+
+def drawn_for(active: Object | None) -> Curves | None:
+    """The Curves whose part lines or flow lines are drawn in Edit Mode of the active object; None if none are."""
+    if active is None or active.type != "CURVE" or active.mode != "EDIT":
+        return None
+    users = (datablock for datablock in bpy.data.hair_curves if active.name in _names_of(datablock))
+    return next(users, None)
+
+
+def draw_parting(hair: Curves, context: Context) -> None:
+    """Begin to draw part lines of hair, or go on with those that it has. Raises `HairError`."""
+    _begin(hair, hair.vellus.hair, "part_lines", "Parting", context)
+
+
+def draw_flow(guides: Curves, context: Context) -> None:
+    """Begin to draw flow lines of guides, or go on with those that they have. Raises `HairError`."""
+    if guide_states.of(guides).is_combed:
+        raise HairError("Combed guides do not follow flow lines: regenerate the guides first, or comb them.")
+    _begin(guides, guides.vellus.guides, "flow_lines", "Flow", context)
+
+
+def stop(context: Context) -> None:
+    """Leave Edit Mode, and make active whose lines were drawn. Lines without a stroke are removed again."""
+    lines = context.object
+    target = drawn_for(lines)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    shown = selection.object_of(target, context.view_layer)
+    if not len(lines.data.splines):
+        for group, name in _fields_of(target):
+            if text_of(group, name) == lines.name:
+                setattr(group, name, "")
+        bpy.data.curves.remove(lines.data)
+    if shown is not None:
+        selection.make_active(shown, context.view_layer)
+
+
+def _begin(target, group, field, title, context):
+    surface = target.surface
+    curves.require_editable(target)
+    if surface is None or context.view_layer.objects.get(surface.name) != surface:
+        raise HairError("The surface is missing: pick a mesh.")
+    lines = bpy.data.objects.get(text_of(group, field))
+    if lines is not None and lines.type != "CURVE":
+        sentence = '"{name}" is no curve that can be drawn: clear the field to draw new lines.'
+        raise HairError(sentence, name=name_of(lines))
+    if lines is None:
+        lines = _new_lines(f"{title} of {surface.name}", surface)
+    if context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    selection.make_active(lines, context.view_layer)
+    surface.select_set(True)  # the tool draws on what is selected
+    bpy.ops.object.mode_set(mode="EDIT")
+    setattr(group, field, lines.name)
+    paint = context.tool_settings.curve_paint_settings
+    for name, value in _TOOL.items():
+        setattr(paint, name, value)
+    if context.area is not None and context.area.type == "VIEW_3D":
+        bpy.ops.wm.tool_set_by_id(name="builtin.draw", space_type="VIEW_3D")
+
+
+def _new_lines(name, surface):
+    data = bpy.data.curves.new(name, "CURVE")
+    data.dimensions = "3D"
+    lines = bpy.data.objects.new(name, data)
+    (surface.users_collection or [bpy.context.scene.collection])[0].objects.link(lines)
+    lines.parent = surface  # whose coordinates they have, and which carries them
+    lines.show_in_front, lines.hide_render = True, True
+    return lines
+
+
+def _fields_of(datablock):
+    state = datablock.vellus
+    return ((state.hair, "part_lines"),) if state.kind == "HAIR" else ((state.guides, "flow_lines"),)
+
+
+def _names_of(datablock):
+    return [text_of(group, name) for group, name in _fields_of(datablock)] if datablock.vellus.kind != "NONE" else []
