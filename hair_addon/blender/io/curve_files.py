@@ -144,8 +144,9 @@ def _made(path, wanted, surface_object):
     joined, made_guides, guide_ids = curve_file.join(curves), None, None
     # Blender plays polylines.
     motion = joined.motion if wanted.plays and not joined.is_smooth.any() else None
-    if motion is None and any(one.motion is not None for one in chosen):
-        notes.append(HairError("{path} moves: its curves are read at the present frame alone.", path=path))
+    moving = [one.motion for one in chosen if one.motion is not None]
+    if motion is None and moving:
+        notes.append(_note_on_motion(path, moving[0]))
     if guides:
         joined_guides = curve_file.join(its_guides)
         made_guides = curve_objects.new_object("Guides", joined_guides, surface_object)
@@ -162,9 +163,19 @@ def _now(curves):
     """Curves that move, where they are at the scene's time, or the nearest that the file has."""
     if curves.motion is None:
         return curves
+    return replace(curves, points=curves.motion.points_at(_present_index(curves.motion)))
+
+
+def _present_index(motion):
     now = scene_time.present_frame() / scene_time.frame_rate(bpy.context.scene)
-    index = int(np.argmin(np.abs(curves.motion.times - now)))
-    return replace(curves, points=curves.motion.points_at(index))
+    return int(np.argmin(np.abs(motion.times - now)))
+
+
+def _note_on_motion(path, motion):
+    frames = np.round(motion.times * scene_time.frame_rate(bpy.context.scene), 3)
+    first, last, frame = frames[0], frames[-1], frames[_present_index(motion)]
+    sentence = "{path} moves from frame {first:g} to {last:g}: its curves are read at frame {frame:g} alone."
+    return HairError(sentence, path=path, first=first, last=last, frame=frame)
 
 
 def _chosen_sets(path, sets, wanted):
