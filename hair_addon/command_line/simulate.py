@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """simulate: guides of a .blend → baked frames, which render then reads; repeating the command goes on."""
 
-import time
-
 from ..core import lazy
 from ..core.errors import HairError
 from ..core.long_work import run_now
@@ -20,9 +18,15 @@ def add(verbs):
         "finds them. Running the same command again goes on where it stopped.",
     )
     parser.add_argument("input", help=".blend file")
-    parser.add_argument(
-        "--last-frame", type=int, metavar="N", help="simulate from the guides' start frame to N [the scene's last]"
+    last = parser.add_mutually_exclusive_group()
+    last.add_argument(
+        "--frames",
+        type=options.frame_range,
+        metavar="A-B",
+        help="frames A to B, one frame, or all frames of the scene: they are simulated from the guides' start frame "
+        "to B [all]",
     )
+    last.add_argument("--last-frame", type=int, metavar="N", help="the same as --frames N")
     parser.add_argument(
         "--guides", action="append", metavar="NAME", help="guides to simulate; may be repeated [all that simulate]"
     )
@@ -49,9 +53,10 @@ def run(given, console):
         _require_delivery(given)
     opening.open_file(given, console)
     scene_last = blender.host.scene_time.scene_frames()[-1]
-    last = scene_last if given.last_frame is None else given.last_frame
+    last = _last_frame(given, scene_last)
     if given.deliver is not None and last < scene_last:
-        raise HairError(f"--deliver needs all frames of the scene, to {scene_last}: leave out --last-frame {last}.")
+        option = "--last-frame" if given.last_frame is not None else "--frames"
+        raise HairError(f"--deliver needs all frames of the scene, to {scene_last}: leave out {option}.")
     folders = blender.groom.dynamics.frame_folders
     guides = [_named(name) for name in given.guides] if given.guides else folders.simulating()
     if given.if_needed:
@@ -61,20 +66,26 @@ def run(given, console):
     if not guides:
         raise HairError(f"{given.input} has no guides that simulate: switch Dynamics on, or name them by --guides.")
     _warn_of_memory(guides, console)
-    started = time.perf_counter()
 
     def tell(baked):
-        nonlocal started
-        seconds, started = time.perf_counter() - started, time.perf_counter()
         values = {"verb": "simulate", "input": str(given.input), "guides": baked.guides, "frame": baked.frame}
-        values |= {"seconds": round(seconds, 3), "substeps": baked.substeps, "broken": baked.broken}
+        values |= {"seconds": round(baked.seconds, 3), "substeps": baked.substeps, "broken": baked.broken}
         values |= {"out": str(baked.folder)}
-        console.result(values, f"{baked.guides}: frame {baked.frame} in {seconds:.2f} s")
+        console.result(values, f"{baked.guides}: frame {baked.frame} in {baked.seconds:.2f} s")
 
     scene = blender.host.scene_time.present_scene()
-    run_now(blender.groom.dynamics.guide_baking.baking(guides, last, scene, given.overwrite, tell), console.progress)
+    baking = blender.groom.dynamics.guide_baking.baking(guides, last, scene, given.overwrite, tell)
+    for one, made in zip(guides, run_now(baking, console.progress), strict=True):
+        if made.worst.count:
+            console.warn(str(made.worst.said_of(one)))
     if given.deliver is not None:
         _deliver(given, guides, scene, console)
+
+
+def _last_frame(given, scene_last):
+    if given.frames is not None:
+        return scene_last if given.frames == "all" else given.frames[-1]
+    return scene_last if given.last_frame is None else given.last_frame
 
 
 def _require_delivery(given):

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """simulate: frames baked from the command line, gone on with, and rendered; what is wrong is one sentence."""
 
+import itertools
 import subprocess
+import types
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
+from hair_addon.blender.groom.dynamics import broken_guides, frame_folders, guide_baking
 from hair_addon.blender.host import memory
+from hair_addon.blender.live import simulated_hair
+from hair_addon.core import dynamics
 from tests.support.commands import ROOT, command, run, run_here
 from tests.support.dynamics.swung import simulate, swing
 from tests.support.reading import evaluated_points, read_picture
@@ -59,6 +63,56 @@ def test_one_of_two_processes_that_bake_at_once_is_told(shot, tmp_path):
     assert statuses == [0, 0] or any("is being baked by another process" in text for text in said)
     frames = [*(tmp_path / "frames").rglob("+*.npz")]
     assert len(frames) == 7 and run_here("simulate", shot, "--json").results == []
+
+
+def test_frames_are_given_as_for_render(shot):
+    def simulated(*words):
+        return [line["frame"] for line in run_here("simulate", shot, "--json", *words).results]
+
+    assert simulated("--frames", "3-4") == [2, 3, 4, 5]  # what is before them too, and one more for motion blur
+    assert simulated("--frames", "5") == [6]
+    assert simulated("--frames", "all") == [7]
+    assert run_here("simulate", shot, "--frames", "1-2", "--last-frame", "2").status == 2
+    refused = run_here("simulate", shot, "--deliver", shot.with_name("delivered.blend"), "--frames", "1-4")
+    assert refused.status == 1 and "leave out --frames" in refused.errors
+
+
+def test_the_time_of_all_guides_is_told(shot, monkeypatch):
+    """Of a clock that advances by a second with each look: reading, simulating, and half of the change of frame."""
+    other = bpy.data.objects["Guides"].copy()
+    other.data = other.data.copy()
+    bpy.context.scene.collection.objects.link(other)
+    other.data.vellus.cache_identity = ""
+    bpy.ops.wm.save_mainfile()
+    looks = itertools.count()
+    monkeypatch.setattr(guide_baking, "time", types.SimpleNamespace(perf_counter=lambda: float(next(looks))))
+    lines = run_here("simulate", shot, "--frames", "1-2", "--json").results
+    assert len({line["guides"] for line in lines}) == 2
+    assert [(line["frame"], line["seconds"]) for line in lines] == [(2, 2.5), (2, 2.5), (3, 2.5), (3, 2.5)]
+
+
+def test_guides_that_break_are_said_in_the_terminal_and_the_panel(shot, monkeypatch):
+    counts = {3: 2, 5: 7}
+
+    def broken(_simulation):
+        return np.arange(counts.get(bpy.context.scene.frame_current, 0))
+
+    monkeypatch.setattr(dynamics.simulation.Simulation, "broken", property(broken))
+    said = 'of 60 guides of "Guides" broke in frame {} and were put back: increase Substeps.'
+    first = run_here("simulate", shot, "--frames", "1-3", "--json")
+    assert first.errors == f"vellus: warning: 2 {said.format(3)}\n"
+    assert [line["broken"] for line in first.results] == [0, 2, 0]
+    counts.pop(3)
+    # Baking goes on, and another session opens the file.
+    ended = run_here("simulate", shot)
+    assert (ended.status, ended.errors) == (0, f"vellus: warning: 7 {said.format(5)}\n")
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    bpy.context.scene.frame_set(2)
+    (note,) = simulated_hair.notes_of(bpy.data.hair_curves["Guides"])
+    assert str(note) == f"7 {said.format(5)}"
+    counts.clear()
+    assert run_here("simulate", shot, "--overwrite").errors == ""
+    assert broken_guides.baked(bpy.data.hair_curves["Guides"]) == broken_guides.NONE
 
 
 def test_frames_that_are_not_baked_are_not_rendered(shot, tmp_path):

@@ -33,7 +33,8 @@ def keep_outside(hair: Curves, bound: BoundHair) -> None:
         blender_scene, depsgraph = scene_time.present_scene(), scene.present_depsgraph()
         metres = simulated_world.metres_of(blender_scene, settings)
         pose = guide_poses.read(hair, depsgraph, metres)
-        world, _errors = simulated_world.read(blender_scene, depsgraph, settings, pose, hair.surface)
+        ways = bound.points[:, 1] - bound.points[:, 0]
+        world, _errors = simulated_world.read(blender_scene, depsgraph, settings, pose, hair.surface, ways)
         obstacles = [replace(one, distance=_SKIN) if one.vertices is pose.vertices else one for one in world.obstacles]
         there = pose.to_world(bound.points)
         moved, is_moved = dynamics.outside.kept_outside(there, obstacles, preferences.device())

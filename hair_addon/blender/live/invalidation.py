@@ -7,6 +7,7 @@ stale.
 
 from ..data import guide_map_readers, orientation, scene, subdivided_surfaces
 from ..data.pictures import drawn_meshes
+from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, surface_textures, world_texture
 from ..groom import bindings, copied_hair, edited_faces, followed_names, paused_hair
@@ -52,6 +53,7 @@ OTHERS = (
     subdivided_surfaces.smooth_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,
+    simulated_world.parts_cache,
     simulated_hair.played_cache,
     dynamics_state.state_cache,
     dynamics_state.change_cache,

@@ -15,7 +15,8 @@ from ...core.errors import HairError
 from ..data import scene
 from ..data.strands import curves, simulated_guides
 from ..groom import bindings, hair_outside
-from ..groom.dynamics import frame_folders, guide_baking, guide_simulation
+from ..groom.dynamics import broken_guides, frame_folders, guide_baking, guide_simulation
+from ..groom.dynamics.broken_guides import Broken
 from ..groom.dynamics.guide_simulation import GuideSimulation, simulated
 from ..host import running, scene_time
 from ..host.caches import Cache
@@ -34,6 +35,7 @@ class _Played:
     frames: dict[int, np.ndarray] = field(default_factory=dict)  # points of frames, local at rest
     outdated: int | None = None  # the last frame that was simulated with other settings
     notes: tuple[HairError, ...] = ()
+    worst: Broken = broken_guides.NONE
 
 
 played_cache = Cache()  # session_uid of guide Curves → _Played
@@ -218,6 +220,7 @@ def _advance(played, guides, blender_scene, depsgraph, settings):
     read = guide_simulation.read(guides, blender_scene, depsgraph, settings, played.simulated.masks)
     points = played.simulated.advance(read)
     played.frame += 1
+    played.worst = max(played.worst, Broken(len(played.simulated.simulation.broken), played.frame))
     played.notes = played.simulated.errors
     played.frames[played.frame] = points
     while len(played.frames) > 1 and points.nbytes * len(played.frames) > MOST_BYTES:
@@ -233,6 +236,9 @@ def _show(guides, points, depsgraph):
 
 
 def notes_of(guides):
-    """Errors of colliders and force fields that were left out of the last frame that was played."""
-    played = played_cache.get(guides.session_uid)
-    return () if played is None else played.notes
+    """Errors of colliders and force fields that were left out of the last frame that was played, and broken guides."""
+    played, worst = played_cache.get(guides.session_uid), broken_guides.baked(guides)
+    if not worst.count and played is not None:
+        worst = played.worst
+    broken = (worst.said_of(guides),) if worst.count else ()
+    return broken if played is None else (*played.notes, *broken)

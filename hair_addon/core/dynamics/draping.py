@@ -8,7 +8,9 @@ import numpy as np
 import warp as wp
 
 from ..errors import HairError
+from ..geometry import closest_point
 from ..geometry.mesh import TriMesh
+from .collision import closed_parts
 from .rod import rotations
 from .rod.settings import DynamicsSettings
 from .root_motion import RootPose
@@ -39,9 +41,8 @@ def draped(
     raise to stop; wetness: as `Simulation` takes it. Raises `HairError`, also for a surface that nothing collides with.
     """
     pose = RootPose(np.asarray(points[:, 0], np.float64), np.tile(rotations.IDENTITY, (len(points), 1)))
-    surface = Obstacle(
-        "surface", mesh.vertices.astype(np.float64), mesh.triangles, settings.friction, settings.collision_distance
-    )
+    vertices, triangles = mesh.vertices.astype(np.float64), _facing(mesh, points)
+    surface = Obstacle("surface", vertices, triangles, settings.friction, settings.collision_distance)
     world = World(gravity, (surface,))
     falling = replace(
         settings,
@@ -67,3 +68,12 @@ def draped(
             break
         before = there
     return simulation.points()
+
+
+def _facing(mesh, points):
+    """(F, 3) triangles of a mesh, where it is open with the hair (G, P, 3) in front of it."""
+    parts = closed_parts.open_parts(mesh)
+    if (parts < 0).all():
+        return mesh.triangles
+    nearest = closest_point.SurfaceQuery(mesh).nearest(points[:, 0])
+    return closed_parts.facing_hair(mesh, parts, mesh.triangles[nearest.triangle], points[:, 1] - points[:, 0])

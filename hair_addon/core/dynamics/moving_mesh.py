@@ -14,6 +14,7 @@ from ..geometry import surface_deform, vertex_turns
 from ..geometry.mesh import Faces, TriMesh, require_finite
 from ..geometry.strands import Strands
 from ..params import array_of
+from .collision import closed_parts
 from .rod import rotations
 from .rod.settings import DynamicsSettings
 from .root_motion import RootPose
@@ -82,6 +83,8 @@ class _Surface:
         self._mesh, self._size = mesh, size
         self._faces = Faces(mesh.triangles.ravel(), np.arange(0, mesh.triangles.size + 1, 3, dtype=np.int32))
         self._places = mesh.triangles[guides.roots.triangle], guides.roots.barycentric
+        points = guides.numpy()
+        self._ways = points[:, 1] - points[:, 0]
         corners, weights = self._places
         roots = np.einsum("nc,ncx->nx", weights, mesh.vertices[corners])
         self._reach = max(float(np.ptp(mesh.vertices, axis=0).max()), 1e-20)
@@ -103,8 +106,14 @@ class _Surface:
         left, _sizes, right = np.linalg.svd(np.swapaxes(posed[:, 1:] - posed[:, :1], 1, 2))
         return RootPose(self._size * positions, rotations.from_matrices(left @ right))
 
+    @cached_property
+    def _triangles(self):
+        """(F, 3), where the mesh is open with the hair in front of it."""
+        parts = closed_parts.open_parts(self._mesh)
+        return closed_parts.facing_hair(self._mesh, parts, self._places[0], self._ways)
+
     def obstacle(self, vertices, settings):
         """The mesh itself, which guides collide with."""
         vertices = self._size * vertices.astype(np.float64)
         distance = settings.collision_distance
-        return Obstacle("surface", vertices, self._mesh.triangles, settings.friction, distance)
+        return Obstacle("surface", vertices, self._triangles, settings.friction, distance)

@@ -4,10 +4,11 @@
 import bpy
 import numpy as np
 
-from ....core import dynamics
+from ....core import dynamics, geometry
 from ....core.dynamics.collision.collider_settings import ColliderSettings, contact_of
 from ....core.errors import HairError
 from ...host import scene_time
+from ...host.caches import Cache
 from ...host.notices import name_of, text_of
 from ...settings import setting_properties
 from .. import scene
@@ -15,23 +16,27 @@ from . import force_fields
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
 
+# (topology, fingerprint of its vertices at rest) of a surface → `closed_parts.open_parts`
+parts_cache = Cache(capacity=16)
+
 
 def metres_of(blender_scene, settings):
     """Metres in a unit of the scene's world, for guides with these `DynamicsSettings`."""
     return blender_scene.unit_settings.scale_length * settings.size
 
 
-def read(blender_scene, depsgraph, settings, guide_pose, surface_object):
+def read(blender_scene, depsgraph, settings, guide_pose, surface_object, ways):
     """The `World` of guides in the frame that a depsgraph was evaluated for, and errors of colliders left out.
 
-    guide_pose: their `GuidePose` in that frame; surface_object: which they grow on.
+    guide_pose: their `GuidePose` in that frame; surface_object: which they grow on; ways: (G, 3) from their roots to
+    their next points at rest, in local coordinates.
     """
     gravity = tuple(blender_scene.gravity) if blender_scene.use_gravity else NO_GRAVITY
     metres = metres_of(blender_scene, settings)
     obstacles, errors = [], []
     if settings.collides_with_surface:
-        vertices, triangles = guide_pose.vertices, guide_pose.triangles
-        obstacles.append(_obstacle(surface_object, vertices, triangles, settings, metres))
+        triangles = _facing_hair(guide_pose.pose.surface, guide_pose.places[0], ways)
+        obstacles.append(_obstacle(surface_object, guide_pose.vertices, triangles, settings, metres))
     for collider in colliders(settings.colliders):
         if settings.collides_with_surface and collider == surface_object:
             continue
@@ -44,6 +49,13 @@ def read(blender_scene, depsgraph, settings, guide_pose, surface_object):
     fields, refused = force_fields.read(depsgraph, metres)
     time = scene_time.time_of(blender_scene) / scene_time.animation_rate(blender_scene)
     return dynamics.simulation.World(gravity, tuple(obstacles), fields, time), errors + refused
+
+
+def _facing_hair(surface, corners, ways):
+    """(F, 3) triangles of a `Surface`: hair is in front of an open mesh, whichever way its faces are turned."""
+    key = surface.topology, geometry.fingerprint.fingerprint(surface.rest)
+    parts = parts_cache.get(key, lambda: dynamics.collision.closed_parts.open_parts(surface.mesh))
+    return dynamics.collision.closed_parts.facing_hair(surface.mesh, parts, corners, surface.from_local(ways))
 
 
 def _obstacle(mesh_object, vertices, triangles, settings, metres):

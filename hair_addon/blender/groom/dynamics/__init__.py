@@ -8,6 +8,7 @@ from ....core.lazy import submodules
 if TYPE_CHECKING:
     from . import (
         bake_resuming,
+        broken_guides,
         dynamics_notes,
         frame_folders,
         guide_baking,

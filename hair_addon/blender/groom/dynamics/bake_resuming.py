@@ -19,7 +19,8 @@ from ...data.simulation import frame_animation
 from ...host import scene_time
 from ...host.datablocks import Remembered
 from ...settings import properties
-from . import guide_simulation
+from . import broken_guides, guide_simulation
+from .broken_guides import Broken
 from .guide_simulation import FrameInput, GuideSimulation
 
 _PAUSE = 0.1  # [s] of visits between two reports of progress
@@ -36,6 +37,8 @@ class Task:
     done: int  # the last frame that is there
     there: FrameCache  # frames that were baked before
     broken: int = 0
+    worst: Broken = broken_guides.NONE
+    seconds: float = 0.0  # that the frame at hand has taken so far
     numbers: set[int] = field(default_factory=set)  # of states that are there
     state: tuple[int, Mapping[str, np.ndarray], FrameInput] | None = None  # to go on from: frame, arrays, what was seen
 

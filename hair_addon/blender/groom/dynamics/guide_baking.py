@@ -5,6 +5,7 @@ Baking goes on where it was stopped, from the last state that was written, and c
 """
 
 import contextlib
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,10 +28,11 @@ from ...host.notices import name_of
 from ...settings import properties
 from .. import followed_names, quiet_hair
 from ..guides import guide_regions
-from . import bake_resuming, frame_folders, guide_simulation
+from . import bake_resuming, broken_guides, frame_folders, guide_simulation
 from .bake_resuming import Task
+from .broken_guides import Broken
 
-SOLVER_VERSION = 2  # of all that frames follow from beside settings: raised when they come out otherwise
+SOLVER_VERSION = 3  # of all that frames follow from beside settings: raised when they come out otherwise
 STATE_FRAMES = 24  # between states
 _PARTING = "parting"  # a part of `key_of`
 _BEYOND = 1  # frames after the last one, for motion blur
@@ -45,20 +47,28 @@ def is_baking() -> bool:
 
 @dataclass(frozen=True)
 class Baked:
-    """What was baked: frames simulated now, and how often strands broke and were put back to their groom."""
+    """What was baked: frames simulated now, and how often strands broke and were put back to their groom.
+
+    worst: the frame in which most did, of all that are there.
+    """
 
     first: int
     last: int
     simulated: int
     broken: int
+    worst: Broken
 
 
 @dataclass(frozen=True)
 class BakedFrame:
-    """A frame that was simulated and written: of which guides, in how many substeps, how many strands broke."""
+    """A frame that was simulated and written: of which guides, in how many substeps, how many strands broke.
+
+    seconds: that reading, simulating and writing these guides took, with their share of the scene's change of frame.
+    """
 
     guides: str
     frame: int
+    seconds: float
     substeps: int
     broken: int
     folder: Path
@@ -146,14 +156,19 @@ def baking(
         for frame in range(first + 1, last + _BEYOND + 1):
             due = [(index, task) for index, task in enumerate(tasks) if task.done == frame - 1]
             scene = its_scene.find()  # another one after an undo
+            started = time.perf_counter()
             scene_time.go_to(scene, frame)
             depsgraph = scenes.present_depsgraph()
+            share = (time.perf_counter() - started) / max(len(due), 1)
+            for _, task in due:
+                task.seconds = share
             inputs = [_read(task, scene, depsgraph) for _, task in due]
             part = (frame - first) / (last + _BEYOND - first)
             yield _computing([task for _, task in due], inputs, frame, part, frame == last + _BEYOND)
             for index, task in due:
                 task.done = frame
                 counts[index] += 1
+                _note_broken(task, frame)
                 tell(_baked_frame(task, frame))
         for task in tasks:
             task.writer.complete()
@@ -162,11 +177,20 @@ def baking(
 
 def _baked_frame(task, frame):
     simulation = task.simulated.simulation
-    return BakedFrame(task.name, frame, simulation.substeps, len(simulation.broken), task.writer.folder)
+    broken, folder = len(simulation.broken), task.writer.folder
+    return BakedFrame(task.name, frame, task.seconds, simulation.substeps, broken, folder)
+
+
+def _note_broken(task, frame):
+    """Keep the frame in which most guides broke in the manifest, for the panel of whoever opens the file."""
+    count = len(task.simulated.simulation.broken)
+    if count > task.worst.count:
+        task.worst = Broken(count, frame)
+        task.writer.change(notes=task.worst.notes)
 
 
 def _results(tasks, counts):
-    return [(task, (count, task.broken)) for task, count in zip(tasks, counts, strict=True)]
+    return [(task, (count, task.broken, task.worst)) for task, count in zip(tasks, counts, strict=True)]
 
 
 def _end(its_scene, present, baked):
@@ -203,9 +227,10 @@ def _begin(guides, last, scene, starts_over, stack):
     parted_by = _parted_by(guides)
     space = tuple(surface_space.applied(guides).matrix.ravel().tolist())
     spaces = () if space == frame_manifest.UNMOVED else (space,)
-    manifest = Manifest(
-        keys, guide_count, point_count, start, last, rate, "baking", layout, parted_by=parted_by, spaces=spaces
-    )
+    before = FrameCache(folder).manifest if (folder / frame_manifest.NAME).exists() else None
+    worst = broken_guides.noted(before if before is not None and before.keys[-1] == keys[0] else None)
+    told = {"notes": worst.notes, "parted_by": parted_by, "spaces": spaces}
+    manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout, **told)
     writer = stack.enter_context(frame_cache.baking(folder, manifest))
     guides_named, there = Remembered(guides), FrameCache(folder)
     numbers = {number for number in there.state_numbers() if start < number <= last + _BEYOND}
@@ -214,15 +239,17 @@ def _begin(guides, last, scene, starts_over, stack):
     if found is None or (found.key, found.digest) != (manifest.key, digest):
         numbers = set()
         writer.write_frame(start, combed, digest)
-    return Task(name_of(guides), guides_named, simulated, writer, start, there, numbers=numbers)
+    return Task(name_of(guides), guides_named, simulated, writer, start, there, worst=worst, numbers=numbers)
 
 
 def _read(task, scene, depsgraph):
     """(`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
-    guides = task.guides.find()
+    guides, started = task.guides.find(), time.perf_counter()
     settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
     read = guide_simulation.read(guides, scene, depsgraph, settings, task.simulated.masks)
-    return read, bake_resuming.digest_of(guides, scene, settings)
+    found = read, bake_resuming.digest_of(guides, scene, settings)
+    task.seconds += time.perf_counter() - started
+    return found
 
 
 def _computing(tasks, inputs, frame, part, is_last):
@@ -231,10 +258,12 @@ def _computing(tasks, inputs, frame, part, is_last):
     def compute(progress):
         progress(f"Frame {frame}", part)
         for task, (read, digest) in zip(tasks, inputs, strict=True):
+            started = time.perf_counter()
             points = task.simulated.advance(read)
             task.broken += len(task.simulated.simulation.broken)
             task.writer.write_frame(frame, points, digest)
             if is_last or (frame - task.simulated.settings.start_frame) % STATE_FRAMES == 0:
                 task.writer.write_state(frame, task.simulated.simulation.save())
+            task.seconds += time.perf_counter() - started
 
     return compute

@@ -160,7 +160,9 @@ def read(
     masks: as in `GuideSimulation`; those that are missing are read and added.
     """
     pose = guide_poses.read(guides, depsgraph, simulated_world.metres_of(scene, settings))
-    world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface)
+    local = combed_points(guides)
+    ways = local[:, 1] - local[:, 0]
+    world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface, ways)
     seconds = settings.time_scale / scene_time.animation_rate(scene)
     wetness = wet_guides.of_guides(guides, pose.pose.surface, depsgraph, masks)
     return FrameInput(scene_time.frame_of(scene), settings, pose, world, seconds, wetness, tuple(errors))

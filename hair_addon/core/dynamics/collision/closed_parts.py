@@ -27,6 +27,40 @@ def outward(mesh: TriMesh) -> np.ndarray:
     return triangles
 
 
+def open_parts(mesh: TriMesh) -> np.ndarray:
+    """(F,) int32: the connected part of each triangle, -1 in closed ones, whose outside is known."""
+    parts = connected_components(mesh)
+    return np.where(_is_closed(welded(mesh), parts)[parts], -1, parts).astype(np.int32)
+
+
+def facing_hair(mesh: TriMesh, parts: np.ndarray, corners: np.ndarray, ways: np.ndarray) -> np.ndarray:
+    """(F, 3) int32: the triangles, those of an open part turned whose hair leaves it at its back, on the mean.
+
+    parts: of `open_parts`; corners: (S, 3) vertices around the root of each strand; ways: (S, 3) from roots on.
+    """
+    triangles = mesh.checked_triangles
+    part_of = np.full(len(mesh.vertices), -1, np.int32)
+    part_of[triangles] = parts[:, None]
+    part_of_strand = part_of[corners[:, 0]]
+    is_on = part_of_strand >= 0
+    if not is_on.any():
+        return triangles
+    first, second, third = np.moveaxis(mesh.vertices[triangles].astype(np.float64), 1, 0)
+    normals = np.zeros((len(mesh.vertices), 3))
+    np.add.at(normals, triangles, np.cross(second - first, third - first)[:, None])
+    at_roots = _unit(normals)[corners[is_on]].mean(axis=1)
+    sines = np.einsum("si,si->s", at_roots, _unit(ways[is_on].astype(np.float64)))
+    is_behind = np.bincount(part_of_strand[is_on], sines, minlength=parts.max() + 1) < 0.0
+    is_turned = (parts >= 0) & is_behind[parts]
+    return np.where(is_turned[:, None], triangles[:, [0, 2, 1]], triangles)
+
+
+def _unit(vectors):
+    """Vectors (N, 3) of length one; zero where there is none."""
+    sizes = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, sizes, out=np.zeros_like(vectors), where=sizes > 0.0)
+
+
 def rims(mesh: TriMesh) -> np.ndarray:
     """(F,) int32 bits of a triangle's rims.
 

@@ -46,7 +46,7 @@
     if (is_touching) {
       const vector n = get_vector(contact(j + 1), 0);
       const lanes a = get(contact(j + 1), 3);
-      step = step * a + n * ((AWAY - a) * dot(n, step));
+      step = step * a + n * ((get(contact(j + 1), 7) - a) * dot(n, step));
     }
     const vector point = get_vector(x, j + 1);
     put_vector(x, j + 1, chosen(stepping, point + step, point));

@@ -96,7 +96,7 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
     D[18] = -turning * d.x * d.z;
     D[19] = -turning * d.y * d.z;
     D[20] = diagonal - turning * d.z * d.z;
-    // Contact filters masses, F = 1 + (a - 1) 1 + (AWAY - a) n nᵀ; both parts are zero where nothing touches.
+    // Contact filters masses, F = 1 + (a - 1) 1 + (away - a) n nᵀ; both parts are zero where nothing touches.
     vector n_b;
     lanes less_b, normal_b;
     if (is_touching) {
@@ -104,7 +104,7 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
         n = get_vector(contact(i), 0);
         const lanes a = get(contact(i), 3);
         less = a - 1.0f;
-        normal = AWAY - a;
+        normal = get(contact(i), 7) - a;
       };
       const auto add = [&](const vector& n, lanes less, lanes normal, lanes moving) {
         less *= moving;

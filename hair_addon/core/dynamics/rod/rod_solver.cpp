@@ -60,7 +60,7 @@
 constexpr int PREDICT = 1, SOLVE = 2, FINISH = 4, AGAIN = 8;
 // What a segment keeps between factorisation and back substitution, and a point between contact passes.
 constexpr int LOWER = 0, UPPER = 21, RIGHT = 48, GRADIENT = 54, TURNING = 63, KEPT = 64;
-constexpr int CONTACT = 7;  // n, a, predicted point
+constexpr int CONTACT = 8;  // n, a, predicted point, mobility that contact leaves along n
 
 #if defined(__CUDA_ARCH__)
 constexpr int STRIDE = GROUP;
@@ -154,6 +154,14 @@ alignas(64) float contacts[(MOST + 1) * CONTACT * WIDTH];
 const auto kept = [&](int j, int row) { return scratch + size_t(KEPT * j + row) * STRIDE; };
 const auto contact = [&](int i) { return contacts + size_t(CONTACT * i) * STRIDE; };
 
+// Mobility that contact leaves along the normal of point i: more of it where the rod is so stiff, seen from a substep,
+// that it would be bent by force to planes that contradict each other, by which Newton's method diverges. With the
+// stiffness κ = h² / (b m l²), which grows with l⁻⁴, points of short hair have 10⁶ times that of long hair.
+const auto away_of = [&](int i) {
+  const lanes size = get(length, i - 1);
+  const lanes stiffness = (h * h) * get(inverse_mass, i) / (get(bending, i - 1) * size * size);
+  return AWAY * clamped(exact_sqrt_of(stiffness * (1.0f / STIFF)), lanes(1.0f), lanes(MOST_AWAY / AWAY));
+};
 const float inverse_square = 1.0f / (h * h), damping = damping_time / h, inverse_damping = 1.0f / (1.0f + damping);
 for (int substep = first; substep < end; ++substep) {
   // The root: positions linear, rotations nlerp, between the frame's two poses.
@@ -201,6 +209,7 @@ for (int substep = first; substep < end; ++substep) {
         put(contact(i), 3, lanes(1.0f));
         if (!is_again) put_vector(predicted_rows, i, get_vector(x, i));
         put_vector(contact(i) + 4 * STRIDE, 0, get_vector(predicted_rows, i));
+        put(contact(i), 7, i > 0 ? away_of(i) : lanes(AWAY));
       }
       put_contacts(!is_again, is_again ? 1.0f : from_last, touches);
     }

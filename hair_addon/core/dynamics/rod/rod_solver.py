@@ -29,7 +29,7 @@ WHOLE = PREDICT | SOLVE | FINISH
 
 PLANE_ROWS = 8  # of a point: normal (3), offset n·c + r, displacement (3), friction
 ROOT_ROWS = 14  # position (3) and frame (4) at the frame's start, and at its end
-_KEPT_ROWS, _CONTACT_ROWS = 64, 7
+_KEPT_ROWS, _CONTACT_ROWS = 64, 8
 
 wp.set_module_options({"enable_backward": False, "block_dim": BLOCK})
 
@@ -42,6 +42,8 @@ _CONSTANTS = {
     "TURN": 2e-3,  # |Δθ|² of a step that ends the solve: the error left over is half of that
     "DRAG_ALONG": 0.5,  # drag along a slender body, in that across it
     "AWAY": 1e-3,  # mobility that contact leaves along the normal: none at all would make the matrix singular
+    "MOST_AWAY": 1e-2,  # the same of stiff points: a third of it lets short hair break, and more weakens friction
+    "STIFF": 1e4,  # κ = h² / (b m l²) from which a point is stiff; hair of 10 cm has some hundreds
     "CREEP": 1e-4,  # [m/s] of what friction holds
     "ROD_SHARE": 1.0,
     "CHANGE": 0.05,  # of friction, that asks for another pass

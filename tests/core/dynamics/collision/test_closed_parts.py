@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.dynamics.collision.closed_parts import outward, rims
+from hair_addon.core.dynamics.collision.closed_parts import facing_hair, open_parts, outward, rims
 from hair_addon.core.geometry.mesh import TriMesh
 from tests.support.meshes import flat_grid, subdivided_sphere
 
@@ -73,3 +73,20 @@ def test_rims_are_the_edges_with_one_triangle(head):
         for row, found in zip(triangles, bits, strict=True):
             edges = [uses[frozenset((row[(k + 1) % 3], row[(k + 2) % 3]))] == 1 for k in range(3)]
             assert found == sum(is_set << k for k, is_set in enumerate([*edges, *(v in on_rim for v in row)]))
+
+
+def test_open_parts_are_turned_to_where_their_hair_is():
+    """Each by itself; closed ones, and those without hair, stay."""
+    up, down = flat_grid(3), turned(moved(flat_grid(3), (0.0, 0.0, 1.0)))
+    mesh = joined(up, down, moved(turned(flat_grid(2)), (0.0, 0.0, 2.0)), moved(BALL, (5.0, 0.0, 0.0)))
+    parts = open_parts(mesh)
+    sizes = [len(one.triangles) for one in (up, down, flat_grid(2), BALL)]
+    assert [np.unique(part).size for part in np.split(parts, np.cumsum(sizes)[:-1])] == [1, 1, 1, 1]
+    assert (parts < 0).sum() == sizes[3]
+    firsts = np.cumsum([0, *sizes])
+    corners = mesh.triangles[np.repeat(firsts[[0, 1, 3]], 3)]
+    ways = np.tile([[0.1, 0.0, 1.0], [0.0, 0.2, 0.5], [0.3, 0.0, -0.1]], (3, 1))
+    found = facing_hair(mesh, parts, corners, ways)
+    is_other = (found != mesh.triangles).any(axis=1)
+    np.testing.assert_array_equal(np.flatnonzero(is_other), np.arange(firsts[1], firsts[2]))
+    np.testing.assert_array_equal(found[is_other], mesh.triangles[is_other][:, [0, 2, 1]])

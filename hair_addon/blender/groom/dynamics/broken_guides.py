@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides that break while they are simulated, and are put back as they were combed: in which frame most of them do."""
+
+from dataclasses import dataclass
+
+from bpy.types import Curves
+
+from ....core.errors import HairError
+from ....core.files.frame_manifest import Manifest
+from ...host.notices import name_of
+from . import frame_folders
+
+_NOTE = "broken"  # of a manifest
+
+
+@dataclass(frozen=True, order=True)
+class Broken:
+    """How many guides broke in the frame in which most did."""
+
+    count: int
+    frame: int
+
+    @property
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """Notes of a manifest; none where no guide broke."""
+        return ((_NOTE, f"{self.count} {self.frame}"),) if self.count else ()
+
+    def said_of(self, guides: Curves) -> HairError:
+        """The sentence of some guides."""
+        return HairError(
+            '{count} of {total} guides of "{name}" broke in frame {frame} and were put back: increase Substeps.',
+            count=self.count,
+            total=len(guides.curves),
+            name=name_of(guides),
+            frame=self.frame,
+        )
+
+
+NONE = Broken(0, 0)
+
+
+def noted(manifest: Manifest | None) -> Broken:
+    """What a manifest notes of its frames."""
+    for name, reason in () if manifest is None else manifest.notes:
+        words = reason.split()
+        if name == _NOTE and len(words) == 2 and all(word.lstrip("-").isdecimal() for word in words):
+            return Broken(int(words[0]), int(words[1]))
+    return NONE
+
+
+def baked(guides: Curves) -> Broken:
+    """The same of the baked frames of guides: panels ask with every redraw, so no file is read."""
+    kept = frame_folders.folder_cache.get(guides.session_uid)
+    return noted(None if kept is None or kept[1] is None else kept[1].manifest)
