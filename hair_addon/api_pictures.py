@@ -14,6 +14,7 @@ from .core.long_work import Progress, no_progress, run_now
 from .core.params import Param, plain_value
 
 __all__ = ["draw", "render"]
+_IS_ALLOWED = Param("")
 _FRAMES = Param("")  # availability in this Blender is checked later
 
 
@@ -36,13 +37,15 @@ def render(
     *,
     frame: int | None = None,
     engine: str = "vellus",
+    allow_missing: bool = False,
     progress: Progress = no_progress,
     **settings: Any,
 ) -> Path:
     """Render a frame of the scene, the current one for None, and write it atomically as .png or .exr.
 
     engine: "vellus", "cycles" or "eevee"; settings: fields of `PictureSettings` (width, height, sample_count,
-    is_transparent, has_passes), width and height default to the scene's. Returns the path, in which ### is
+    is_transparent, has_passes), width and height default to the scene's; allow_missing: render also where linked
+    libraries, images or caches are missing, which is an error otherwise. Returns the path, in which ### is
     replaced with the frame number. Views of a stereoscopic scene are saved as its output settings say: one file, or
     one for each view, with its suffix before the extension.
 
@@ -56,5 +59,6 @@ def render(
     frame = plain_value("frame", blender.host.scene_time.present_frame() if frame is None else frame, 1, _FRAMES)
     blender.io.frames.require_pattern(path, 1)
     target = blender.io.frames.path_of(path, frame)
-    blender.io.frames.write_frame(target, frame, engine, wanted, progress=progress)
+    allows_missing = plain_value("allow_missing", allow_missing, False, _IS_ALLOWED)
+    blender.io.frames.write_frame(target, frame, engine, wanted, None, progress, allows_missing)
     return target

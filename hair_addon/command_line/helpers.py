@@ -7,7 +7,6 @@ import signal
 import subprocess
 import threading
 
-from ..core.errors import HairError
 from .console import PROGRAM
 
 _LOOK = 0.2  # [s] between checks for an interruption
@@ -15,7 +14,7 @@ _PATIENCE = 30.0  # [s] for a process to end that was asked to
 
 
 def run(commands, console, said_as):
-    """Run commands in parallel until all have ended; raises `HairError` if one failed, when the others are done.
+    """Run commands in parallel until all have ended; returns a sentence for each that failed.
 
     commands: argument lists of processes that print lines of JSON; said_as(values): the sentence for a line.
     """
@@ -33,9 +32,7 @@ def run(commands, console, said_as):
     finally:
         for helper in helpers:
             helper.stop()
-    failed = next((helper for helper in helpers if helper.status != 0), None)
-    if failed is not None:
-        raise HairError(failed.complaint)
+    return [helper.complaint for helper in helpers if helper.status != 0]
 
 
 class _Helper:
@@ -51,12 +48,13 @@ class _Helper:
 
     def _hear(self):
         for line in self._process.stdout:
-            if line.startswith("{"):  # Blender prints messages before the command starts
+            # Blender prints messages before the command starts, and a process may be killed in the middle of a line.
+            if line.startswith("{") and line.endswith("\n"):
                 self._heard.put(json.loads(line))
 
     def _hear_errors(self):
         for line in self._process.stderr:
-            if line.startswith(f"{PROGRAM}: "):
+            if line.startswith(f"{PROGRAM}: ") and not line.startswith(f"{PROGRAM}: warning: "):
                 self._complaints.append(line.removeprefix(f"{PROGRAM}: ").strip())
 
     @property
@@ -74,6 +72,8 @@ class _Helper:
         """Why it failed."""
         if self._complaints:
             return self._complaints[-1]
+        if self.status < 0:
+            return f"A worker process was killed by signal {-self.status}."
         return f"A worker process ended with status {self.status} and without an error message."
 
     def stop(self):
@@ -86,3 +86,5 @@ class _Helper:
                 self._process.kill()
         for thread in self._threads:
             thread.join()
+        for stream in (self._process.stdout, self._process.stderr):
+            stream.close()

@@ -5,6 +5,7 @@ import argparse
 import time
 
 from ..core import lazy
+from ..core.errors import HairError
 from ..core.files.whole_file import partial_of
 from ..core.imaging.pixel_sampling import DRAWING_FIELDS, PictureSettings
 from ..core.params import declared
@@ -41,6 +42,12 @@ def add(verbs):
     parser.add_argument("--samples", type=int, metavar="N", help="samples per pixel [from the scene]")
     parser.add_argument("--transparent", action=_Flag, default=False, help="render a transparent background")
     parser.add_argument("--passes", action=_Flag, default=False, help="write all passes as layers of the .exr")
+    parser.add_argument(
+        "--allow-missing",
+        action=_Flag,
+        default=False,
+        help="render also where linked libraries, images or caches are missing, with a warning",
+    )
     parser.add_argument("--overwrite", action="store_true", help="render existing frames again")
     parser.add_argument(
         "--jobs", type=options.count, default=1, metavar="N", help="number of processes on this machine [1]"
@@ -62,13 +69,17 @@ def run(given, console):
     blender.io.frames.require_pattern(given.out, len(numbers))
     blender.io.frames.require_view_layer()
     blender.groom.dynamics.frame_folders.require_baked(numbers)
+    without = blender.io.frames.missing_files(numbers, given.allow_missing)
+    if without:
+        console.warn(without)
     blender.io.frames.bind_simulated()
     settings = _frame_settings(given, blender.io.frames.scene_size())
     if blender.io.frames.is_sequence(given.out):
         _make_sequence(given, console, numbers, settings)
     else:
         started = time.perf_counter()
-        blender.io.frames.write_frame(given.out, numbers[0], given.engine, settings, progress=console.progress)
+        write = blender.io.frames.write_frame
+        write(given.out, numbers[0], given.engine, settings, None, console.progress, given.allow_missing)
         _tell(given, console, numbers[0], given.out, started)
 
 
@@ -78,17 +89,28 @@ def _make_sequence(given, console, numbers, settings):
     described = blender.io.sequence.description(given.input, given.engine, values | {"scripts": given.enable_scripts})
     blender.io.sequence.begin(given.out, numbers, described, given.overwrite)
     if given.jobs > 1:
-        words = [*blender.host.cli_command.words(), *_words(given, numbers, settings)]
-        helpers.run([words] * given.jobs, console, _sentence)
+        _run_jobs(given, console, numbers, settings)
         return
 
     def write(path, number):
-        blender.io.frames.write_frame(path, number, given.engine, settings, partial_of(path), console.progress)
+        settled = settings, partial_of(path), console.progress, given.allow_missing
+        blender.io.frames.write_frame(path, number, given.engine, *settled)
 
     started = time.perf_counter()
     for number, path in blender.io.sequence.make(given.out, numbers, write, console.progress):
         _tell(given, console, number, path, started)
         started = time.perf_counter()
+
+
+def _run_jobs(given, console, numbers, settings):
+    """Render by several processes. Where one fails the others render its frames: only missing ones are an error."""
+    words = [*blender.host.cli_command.words(), *_words(given, numbers, settings)]
+    complaints = helpers.run([words] * given.jobs, console, _sentence)
+    missing = blender.io.sequence.missing_frames(given.out, numbers)
+    if missing:
+        raise HairError(complaints[0] if complaints else f"Frame {missing[0]} was not rendered.")
+    for complaint in complaints:
+        console.warn(f"all frames are rendered, but not by all processes: {complaint}")
 
 
 def _words(given, numbers, settings):
@@ -98,6 +120,7 @@ def _words(given, numbers, settings):
     words += ["--engine", given.engine, "--width", str(settings.width), "--height", str(settings.height)]
     words += ["--samples", str(settings.sample_count)] if settings.sample_count else []
     flags = {"transparent": given.transparent, "passes": given.passes, "enable-scripts": given.enable_scripts}
+    flags |= {"allow-missing": given.allow_missing}
     return words + [f"--{name}" for name, is_given in flags.items() if is_given]
 
 

@@ -12,6 +12,7 @@ import bpy
 import pytest
 
 from hair_addon import api
+from hair_addon.command_line import helpers, render
 from hair_addon.command_line.interruption import Interruption
 from hair_addon.core.long_work import Stopped
 from tests.support.commands import HEAD, ROOT, command, run_here
@@ -98,6 +99,38 @@ def test_finished_frames_are_complete(lit, tmp_path):
     for path in told:
         image = bpy.data.images.load(path)
         assert tuple(image.size) == (64, 48)
+
+
+@pytest.mark.parametrize("killed", [1, 2], ids=["one", "all"])
+def test_frames_of_a_killed_worker_are_rendered_by_the_other(lit, tmp_path, monkeypatch, killed):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    processes, sentence_of, real = [], render._sentence, subprocess.Popen
+
+    def started(*words, **details):
+        processes.append(real(*words, **details))
+        return processes[-1]
+
+    def told(values):
+        """Kill workers when the first frame is there: in the middle of another frame, or before they have one."""
+        for process in processes[:killed]:
+            process.kill()
+        return sentence_of(values)
+
+    monkeypatch.setattr(helpers.subprocess, "Popen", started)
+    monkeypatch.setattr(render, "_sentence", told)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    words = ("render", tmp_path / "shot.blend", "--frames", "1-6", "--width", 64, "--height", 48, "--samples", 8)
+    ended = run_here(*words, "--jobs", 2, "--out", tmp_path / "out" / "f_##.png")
+    frames = sorted(path.name for path in (tmp_path / "out").iterdir() if not path.name.startswith("."))
+    left = [path.name for path in (tmp_path / "out").glob(".vellus*")]
+    if killed == 2:
+        assert ended.status == 1 and ended.errors == "vellus: A worker process was killed by signal 9.\n"
+        assert len(frames) < 6
+        return
+    assert (ended.status, frames, left) == (0, [f"f_{number:02}.png" for number in range(1, 7)], [])
+    assert ended.errors == (
+        "vellus: warning: all frames are rendered, but not by all processes: A worker process was killed by signal 9.\n"
+    )
 
 
 def test_a_second_ctrl_c_does_not_wait():

@@ -14,6 +14,7 @@ from ...core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME, PassSettings
 from ...core.long_work import no_progress
 from ...core.params import declared
 from ..data import scene
+from ..data.pictures import rendered_files
 from ..data.strands import curves
 from ..groom.dynamics import frame_folders
 from ..host import scene_time
@@ -102,12 +103,25 @@ def _number_width(pattern):
     return len(name) - len(name.rstrip("#"))
 
 
-def write_frame(path, frame, engine, settings, partial=None, progress=no_progress):
+def missing_files(numbers, allows_missing=False):
+    """A sentence on files of the open scene that are missing in frames of some numbers, "" without any.
+
+    Raises `HairError` in place of the sentence unless `allows_missing`.
+    """
+    if not allows_missing:
+        rendered_files.require(bpy.context.scene, numbers)
+        return ""
+    names = rendered_files.missing(bpy.context.scene, numbers)
+    return f"rendered without missing files: {rendered_files.in_short(names)}." if names else ""
+
+
+def write_frame(path, frame, engine, settings, partial=None, progress=no_progress, allows_missing=False):
     """Render a frame of the open scene and write it; its files appear whole or not at all. Raises `HairError`.
 
     path: of `view_files.files_of`; engine: of `ENGINES`; settings: `PictureSettings`, but `DRAWING_FIELDS`; partial:
     where it is written first, None for a new path; progress(step, part): told how far it is, and may raise to stop it:
-    Vellus after any pass, others before the file is written.
+    Vellus after any pass, others before the file is written. allows_missing: render also where files are missing that
+    the scene needs.
     """
     blender_scene = bpy.context.scene
     if not FIRST_FRAME <= frame <= LAST_FRAME:
@@ -119,6 +133,7 @@ def write_frame(path, frame, engine, settings, partial=None, progress=no_progres
     files, partial = view_files.files_of(path), partial or new_partial_of(Path(path))
     partials = view_files.files_of(partial)
     with whole_files(files, partials), _rendering(blender_scene, partial, engine, settings):
+        missing_files([frame], allows_missing)
         scene_time.go_to(blender_scene, frame)
         progress(f"Frame {frame}", 0.0)
         try:

@@ -2,8 +2,8 @@
 """Frames of a sequence, shared among all processes with the same command: none is rendered twice.
 
 A frame is done when its files, one or one for each view, exist and are complete: they are written atomically, but
-another program may have left an empty one with the same name. A file beside the frames identifies the sequence, so that
-another command does not continue it.
+another program may have left an empty one with the same name. A file beside the frames identifies the sequence, with
+the files that the scene reads, so that another command, or one with another texture, does not continue it.
 """
 
 import contextlib
@@ -17,7 +17,8 @@ from ...core.files.file_lock import claim, claim_of
 from ...core.files.whole_file import partial_of, require_place, whole_file
 from ...core.imaging import picture_checks
 from ...core.long_work import no_progress
-from ..host import paths
+from ..data.pictures import rendered_files
+from ..host import paths, scene_time
 from . import frames, view_files
 
 _VERSION = 1
@@ -27,12 +28,15 @@ _PAUSE = 0.5  # [s] between checks of other processes' frames
 def description(input_path, engine, settings):
     """Description of a sequence, equal for commands with the same result.
 
-    input_path: the .blend; engine: of `frames.ENGINES`; settings: {name: value}.
+    input_path: the .blend, which is open; engine: of `frames.ENGINES`; settings: {name: value}. Linked files and images
+    count by size and time of change: to digest gigabytes of textures would delay each process of a farm by minutes.
     """
     with open(input_path, "rb") as file:
         digest = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
     program = f"Vellus {paths.addon_version()}"
-    return {"sequence": _VERSION, "program": program, "input": digest, "engine": engine, "settings": settings}
+    files = rendered_files.states(scene_time.present_scene())
+    described = {"sequence": _VERSION, "program": program, "input": digest, "engine": engine, "settings": settings}
+    return described | {"files": files}
 
 
 def begin(pattern, numbers, described, replaces=False):
@@ -90,10 +94,19 @@ def _require_same(record, described):
         raise HairError(f"{record} cannot be read: remove it, or use --overwrite to start over.") from error
     other = [key for key, value in described.items() if not isinstance(found, dict) or found.get(key) != value]
     if other:
-        what = ", ".join(other)
+        what = ", ".join(_in_words(key, found, described) for key in other)
         raise HairError(
             f"{record} belongs to another sequence ({what}): choose another name, or use --overwrite to start over."
         )
+
+
+def _in_words(key, found, described):
+    """What of a sequence is other, and which of its files are, where only some are."""
+    if key != "files" or not isinstance(found, dict) or not isinstance(found.get(key), dict):
+        return key
+    before, now = found[key], described[key]
+    names = sorted(name for name in {*before, *now} if before.get(name) != now.get(name))
+    return f"{key}: {rendered_files.in_short(names)}"
 
 
 def _require_none(pattern, numbers):
@@ -127,6 +140,12 @@ def make(pattern, numbers, write, told=no_progress):
         if left and is_idle:
             time.sleep(_PAUSE)
     _sweep(pattern, numbers)
+
+
+def missing_frames(pattern, numbers):
+    """The numbers of the frames that are not done; what killed processes have left of others is removed."""
+    _sweep(pattern, numbers)
+    return [number for number in numbers if not _is_done(frames.path_of(pattern, number))]
 
 
 def _files(pattern, numbers):

@@ -11,7 +11,7 @@ from ....core.errors import HairError
 from ....core.imaging import pixel_sampling
 from ....core.long_work import Stopped, no_progress
 from ...data import scene
-from ...data.pictures import camera_lens, panoramic_camera, view_cameras
+from ...data.pictures import camera_lens, panoramic_camera, rendered_files, view_cameras
 from ...gpu import drawing, world_texture
 from ...groom.dynamics import frame_folders
 from ...host import scene_time
@@ -90,6 +90,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         _require_supported(self.camera_override)
         if self.is_animation or composite.is_in_sequence(blender_scene):
             frame_folders.require_baked([scene_time.frame_of(blender_scene)])
+        if bpy.app.background and _listener is no_progress:  # `io.frames` has asked by itself
+            rendered_files.require(blender_scene.original, [scene_time.frame_of(blender_scene)])
         size, window = scene.picture_size(blender_scene.render)
         views = self._views(view_layer)
         offsets = _offsets(blender_scene.render, blender_scene.vellus.motion_steps)

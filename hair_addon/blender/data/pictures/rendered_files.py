@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that renders of a scene read: linked libraries, images, caches of meshes, volumes; which of them are missing.
+
+Blender renders without them, black or otherwise wrong, and calls that a success.
+"""
+
+import hashlib
+import os
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from ....core.errors import HairError
+from . import live_nodes
+
+MOST_NAMED = 4  # of missing files in a sentence
+
+# How files begin that Blender's image readers know; it is asked about others.
+_SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"#?", b"RIFF", b"8BPS", b"SDPX")
+_SIGNATURES += (b"XPDS", b"BM", b"\0\0\0\x0cjP", b"\xff\x4f\xff\x51")
+_OWNERS_WITH_NODES = (bpy.types.Material, bpy.types.World, bpy.types.Light, bpy.types.NodeTree)
+
+
+@dataclass(frozen=True)
+class RenderedFile:
+    """A file of a scene, or one for each number or tile.
+
+    name: its path as the .blend has it; paths: those that some frames need; siblings: all files of a numbered row.
+    """
+
+    name: str
+    paths: tuple[Path, ...]
+    is_image: bool = False
+    siblings: tuple[Path, ...] = ()
+
+
+def require(scene: bpy.types.Scene, numbers: Iterable[int]) -> None:
+    """Raise `HairError`, which names them, if files are missing that frames of these numbers need."""
+    names = missing(scene, numbers)
+    if names:
+        raise HairError(
+            "Files are missing: {names}; restore or relink them, or render without them by --allow-missing.",
+            names=in_short(names),
+        )
+
+
+def in_short(names: list[str]) -> str:
+    """Names for a sentence, of which there may be many."""
+    rest = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" + {rest}" if rest > 0 else "")
+
+
+def missing(scene: bpy.types.Scene, numbers: Iterable[int]) -> list[str]:
+    """Names of the files that are not there, or cannot be read, and of datablocks that are not in their library."""
+    reached = _reached(scene)
+    names = [_name_of_missing(datablock) for datablock in reached if datablock.is_missing]
+    names += [file.name for file in _files(reached, list(numbers)) if not all(map(_reader_of(file), file.paths))]
+    return sorted({*names})
+
+
+def states(scene: bpy.types.Scene) -> dict[str, str]:
+    """{name: what tells a file from a later version of it} of a scene's files, in whichever frame they are read.
+
+    Size and time of change in seconds, "missing" without a file; of a numbered row a digest of these of all its files.
+    """
+    reached, found = _reached(scene), {}
+    for library in {datablock.library for datablock in reached} - {None}:
+        found[library.filepath] = _state((_absolute(library.filepath, library.parent),))
+    for file in _files(reached, []):
+        found[file.name] = _state(file.siblings or file.paths)
+    return dict(sorted(found.items()))
+
+
+def _state(paths):
+    marks = []
+    for path in paths:
+        try:
+            status = path.stat()
+        except OSError:
+            marks.append("missing")
+        else:
+            marks.append(f"{status.st_size} {int(status.st_mtime)}")
+    if len(paths) == 1:
+        return marks[0]
+    text = "\n".join(f"{path.name} {mark}" for path, mark in zip(paths, marks, strict=True))
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def _name_of_missing(datablock):
+    library = datablock.library
+    path = library.filepath
+    if not _is_there(_absolute(path, library.parent)):
+        return path
+    return f'{path} ({datablock.bl_rna.name} "{datablock.name}")'
+
+
+def _reached(scene):
+    """All datablocks that a scene uses, and they: in a render, but for what the interface shows of them."""
+    used = {}
+    for datablock, users in bpy.data.user_map().items():
+        for user in users:
+            used.setdefault(user, []).append(datablock)
+    reached, left = {scene: None}, [scene]
+    while left:
+        user = left.pop()
+        named = _named_images(user) if isinstance(user, bpy.types.Curves) else ()
+        for datablock in (*used.get(user, ()), *named):
+            if datablock not in reached and _is_rendered(user, datablock):
+                reached[datablock] = None
+                left.append(datablock)
+    return list(reached)
+
+
+def _is_rendered(user, datablock):
+    """Whether a render shows what a datablock uses."""
+    if isinstance(datablock, (bpy.types.Brush, bpy.types.Palette, bpy.types.MovieClip, bpy.types.Sound)):
+        return False
+    if not isinstance(datablock, bpy.types.Image):
+        return True
+    if isinstance(user, _OWNERS_WITH_NODES):
+        return any(image == datablock for image, _node in live_nodes.images(user))
+    # Of a scene the images that are painted on, of cameras and empties what they show in viewports.
+    is_shown = isinstance(user, (bpy.types.Scene, bpy.types.Camera))
+    return not is_shown and not (isinstance(user, bpy.types.Object) and user.type == "EMPTY")
+
+
+def _named_images(curves):
+    """Images that settings of hair name, as masks."""
+    owners = [curves.vellus.hair, curves.vellus.guides, *curves.vellus.styles]
+    names = {getattr(owner, name) for owner in owners for name in owner.bl_rna.properties.keys() if "image" in name}
+    images = (bpy.data.images.get(name) for name in names if isinstance(name, str) and name)
+    return [image for image in images if image is not None]
+
+
+def _files(reached, numbers) -> Iterator[RenderedFile]:
+    """Files beside libraries, for frames of some numbers; without any, the first of each numbered row."""
+    users = {}
+    for datablock in reached:
+        for image, user in _image_users(datablock):
+            users.setdefault(image, []).append(user)
+    for datablock in reached:
+        if isinstance(datablock, bpy.types.Image):
+            yield from _image_files(datablock, users.get(datablock, ()), numbers)
+        elif isinstance(datablock, bpy.types.Volume) and datablock.packed_file is None:
+            yield from _numbered_file(datablock, datablock.is_sequence, ())
+        elif isinstance(datablock, bpy.types.CacheFile):
+            asked = [round(datablock.frame)] if datablock.override_frame else numbers
+            yield from _numbered_file(datablock, datablock.is_sequence, asked)
+
+
+def _image_users(datablock):
+    """(image, what says which of its numbers is read in a frame) of a datablock's nodes, or a texture."""
+    if isinstance(datablock, bpy.types.ImageTexture):
+        return [(datablock.image, datablock.image_user)]
+    if not isinstance(datablock, _OWNERS_WITH_NODES):
+        return []
+    # A compositor's node is its own image user.
+    return [(image, getattr(node, "image_user", node)) for image, node in live_nodes.images(datablock)]
+
+
+def _image_files(image, users, numbers):
+    is_in_views = image.use_multiview and image.views_format == "INDIVIDUAL"
+    if image.source in {"GENERATED", "VIEWER"} or len(image.packed_files) or is_in_views or not image.filepath:
+        return
+    path = _absolute(image.filepath, image.library)
+    if image.source == "TILED":
+        paths = tuple(_tile(path, tile.number) for tile in image.tiles)
+        yield RenderedFile(image.filepath, paths, is_image=True)
+    elif image.source == "SEQUENCE":
+        timed = [user for user in users if hasattr(user, "frame_duration")]
+        asked = sorted({_image_number(user, number) for user in timed for number in numbers})
+        paths = tuple(_numbered(path, number) for number in asked) or (path,)
+        yield RenderedFile(image.filepath, paths, is_image=True, siblings=_row_of(path))
+    else:
+        yield RenderedFile(image.filepath, (path,), is_image=image.source == "FILE")
+
+
+def _numbered_file(datablock, is_sequence, numbers):
+    if not datablock.filepath:
+        return
+    path = _absolute(datablock.filepath, datablock.library)
+    if is_sequence:
+        paths = tuple(_numbered(path, number) for number in numbers) or (path,)
+        yield RenderedFile(datablock.filepath, paths, siblings=_row_of(path))
+    else:
+        yield RenderedFile(datablock.filepath, (path,))
+
+
+def _image_number(user, frame):
+    """Number of the image that an image user reads in a frame, as Blender counts."""
+    length = user.frame_duration
+    place = frame - user.frame_start + 1
+    if length and user.use_cyclic:
+        place = place % length or length
+    return min(max(place, 0), length) + user.frame_offset
+
+
+def _numbered(path, number):
+    """A path with another number in the place of the last one in its name."""
+    found = list(re.finditer(r"\d+", path.stem))
+    if not found:
+        return path
+    last = found[-1]
+    digits = f"{number:0{len(last[0])}d}"
+    return path.with_name(path.stem[: last.start()] + digits + path.stem[last.end() :] + path.suffix)
+
+
+def _row_of(path):
+    """All files whose names differ from that of a path in the last number alone."""
+    found = list(re.finditer(r"\d+", path.stem))
+    if not found or not path.parent.is_dir():
+        return (path,)
+    before, after = path.stem[: found[-1].start()], path.stem[found[-1].end() :] + path.suffix
+    pattern = re.compile(re.escape(before) + r"\d+" + re.escape(after))
+    return tuple(sorted(path.with_name(name) for name in os.listdir(path.parent) if pattern.fullmatch(name)))
+
+
+def _tile(path, number):
+    across, up = (number - 1001) % 10 + 1, (number - 1001) // 10 + 1
+    name = path.name.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{across}_v{up}")
+    return path.with_name(name)
+
+
+def _absolute(path, library):
+    return Path(bpy.path.abspath(path, library=library))
+
+
+def _reader_of(file):
+    return _is_readable_image if file.is_image else _is_there
+
+
+def _is_there(path):
+    """Whether there is a file that is not empty."""
+    return path.is_file() and path.stat().st_size > 0
+
+
+def _is_readable_image(path):
+    """Whether there is a file that Blender takes for an image."""
+    if not _is_there(path):
+        return False
+    with path.open("rb") as file:
+        head = file.read(16)
+    if head.startswith(_SIGNATURES):
+        return True
+    image = bpy.data.images.load(str(path))
+    try:
+        return min(image.size) > 0
+    finally:
+        bpy.data.images.remove(image)
