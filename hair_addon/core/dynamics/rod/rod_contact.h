@@ -12,9 +12,9 @@
 //
 // F filters masses in the solve [Baraff98], and x follows from λ and the contact's state, so passes may change that at
 // will. w is `away_of` the point, and U' is U at the beginning of the pass: what the rod pushes, w would else let in.
-// In the first pass U is that of the last substep: it says who is pressed and who is lifted. There t is what Coulomb's law gives,
-// |T (x̃ + U - x_before - s)| - μ p, for a point that the rod hardly pulls; for one that the rod drags along it is the
-// last slide, as such a pull depends on a so much that the law would overshoot.
+// In the first pass U is that of the last substep: it says who is pressed and who is lifted. There t is what Coulomb's
+// law gives, |T (x̃ + U - x_before - s)| - μ p, for a point that the rod hardly pulls; for one that the rod drags
+// along it is the last slide, as such a pull depends on a so much that the law would overshoot.
 
 struct touch {
   vector n, point;
