@@ -3,7 +3,6 @@
 
 import itertools
 import subprocess
-import types
 from pathlib import Path
 
 import bpy
@@ -85,7 +84,7 @@ def test_the_time_of_all_guides_is_told(shot, monkeypatch):
     other.data.vellus.cache_identity = ""
     bpy.ops.wm.save_mainfile()
     looks = itertools.count()
-    monkeypatch.setattr(guide_baking, "time", types.SimpleNamespace(perf_counter=lambda: float(next(looks))))
+    monkeypatch.setattr(guide_baking, "_now", lambda: float(next(looks)))
     lines = run_here("simulate", shot, "--frames", "1-2", "--json").results
     assert len({line["guides"] for line in lines}) == 2
     assert [(line["frame"], line["seconds"]) for line in lines] == [(2, 2.5), (2, 2.5), (3, 2.5), (3, 2.5)]

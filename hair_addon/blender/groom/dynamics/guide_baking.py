@@ -114,6 +114,11 @@ def changed_parts(guides: Curves, scene: Scene, manifest: Manifest) -> list[str]
     return changed
 
 
+def _now():
+    """[s], of a clock that tests turn by hand."""
+    return time.perf_counter()
+
+
 def _parted_by(guides):
     return frame_manifest.digest(guide_regions.parting_keys(guides))
 
@@ -156,10 +161,10 @@ def baking(
         for frame in range(first + 1, last + _BEYOND + 1):
             due = [(index, task) for index, task in enumerate(tasks) if task.done == frame - 1]
             scene = its_scene.find()  # another one after an undo
-            started = time.perf_counter()
+            started = _now()
             scene_time.go_to(scene, frame)
             depsgraph = scenes.present_depsgraph()
-            share = (time.perf_counter() - started) / max(len(due), 1)
+            share = (_now() - started) / max(len(due), 1)
             for _, task in due:
                 task.seconds = share
             inputs = [_read(task, scene, depsgraph) for _, task in due]
@@ -244,11 +249,11 @@ def _begin(guides, last, scene, starts_over, stack):
 
 def _read(task, scene, depsgraph):
     """(`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
-    guides, started = task.guides.find(), time.perf_counter()
+    guides, started = task.guides.find(), _now()
     settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
     read = guide_simulation.read(guides, scene, depsgraph, settings, task.simulated.masks)
     found = read, bake_resuming.digest_of(guides, scene, settings)
-    task.seconds += time.perf_counter() - started
+    task.seconds += _now() - started
     return found
 
 
@@ -258,12 +263,12 @@ def _computing(tasks, inputs, frame, part, is_last):
     def compute(progress):
         progress(f"Frame {frame}", part)
         for task, (read, digest) in zip(tasks, inputs, strict=True):
-            started = time.perf_counter()
+            started = _now()
             points = task.simulated.advance(read)
             task.broken += len(task.simulated.simulation.broken)
             task.writer.write_frame(frame, points, digest)
             if is_last or (frame - task.simulated.settings.start_frame) % STATE_FRAMES == 0:
                 task.writer.write_state(frame, task.simulated.simulation.save())
-            task.seconds += time.perf_counter() - started
+            task.seconds += _now() - started
 
     return compute
