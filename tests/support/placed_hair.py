@@ -186,10 +186,10 @@ def went(before, after):
     return matrix
 
 
-def require_carried(before, after, points=2e-5, names=None):
+def require_carried(before, after, points=2e-5, names=None, lengths=1e-3):
     """The law: all points of strands went as the surface did, and their widths and lengths as its size.
 
-    points: tolerance in parts of the surface's size; names: of objects, None for all.
+    points: tolerance in parts of the surface's size; names: of objects, None for all; lengths: tolerance in parts.
     """
     matrix = went(before, after)
     factor = abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0)
@@ -197,13 +197,13 @@ def require_carried(before, after, points=2e-5, names=None):
     assert names is not None or before.strands.keys() == after.strands.keys()
     tolerance = _tolerance(before, after, points)
     for name in before.strands if names is None else names:
-        (were, radii, lengths), (are, radii_now, lengths_now) = before.strands[name], after.strands[name]
+        (were, radii, long), (are, radii_now, long_now) = before.strands[name], after.strands[name]
         assert were.shape == are.shape, name
         apart = np.linalg.norm(_in_world(were, matrix) - are, axis=1)
         assert apart.max() <= tolerance, f"{name}: {apart.max():.3g} off, of a size of {after.size:.3g}"
         np.testing.assert_allclose(radii_now, factor * radii, rtol=1e-4, err_msg=f"widths of {name}")
         if is_even:
-            np.testing.assert_allclose(lengths_now, factor * lengths, rtol=1e-3, err_msg=f"lengths of {name}")
+            np.testing.assert_allclose(long_now, factor * long, rtol=lengths, err_msg=f"lengths of {name}")
 
 
 def _tolerance(before, after, part):
