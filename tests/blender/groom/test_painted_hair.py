@@ -18,7 +18,7 @@ def two(hair):
     style_items.add(hair.data.vellus, frizz.Settings(), "Frizz")
     bpy.context.view_layer.objects.active = sphere
     bpy.ops.vellus.distribute_guides(guide_count=20, length=0.2)
-    bpy.context.view_layer.objects.active = bpy.data.objects["Hair.001 Guides"]
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides.001"]
     bpy.ops.vellus.interpolate_hair(strand_count=50)
     newer = bpy.data.objects["Hair.001"]
     style_items.add(newer.data.vellus, curl.Settings(), "Curl")

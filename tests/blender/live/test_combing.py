@@ -299,7 +299,7 @@ def test_undo_and_redo_keep_hair_and_guides_together(hair, window, is_written_be
 def test_a_stroke_on_one_groom_leaves_another_alone(hair, sphere, window, monkeypatch):
     bpy.context.view_layer.objects.active = sphere
     bpy.ops.vellus.distribute_guides(guide_count=30, length=0.2)
-    bpy.context.view_layer.objects.active = bpy.data.objects["Hair.001 Guides"]
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides.001"]
     bpy.ops.vellus.interpolate_hair(strand_count=100)
     other = bpy.data.objects["Hair.001"]
     drawn(hair), drawn(other)
