@@ -204,3 +204,14 @@ def test_hair_without_guides_stays_on_its_surface(place):
     before = seen()
     CHANGES["apply all"]()
     require_carried(before, seen())
+
+
+@pytest.mark.parametrize("place", ["turned", "mirrored", "on a scaled rig"], indirect=True)
+def test_locks_stay_the_same(place):
+    """Where clumps stand, and how each is shaped, follows from all bits of the surface at rest."""
+    select(bpy.data.objects["Hair"])
+    bpy.ops.vellus.add_style(style="CLUMP")
+    before = seen()
+    for change in ("apply rotation and scale", "apply all", "origin to cursor"):
+        CHANGES[change]()
+        require_carried(before, seen())

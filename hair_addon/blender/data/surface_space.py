@@ -78,9 +78,26 @@ def applied(curves):
     return found if found.is_valid else Affine.identity()
 
 
-def note_applied(curves, change):
-    """Note that an `Affine` was applied to the local coordinates."""
-    _keep(curves, _APPLIED, {"matrix": (change @ applied(curves)).matrix.ravel()})
+def note_applied(curves, change, rest_before=None):
+    """Note that an `Affine` was applied to the local coordinates; rest_before: (V, 3) vertices at rest until then."""
+    kept = {"matrix": (change @ applied(curves)).matrix.ravel()}
+    first = curves.get(_APPLIED, {}).get("rest")
+    if rest_before is not None:
+        kept["rest"] = rest_before.ravel() if first is None else np.array(first, np.float32)
+    _keep(curves, _APPLIED, kept)
+
+
+def made_on(curves, rest):
+    """(V, 3) vertices, to the last bit, that were at rest when strands were made, if they are (V, 3) now; else None.
+
+    What is spread over a surface at random follows their bits.
+    """
+    first = curves.get(_APPLIED, {}).get("rest")
+    if first is None or len(first) != rest.size:
+        return None
+    before = np.array(first, np.float32).reshape(-1, 3)
+    tolerance = 1e-5 * np.ptp(rest, axis=0).max() + 1e-6 * abs(rest).max()
+    return before if np.allclose(applied(curves).points(before), rest, rtol=0.0, atol=tolerance) else None
 
 
 def note_same(curves, before, now):

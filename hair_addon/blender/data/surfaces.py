@@ -155,6 +155,12 @@ class Surface:
         # A mirrored object's triangles are wound the other way, as those of the rest mirrored at its origin are.
         return TriMesh(-self.rest if self.is_mirrored else self.rest, self.mesh.triangles)
 
+    def shape_made_on(self, rest, is_mirroring):
+        """`shape` as it was when its vertices were at rest at (V, 3); is_mirroring: whether left was right then."""
+        if rest is None or self.shape is None:
+            return self.shape
+        return TriMesh(-rest if self.is_mirrored != is_mirroring else rest, self.mesh.triangles)
+
     def root_vertices(self, points):
         """(N, 3) int32: the vertices that surface points lie between, in Blender's order of corners."""
         vertices = self.mesh.triangles.take(points.triangle, axis=0)  # a third of the time of brackets

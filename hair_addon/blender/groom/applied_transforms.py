@@ -66,13 +66,14 @@ def note(strands: list[Curves], surface: Surface, change: Affine) -> None:
 
     Of a scale that mirrors: Blender has turned the faces, and a `Surface` that is read afterwards knows it.
     """
+    rest_before = surface_space.rest_before(strands[0])
     for one in strands:
         if change.is_mirroring and one.vellus.topology == surface.turned_topology:
             stored_roots.turn(one)
             before, now = (frame_manifest.digest(key) for key in (one.vellus.topology, surface.topology))
             surface_space.note_same(one, before, now)
             one.vellus.topology = surface.topology
-        surface_space.note_applied(one, change)
+        surface_space.note_applied(one, change, rest_before)
 
 
 def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgraph) -> None:

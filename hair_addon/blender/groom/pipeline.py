@@ -16,7 +16,7 @@ from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.long_work import Work, part_of, run_now
 from ...core.styling.base import StyleSettings
-from ..data import masks, scene
+from ..data import masks, scene, surface_space
 from ..data.scene import Surface
 from ..data.strands import curves, drawn_lines, partings, stored_roots
 from ..data.surfaces import cage_of
@@ -116,6 +116,9 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     device, guide_uid = preferences.device(), guide_curves.session_uid
 
     ground = _ground(surface, mask, parting, device)
+    if target is not None:
+        made_on = surface_space.made_on(target, surface.rest)
+        ground["shape"] = surface.shape_made_on(made_on, surface_space.applied(target).is_mirroring)
 
     def compute(progress):
         if known is None:
