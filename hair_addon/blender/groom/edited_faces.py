@@ -11,7 +11,7 @@ import numpy as np
 from bpy.types import Curves, Depsgraph
 
 from ...core import geometry
-from ...core.geometry.mesh import SurfacePoints, TriMesh, require_finite
+from ...core.geometry.mesh import SurfacePoints, TriMesh, check_mesh, require_finite
 from ..data import surface_space
 from ..data.scene import Surface
 from ..data.strands import attributes, curves, kept_shapes, posed_strands, stored_roots
@@ -36,8 +36,9 @@ def root_again(strands: Curves, surface: Surface, depsgraph: Depsgraph) -> tuple
     """Root guides or kept hair, and the hair between guides, on a surface with other faces.
 
     Strands are carried with vertices that were moved in the same edit. Returns how many guides, or kept strands, and
-    how many strands between guides had a face that is gone.
+    how many strands between guides had a face that is gone. Raises `HairError` as `check_mesh`.
     """
+    check_mesh(surface.mesh)
     edit = _edit(surface_space.rest_before(strands), surface)
     places, stored = _rooted(strands, edit)
     is_moved, lost_between = not np.array_equal(edit.before, surface.rest), 0

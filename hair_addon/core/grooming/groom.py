@@ -357,6 +357,7 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         placement.exact_cells,
         interpolation.guide_weights,
         grooming.guide_growth,
+        geometry.bspline,
         geometry.hash_grid,
         geometry.root_frames,
         placement.sampled_cells,
@@ -375,8 +376,7 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
     if device == "cpu":
         _load_kernels(device, [*on_device, interpolation.interpolation, *on_processor], progress, most_threads)
     else:
-        on_device += [interpolation.gpu_interpolation, geometry.bspline]
-        _load_kernels(device, on_device, part_of(progress, 0.0, 0.8), most_threads)
+        _load_kernels(device, [*on_device, interpolation.gpu_interpolation], part_of(progress, 0.0, 0.8), most_threads)
         _load_kernels("cpu", on_processor, part_of(progress, 0.8, 1.0), most_threads)
 
 

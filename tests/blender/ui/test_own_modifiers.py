@@ -53,8 +53,9 @@ def test_hair_that_blender_draws_shows_its_modifiers(hair):
     assert not notes()
 
 
-def test_hair_without_an_object_has_no_note(hair):
+def test_hair_without_an_object_has_no_panel(hair):
     add_asset(hair, "Clump Hair Curves")
+    assert notes("Sphere")
     hair.data.use_fake_user = True
     bpy.data.objects.remove(hair)
-    assert not notes("Sphere")
+    assert draw(bpy.types.VELLUS_PT_shading) is None

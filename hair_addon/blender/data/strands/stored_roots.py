@@ -16,10 +16,10 @@ VERTICES = ("root_vertex_0", "root_vertex_1", "root_vertex_2")
 def points(curves, surface, is_complete=False):
     """`SurfacePoints` of roots on a surface with the faces that they were stored on; impossible ones become a corner.
 
-    is_complete: None if any of them is impossible; None too if none are stored.
+    is_complete: None if any of them is impossible; None too if none are stored, or the surface has no faces.
     """
     triangle, barycentric = raw(curves)
-    if barycentric is None or triangle is None:
+    if barycentric is None or triangle is None or not len(surface.mesh.triangles):
         return None
     # Curves that sculpt mode adds carry zeros; a surface that lost faces leaves indices out of range.
     known = are_barycentric(barycentric) & (triangle >= 0) & (triangle < len(surface.mesh.triangles))
