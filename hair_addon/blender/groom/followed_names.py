@@ -51,7 +51,7 @@ def follow() -> None:
 
 
 def _follow(datablock: Curves) -> None:
-    kept = {} if _POINTERS not in datablock else datablock[_POINTERS].to_dict()
+    kept = _kept(datablock)
     now: dict[str, dict[str, Any]] = {}
     for key, group, field, source in _named(datablock):
         name = text_of(group, field)
@@ -75,6 +75,18 @@ def _follow(datablock: Curves) -> None:
             del datablock[_POINTERS]
         if now:
             datablock[_POINTERS] = now
+
+
+def _kept(datablock):
+    """{setting: {"name": str, "to": ID}}; nothing where a damaged file has text that is not UTF-8.
+
+    Entry by entry: `to_dict` leaves such an error to whatever runs next.
+    """
+    try:
+        entries = datablock.get(_POINTERS, {})
+        return {key: {name: entries[key][name] for name in ("name", "to")} for key in entries.keys()}
+    except (UnicodeDecodeError, KeyError):
+        return {}
 
 
 def _object(datablock, key, name, found):

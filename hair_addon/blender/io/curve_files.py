@@ -257,6 +257,7 @@ def _chosen_objects(path, came, wanted, is_open):
 
 
 def _guides_of(chosen, came):
-    """The objects of the guides that hair follows."""
-    wanted = {one.data.vellus.guide_curves for one in chosen if one.type == "CURVES"} - {None}
-    return [one for one in came if one.type == "CURVES" and one.data in wanted]
+    """The objects of the guides that hair follows, in the order of the hair."""
+    followed = dict.fromkeys(one.data.vellus.guide_curves for one in chosen if one.type == "CURVES")
+    shown = {one.data: one for one in came if one.type == "CURVES"}
+    return [shown[guides] for guides in followed if guides in shown]
