@@ -24,6 +24,7 @@ from ..data.strands import (
     simulated_guides,
     stored_roots,
 )
+from ..data.surfaces import cage_of
 from . import bindings, pipeline, staleness
 
 _CLOSE = 1e-5  # parts of the surface's size
@@ -70,7 +71,8 @@ def note(strands: list[Curves], surface: Surface, change: Affine) -> None:
     for one in strands:
         if change.is_mirroring and one.vellus.topology == surface.turned_topology:
             stored_roots.turn(one)
-            before, now = (frame_manifest.digest(key) for key in (one.vellus.topology, surface.topology))
+            # As baked frames know them, by the faces of the cage: `guide_baking.key_of`.
+            before, now = (frame_manifest.digest(cage_of(key)) for key in (one.vellus.topology, surface.topology))
             surface_space.note_same(one, before, now)
             one.vellus.topology = surface.topology
         surface_space.note_applied(one, change, rest_before)
