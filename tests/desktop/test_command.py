@@ -44,7 +44,10 @@ def test_it_makes_the_arrays_that_python_does(vellus, tmp_path):
     assert run("groom", HEAD, *SMALL, "--out", tmp_path / "head.npz").status == 0
     expected, found = load(tmp_path / "head.npz"), load(out)
     for name, array in expected.items():
-        np.testing.assert_allclose(found[name], array, atol=1e-5)
+        if array.dtype.kind == "U":  # the axis that points up
+            np.testing.assert_array_equal(found[name], array)
+        else:
+            np.testing.assert_allclose(found[name], array, atol=1e-5)
 
 
 def test_a_groom_is_made_told_of_and_drawn(vellus):
