@@ -12,7 +12,7 @@ from hair_addon.blender.data.strands import curves
 from hair_addon.blender.live import handlers
 from tests.support import placed_hair
 from tests.support.exchange.imported import select
-from tests.support.placed_hair import PLACES, require_carried, seen
+from tests.support.placed_hair import PLACES, Placed, require_carried, seen
 
 
 @pytest.fixture(scope="module")
@@ -158,6 +158,32 @@ def test_hair_goes_wherever_its_surface_goes(place, change):
     is_distorted = place == "on a sheared rig" and change == "apply all to rig and body"
     require_carried(before, seen(), names=before.strands.keys() - {"Hair"} if is_distorted else None)
     assert not curves.is_combed(bpy.data.objects["Hair"].data)
+
+
+@pytest.mark.parametrize(
+    ("place", "change"),
+    [
+        ("mirrored, subdivided 1", "apply scale"),
+        ("mirrored, subdivided 1", "apply all"),
+        ("mirrored, subdivided 2", "Apply Scale of the panel"),
+    ],
+    indirect=["place"],
+)
+def test_hair_stays_where_faces_that_are_subdivided_are_turned(place, change):
+    """Blender turns the faces of the cage: those that they are divided into come in another order."""
+
+    def seen_with_cage():
+        found = seen()
+        return Placed(found.vertices[: len(body().data.vertices)], found.strands)
+
+    before = seen_with_cage()
+    CHANGES[change]()
+    require_carried(before, seen_with_cage(), points=1e-5)
+    assert not curves.is_combed(bpy.data.objects["Hair"].data)
+    body().scale = (1.0, -1.0, 1.0)
+    before = seen_with_cage()
+    CHANGES[change]()
+    require_carried(before, seen_with_cage(), names=before.strands.keys() - {"Hair"})
 
 
 @pytest.mark.parametrize("change", ["apply all", "apply scale", "origin to cursor"])

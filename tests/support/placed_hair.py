@@ -51,6 +51,15 @@ def _in_centimetres(body):
     body.location, body.scale = (150.0, 20.0, -30.0), (100.0, 100.0, 100.0)
 
 
+def _subdivided(levels, place):
+    def place_subdivided(body):
+        place(body)
+        modifier = body.modifiers.new("Subdivision", "SUBSURF")
+        modifier.levels = modifier.render_levels = levels
+
+    return place_subdivided
+
+
 _FAR, _TURNED = (3.0, 1.0, -2.0), (0.4, -0.3, 1.2)
 
 # Where a surface may stand: {kind: function of the body}.
@@ -69,11 +78,14 @@ PLACES = {
     "in a scene of centimetres": _in_centimetres,
 }
 
+# The same where a modifier subdivides the surface.
+SUBDIVIDED = {f"mirrored, subdivided {levels}": _subdivided(levels, PLACES["mirrored"]) for levels in (1, 2)}
+
 
 def grow(place):
-    """A body at one of `PLACES` with combed guides and styled hair, kept hair, and hand-made guides."""
+    """A body at one of `PLACES` or `SUBDIVIDED` with combed guides and styled hair, kept hair, and hand-made guides."""
     body = add_body()
-    PLACES[place](body)
+    (PLACES | SUBDIVIDED)[place](body)
     bpy.context.view_layer.update()
     size = world_scale(body)
     select(body)

@@ -49,7 +49,8 @@ def read_surface(surface_object, depsgraph):
         read = _Reading(
             name_of(surface_object), rest, faces, uv_map, loop_uvs, to_world_axes, rest is not posed, is_turned
         )
-        if known is None or not known[0].is_same(read):
+        undivided = subdivided_surfaces.undivided_corners(surface_object, depsgraph, faces)
+        if known is None or not known[0].is_same(read) or known[1].undivided_corners != undivided:
             if read.has_rest and (np.diff(faces.starts) > 3).any():
                 # Where polygons are cut depends on where vertices are: triangles are to stay the same in every pose.
                 # Written to the attribute, positions would not reach triangles that Blender shares with the evaluated
@@ -57,15 +58,14 @@ def read_surface(surface_object, depsgraph):
                 mesh.vertices.foreach_set("co", rest.ravel())
             corners = triangle_corners(mesh, faces, read.name)
             if is_turned:
-                corners = corners[_turned_order(faces)]
+                corners = _turned_back(corners, faces, undivided)
             known = None
     finally:
         evaluated.to_mesh_clear()
     cage_corners = 0
     if read.has_rest and np.isfinite(rest).all():
         cage_corners = subdivided_surfaces.cage_corners(surface_object, depsgraph, faces)
-    undivided = subdivided_surfaces.undivided_corners(surface_object, depsgraph, faces)
-    if known is not None and (known[1].cage_corners, known[1].undivided_corners) == (cage_corners, undivided):
+    if known is not None and known[1].cage_corners == cage_corners:
         return known[1].posed_at(posed if read.has_rest else known[1].rest)
     if known is not None:
         corners = known[2]
@@ -102,6 +102,17 @@ class _Reading:
             for r in (self, other)
         )
         return all(a is b or np.array_equal(a, b) for a, b in zip(mine, its, strict=True))
+
+
+def _turned_back(corners, faces, undivided):
+    """(T, 3) corners of triangles in the order that they had before faces, or those of their cage, were turned."""
+    turned = geometry.turned_faces.turned_cage(faces, undivided) if undivided else None
+    if turned is None:
+        return corners[_turned_order(faces)]
+    quads = turned.corners.reshape(-1, 4)
+    is_cut_otherwise = (corners[::2, 2] % 4 == 3)[quads[:, 0] // 4]  # as Blender cuts quads that are not convex
+    cuts = np.where(is_cut_otherwise[:, None], (0, 3, 1, 1, 3, 2), (0, 2, 1, 0, 3, 2))
+    return np.take_along_axis(quads, cuts, axis=1).reshape(-1, 3).astype(corners.dtype)
 
 
 def _turned_order(faces):

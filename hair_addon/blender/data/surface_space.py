@@ -78,12 +78,18 @@ def applied(curves):
     return found if found.is_valid else Affine.identity()
 
 
-def note_applied(curves, change, rest_before=None):
-    """Note that an `Affine` was applied to the local coordinates; rest_before: (V, 3) vertices at rest until then."""
-    kept = {"matrix": (change @ applied(curves)).matrix.ravel()}
+def note_applied(curves, change, rest_before=None, vertices=None):
+    """Note that an `Affine` was applied to the local coordinates.
+
+    rest_before: (V, 3) vertices at rest until then, in their present order; vertices: (V,) of `TurnedFaces` where this
+    is another than that of before.
+    """
+    kept = {"matrix": (change @ applied(curves)).matrix.ravel(), "turns": _turns(curves) + int(change.is_mirroring)}
     first = curves.get(_APPLIED, {}).get("rest")
     if rest_before is not None:
         kept["rest"] = rest_before.ravel() if first is None else np.array(first, np.float32)
+        if first is not None and vertices is not None and len(first) == 3 * len(vertices):
+            kept["rest"] = kept["rest"].reshape(-1, 3)[vertices].ravel()
     _keep(curves, _APPLIED, kept)
 
 
@@ -114,9 +120,18 @@ def known_as(curves, digest):
 
 
 def is_turned(surface_object):
-    """Whether a mirroring scale was applied to a mesh object on which hair grows, as then Blender turns its faces."""
+    """Whether a mirroring scale was applied to a mesh object on which hair grows, as then Blender turns its faces.
+
+    Hair that has not followed the last turn yet does not count.
+    """
     grown = (datablock for datablock in bpy.data.hair_curves if datablock.surface == surface_object)
-    return any(applied(datablock).is_mirroring for datablock in grown if _APPLIED in datablock)
+    return max((_turns(datablock) for datablock in grown if _APPLIED in datablock), default=0) % 2 == 1
+
+
+def _turns(curves):
+    """How often a scale that mirrors was applied to what Curves are rooted on."""
+    turns = curves.get(_APPLIED, {}).get("turns")
+    return turns if isinstance(turns, int) else int(applied(curves).is_mirroring)
 
 
 def forget_applied(curves):

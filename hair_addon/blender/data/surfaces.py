@@ -12,7 +12,7 @@ from ...core.geometry.mesh import Faces, TriMesh, check_mesh
 from ...core.kernels.checks import require_indices
 
 # What does not follow from where vertices are posed, and is kept in another pose.
-_AT_REST = ("to_local_axes", "local_mesh", "shape", "extent", "topology", "cage_vertices")
+_AT_REST = ("to_local_axes", "local_mesh", "shape", "extent", "topology", "turned", "turned_topology", "cage_vertices")
 
 _MOST_TURNINGS = 8  # of a surface: of the hair and the guides on it
 
@@ -198,27 +198,32 @@ class Surface:
         return _half_key(self.cage_vertices) + _half_key(self.faces.corner_vertices, self.faces.starts)
 
     @cached_property
+    def turned(self):
+        """The `TurnedFaces` of its faces, or of those of its cage, as Blender turns them."""
+        count = self.undivided_corners
+        found = geometry.turned_faces.turned_cage(self.faces, count) if count else None
+        return geometry.turned_faces.turned(self.faces) if found is None else found
+
+    @cached_property
     def turned_topology(self):
         """`topology` with each face turned, as Blender turns them where it applies a scale that mirrors."""
-        starts, sizes = self.faces.starts[:-1], np.diff(self.faces.starts)
-        first, size = np.repeat(starts, sizes), np.repeat(sizes, sizes)
-        corner = np.arange(len(first)) - first
-        turned = self.faces.corner_vertices[first + (size - corner) % np.maximum(size, 1)]
-        return _half_key(turned) + _half_key(turned, self.faces.starts)
+        faces = Faces(self.turned.before(self.faces.corner_vertices), self.faces.starts)
+        of_cage = geometry.turned_faces.cage_vertices(faces, self.undivided_corners)
+        return _half_key(of_cage) + _half_key(faces.corner_vertices, faces.starts)
+
+    @cached_property
+    def triangulated(self):
+        """The `Faces` in the order of their triangles, which is that of before where they are turned."""
+        turned = self.turned
+        if not self.is_turned or turned.vertices is None:
+            return self.faces
+        quads = self.faces.corner_vertices.reshape(-1, 4)[turned.corners[::4] // 4]
+        return Faces(np.ascontiguousarray(quads).ravel(), self.faces.starts)
 
     @cached_property
     def cage_vertices(self):
-        """(C,) int32: the vertices at the corners of faces before modifiers subdivide them, face after face.
-
-        A subdivided mesh has the vertices of its cage first, and each corner of the cage is one of its own, in order.
-        """
-        vertices, count = self.faces.corner_vertices, self.undivided_corners
-        if count:
-            up_to = np.cumsum(np.bincount(vertices))
-            last = int(np.searchsorted(up_to, count))
-            if last < len(up_to) and up_to[last] == count:
-                return vertices[vertices <= last]
-        return vertices
+        """(C,) int32: the vertices at the corners of faces before modifiers subdivide them, face after face."""
+        return geometry.turned_faces.cage_vertices(self.faces, self.undivided_corners)
 
     @property
     def cage_size(self):
@@ -227,8 +232,8 @@ class Surface:
         return int(self.cage_vertices.max()) + 1 if is_divided else len(self.rest)
 
     def points_at(self, polygons, vertices, barycentric):
-        """(`SurfacePoints`, (N,) bool: which are none) of places in polygons, as `places` gives them."""
-        return geometry.face_places.on_triangles(self.mesh, self.faces, polygons, vertices, barycentric)
+        """(`SurfacePoints`, (N,) bool: which are none) of places in `triangulated` polygons, as of `places`."""
+        return geometry.face_places.on_triangles(self.mesh, self.triangulated, polygons, vertices, barycentric)
 
     def to_local_normals(self, normals):
         """(N, 3) unit normals → unit normals in local coordinates: the inverse transpose of `to_local`."""

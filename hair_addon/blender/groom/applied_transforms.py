@@ -37,7 +37,7 @@ def find(strands: Curves, surface: Surface, to_world_before: Affine | None) -> A
 
     to_world_before: where the surface's object was before, if that is known.
     """
-    rest_before = surface_space.rest_before(strands)
+    rest_before = _rest_before(strands, surface)
     for change in _candidates(strands, to_world_before):
         if rest_before is None:
             if _are_rooted(strands, surface, change) and not _are_rooted(strands, surface, Affine.identity()):
@@ -67,15 +67,26 @@ def note(strands: list[Curves], surface: Surface, change: Affine) -> None:
 
     Of a scale that mirrors: Blender has turned the faces, and a `Surface` that is read afterwards knows it.
     """
-    rest_before = surface_space.rest_before(strands[0])
+    rest_before, vertices = _rest_before(strands[0], surface), _vertices_before(strands[0], surface)
     for one in strands:
         if change.is_mirroring and one.vellus.topology == surface.turned_topology:
-            stored_roots.turn(one)
+            stored_roots.turn(one, surface.turned)
             # As baked frames know them, by the faces of the cage: `guide_baking.key_of`.
             before, now = (frame_manifest.digest(cage_of(key)) for key in (one.vellus.topology, surface.topology))
             surface_space.note_same(one, before, now)
             one.vellus.topology = surface.topology
-        surface_space.note_applied(one, change, rest_before)
+        surface_space.note_applied(one, change, rest_before, vertices)
+
+
+def _rest_before(strands, surface):
+    """(V, 3) vertices of the surface as strands know it, in their present order; None if they do not."""
+    before, vertices = surface_space.rest_before(strands), _vertices_before(strands, surface)
+    return before if before is None or vertices is None or len(before) != len(vertices) else before[vertices]
+
+
+def _vertices_before(strands, surface):
+    """The vertices of `TurnedFaces` where strands are rooted on the faces of before a turn that gave others numbers."""
+    return surface.turned.vertices if strands.vellus.topology == surface.turned_topology else None
 
 
 def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgraph) -> None:

@@ -183,9 +183,9 @@ def _polygons_with(surface, vertices):
     count = len(surface.rest)
     keys = (vertices[:, 0].astype(np.float64) * count + vertices[:, 1]) * count + vertices[:, 2]
     if count > 200_000:  # beyond which such a number is not exact
-        return geometry.face_places.polygons_with(surface.faces, count, vertices)
+        return geometry.face_places.polygons_with(surface.triangulated, count, vertices)
     _keys, first, which = np.unique(keys, return_index=True, return_inverse=True)
-    return geometry.face_places.polygons_with(surface.faces, count, vertices[first])[which]
+    return geometry.face_places.polygons_with(surface.triangulated, count, vertices[first])[which]
 
 
 def _write(strands, edit, roots, depsgraph):

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         surface_deform,
         texture,
         transform,
+        turned_faces,
         uv_check,
         vertex_turns,
     )

@@ -32,7 +32,7 @@ def points(curves, surface, is_complete=False):
         cut_otherwise = np.flatnonzero(known & is_other & are_vertices)
         known &= are_vertices
         if len(cut_otherwise):
-            polygons = geometry.face_places.owners(surface.faces)[triangle[cut_otherwise]]
+            polygons = geometry.face_places.owners(surface.triangulated)[triangle[cut_otherwise]]
             its_places = vertices[cut_otherwise], barycentric[cut_otherwise]
             present, are_none = surface.points_at(polygons, *its_places)
             found.triangle[cut_otherwise], found.barycentric[cut_otherwise] = present.triangle, present.barycentric
@@ -63,11 +63,17 @@ def places(curves, vertex_count):
     return vertices, barycentric
 
 
-def turn(curves):
-    """Turn the triangles that roots are stored in, as Blender turns faces where it applies a scale that mirrors."""
+def turn(curves, turned):
+    """Turn the triangles that roots are stored in, as Blender turns faces where it applies a scale that mirrors.
+
+    turned: the `TurnedFaces` of the surface.
+    """
     vertices, barycentric = _vertices(curves), attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
     if vertices is None or barycentric is None:
         return
+    if turned.vertices is not None:
+        are_vertices = (vertices >= 0) & (vertices < len(turned.vertices))
+        vertices[are_vertices] = turned.vertices[vertices[are_vertices]]
     attributes.write(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE", barycentric[:, [0, 2, 1]])
     for name, column in zip(VERTICES, (0, 2, 1), strict=True):
         attributes.write(curves, name, "INT", "CURVE", vertices[:, column])
