@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Transforms that are applied to a head in a window leave the picture of its hair as it is."""
+
+import pytest
+
+from tests.desktop import walks
+
+pytestmark = pytest.mark.desktop
+
+# Of the pixels with hair: rounding flips single samples at the edges of strands.
+FLIPPED = 0.02
+
+SIZE = (640, 400)  # of the window [pixels]: software drivers take their time for each
+
+
+@pytest.fixture(scope="module")
+def walk(desktop, extension, new_profile):
+    """The `Walk` with OpenGL: what is read of the surface is the same with any driver."""
+    return walks.take(desktop, "moving/applied_transforms", extension, new_profile(), "opengl", size=SIZE)
+
+
+def test_it_comes_to_its_end(walk):
+    walk.assert_done()
+    assert walk.complaints() == []
+
+
+@pytest.mark.parametrize("change", ["all_transforms", "set_origin", "mirrored", "rig"])
+def test_the_picture_stays(walk, change):
+    covered, differ, statuses = walk.facts[change]
+    assert covered > 0.02 and differ < FLIPPED and not any(statuses)
