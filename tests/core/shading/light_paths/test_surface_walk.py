@@ -60,19 +60,22 @@ def direction(theta, phi=0.0):
 
 def inputs(viewer, material, weight):
     color, gloss = material
-    table = wp.array(surface_albedo.table(), dtype=wp.vec4)
+    table = wp.array(surface_albedo.table(), dtype=wp.vec4, device="cpu")
     return [wp.vec3(*viewer), wp.vec3(*color), wp.vec3(*gloss), table, wp.vec3(*weight)]
 
 
 def values(viewer, lights, material, weight=(1.0, 1.0, 1.0)):
-    lights = wp.array(np.atleast_2d(lights).astype(np.float32), dtype=wp.vec3)
-    found, densities = wp.zeros(len(lights), dtype=wp.vec3), wp.zeros(len(lights), dtype=float)
+    lights = wp.array(np.atleast_2d(lights).astype(np.float32), dtype=wp.vec3, device="cpu")
+    found, densities = (
+        wp.zeros(len(lights), dtype=wp.vec3, device="cpu"),
+        wp.zeros(len(lights), dtype=float, device="cpu"),
+    )
     wp.launch(_values, len(lights), [*inputs(viewer, material, weight), lights, found, densities], device="cpu")
     return found.numpy(), densities.numpy()
 
 
 def turns(viewer, material, count, weight=(1.0, 1.0, 1.0)):
-    found = [wp.zeros(count, dtype=wp.vec3) for _ in range(2)]
+    found = [wp.zeros(count, dtype=wp.vec3, device="cpu") for _ in range(2)]
     wp.launch(_turns, count, [*inputs(viewer, material, weight), *found], device="cpu")
     return [array.numpy() for array in found]
 
