@@ -195,6 +195,10 @@ def _initialize():
             wp.init()
         except OSError as error:
             raise HairError("Kernels cannot be compiled: no folder for them can be written.") from error
+    # Warp asks its compiler once, on first use. Of two threads that ask together one may be given empty names,
+    # and compiles kernels again under another file name.
+    compiled_kernels.compiler()
+    compiled_kernels.processor_features()
 
 
 _initialize()

@@ -21,6 +21,9 @@ from hair_addon.core.geometry import bspline, fingerprint, connected_components,
 from hair_addon.core.grooming import groom
 from hair_addon.core.interpolation import clump_centers
 from hair_addon.core.geometry.mesh import TriMesh
+from warp._src import context
+assert context._cpu_toolchain_version_cache and context._cpu_target_triple_cache  # not first asked for by two threads
+assert context._cpu_feature_set_cache is not None
 mesh = TriMesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
 groom._load_kernels("cpu", [bspline, fingerprint], print)
 controls = np.arange(36, dtype=np.float32).reshape(2, 6, 3)
