@@ -6,6 +6,16 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import checks, compiled_kernels, foreign_memory, kernel_cache, kernel_setup, native_code, parallel, replays
+    from . import (
+        checks,
+        compiled_kernels,
+        foreign_memory,
+        kernel_cache,
+        kernel_entries,
+        kernel_setup,
+        native_code,
+        parallel,
+        replays,
+    )
 else:
     __getattr__ = submodules(__name__)

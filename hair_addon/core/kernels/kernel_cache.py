@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Loading and launching of Warp kernels, with a cache of compiled kernels that may be damaged, read-only or full.
 
-Precompiled kernels of the extension are used if they fit. A damaged entry of the cache is removed and
-compiled again. If Warp's own folder is not writable, a folder of the user in the system's temporary
-folder is used. The cache holds native code: its folder never comes from a .blend.
+Precompiled kernels of the extension are used if they fit, then those of the cache that are whole
+(`kernel_entries`). If Warp's own folder is not writable, a folder of the user in the system's temporary folder is
+used. The cache holds native code: its folder never comes from a .blend.
 """
 
 import contextlib
 import os
-import shutil
 import stat
 import tempfile
 import threading
@@ -20,7 +19,7 @@ from typing import Any
 import warp as wp
 
 from ..errors import HairError
-from . import compiled_kernels
+from . import compiled_kernels, kernel_entries
 
 # Free bytes required in a folder before kernels are compiled into it, several times the size of all: Warp's
 # compiler crashes on a full disk.
@@ -78,71 +77,26 @@ def load_locked(device: wp.Device, module: wp.Module, compiling: Callable[[], No
     """`load` of one module whose lock the caller holds; compiling: called before it is compiled, if it must be."""
     if is_loaded(device, module):
         return
-    if not compiled_kernels.load(module, device):
-        if not is_compiled(device, module):
-            compiling()
-        _load_or_mend(device, module)
+    if not compiled_kernels.load(module, device) and not kernel_entries.load(device, module):
+        compiling()
+        _compile(device, module)
     _loaded.add((module.name, device.alias))
 
 
-def _load_or_mend(device, module):
-    try:
-        _load_once(device, module)
+def _compile(device, module):
+    with _choosing:
+        _find_room()
+    # Where the folder has just been left for another one, an earlier process may have compiled them there.
+    if kernel_entries.load(device, module):
         return
-    except HairError:
-        raise
-    except Exception:
-        _remove_entry(device, module)
     try:
-        _load_once(device, module)
-    except HairError:
-        raise
-    except Exception as error:
+        kernel_entries.compile_anew(device, module)
+    except Exception as error:  # Warp raises nothing more specific
         raise HairError(
             "Kernels cannot be compiled in {folder} ({cause}): remove that folder, or reinstall Vellus.",
             folder=wp.config.kernel_cache_dir,
             cause=next(iter(str(error).splitlines()), type(error).__name__),
         ) from error
-
-
-def _load_once(device, module):
-    if not is_compiled(device, module):
-        with _choosing:
-            _find_room()
-    wp.force_load(device, [module])
-    executables = [executable for executable in module.execs.values() if executable.device == device]
-    hooks = [executable.get_kernel_hooks(kernel) for executable in executables for kernel in module.kernels.values()]
-    # A file filled with zeros, as a crash of the system leaves it, loads without its kernels.
-    if any(found.forward is None for found in hooks):
-        raise RuntimeError(f"{module.name} has lost its kernels")
-
-
-def _entry(device, module):
-    """The folder of a module's compiled kernels."""
-    block_dim = 1 if device.is_cpu else module.options["block_dim"]
-    return Path(wp.config.kernel_cache_dir) / module.get_module_identifier(block_dim)
-
-
-def is_compiled(device: wp.Device, module: wp.Module) -> bool:
-    """Whether the cache has compiled kernels of a module, which may be damaged after all."""
-    endings = {".o"} if device.is_cpu else {".cubin", ".ptx"}
-    try:
-        return any(path.suffix in endings for path in _entry(device, module).iterdir())
-    except OSError:
-        return False
-
-
-def _remove_entry(device, module):
-    entry = _entry(device, module)
-    try:
-        if entry.is_dir() and not entry.is_symlink():
-            shutil.rmtree(entry)
-        else:
-            entry.unlink(missing_ok=True)
-    except OSError:
-        with _choosing:
-            _use_temporary_folder()
-    module.unload()
 
 
 def _find_room():

@@ -48,9 +48,8 @@ def load(
     if not missing:
         return
     if not device.is_cpu:  # NVIDIA's compiler, on this thread, whose context it needs
-        progress(
-            LOADING if all(kernels.kernel_cache.is_compiled(device, module) for module in missing) else COMPILING, 0.0
-        )
+        are_compiled = all(kernels.kernel_entries.is_whole(device, module) for module in missing)
+        progress(LOADING if are_compiled else COMPILING, 0.0)
         kernels.kernel_cache.load(device, *missing)
         return
     loading = _Loading(missing, device)

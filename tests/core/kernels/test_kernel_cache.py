@@ -94,8 +94,45 @@ def test_damaged_entries_are_compiled_again(cache, tmp_path):
     assert work(cache, tmp_path).parent == cache
     mended = digest(cache)
     assert len(mended) == 5 and all(mended[path] != damaged[path] for path in (code, zeros))
+    assert len(list(cache.rglob("*.sha256"))) == 5 and not list(cache.rglob("vellus_*"))
     assert work(cache, tmp_path).parent == cache
     assert digest(cache) == mended
+
+
+FLIPS = """
+from pathlib import Path
+from hair_addon.core.kernels import kernel_entries
+module, device = warp.get_module(bspline.__name__), warp.get_device("cpu")
+place = next(Path(warp.config.kernel_cache_dir).glob("*.bspline_*"))
+assert kernel_entries.load(device, module)
+for path in sorted(path for path in place.iterdir() if path.suffix != ".cpp"):
+    whole = path.read_bytes()
+    for flip in range(15):
+        bit = len(whole) * 8 * flip // 15
+        damaged = bytearray(whole)
+        damaged[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(damaged)
+        module.unload()
+        if kernel_entries.load(device, module):
+            print("loaded", path.suffix, bit)
+            bspline.evaluate(controls, 9).numpy()
+    path.write_bytes(whole)
+module.unload()
+assert kernel_entries.load(device, module)
+next(place.glob("*.sha256")).unlink()
+print("without digest:", kernel_entries.is_whole(device, module))
+"""
+
+
+def test_a_flipped_bit_is_noticed(cache, tmp_path):
+    """In code it ends the process, or computes something else; none of the damaged files is loaded."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "WARP_CACHE_PATH": str(cache), "TMPDIR": str(tmp_path)}
+    line = [sys.executable, "-c", WORK + FLIPS]
+    done = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "without digest: False"), (
+        done.stdout + done.stderr[-2000:]
+    )
+    assert "loaded ." not in done.stdout
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from itertools import count
 import pytest
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.kernels import kernel_cache, kernel_setup
+from hair_addon.core.kernels import kernel_entries, kernel_setup
 from hair_addon.core.long_work import Job, Stopped
 
 SECONDS = 0.02  # that a module takes
@@ -23,9 +23,6 @@ class Module:
     def __init__(self):
         self.name = f"tests.module_{next(numbers)}"
 
-    def get_module_identifier(self, _block_dim):
-        return self.name
-
 
 @pytest.fixture
 def modules():
@@ -37,26 +34,27 @@ def compiled(monkeypatch):
     """How often each module was compiled, by name."""
     times = Counter()
 
-    def load_once(_device, module):
+    def compile_anew(_device, module):
         time.sleep(SECONDS)
         times.update([module.name])
 
-    monkeypatch.setattr(kernel_cache, "_load_once", load_once)
+    monkeypatch.setattr(kernel_entries, "load", lambda _device, _module: False)
+    monkeypatch.setattr(kernel_entries, "compile_anew", compile_anew)
     return times
 
 
 @pytest.fixture
 def endless(monkeypatch, compiled):
     """The first module is compiled at once, the others when somebody has asked to stop."""
-    compile_one = kernel_cache._load_once
+    compile_one = kernel_entries.compile_anew
 
-    def load_once(device, module):
+    def compile_anew(device, module):
         if compiled:
             for loading in kernel_setup._under_way:
                 assert loading._is_stopped.wait(20.0)
         compile_one(device, module)
 
-    monkeypatch.setattr(kernel_cache, "_load_once", load_once)
+    monkeypatch.setattr(kernel_entries, "compile_anew", compile_anew)
 
 
 def names_of(modules):
@@ -109,7 +107,7 @@ def test_a_failure_is_raised_and_tried_again(modules, compiled, monkeypatch):
         raise HairError("no compiler")
 
     with monkeypatch.context() as context:
-        context.setattr(kernel_cache, "_load_once", fail)
+        context.setattr(kernel_entries, "compile_anew", fail)
         with pytest.raises(HairError, match="no compiler"):
             kernel_setup.load(modules, "cpu")
     kernel_setup.load(modules, "cpu")
