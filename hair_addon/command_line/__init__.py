@@ -15,6 +15,7 @@ from . import (
     console,
     export,
     groom,
+    import_mesh,
     info,
     interruption,
     paths,
@@ -27,7 +28,7 @@ from . import (
 )
 from .options import Parser
 
-_VERBS = (groom, tables, transfer, simulate, render, export, cards, tubes, info, settings)
+_VERBS = (groom, tables, transfer, simulate, render, export, cards, tubes, info, settings, import_mesh)
 
 
 def main(arguments, program):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Worker processes of one command on this machine."""
 
+import contextlib
 import json
 import queue
 import signal
@@ -13,26 +14,45 @@ _LOOK = 0.2  # [s] between checks for an interruption
 _PATIENCE = 30.0  # [s] for a process to end that was asked to
 
 
-def run(commands, console, said_as):
-    """Run commands in parallel until all have ended; returns a sentence for each that failed.
+class Failed:
+    """A process that failed: its exit status, below 0 where a signal ended it, and what it complained of."""
 
-    commands: argument lists of processes that print lines of JSON; said_as(values): the sentence for a line.
+    def __init__(self, status, complaint=""):
+        self.status, self.complaint = status, complaint
+
+    @property
+    def cause(self):
+        """What ended it, in words."""
+        return f"signal {-self.status}" if self.status < 0 else f"status {self.status}"
+
+    def __str__(self):
+        if self.complaint:
+            return self.complaint
+        if self.status < 0:
+            return f"A worker process was killed by {self.cause}."
+        return f"A worker process ended with {self.cause} and without an error message."
+
+
+def run(commands, console, hear, step=""):
+    """Run commands in parallel until all have ended; returns a `Failed` for each that failed.
+
+    commands: argument lists of processes that print lines of JSON; hear(values): called with each; step: what they do.
     """
     heard = queue.Queue()
     helpers = []
     try:
         helpers += [_Helper(words, heard) for words in commands]
         while any(helper.is_at_work for helper in helpers) or not heard.empty():
-            console.progress(f"{len(helpers)} processes", 0.0)
+            console.progress(step or f"{len(helpers)} processes", 0.0)
             try:
                 values = heard.get(timeout=_LOOK)
             except queue.Empty:
                 continue
-            console.result(values, said_as(values))
+            hear(values)
     finally:
         for helper in helpers:
             helper.stop()
-    return [helper.complaint for helper in helpers if helper.status != 0]
+    return [Failed(helper.status, helper.complaint) for helper in helpers if helper.status != 0]
 
 
 class _Helper:
@@ -50,7 +70,8 @@ class _Helper:
         for line in self._process.stdout:
             # Blender prints messages before the command starts, and a process may be killed in the middle of a line.
             if line.startswith("{") and line.endswith("\n"):
-                self._heard.put(json.loads(line))
+                with contextlib.suppress(ValueError):
+                    self._heard.put(json.loads(line))
 
     def _hear_errors(self):
         for line in self._process.stderr:
@@ -69,12 +90,8 @@ class _Helper:
 
     @property
     def complaint(self):
-        """Why it failed."""
-        if self._complaints:
-            return self._complaints[-1]
-        if self.status < 0:
-            return f"A worker process was killed by signal {-self.status}."
-        return f"A worker process ended with status {self.status} and without an error message."
+        """What it said last of why it failed; empty if it said nothing."""
+        return self._complaints[-1] if self._complaints else ""
 
     def stop(self):
         """Terminate the process: at its next step, or at once if that takes too long."""

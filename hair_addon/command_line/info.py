@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """info: show the hair, settings or tables in a file."""
 
-import zipfile
+import math
 from dataclasses import asdict
-
-import numpy as np
 
 from ..core import lazy
 from ..core.errors import HairError
-from ..core.files import settings_file, table_exr
+from ..core.files import foreign_arrays, settings_file, table_exr
 from ..core.shading.tables import table_axes
 from . import opening, options
 
@@ -54,19 +52,13 @@ def _arrays(path):
     """Return shapes and types from the headers."""
     if path.exists() and not path.is_file():  # opening a pipe without a writer would block
         raise HairError(f"{path} cannot be read: it is not a file.")
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return {"arrays": {name.removesuffix(".npy"): _array(archive, name) for name in archive.namelist()}}
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise HairError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.") from error
+    with foreign_arrays.opened(path) as archive:
+        return {"arrays": {name: _array(archive, name) for name in foreign_arrays.names(archive)}}
 
 
 def _array(archive, name):
-    with archive.open(name) as file:
-        version = np.lib.format.read_magic(file)
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _is_fortran, kind = read(file)
-    return {"shape": list(shape), "type": str(kind), "bytes": int(np.prod(shape, dtype=np.int64)) * kind.itemsize}
+    shape, kind = foreign_arrays.header(archive, name)
+    return {"shape": list(shape), "type": str(kind), "bytes": math.prod(shape) * kind.itemsize}
 
 
 def _in_lines(values, indent=""):

@@ -2,6 +2,7 @@
 """Opening the input file of a command, with warnings about scripts that were not run."""
 
 from ..core import lazy
+from . import import_mesh
 
 blender = lazy.Package("..blender", __package__)
 
@@ -9,9 +10,12 @@ blender = lazy.Package("..blender", __package__)
 def open_file(given, console):
     """Open `given.input`; returns (3, 3), Blender's axes → the file's. Raises `HairError`."""
     blender.require_registered()
-    file_axes = blender.io.mesh_files.open_file(
-        given.input, up=getattr(given, "up", None) or "Z", runs_scripts=given.enable_scripts
-    )
+    blender.io.mesh_files.require_readable(given.input)
+    asks = blender.io.mesh_files.asks_for_axis(given.input)
+    up = (asks and getattr(given, "up", None)) or "Z"
+    if blender.io.mesh_files.ends_blender(given.input):
+        return import_mesh.open_apart(given.input, up, console)
+    file_axes = blender.io.mesh_files.open_file(given.input, up=up, runs_scripts=given.enable_scripts)
     kept = blender.io.mesh_files.scripts_kept_from_running()
     if kept:
         console.warn(f"{given.input} has scripts or drivers that were not run ({kept}): --enable-scripts runs them.")

@@ -105,12 +105,12 @@ def _make_sequence(given, console, numbers, settings):
 def _run_jobs(given, console, numbers, settings):
     """Render by several processes. Where one fails the others render its frames: only missing ones are an error."""
     words = [*blender.host.cli_command.words(), *_words(given, numbers, settings)]
-    complaints = helpers.run([words] * given.jobs, console, _sentence)
+    failed = helpers.run([words] * given.jobs, console, lambda values: console.result(values, _sentence(values)))
     missing = blender.io.sequence.missing_frames(given.out, numbers)
     if missing:
-        raise HairError(complaints[0] if complaints else f"Frame {missing[0]} was not rendered.")
-    for complaint in complaints:
-        console.warn(f"all frames are rendered, but not by all processes: {complaint}")
+        raise HairError(str(failed[0]) if failed else f"Frame {missing[0]} was not rendered.")
+    for one in failed:
+        console.warn(f"all frames are rendered, but not by all processes: {one}")
 
 
 def _words(given, numbers, settings):

@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Free memory, asked for before work that takes much of it."""
 
+import contextlib
 from pathlib import Path
 
 from ...core.errors import HairError
 
+try:
+    import resource
+except ModuleNotFoundError:  # Windows
+    resource = None
+
 MUCH, MOST = 0.3, 0.7  # of what is free: said before work begins, and refused
 
 _MEMINFO = Path("/proc/meminfo")
+_OWN = Path("/proc/self/statm")
 
 
 def free_bytes():
@@ -33,3 +40,16 @@ def require(byte_count):
             needed=f"{byte_count / 1e9:.1f}",
             free=f"{free_bytes() / 1e9:.1f}",
         )
+
+
+def limit_this_process():
+    """Let memory run out for this process alone, where it asks for more than there is to spare.
+
+    Otherwise the system would end any process for it. Nothing is done where the system does not tell.
+    """
+    free = free_bytes()
+    if free is None or resource is None:
+        return
+    with contextlib.suppress(OSError, ValueError):  # a lower limit holds already
+        own = int(_OWN.read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (own + int(MOST * free),) * 2)

@@ -25,10 +25,17 @@ def identifier(folder: Path, catalog: str) -> str:
         raise HairError("{path} cannot be read: {cause}.", path=path, cause=cause_of(error)) from error
     for line in text.splitlines():
         found = line.split(":")
-        if len(found) >= 2 and found[1] == catalog and not line.startswith("#"):
+        if len(found) >= 2 and found[1] == catalog and _is_uuid(found[0]):  # Blender leaves out other lines
             return found[0]
     made = str(uuid.uuid4())
     line = f"{made}:{catalog}:{catalog.replace('/', '-')}\n"
     with whole_file(path) as partial:
         partial.write_text(text + ("" if text.endswith("\n") else "\n") + line, encoding="utf-8")
     return made
+
+
+def _is_uuid(text):
+    try:
+        return str(uuid.UUID(text)) == text.lower()
+    except ValueError:
+        return False

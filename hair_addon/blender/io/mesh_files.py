@@ -59,6 +59,9 @@ _FORMATS = {
     ".abc": (_import_alembic, "wm.alembic_import", mesh_checks.require_alembic),
 }
 
+# Endings of files on which Blender's importers end the process where they are damaged, past all checks.
+_END_BLENDER = {".ply", ".usd", ".usdc", ".usda", ".usdz", ".abc"}
+
 # Files without axes and units: read in metres.
 _UP_IS_ASKED = {".obj", ".ply", ".stl"}
 
@@ -66,6 +69,11 @@ _UP_IS_ASKED = {".obj", ".ply", ".stl"}
 def asks_for_axis(path):
     """Whether a file does not say which of its axes points up."""
     return Path(path).suffix.lower() in _UP_IS_ASKED
+
+
+def ends_blender(path):
+    """Whether reading a file in this process may end it, where the file is damaged."""
+    return Path(path).suffix.lower() in _END_BLENDER
 
 
 def axis_of(file_axes):
@@ -120,6 +128,20 @@ def open_file(path, *, up="Z", runs_scripts=False):
     if ending in _UP_IS_ASKED:
         return _UP[up]
     return _Y_UP if _is_y_up(path, ending) else np.eye(3)
+
+
+def save_scene(path):
+    """Save what is open, once Blender has evaluated it, for `load_scene`."""
+    bpy.context.view_layer.update()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
+
+
+def load_scene(path):
+    """Open what `save_scene` has saved, as if it had been made here: it has no name. Raises `HairError`."""
+    try:
+        bpy.ops.wm.read_homefile(filepath=str(path), load_ui=False)
+    except RuntimeError as error:
+        raise HairError(f"{path} cannot be read: {cause_of(error)}.") from error
 
 
 def _open_blend(path, runs_scripts):

@@ -8,11 +8,15 @@ here. languages/ has a dictionary for each language, in gettext's format.
 import json
 import re
 import string
+import sys
 from functools import lru_cache
 from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_iface, pgettext_rpt
+
+from ...core.errors import HairError
+from ...core.params import is_text
 
 # A context of our own: in Blender "Guides" are drawing guides, and its dictionary is searched first.
 CONTEXT = "Vellus"
@@ -87,20 +91,39 @@ def _filled(sentence, values):
 
 
 def read_po(path):
-    """{msgid: msgstr} of a .po file with one line for each; strings are written as in C, which JSON reads."""
+    """{msgid: msgstr} of a .po file with one line for each; strings are written as in C, which JSON reads.
+
+    Raises `HairError`.
+    """
     texts, msgid = {}, ""
-    for line in path.read_text(encoding="utf-8").splitlines():
-        kind, _, quoted = line.partition(" ")
-        if kind == "msgid":
-            msgid = json.loads(quoted)
-        elif kind == "msgstr":
-            texts[msgid] = json.loads(quoted)
+    try:
+        for line in path.read_text(encoding="utf-8").splitlines():
+            kind, _, quoted = line.partition(" ")
+            if kind == "msgid":
+                msgid = _text(quoted)
+            elif kind == "msgstr":
+                texts[msgid] = _text(quoted)
+    except (OSError, ValueError, RecursionError) as error:
+        raise HairError("{path} cannot be read: {cause}.", path=path, cause="it is damaged") from error
     return texts
 
 
+def _text(quoted):
+    text = json.loads(quoted)
+    if not isinstance(text, str) or not is_text(text):
+        raise ValueError(quoted)
+    return text
+
+
 def dictionaries():
-    """{locale: {msgid: msgstr}} of all languages."""
-    return {path.stem: read_po(path) for path in (Path(__file__).parent / "languages").glob("*.po")}
+    """{locale: {msgid: msgstr}} of all languages whose files can be read; the others are told of on the console."""
+    found = {}
+    for path in (Path(__file__).parent / "languages").glob("*.po"):
+        try:
+            found[path.stem] = read_po(path)
+        except HairError as error:
+            print(f"Vellus: {error}", file=sys.stderr)
+    return found
 
 
 def register():

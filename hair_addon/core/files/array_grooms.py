@@ -8,13 +8,12 @@
 A file of guide_points alone is one too: widths and axis are optional.
 """
 
-import math
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import HairError, cause_of
+from ..errors import HairError
+from . import foreign_arrays
 from .curve_file import TO_Z_UP, Convention, CurveFile, CurveSet
 
 _POINTS = {"guide_points": True, "strand_points": False}
@@ -23,15 +22,12 @@ _NAMES = {"guide_points": "Guides", "strand_points": "Hair"}
 
 def read(path: Path, axis: str = "Z") -> CurveFile:
     """The curves of a file of arrays; axis: that points up in one that does not say. Raises `HairError`."""
-    try:
-        with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
-            return _read(path, archive, axis)
-    except (OSError, RuntimeError, ValueError, EOFError, MemoryError, NotImplementedError, zipfile.BadZipFile) as error:
-        raise HairError("{path} cannot be read: {cause}.", path=path, cause=cause_of(error)) from error
+    with foreign_arrays.opened(path) as archive:
+        return _read(path, archive, axis)
 
 
 def _read(path, archive, axis):
-    there = {name.removesuffix(".npy") for name in archive.namelist()}
+    there = {*foreign_arrays.names(archive)}
     names = [name for name in _POINTS if name in there]
     if not names:
         raise HairError(
@@ -39,7 +35,7 @@ def _read(path, archive, axis):
         )
     sets = []
     for name in names:
-        points = _array(archive, name)
+        points = foreign_arrays.array(archive, name)
         if (
             points.ndim != 3
             or points.shape[2] != 3
@@ -53,7 +49,7 @@ def _read(path, archive, axis):
         width_name = name.replace("points", "widths")
         radii = None
         if width_name in there:
-            widths = _array(archive, width_name)
+            widths = foreign_arrays.array(archive, width_name)
             if widths.shape != (count, length) or widths.dtype.kind != "f":
                 sentence = "{path}: {name} has shape {shape}, but must be {wanted}, as points have."
                 raise HairError(sentence, path=path, name=width_name, shape=widths.shape, wanted=(count, length))
@@ -69,20 +65,7 @@ def _read(path, archive, axis):
             )
         )
     if "up" in there:
-        axis = str(_array(archive, "up"))
+        axis = str(foreign_arrays.array(archive, "up"))
         if axis not in TO_Z_UP:
             raise HairError("{path}: up is {axis}, but must be X, Y or Z.", path=path, axis=axis[:20])
     return CurveFile(sets, Convention(1.0, axis))
-
-
-def _array(archive, name):
-    """An array of a file, which is as large as the file says, so that no more memory is taken."""
-    member = archive.getinfo(f"{name}.npy")
-    with archive.open(member) as file:
-        version = np.lib.format.read_magic(file)
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _is_fortran, kind = read(file)
-    if math.prod(shape) * kind.itemsize > member.file_size:
-        raise ValueError("it is damaged")
-    with archive.open(member) as file:
-        return np.lib.format.read_array(file)  # no objects, which could be code

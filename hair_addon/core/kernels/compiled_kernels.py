@@ -88,13 +88,23 @@ def _fitting(folder):
     import warp as wp
 
     try:
-        index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return "", {}
-    if index["compiler"]["warp"] != wp.config.version or index["compiler"] != compiler():
+        made_by, processors, modules = _read_index(folder)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return "", {}  # there is none, or what there is was not written by tools/compile_kernels.py
+    if made_by.get("warp") != wp.config.version or made_by != compiler():
         return "", {}
     features = processor_features()
-    for processor in index["processors"]:
-        if features.issuperset(processor["features"]):
-            return processor["name"], index["modules"]
+    for name, needed in processors:
+        if features.issuperset(needed):
+            return name, modules
     return "", {}
+
+
+def _read_index(folder):
+    """(compiler, [(processor, its features)], {module: its entry}); raises what another shape brings about."""
+    index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
+    processors = [(str(kind["name"]), frozenset(kind["features"])) for kind in index["processors"]]
+    entries = {
+        name: {"hash": str(entry["hash"]), "files": dict(entry["files"])} for name, entry in index["modules"].items()
+    }
+    return dict(index["compiler"]), processors, entries

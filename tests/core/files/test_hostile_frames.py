@@ -15,6 +15,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.files import array_file, frame_manifest
 from hair_addon.core.files.frame_cache import FrameCache, remove
 from tests.support.cached_frames import bake, frame_bytes, manifest, points_of, said
+from tests.support.mutants.changes import mutated
 
 
 @pytest.fixture
@@ -38,32 +39,6 @@ def test_a_frame_cut_at_any_byte_is_missing(folder):
         assert len(said(cache)) == 1  # once
     path.write_bytes(data + b"\0")
     assert FrameCache(folder).read_frame(1) is None
-
-
-def mutated(data, source):
-    """Bytes changed as accidents, and people who want to know, change them."""
-    data = bytearray(data)
-    for _ in range(source.choice((1, 1, 1, 2, 3, 8))):
-        place = source.randrange(len(data))
-        kind = source.randrange(6)
-        if kind == 0:
-            data[place] ^= 1 << source.randrange(8)
-        elif kind == 1:
-            data[place] = source.choice((0, 1, 0x7F, 0x80, 0xFF, source.randrange(256)))
-        elif kind == 2:
-            size = source.choice((2, 4, 8))
-            data[place : place + size] = source.choice((0, 1, 2**15, 2**16 - 1)).to_bytes(2, "little") * (size // 2)
-        elif kind == 3:
-            del data[place : place + source.randrange(1, 20)]
-        elif kind == 4:
-            data[place:place] = data[source.randrange(len(data)) :][: source.randrange(1, 20)]
-        else:
-            start = source.randrange(len(data))
-            part = data[start : start + source.randrange(1, 64)]
-            data[place : place + len(part)] = part
-        if not data:
-            break
-    return bytes(data)
 
 
 def check_mutants(count, seed):

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes that are imported by a process of its own: the same scene, and one sentence where that process is ended."""
+
+import signal
+import sys
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.host import cli_command
+from hair_addon.blender.io import mesh_files
+from tests.support.commands import run_here
+
+GROOM = ("--guides", 5, "--strands", 20, "--out")
+
+
+@pytest.fixture
+def files(scene, tmp_path):
+    """Paths of a sphere, moved and painted, in a file of each kind."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=0.1, location=(0.3, 0.2, 0.1), rotation=(0.4, 0, 0))
+    sphere = bpy.context.object
+    sphere.name = "Scalp"
+    sphere.data.materials.append(bpy.data.materials.new("Skin"))
+    bpy.ops.wm.usd_export(filepath=str(tmp_path / "a.usdc"))
+    bpy.ops.wm.ply_export(filepath=str(tmp_path / "a.ply"), up_axis="Y", forward_axis="NEGATIVE_Z")
+    bpy.ops.wm.alembic_export(filepath=str(tmp_path / "a.abc"), as_background_job=False)
+    return {ending: tmp_path / f"a{ending}" for ending in (".usdc", ".ply", ".abc")}
+
+
+def seen():
+    """What matters of the open file."""
+    bpy.context.view_layer.update()
+    meshes = {}
+    for one in (o for o in bpy.context.view_layer.objects if o.type == "MESH"):
+        places = np.array([one.matrix_world @ vertex.co for vertex in one.data.vertices])
+        uvs = np.array([loop.uv[:] for layer in one.data.uv_layers for loop in layer.data])
+        faces = [face.vertices[:] for face in one.data.polygons]
+        meshes[one.name] = (places.tobytes(), uvs.tobytes(), faces, [slot.name for slot in one.material_slots])
+    return meshes, bpy.data.filepath, bpy.context.scene.unit_settings.scale_length
+
+
+@pytest.mark.parametrize("ending", [".usdc", ".ply"])  # .abc goes the way of these
+def test_another_process_gives_the_same_scene(files, tmp_path, ending):
+    up = "Y" if ending == ".ply" else "Z"
+    file_axes = mesh_files.open_file(files[ending], up=up)
+    expected = seen()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    ended = run_here("groom", files[ending], *GROOM, tmp_path / "out.npz", *(["--up", up] if up == "Y" else []))
+    assert (ended.status, ended.errors) == (0, "")
+    meshes, path, scale = seen()
+    assert expected == ({name: of for name, of in meshes.items() if name in expected[0]}, path, scale)
+    with np.load(tmp_path / "out.npz") as arrays:
+        roots = arrays["roots"] @ file_axes  # back to Blender's axes
+    assert abs(np.linalg.norm(roots - [0.3, 0.2, 0.1], axis=1) - 0.1).max() < 0.01
+
+
+@pytest.mark.parametrize("verb", ["groom", "info"])
+@pytest.mark.parametrize("ending", [".usdc", ".ply", ".abc"])
+def test_an_importer_that_ends_its_process_is_one_sentence(files, tmp_path, monkeypatch, verb, ending):
+    script = f"import os; os.kill(os.getpid(), {int(signal.SIGSEGV)})"
+    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", script])
+    before = set(tmp_path.iterdir())
+    ended = run_here(verb, files[ending], *([*GROOM, tmp_path / "out.npz"] if verb == "groom" else []))
+    assert (ended.status, ended.out) == (1, "") and set(tmp_path.iterdir()) == before
+    assert ended.errors == (
+        f"vellus: {files[ending]} cannot be read: Blender's importer ended without a word (signal 11), as it does "
+        "where a file is damaged.\n"
+    )
+
+
+def test_what_the_other_process_says_is_said(files):
+    files[".usdc"].write_bytes(files[".usdc"].read_bytes()[:200])
+    ended = run_here("info", files[".usdc"])
+    assert (ended.status, ended.out) == (1, "")
+    assert ended.errors == f"vellus: {files['.usdc']} is not a valid USD file: it is damaged, or has another format.\n"

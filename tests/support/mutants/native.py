@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Damaged files for readers in native code, which may end their process: USD, OpenEXR, Blender's importers.
+
+    python -m tests.support.mutants.native COUNT SEED [ending, or name of a reader]
+
+Each reader has a process of its own, and a new one after its end. The command line gives some importers a process of
+their own too (`mesh_files.ends_blender`), which may end; no other reader may.
+"""
+
+import os
+import random
+import selectors
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+PATIENCE = 120.0  # [s] without a word of a process
+_MEMORY = 4 * 2**30  # [bytes] beside what the process has
+
+CURVES, TABLES = "curves", "tables"
+MESHES = (".ply", ".usdc", ".usda", ".usdz", ".abc", ".obj", ".stl", ".glb", ".gltf")
+NAMES = (CURVES, TABLES, *MESHES)
+
+
+def _samples(name, folder):
+    """Paths of whole files of a kind; the first is the one to be read."""
+    import bpy
+
+    if name == TABLES:
+        from hair_addon.core.files import table_exr
+        from hair_addon.core.shading.tables import lookup_tables
+
+        return table_exr.write_tables(folder, lookup_tables.bake(lookup_tables.Settings(size=16)), "1.0.0")
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    if name == CURVES:
+        curves = bpy.data.hair_curves.new("Hair")
+        curves.add_curves([4, 5, 6])
+        curves.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", [1e-3] * 15)
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new("Hair", curves))
+        for number, point in enumerate(curves.points):
+            point.position = (number % 5, number // 5, 0.1 * number)
+    else:
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+        bpy.context.object.data.materials.append(bpy.data.materials.new("Skin"))
+    path = folder / (f"a{name}" if name in MESHES else "a.usdc")
+    write = {
+        ".obj": bpy.ops.wm.obj_export,
+        ".ply": bpy.ops.wm.ply_export,
+        ".stl": bpy.ops.wm.stl_export,
+        ".abc": lambda filepath: bpy.ops.wm.alembic_export(filepath=filepath, as_background_job=False),
+        ".glb": bpy.ops.export_scene.gltf,
+        ".gltf": lambda filepath: bpy.ops.export_scene.gltf(filepath=filepath, export_format="GLTF_SEPARATE"),
+    }.get(path.suffix, bpy.ops.wm.usd_export)
+    write(filepath=str(path))
+    return [path, *(other for other in sorted(folder.iterdir()) if other != path)]
+
+
+def _reader(name, path):
+    """(read, check of what it returns beside what the whole file gives)."""
+    import bpy
+
+    from hair_addon.blender.io import mesh_files, usd_curves
+    from hair_addon.core.files import table_exr
+
+    def same_tables(found, whole):
+        assert found.settings == whole.settings and found.n.tobytes() == whole.n.tobytes()
+
+    def valid_scene(_found, _whole):
+        bpy.context.view_layer.update()
+        for one in (o for o in bpy.data.objects if o.type == "MESH"):
+            mesh = one.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+            assert not len(mesh.loops) or max(loop.vertex_index for loop in mesh.loops) < len(mesh.vertices)
+
+    if name == CURVES:
+        from tests.support.mutants.readers import are_curves
+
+        return lambda: usd_curves.read(path), are_curves
+    if name == TABLES:
+        return lambda: table_exr.read_tables(path.parent), same_tables
+    return lambda: mesh_files.open_file(path), valid_scene
+
+
+def _child(name, first, last):
+    """Read mutants, telling of each on standard output: its number before, and how it was read after."""
+    import resource
+
+    out = os.fdopen(os.dup(1), "w")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    sys.stdout = open(os.devnull, "w")
+    from hair_addon.core.errors import HairError
+    from tests.support.mutants.changes import mutated
+
+    with tempfile.TemporaryDirectory() as folder:
+        paths = _samples(name, Path(folder))
+        wholes = [path.read_bytes() for path in paths]
+        read, check = _reader(name, paths[0])
+        whole = read()
+        check(whole, whole)
+        own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (own + _MEMORY, own + _MEMORY))
+        for number in range(first, last):
+            print(f"at {number}", file=out, flush=True)
+            source = random.Random(number)
+            place = source.randrange(len(paths)) if source.random() < 0.3 else 0
+            is_text = paths[place].suffix in {".usda", ".obj", ".gltf", ".mtl"}
+            paths[place].write_bytes(mutated(wholes[place], source, is_text))
+            try:
+                check(read(), whole)
+                said = "read"
+            except HairError as error:
+                said = (
+                    "refused" if str(error).endswith(".") and "\n" not in str(error) else f"no sentence: {error!s:.90}"
+                )
+            except AssertionError as error:
+                said = f"accepted: {error!s:.90}"
+            except Exception as error:
+                said = f"{type(error).__name__}: {error!s:.90}"
+            print(" ".join(said.split()), file=out, flush=True)
+            paths[place].write_bytes(wholes[place])
+
+
+def faults(name, count, seed):
+    """(Counter of how mutants were read, [what went wrong]) of one reader."""
+    may_end = name in MESHES and _ends_blender(name)
+    told, found = Counter(), []
+    number, last = seed * 10**9, seed * 10**9 + count
+    while number < last:
+        words = [sys.executable, "-m", "tests.support.mutants.native", "child", name, str(number), str(last)]
+        process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        before = number
+        seen = _watch(process)
+        for line in seen.lines:
+            kind, _, rest = line.partition(" ")
+            if kind == "at":
+                number = int(rest)
+                continue
+            told[line if line in ("read", "refused") else "wrong"] += 1
+            if line not in ("read", "refused"):
+                found.append(f"{name} {number}: {line}")
+        if process.returncode == 0:
+            break
+        ended = "no end" if seen.is_late else f"ended with {process.returncode}"
+        told[ended] += 1
+        if number == before and not seen.lines:
+            found.append(f"{name}: {ended} before the first")
+            break
+        if not may_end or seen.is_late:
+            found.append(f"{name} {number}: {ended}")
+        number += 1
+    return told, found
+
+
+class _Watched:
+    def __init__(self):
+        self.lines, self.is_late = [], False
+
+
+def _watch(process):
+    """What a process says until its end, which is brought about where it says nothing for long."""
+    seen, rest = _Watched(), b""
+    with selectors.DefaultSelector() as selector:
+        selector.register(process.stdout, selectors.EVENT_READ)
+        while True:
+            if not selector.select(PATIENCE):
+                seen.is_late = True
+                process.kill()
+                break
+            part = os.read(process.stdout.fileno(), 65_536)
+            if not part:
+                break
+            rest += part
+    process.wait()
+    seen.lines = rest.decode(errors="replace").splitlines()
+    return seen
+
+
+def _ends_blender(ending):
+    from hair_addon.blender.io import mesh_files
+
+    return mesh_files.ends_blender(f"a{ending}")
+
+
+def main(count, seed, only=""):
+    """Print how mutants of each reader were read, and what went wrong."""
+    wrong = 0
+    for name in [only] if only else NAMES:
+        told, found = faults(name, int(count), int(seed))
+        print(f"{name}: {dict(told)}", *found[:20], sep="\n  ", flush=True)
+        wrong += len(found)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "child":
+        _child(sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))
+    else:
+        sys.exit(main(*sys.argv[1:]))
