@@ -26,11 +26,11 @@ def load(module: "wp.Module", device: "wp.Device") -> bool:
     if not device.is_cpu:
         return False
     processor, modules = _fitting(FOLDER)
-    entry = modules.get(short_name(module))
-    if entry is None or entry["hash"] != module.get_module_hash(1).hex():
+    module_hash, digests = modules.get(short_name(module), ("", {}))
+    if module_hash != module.get_module_hash(1).hex():
         return False
     binary, meta = (FOLDER / path for path in file_names(short_name(module), processor))
-    if entry["files"].get(processor) != digest(binary, meta):
+    if digests.get(processor, "") != digest(binary, meta):
         return False
     # One thread is a block on the processor.
     module.load(device, block_dim=1, binary_path=binary, meta_path=meta)
@@ -84,7 +84,7 @@ def _warp_context():
 
 @cache
 def _fitting(folder):
-    """(name of the best kind of processor that this one is, {module name: entry of the index}); ("", {}) for none."""
+    """(best kind of processor that this one is, {module: (hash, {processor: digest})}); ("", {}) for none."""
     import warp as wp
 
     try:
@@ -101,10 +101,8 @@ def _fitting(folder):
 
 
 def _read_index(folder):
-    """(compiler, [(processor, its features)], {module: its entry}); raises what another shape brings about."""
+    """(compiler, [(processor, its features)], {module: (hash, digests)}); raises what another shape brings about."""
     index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
     processors = [(str(kind["name"]), frozenset(kind["features"])) for kind in index["processors"]]
-    entries = {
-        name: {"hash": str(entry["hash"]), "files": dict(entry["files"])} for name, entry in index["modules"].items()
-    }
+    entries = {name: (str(entry["hash"]), dict(entry["files"])) for name, entry in index["modules"].items()}
     return dict(index["compiler"]), processors, entries
