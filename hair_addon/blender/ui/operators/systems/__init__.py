@@ -6,8 +6,7 @@ from .comb_guides import VELLUS_OT_comb_guides
 from .delete_hair import VELLUS_OT_delete_hair
 from .delete_system import VELLUS_OT_delete_system
 from .distribute_guides import VELLUS_OT_distribute_guides
-from .draw_flow import VELLUS_OT_draw_flow
-from .draw_parting import VELLUS_OT_draw_parting
+from .draw_lines import VELLUS_OT_draw_flow, VELLUS_OT_draw_parting
 from .interpolate_hair import VELLUS_OT_interpolate_hair
 from .make_own_guides import VELLUS_OT_make_own_guides
 from .pick_hair import VELLUS_OT_pick_hair
