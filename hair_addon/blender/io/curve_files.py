@@ -142,8 +142,12 @@ def _made(path, wanted, surface_object):
     notes = [*file.notes, *reading.notes, *_notes_on_groups(path, chosen)]
     curves, its_guides = ([_now(one.placed(reading.metres, reading.up)) for one in sets] for sets in (chosen, guides))
     joined, made_guides, guide_ids = curve_file.join(curves), None, None
-    # Blender plays polylines.
-    motion = joined.motion if wanted.plays and not joined.is_smooth.any() else None
+    motion = None
+    if wanted.plays and joined.motion is not None:
+        if joined.is_smooth.any():
+            joined = curve_file.as_polylines(joined)
+            notes.append(HairError(curve_file.SPLINES_MOVE, path=path))
+        motion = joined.motion
     moving = [one.motion for one in chosen if one.motion is not None]
     if motion is None and moving:
         notes.append(_note_on_motion(path, moving[0]))

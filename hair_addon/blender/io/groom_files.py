@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.errors import HairError
 from ...core.files.whole_file import require_place, require_room, whole_file
+from ...core.geometry.strands import curve_offsets
 from ..data.strands import attributes, exported_curves
 from ..groom.selection import object_of
 from ..host import paths, scene_time
@@ -60,15 +61,20 @@ def save_copy(path):
 
 
 def arrays(guides, hair, file_axes):
-    """{name: array} as `array_grooms` has them; file_axes: as of `write`."""
+    """{name: array} as `array_grooms` has them, unequal numbers of points too; file_axes: as of `write`."""
     made = {}
     for name, curves in (("guide", guides), ("strand", hair)):
-        points = strand_arrays.world_points(curves)
-        made[f"{name}_points"] = np.ascontiguousarray(points @ file_axes.T.astype(np.float32))
-        radii = exported_curves.read_radii(curves, points.shape[1])(slice(0, len(points)))
-        made[f"{name}_widths"] = radii * np.float32(2.0 * strand_arrays.world_scale(curves))
+        counts = strand_arrays.counts_of(curves)
+        points = strand_arrays.world_rows(curves)(slice(0, len(counts))) @ file_axes.T.astype(np.float32)
+        widths = exported_curves.radii_kept(curves) * np.float32(2.0 * strand_arrays.world_scale(curves))
+        roots = points[curve_offsets(counts)[:-1]]
+        if (counts == counts[0]).all():
+            points, widths = points.reshape(len(counts), -1, 3), widths.reshape(len(counts), -1)
+        else:
+            made[f"{name}_counts"] = counts
+        made[f"{name}_points"], made[f"{name}_widths"] = np.ascontiguousarray(points), widths
     axis = mesh_files.axis_of(file_axes)
-    return {"roots": made["strand_points"][:, 0], **made, "up": np.array(axis)}
+    return {"roots": roots, **made, "up": np.array(axis)}
 
 
 def _objects(guides, hair):

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import HairError
+from ...core.files import curve_file
 from ...core.files.curve_file import Convention, CurveFile, CurveSet, Motion
 from ...core.files.groom_curves import GUIDE_SLOTS
 from . import usd_shapes, usd_stage
@@ -67,6 +68,8 @@ def _sets_of(path, prim, name, timing, notes) -> Iterator[CurveSet]:
     if left_out:
         sentence = "curves have too few points, or some that belong to no segment, and are left out."
         notes.append(HairError(f'"{name}" in {path}: {left_out} {sentence}'))
+    if drawn.was_smooth:
+        notes.append(HairError(curve_file.SPLINES_MOVE, path=f'"{name}" in {path}'))
     if drawn.has_odd_widths:
         sentence = "has widths that are neither one for each point nor for each curve: they are left out."
         notes.append(HairError(f'"{name}" in {path} {sentence}'))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The shape of a prim of USD's curves at a time, as polylines or Catmull-Rom splines in its own coordinates."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ class Drawn:
 
     is_kept: which of the file's curves these are; is_smooth: whether they are Catmull-Rom splines; has_odd_widths:
     whether the file has diameters, of a number that fits nothing; lines: as of `bezier_segments.polylines`, None of
-    curves that keep their points.
+    curves that keep their points; was_smooth: whether they could be Catmull-Rom splines, which were not to be kept.
     """
 
     points: np.ndarray
@@ -29,6 +29,7 @@ class Drawn:
     is_smooth: bool = False
     has_odd_widths: bool = False
     lines: np.ndarray | None = None
+    was_smooth: bool = False
 
 
 @dataclass(frozen=True)
@@ -124,12 +125,14 @@ def _cubic(prim, time, points, counts, basis, wrap, lines, keeps_splines):
     is_kept = bezier_segments.is_cubic(counts, basis, wrap)
     curves = _Curves(points, counts, is_kept, bezier_segments.segment_counts(counts, basis, wrap), is_closed)
     widths = _widths(prim, time, curves, np.maximum(counts - 4, 0) + 2 if is_pinned else None)
-    if keeps_splines and basis == "catmullRom" and wrap == "nonperiodic" and _ends_twice(curves):
+    is_spline = basis == "catmullRom" and wrap == "nonperiodic" and _ends_twice(curves)
+    if keeps_splines and is_spline:
         own, along = each(curves.kept_counts - 2)
         rows = curve_offsets(counts)[:-1][is_kept][own] + along + 1
         return _unchanged(curves, rows, curves.kept_counts - 2, widths, is_smooth=True)
     values = _with_widths(points[curves.rows], widths)
-    return _divided(curves, bezier_segments.cubic(values, curves.kept_counts, basis, wrap), widths, lines)
+    divided = _divided(curves, bezier_segments.cubic(values, curves.kept_counts, basis, wrap), widths, lines)
+    return replace(divided, was_smooth=is_spline)
 
 
 def _hermite(prim, time, points, counts, lines):

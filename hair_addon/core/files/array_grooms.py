@@ -3,9 +3,11 @@
 
     roots (S, 3), strand_points (S, P, 3), guide_points (G, P, 3)   [m], in the axes of the mesh's file
     strand_widths (S, P), guide_widths (G, P)                       diameters [m]
+    strand_counts (S,), guide_counts (G,)                           of curves of unequal numbers of points, see below
     up                                                              the axis that points up, X, Y or Z
 
-A file of guide_points alone is one too: widths and axis are optional.
+A file of guide_points alone is one too: widths and axis are optional. Where curves have unequal numbers of points, all
+points stand one after another, (N, 3), their widths are (N,), and counts say how many are of each curve.
 """
 
 from pathlib import Path
@@ -35,31 +37,31 @@ def _read(path, archive, axis):
         )
     sets = []
     for name in names:
-        points = foreign_arrays.array(archive, name)
-        if (
-            points.ndim != 3
-            or points.shape[2] != 3
-            or len(points) < 1
-            or points.shape[1] < 2
-            or points.dtype.kind != "f"
-        ):
-            sentence = "{path}: {name} has shape {shape}, but must be (G, P, 3), P at least 2."
-            raise HairError(sentence, path=path, name=name, shape=points.shape)
-        count, length, _ = points.shape
+        points, counts = foreign_arrays.array(archive, name), _counts(path, archive, there, name)
+        shape = points.shape
+        is_fitting = len(shape) == 3 and shape[1] >= 2 if counts is None else len(shape) == 2
+        if not is_fitting or shape[0] < 1 or shape[-1] != 3 or points.dtype.kind != "f":
+            sentence = "{path}: {name} has shape {shape}, but must be (G, P, 3), P at least 2, or (N, 3) with {counts}."
+            raise HairError(sentence, path=path, name=name, shape=shape, counts=_counts_of(name))
+        if counts is None:
+            counts = np.full(*shape[:2])
+        elif counts.min() < 2 or counts.sum() != len(points):
+            sentence = "{path}: {name} must be at least 2 of each curve, and {count} in all, as points have."
+            raise HairError(sentence, path=path, name=_counts_of(name), count=len(points))
         width_name = name.replace("points", "widths")
         radii = None
         if width_name in there:
             widths = foreign_arrays.array(archive, width_name)
-            if widths.shape != (count, length) or widths.dtype.kind != "f":
+            if widths.shape != shape[:-1] or widths.dtype.kind != "f":
                 sentence = "{path}: {name} has shape {shape}, but must be {wanted}, as points have."
-                raise HairError(sentence, path=path, name=width_name, shape=widths.shape, wanted=(count, length))
+                raise HairError(sentence, path=path, name=width_name, shape=widths.shape, wanted=shape[:-1])
             radii = widths.ravel() / np.asarray(2.0, widths.dtype)
         sets.append(
             CurveSet(
                 _NAMES[name],
                 points.reshape(-1, 3),
-                np.full(count, length),
-                np.zeros(count, bool),
+                counts,
+                np.zeros(len(counts), bool),
                 radii,
                 is_guide=_POINTS[name] if len(names) > 1 else None,
             )
@@ -69,3 +71,18 @@ def _read(path, archive, axis):
         if axis not in TO_Z_UP:
             raise HairError("{path}: up is {axis}, but must be X, Y or Z.", path=path, axis=axis[:20])
     return CurveFile(sets, Convention(1.0, axis))
+
+
+def _counts_of(name):
+    return name.replace("points", "counts")
+
+
+def _counts(path, archive, there, name):
+    """(G,) int64 points of each curve; None where all have as many, and the shape of their points says it."""
+    if _counts_of(name) not in there:
+        return None
+    counts = foreign_arrays.array(archive, _counts_of(name))
+    if counts.ndim != 1 or not len(counts) or counts.dtype.kind not in "iu" or counts.max() >= 2**31:
+        sentence = "{path}: {name} must have the number of points of each curve."
+        raise HairError(sentence, path=path, name=_counts_of(name))
+    return counts.astype(np.int64)

@@ -12,6 +12,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import HairError
+from ..geometry import bezier_segments
+
+# Said of splines that move, as Blender plays polylines alone.
+SPLINES_MOVE = "{path} moves: its Catmull-Rom splines become polylines, which follow them at all times."
 
 # Metres in a unit, by the names that people give them.
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048, "km": 1000.0}
@@ -129,6 +133,26 @@ class CurveSet:
             guide_weights=of_curves(self.guide_weights),
             motion=motion,
         )
+
+
+def as_polylines(curves: CurveSet) -> CurveSet:
+    """The same curves, of which Catmull-Rom splines are lines through points on them, as many at all times."""
+    counts, is_smooth, motion = curves.counts, curves.is_smooth, curves.motion
+    values = curves.points if curves.radii is None else np.column_stack([curves.points, curves.radii])
+    made, made_counts, lines = bezier_segments.smooth_lines(values, counts, is_smooth)
+    if motion is not None:
+        points_at = motion.points_at
+        motion = Motion(
+            motion.times, lambda index: bezier_segments.smooth_lines(points_at(index), counts, is_smooth, lines)[0]
+        )
+    return replace(
+        curves,
+        points=made[:, :3],
+        counts=made_counts,
+        is_smooth=np.zeros(len(counts), bool),
+        radii=None if curves.radii is None else made[:, 3],
+        motion=motion,
+    )
 
 
 @dataclass(frozen=True)

@@ -232,6 +232,30 @@ def polylines(segments: Segments, lines: np.ndarray) -> tuple[np.ndarray, np.nda
     return values, counts, places
 
 
+def smooth_lines(
+    values: np.ndarray, counts: np.ndarray, is_smooth: np.ndarray, lines: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(values (M, D), counts (S,), lines (K,)): curves, some of them Catmull-Rom splines, as polylines through them.
+
+    values: (N, D), counts: (S,) rows of each curve; is_smooth: (S,) bool, the splines, whose end points count twice as
+    in Blender; lines: into how many the segments of all splines are divided, None for as many as each needs.
+    """
+    values, counts = np.asarray(values), np.asarray(counts, np.int64)
+    is_divided = np.asarray(is_smooth) & (counts > 1)
+    starts, its = strands.curve_offsets(counts)[:-1][is_divided], counts[is_divided]
+    own, along = each(its + 2)
+    rows = starts[own] + np.clip(along - 1, 0, its[own] - 1)
+    segments = cubic(values[rows], its + 2, "catmullRom", "nonperiodic")
+    lines = line_counts(segments) if lines is None else lines
+    made, made_counts, _places = polylines(segments, lines)
+    all_counts = counts.copy()
+    all_counts[is_divided] = made_counts
+    is_made = np.repeat(is_divided, all_counts)
+    out = np.empty((len(is_made), values.shape[1]), values.dtype)
+    out[is_made], out[~is_made] = made, values[~np.repeat(is_divided, counts)]
+    return out, all_counts, lines
+
+
 def _at(controls, parts):
     """(T, K, D) polynomial values of segments (K, p + 1, D) at parts (T,) in [0, 1] of each."""
     degree, total, binomial = controls.shape[1] - 1, 0.0, 1.0

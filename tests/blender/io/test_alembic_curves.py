@@ -95,11 +95,11 @@ def test_scripts_read_them_too(scene, sphere, lines, tmp_path):
             api.import_curves(tmp_path / "curves.abc", sphere, **arguments)
 
 
-@pytest.mark.parametrize("ending", [".abc", ".usdc"])
-def test_hair_of_a_file_that_moves_plays_all_of_its_frames(scene, sphere, lines, tmp_path, ending):
-    """In a .blend; other files have the present frame, and a warning."""
+@pytest.mark.parametrize(("ending", "kind"), [(".abc", "POLY"), (".usdc", "POLY"), (".abc", "CATMULL_ROM")])
+def test_hair_of_a_file_that_moves_plays_all_of_its_frames(scene, sphere, lines, tmp_path, ending, kind):
+    """In a .blend; other files have the present frame, and a warning. Splines play as lines through their points."""
     lines[::3] = lines[::3, ::-1]  # from tip to root
-    made = curves_object(lines)
+    made = curves_object(lines, kind=kind)
     for frame, place in ((1, 0.0), (4, 0.3)):
         made.location = (place, 0.0, 0.0)
         made.keyframe_insert("location", frame=frame)
@@ -119,9 +119,14 @@ def test_hair_of_a_file_that_moves_plays_all_of_its_frames(scene, sphere, lines,
     assert ended.status == 0 and "from frame 1 to 4: its curves are read at frame 1 alone" in ended.errors
     ended = run_here(*words, "--out", tmp_path / "out.blend")
     assert ended.status == 0 and "plays its 4 frames" in ended.errors
+    assert ("its Catmull-Rom splines become polylines" in ended.errors) == (kind == "CATMULL_ROM")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
     hair = next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR")
     for frame, points in enumerate(expected, 1):
         bpy.context.scene.frame_set(frame)
         points[::3] = points[::3, ::-1]
-        np.testing.assert_allclose(world(hair), points.reshape(-1, 3), atol=1e-5)
+        played = np.split(world(hair), np.cumsum([len(strand.points) for strand in hair.data.curves])[:-1])
+        for strand, its in zip(played, points, strict=True):
+            assert len(strand) == 5 if kind == "POLY" else len(strand) > 5
+            np.testing.assert_allclose(strand[[0, -1]], its[[0, -1]], atol=1e-5)
+            assert np.linalg.norm(strand[:, None] - its, axis=2).min(axis=0).max() < 1e-5

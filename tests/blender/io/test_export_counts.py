@@ -7,6 +7,9 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.data.strands import curves
+from hair_addon.blender.io import groom_files
+from hair_addon.core.errors import HairError
+from hair_addon.core.files import array_grooms
 from tests.support.dynamics.following import update
 from tests.support.exchange import alembic_reader
 from tests.support.exchange.exported import export, shape, widths
@@ -44,6 +47,31 @@ def test_curves_keep_their_numbers_of_points(imported, tmp_path, ending, animati
     starts = np.cumsum([0, *counts])
     at_roots, at_tips = found["colors"][starts[:-1]], found["colors"][starts[1:] - 1]
     assert (at_tips > at_roots).all() and len(found["colors"]) == len(points)  # tips are lighter
+
+
+def test_arrays_keep_them_too(imported, tmp_path):
+    """60 curves of 2 to 12 points in an .npz file, and read back, as hair and as guides."""
+    radii = np.linspace(0.001, 0.002, len(imported.data.points), dtype=np.float32)
+    imported.data.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", radii)
+    made = api.use_as_hair(imported, bpy.data.objects["Sphere"])
+    update()
+    counts, points = ragged(bpy.data.objects[imported.name])
+    assert len({*counts}) > 5
+    path = tmp_path / "groom.npz"
+    groom_files.write(path, made.guides, made.hair, np.eye(3))
+    guides, hair = array_grooms.read(path).sets
+    np.testing.assert_array_equal(hair.counts, counts)
+    np.testing.assert_allclose(hair.points, points, atol=1e-6)
+    np.testing.assert_allclose(2.0 * hair.radii, widths(bpy.data.objects[imported.name]), rtol=1e-5)
+    assert guides.is_guide and len({*guides.counts}) == 1
+    arrays = dict(np.load(path))
+    np.testing.assert_array_equal(arrays["roots"], arrays["strand_points"][np.cumsum([0, *counts])[:-1]])
+    assert "guide_counts" not in arrays and arrays["guide_points"].ndim == 3
+    counts[0] -= 1
+    for wrong in (counts, counts[None], counts + 0.5, np.zeros(0, int), np.full(2, 2**62)):
+        np.savez(path, **(arrays | {"strand_counts": wrong}))
+        with pytest.raises(HairError, match="strand_"):
+            array_grooms.read(path)
 
 
 def test_catmull_rom_splines_are_written_through_their_points(imported, tmp_path):

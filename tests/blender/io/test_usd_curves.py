@@ -301,7 +301,10 @@ def test_what_moves_is_where_the_file_begins_and_has_all_its_times(rng, tmp_path
     made.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points * 100), 900)  # before the file begins
     stage.Save()
     del stage
-    (one,) = usd_curves.read(tmp_path / "a.usdc").sets
+    read = usd_curves.read(tmp_path / "a.usdc")
+    (one,) = read.sets
+    said = [str(note) for note in read.notes]
+    assert [("Catmull-Rom splines become polylines" in one) for one in said] == [True] * (basis == "catmullRom")
     np.testing.assert_allclose(one.points[[0, -1]], points[[0, -1]], atol=1e-7)
     np.testing.assert_allclose(one.motion.times, np.array([1001, 1002, 1003]) / 25.0)
     assert not one.is_smooth.any()  # Blender plays polylines

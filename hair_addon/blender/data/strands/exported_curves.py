@@ -83,13 +83,5 @@ def _kept(datablock, values):
     is_divided = lines > 1
     if not is_divided.any():
         return values
-    starts, its = strands.curve_offsets(counts)[:-1][is_divided], counts[is_divided]
-    own, along = bezier_segments.each(its + 2)  # end points count twice
-    rows = starts[own] + np.clip(along - 1, 0, its[own] - 1)
-    segments = bezier_segments.cubic(values[rows], its + 2, "catmullRom", "nonperiodic")
-    made, _counts, _places = bezier_segments.polylines(segments, np.repeat(lines[is_divided], its - 1))
-    wanted = (counts - 1) * lines + 1
-    out = np.empty((int(wanted.sum()), values.shape[1]), np.float32)
-    out[np.repeat(is_divided, wanted)] = made
-    out[~np.repeat(is_divided, wanted)] = values[~np.repeat(is_divided, counts)]
-    return out
+    each_segment = np.repeat(lines[is_divided], counts[is_divided] - 1)
+    return bezier_segments.smooth_lines(values, counts, is_divided, each_segment)[0]
