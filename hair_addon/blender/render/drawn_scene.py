@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...core.errors import HairError
+from ...core.long_work import no_progress, part_of
 from ..data.pictures import drawn_meshes
 from ..gpu import (
     ambient_visibility,
@@ -194,25 +195,33 @@ def _hair_receivers(hair, owners):
     ]
 
 
-def read_render(depsgraph, known, refused):
+def read_render(depsgraph, known, refused, progress=no_progress):
     """The same for a render, whose depsgraph may be at another time than the file: evaluated hair is read.
 
     refused: called with the datablock and the `HairError` of hair that cannot be drawn, and is left out; known:
     {session_uid: (points, radii, random numbers, StrandsOnGPU)} of what was drawn a moment before, changed: what stands
     still is not uploaded again.
     """
-    unlit = read_unlit(depsgraph, known, refused)
+    unlit = read_unlit(depsgraph, known, refused, part_of(progress, 0.0, 0.5))
+    progress("Reading lights", 0.5)
     world = light_door.read_world(depsgraph.scene_eval, depsgraph.view_layer_eval)
     hair_receivers = _hair_receivers(unlit.hair, [owner[1::-1] for owner in unlit.owners])
     lamps = scene_lights.gather(*light_door.read_lights(depsgraph, for_render=True), world, hair_receivers)
     hair_seen, surfaces_seen = visibility(unlit)
+    progress("Drawing shadows", 0.7)
     drawn = replace(unlit, world=world, hair_visibility=hair_seen, surface_visibility=surfaces_seen)
     return _lit(drawn, lamps, scene_lights.new_maps(lamps.record, is_wide=True), hair_receivers)
 
 
-def read_unlit(depsgraph, known, refused):
+def read_unlit(depsgraph, known, refused, progress=no_progress):
     """The same without lighting, for motion vectors."""
-    found = list(_read_rendered_hair(depsgraph, known, refused))
+    count = sum(_is_hair(instance.object) for instance in depsgraph.object_instances)
+    progress("Reading hair", 0.0)
+    found = []
+    for one in _read_rendered_hair(depsgraph, known, refused):
+        found.append(one)
+        progress("Reading hair", 0.6 * len(found) / count)
+    progress("Reading surfaces", 0.6)
     meshes = drawn_meshes.told_apart(drawn_meshes.read_drawn_meshes(depsgraph))
     if depsgraph.scene.vellus.is_hair_only:
         meshes = drawn_meshes.held_out(meshes)
@@ -293,12 +302,19 @@ def _renewed(renewal, seen, drawn):
     return renewal.step(seen, _placed(drawn.hair), _blocking(drawn), through, _receiving(drawn))
 
 
+def _is_hair(evaluated):
+    """Whether an evaluated object shows hair."""
+    if evaluated.type != "CURVES" or evaluated.original.data.vellus.kind != "HAIR":
+        return False
+    return len(evaluated.data.curves) > 0
+
+
 def _read_rendered_hair(depsgraph, known, refused):
     for instance in depsgraph.object_instances:
         hair_object = instance.object
-        original = hair_object.original.data
-        if hair_object.type != "CURVES" or original.vellus.kind != "HAIR" or not len(hair_object.data.curves):
+        if not _is_hair(hair_object):
             continue
+        original = hair_object.original.data
         to_world = np.array(instance.matrix_world, np.float64)
         if not can_be_drawn(hair_object, to_world):
             continue

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.imaging import lamps, texture_sides
+from ...core.long_work import no_progress, part_of
 from ...core.shading import appearance, light_paths
 from ...core.shading.fibre import strand_variation
 from ...core.shading.fibre.principled import varied_roughness
@@ -26,7 +27,7 @@ def path_count(blender_scene, size):
     return min(max(_PATHS_A_PIXEL * size[0] * size[1], _LEAST_PATHS), _MOST_PATHS)
 
 
-def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
+def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_progress):
     """A `DrawnScene` whose hair is lit by `count` paths through a grid, as a view of these (4, 4) sees it.
 
     The same scene for no paths, without hair of any area in view, where lights are linked, and unless all hair is
@@ -45,13 +46,17 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
     if not light_paths.strand_grid.has_area(systems):
         return drawn
     device = preferences.device()
+    progress(light_paths.gather.FOLLOWING, 0.0)
     grid = light_paths.strand_grid.build(systems, fibres, device=device)
+    progress(light_paths.gather.FOLLOWING, 0.15)
     seen = seen_strands.find(drawn, grid, (world_to_view, view_to_clip), window, _SAMPLES_A_PATH * count, seed)
     if not len(seen.segments):
         return drawn
+    progress(light_paths.gather.FOLLOWING, 0.3)
     most = _MOST_TIMES * count
     starting = -(-len(seen.segments) // _SAMPLES_A_PATH)
-    sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, starting, seed, device, most)
+    told = part_of(progress, 0.3, 1.0)
+    sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, starting, seed, device, most, told)
     means = [light_paths.voxel_means.shares(of_hair, taken, grid.origin) for of_hair in sums]
     visibility = [
         {**textures, "light_grid": light_grid.upload(of_hair)}

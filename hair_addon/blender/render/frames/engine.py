@@ -2,14 +2,13 @@
 """The render engine: surfaces and hair by the viewport's drawing code, at any resolution, also without a window."""
 
 import contextlib
-import time
 
 import bpy
 import numpy as np
 
 from ....core.errors import HairError
 from ....core.imaging import pixel_sampling
-from ....core.long_work import Stopped, no_progress
+from ....core.long_work import Stopped, no_progress, part_of
 from ...data import scene
 from ...data.pictures import camera_lens, panoramic_camera, rendered_files, view_cameras
 from ...gpu import drawing, world_texture
@@ -19,14 +18,17 @@ from ...settings import setting_properties
 from ...settings.translations import error_text, interface_text
 from .. import drawn_scene, film, light_paths, motion_vectors
 from ..viewport import rendered_view, viewport
-from . import composite
+from . import composite, frame_progress
+from .frame_progress import FrameProgress
 from .panoramic_frame import PanoramicFrame
 from .tiled_frame import Frame
 
 NAME = viewport.ENGINE
 
 _CURVE_PARTS = 256  # that a shutter curve is read in, as by Cycles
-_TURN = 0.002  # [s] between passes, to let the window redraw
+# Shares of the bar: of a render with motion vectors what is before its first moment, and of each moment its reading.
+_NEIGHBOURS, _READING = 0.1, 0.25
+_EVALUATING = "Evaluating the scene"
 
 
 _listener = no_progress  # an additional progress callback of renders, which may raise `Stopped`
@@ -73,6 +75,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         """Render a view layer in the depsgraph's frame."""
         try:
             self._render(depsgraph)
+        except Stopped:
+            pass  # by Esc: Blender keeps what it was shown
         except HairError as error:
             self._refuse(depsgraph.scene, error_text(error))
         except KeyboardInterrupt:  # a script's
@@ -103,33 +107,31 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         path_count = -(-light_paths.path_count(blender_scene, size) // len(offsets))
         film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count
         frames = {view: self._frame(depsgraph, view, size, window, film_settings) for view in views}
-        others = self._others(depsgraph, size, views) if "Vector" in passes else {}
+        told = FrameProgress(self, frame_progress.share_of(depsgraph), _listener)
+        before = _NEIGHBOURS if "Vector" in passes else 0.0
+        others = self._others(depsgraph, size, views, part_of(told, 0.0, before)) if before else {}
         world_texture.check_image()
-        known, refused, done, in_all = {}, {}, 0, sum(frame.pass_count for frame in frames.values()) * len(offsets)
+        told(_EVALUATING, before)
+        known, refused, each = {}, {}, (1.0 - before) / len(offsets)
         for index in scene_time.visit(blender_scene, offsets, self.frame_set):
-            said = interface_text("Motion step {number} of {count}", number=index + 1, count=len(offsets))
-            self.update_stats("", f"{said} | {interface_text('Reading the scene')}")
+            told.moment = interface_text("Motion step {number} of {count}", number=index + 1, count=len(offsets))
+            begun, end = before + each * index, before + each * (index + 1)
+            drawn_from = begun + _READING * each
             with drawing.ALONE:
-                drawn = drawn_scene.read_render(depsgraph, known, refused.__setitem__)
-            for view, frame in frames.items():
+                drawn = drawn_scene.read_render(depsgraph, known, refused.__setitem__, part_of(told, begun, drawn_from))
+            for number, (view, frame) in enumerate(frames.items()):
                 with drawing.ALONE:
                     camera = self._camera(depsgraph, view, size)
                     lens = camera_lens.read_lens(blender_scene, depsgraph, self._camera_object(depsgraph, view))
                     moving = None
                     if others:
-                        now, (before, after) = motion_vectors.places(drawn, *camera), others[view]
-                        moving = motion_vectors.Motion(before, now, after, size)
-                for _pass in frame.expose(drawn, *camera, moving, lens):
-                    done += 1
-                    if not bpy.app.background:
-                        time.sleep(_TURN)
-                    self.update_progress(done / in_all)
-                    samples = interface_text("Pass {number} of {count}", number=done, count=in_all)
-                    self.update_stats("", f"{said} | {samples}")
-                    if self.test_break() or _is_stopped(done / in_all):
-                        return
+                        now, around = motion_vectors.places(drawn, *camera), others[view]
+                        moving = motion_vectors.Motion(around[0], now, around[1], size)
+                first, last = (drawn_from + (end - drawn_from) * (number + n) / len(frames) for n in (0, 1))
+                frame.expose(drawn, *camera, moving, lens, part_of(told, first, last))
                 if index + 1 == len(offsets) or not bpy.app.background:
                     self._show(view_layer, view, window, frame.arrays())
+            told(_EVALUATING, end)
         # Last, so that there is a picture of everything else. A command that renders to a file fails: a picture
         # without some of the hair is not a valid result.
         for error in refused.values():
@@ -172,12 +174,14 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         outside = 0.0 if depsgraph.scene.vellus.is_hair_only else 1.0
         return PanoramicFrame(panorama, clip, outside, size, window, *settings)
 
-    def _others(self, depsgraph, size, views):
+    def _others(self, depsgraph, size, views, progress):
         """Where everything is a frame before and a frame after: {view: [`motion.Places`]}."""
         found = {view: [] for view in views}
-        for _index in scene_time.visit(depsgraph.scene, [-1.0, 1.0], self.frame_set):
+        progress(_EVALUATING, 0.0)
+        for index in scene_time.visit(depsgraph.scene, [-1.0, 1.0], self.frame_set):
             with drawing.ALONE:
-                there = drawn_scene.read_unlit(depsgraph, {}, _unheard)
+                told = part_of(progress, 0.5 * index, 0.5 * (index + 1))
+                there = drawn_scene.read_unlit(depsgraph, {}, _unheard, told)
                 for view, places in found.items():
                     places.append(motion_vectors.places(there, *self._camera(depsgraph, view, size)))
         return found
@@ -193,14 +197,6 @@ class VellusRenderEngine(bpy.types.RenderEngine):
 
 def _unheard(_datablock, _error):
     """Hair that cannot be drawn is reported for the frame itself, not for those around it."""
-
-
-def _is_stopped(part):
-    try:
-        _listener("Rendering", part)
-    except Stopped:
-        return True
-    return False
 
 
 def _passes(view_layer, is_blurred):

@@ -4,6 +4,7 @@
 import numpy as np
 
 from ....core import imaging
+from ....core.long_work import no_progress, part_of
 from .. import film
 from .tiled_frame import Frame
 
@@ -24,18 +25,14 @@ class PanoramicFrame:
         }
         self._passes = passes
 
-    @property
-    def pass_count(self):
-        """Number of passes per motion sample."""
-        return sum(frame.pass_count for frame in self._faces.values())
-
-    def expose(self, drawn, world_to_view, _view_to_clip, _motion=None, _lens=None):
+    def expose(self, drawn, world_to_view, _view_to_clip, _motion=None, _lens=None, progress=no_progress):
         """As of `Frame`, without motion vectors and depth of field."""
         to_clip = _face_projection(self._lookup.half_width, *self._clip)
-        for face, frame in self._faces.items():
+        for done, (face, frame) in enumerate(self._faces.items()):
             turn = np.eye(4)
             turn[:3, :3] = imaging.panorama.FACES[face]
-            yield from frame.expose(drawn, turn @ world_to_view, to_clip)
+            told = part_of(progress, done / len(self._faces), (done + 1) / len(self._faces))
+            frame.expose(drawn, turn @ world_to_view, to_clip, progress=told)
             frame.free_film()
 
     def arrays(self):

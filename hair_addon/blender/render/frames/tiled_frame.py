@@ -4,8 +4,12 @@
 import numpy as np
 
 from ....core.imaging import pixel_sampling
+from ....core.long_work import no_progress, part_of
 from ...gpu import drawing
 from .. import film, light_paths
+
+_LIGHT = 0.3  # share of a moment in which light among strands is followed, before it is drawn
+_PASS = "Pass {number} of {count}"
 
 
 class Frame:
@@ -27,17 +31,22 @@ class Frame:
         self._film, self._moment_count, self._sums = None, 0, {}
 
     @property
-    def pass_count(self):
+    def _passes_of_moment(self):
         """Number of passes per motion sample."""
         return len(self._tiles) * self._turns
 
-    def expose(self, drawn, world_to_view, view_to_clip, motion=None, lens=None):
-        """Draw a moment: a generator that yields after each pass, so that whoever draws may stop.
+    def expose(self, drawn, world_to_view, view_to_clip, motion=None, lens=None, progress=no_progress):
+        """Draw a moment; progress is told after each pass, and may raise `Stopped`.
 
         drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4); motion: for the pass "Vector"; lens: `Lens`, None: all
         in focus.
         """
-        drawn = light_paths.with_grid(drawn, world_to_view, view_to_clip, self._path_count, self._moment_count)
+        lit = _LIGHT if self._path_count and drawn.hair else 0.0
+        following, drawing_passes = part_of(progress, 0.0, lit), part_of(progress, lit, 1.0)
+        drawn = light_paths.with_grid(
+            drawn, world_to_view, view_to_clip, self._path_count, self._moment_count, following
+        )
+        done = 0
         for tile in self._tiles:
             if self._film is None or self._film.size != tile[2:]:
                 self._film = self._new_film(tile)
@@ -49,7 +58,8 @@ class Frame:
                     self._film.add_pass(
                         drawn, world_to_view, view_to_clip, self._size, turns_before + turn, tile[:2], lens
                     )
-                yield
+                done += 1
+                drawing_passes(_PASS.format(number=done, count=self._passes_of_moment), done / self._passes_of_moment)
             with drawing.ALONE:
                 self._add(tile, self._film.read())
         self._moment_count += 1

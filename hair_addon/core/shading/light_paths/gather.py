@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 
 from ...kernels.checks import require_count, require_indices
+from ...long_work import Progress, no_progress, part_of
 from . import grid_walk, start_places, view
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
@@ -22,6 +23,8 @@ from .start_places import start
 from .strand_grid import StrandGrid
 from .surface_walk import surface_of, surface_turn
 
+FOLLOWING = "Following light"  # the step that progress is told of
+
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 _MOST_EVENTS = wp.constant(1000)
@@ -29,6 +32,7 @@ _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
 _KNOWN = 0.015  # standard error of the mean light, as a part of it, below which no more paths are taken
 _FAINT = 0.3  # of the mean light that is drawn: light below it is worth no shadow each time
+_SHARES, _LEAST_SHARE = 8, 8_192  # paths after which processors tell progress: shares of all, of so many at least
 _MOST_TURNS = 64  # of paths on the same hair
 _SPARE = 1.1  # by which more are taken: the error is an estimate, and each turn has a cost of its own
 _LEAST_TURN = 0.125  # paths of a further turn, as a part of all before
@@ -118,6 +122,7 @@ def gather(
     seed: int = 0,
     device: wp.DeviceLike = "cpu",
     most_paths: int = 0,
+    progress: Progress = no_progress,
 ) -> tuple[np.ndarray, int]:
     """(systems, Z, Y, X, 12) float64 by voxel, sums of RGB: over paths their light, and what even light would give;
     over samples, which are others, what is drawn without paths, and what even light would give there; and how many
@@ -146,7 +151,8 @@ def gather(
         total, squares, taken, tried, turn, more = 0.0, 0.0, 0, 0, 0, path_count
         while True:
             starts = start_places.of_seen(in_sight, grid, seen, voxels, more, seed * _MOST_TURNS + turn, device)
-            positions, light, even = _traced(medium, sources, seen.view, starts, device)
+            told = part_of(progress, tried / (tried + more), 1.0)
+            positions, light, even = _traced(medium, sources, seen.view, starts, device, told)
             found = np.concatenate([light, even], axis=-1)
             _add_by_voxel(sums[..., :6], grid, positions, systems[starts.segments], found)
             brightness = light.sum(axis=1, dtype=np.float64)
@@ -176,13 +182,19 @@ def _even_there(medium, seen, device):
     return found.numpy()
 
 
-def _traced(medium, sources, seen_in, starts, device):
+def _traced(medium, sources, seen_in, starts, device, progress):
     """Of paths: where they start, light from there, and what even light would give, (N, 3) each."""
-    count = len(starts.segments)
-    found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
-    given = [wp.array(values, dtype=int) for values in (starts.segments, starts.keys)]
-    launch(_gather, count, [medium, sources, view.on_device(seen_in), *given, *found], device)
-    return [array.numpy() for array in found]
+    count, seen_here, made = len(starts.segments), view.on_device(seen_in), []
+    # A GPU takes about as long for a share as for all.
+    share = max(count // _SHARES, _LEAST_SHARE) if wp.get_device(device).is_cpu else max(count, 1)
+    for first in range(0, max(count, 1), share):
+        some = slice(first, first + share)
+        given = [wp.array(values[some], dtype=int) for values in (starts.segments, starts.keys)]
+        found = [wp.zeros(len(given[0]), dtype=wp.vec3) for _ in range(3)]
+        launch(_gather, len(given[0]), [medium, sources, seen_here, *given, *found], device)
+        made.append([array.numpy() for array in found])
+        progress(FOLLOWING, min(some.stop / max(count, 1), 1.0))
+    return [np.concatenate(parts) for parts in zip(*made, strict=True)]
 
 
 def _standard_error(total, squares, count):

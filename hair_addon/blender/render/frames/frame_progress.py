@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a rendered frame is: Blender's bar and text, and whether somebody asks to stop."""
+
+import time
+
+import bpy
+
+from ....core.long_work import Progress, Stopped
+from ...settings.translations import status_text
+
+_TURN = 0.002  # [s] in which the window may redraw
+_LEAST = 1e-3  # parts that no bar shows
+
+
+class FrameProgress:
+    """A `Progress` of a render engine's view layer, which is a share of the whole bar; it never falls.
+
+    listener: is told too, and may raise `Stopped`. Raises it when Esc was pressed.
+    """
+
+    def __init__(self, engine: bpy.types.RenderEngine, share: tuple[float, float], listener: Progress) -> None:
+        self._engine, self._share, self._listener = engine, share, listener
+        self._shown, self._text = -1.0, ""
+        self.moment = ""  # which moment of a blurred frame is rendered, for the text
+
+    def __call__(self, step: str, part: float) -> None:
+        first, last = self._share
+        shown = max(first + (last - first) * min(max(part, 0.0), 1.0), self._shown)
+        text = " | ".join(filter(None, (self.moment, status_text(step))))
+        if shown < self._shown + _LEAST and text == self._text:
+            return
+        self._shown, self._text = shown, text
+        self._engine.update_progress(shown)
+        self._engine.update_stats("", text)
+        if not bpy.app.background:
+            time.sleep(_TURN)
+        self._listener("Rendering", shown)
+        if self._engine.test_break():
+            raise Stopped
+
+
+def share_of(depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
+    """Where a view layer begins and ends in the bar: Blender renders all that are on, one after another."""
+    scene, layer = depsgraph.scene, depsgraph.view_layer
+    names = [one.name for one in scene.view_layers if one.use]
+    is_alone = scene.render.use_single_layer and not bpy.app.background
+    if is_alone or layer.name not in names:
+        return 0.0, 1.0
+    index = names.index(layer.name)
+    return index / len(names), (index + 1) / len(names)
