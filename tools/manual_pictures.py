@@ -153,7 +153,7 @@ def save_sample(path):
     head.light()
     bpy.ops.vellus.add_hair(density_group="scalp", length=0.1, gravity=0.8, strand_count=5000)
     bpy.data.hair_curves["Hair"].vellus.marschner.size = 64
-    bpy.data.hair_curves["Guides"].vellus.simulates = True  # else its panel is gray
+    bpy.data.hair_curves["Hair Guides"].vellus.simulates = True  # else its panel is gray
     for style in ("CLUMP", "CURL"):
         bpy.ops.vellus.add_style(style=style)
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -270,7 +270,7 @@ def take(pictures):
     window.sidebar.active_panel_category = "Hair"
     yield from pause(0.5)
     yield from window.narrow()
-    for active in ("Head", "Guides", "Hair") if "windows" in pictures else ():
+    for active in ("Head", "Hair Guides", "Hair") if "windows" in pictures else ():
         bpy.context.view_layer.objects.active = bpy.data.objects[active]
         for part, names in enumerate((every[:8], every[8:])):
             window.show_panels(names)

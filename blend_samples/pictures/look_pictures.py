@@ -46,7 +46,7 @@ def grow_lock():
     bpy.ops.vellus.add_hair(
         guide_count=60, length=LENGTH, length_variation=0.1, tilt=0.0, gravity=0.0, strand_count=4000, radius=8e-5
     )
-    guides = bpy.data.objects["Guides"]
+    guides = bpy.data.objects["Hair Guides"]
     hang(guides.data)
     bpy.context.view_layer.update()
     patch.hide_set(True)

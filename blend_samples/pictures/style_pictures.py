@@ -114,7 +114,7 @@ def _grown(width, depth, height, side, comb):
         strand_count=STRAND_COUNT,
         radius=8e-5,
     )
-    guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"].data
+    guides, hair = bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"].data
     points = np.empty((len(guides.data.points), 3), np.float32)
     guides.data.attributes["position"].data.foreach_get("vector", points.ravel())
     comb(points.reshape(len(guides.data.curves), -1, 3))

@@ -59,7 +59,7 @@ def grow_on_ball():
     ball.data.materials.append(head.skin())
     bpy.ops.object.shade_smooth()
     bpy.ops.vellus.add_hair(guide_count=300, length=0.04, tilt=0.5, gravity=0.3, strand_count=40_000)
-    bpy.data.objects["Guides"].hide_set(True)
+    bpy.data.objects["Hair Guides"].hide_set(True)
     head.light()
     hair = bpy.data.objects["Hair"].data
     styles.light(hair)

@@ -334,7 +334,7 @@ def _play(monkeypatch):
     monkeypatch.setattr(running, "has_window", lambda: True)
     monkeypatch.setattr(preferences, "device", lambda: DEVICE)
     bpy.ops.vellus.add_hair(guide_count=1000, length=LENGTH, strand_count=100_000)
-    guides, hair = (bpy.data.hair_curves[name] for name in ("Guides", "Hair"))
+    guides, hair = (bpy.data.hair_curves[name] for name in ("Hair Guides", "Hair"))
     guides.vellus.simulates = True
     view, parts = View(), Parts(monkeypatch)
     for frame in range(1, 5):  # compiles

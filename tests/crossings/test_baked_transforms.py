@@ -31,7 +31,7 @@ def baked_files(blender, tmp_path_factory):
         bpy.context.view_layer.update()
         size = placed_hair.world_scale(body)
         bpy.ops.vellus.add_hair(guide_count=6, strand_count=20, length=0.5 * size, radius=0.001 * size)
-        guides, scene = bpy.data.objects["Guides"].data, bpy.context.scene
+        guides, scene = bpy.data.objects["Hair Guides"].data, bpy.context.scene
         placed_hair.comb(guides)
         guides.vellus.simulates, guides.vellus.dynamics.bend_stiffness = True, 1e-9
         scene.frame_end = LAST
@@ -59,7 +59,7 @@ CHANGES = {
 @pytest.mark.parametrize("place", ["turned", "mirrored", "on a scaled rig"])
 def test_baked_frames_play_where_they_did(baked_files, place, change):
     bpy.ops.wm.open_mainfile(filepath=baked_files(place))
-    scene, guides = bpy.context.scene, bpy.data.objects["Guides"].data
+    scene, guides = bpy.context.scene, bpy.data.objects["Hair Guides"].data
     frames = {}
     for frame in (1, 2, LAST):
         scene.frame_set(frame)
@@ -78,7 +78,7 @@ def test_baked_frames_play_where_they_did(baked_files, place, change):
 def test_a_bake_after_it_is_of_the_coordinates_of_now(baked_files, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=baked_files("turned"))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copy.blend"))
-    scene, guides = bpy.context.scene, bpy.data.objects["Guides"].data
+    scene, guides = bpy.context.scene, bpy.data.objects["Hair Guides"].data
     guides.vellus.cache_identity = ""
     run_now(guide_baking.baking([guides], LAST, scene))
     scene.frame_set(LAST)

@@ -51,7 +51,7 @@ def world(curves_object):
 def grow(surface):
     bpy.context.view_layer.objects.active = surface
     bpy.ops.vellus.add_hair(guide_count=GUIDE_COUNT, strand_count=STRAND_COUNT, length=0.3, radius=0.004)
-    return bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    return bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"]
 
 
 def imported(path, read):

@@ -154,10 +154,11 @@ def test_all_ways_grow_the_same_hair_where_no_size_is_given(sphere, tmp_path):
     made = {}
 
     def keep(way):
-        guides, hair = (bpy.data.hair_curves[name] for name in ("Guides", "Hair"))
+        hair = bpy.data.hair_curves["Hair"]
+        guides = hair.vellus.guide_curves
         radii = np.empty(len(hair.points), np.float32)
         hair.attributes["radius"].data.foreach_get("value", radii)
-        found = (points(bpy.data.objects[o]) for o in ("Guides", "Hair"))
+        found = (points(next(o for o in bpy.data.objects if o.data == its)) for its in (guides, hair))
         made[way] = [*found, radii, np.array(list(sizes(guides, hair).values()))]
         bpy.ops.wm.open_mainfile(filepath=str(blend))
         bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]

@@ -69,7 +69,7 @@ class Strands:
 def groom(sphere):
     """(guides, hair) objects, few strands each."""
     bpy.ops.vellus.add_hair(guide_count=GUIDE_COUNT, strand_count=STRAND_COUNT, length=LENGTH, radius=0.004)
-    return bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    return bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"]
 
 
 def appended(name):

@@ -48,7 +48,7 @@ def test_all_ways_make_the_same_strands(surface, tmp_path):
         made[way] = points(guides), points(hair)
 
     bpy.ops.vellus.add_hair(**GUIDES, **HAIR)
-    keep("add hair", bpy.data.objects["Guides"], bpy.data.objects["Hair"])
+    keep("add hair", bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"])
 
     _open(blend)
     bpy.ops.vellus.distribute_guides(**GUIDES)
@@ -101,7 +101,7 @@ def test_arrays_make_what_an_object_of_them_does(sphere):
     guides = api.distribute_guides((vertices, triangles), **GUIDES)
     hair = api.interpolate_hair(guides, mesh=(vertices, triangles), **HAIR, seed=SEED)
     bpy.ops.vellus.add_hair(**GUIDES, **HAIR)
-    assert np.array_equal(api.points(guides), points(bpy.data.objects["Guides"]))
+    assert np.array_equal(api.points(guides), points(bpy.data.objects["Hair Guides"]))
     assert np.array_equal(api.points(hair), points(bpy.data.objects["Hair"]))
 
 

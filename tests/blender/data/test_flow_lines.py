@@ -162,8 +162,8 @@ def test_a_new_hair_system_takes_flow_lines(plane):
     spline("POLY")
     bpy.context.view_layer.objects.active = plane
     bpy.ops.vellus.add_hair(**STRAIGHT, strand_count=50, flow_lines="Flow", lift=0.3)
-    expect(bpy.data.objects["Guides"], 1.0, 0.0, 0.3)
-    assert not bpy.data.objects["Guides"].data.vellus.is_stale
+    expect(bpy.data.objects["Hair Guides"], 1.0, 0.0, 0.3)
+    assert not bpy.data.objects["Hair Guides"].data.vellus.is_stale
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ def test_what_is_new_is_seen_beside_its_surface(sphere, way):
     assert sphere.visible_get() and sphere.users_collection[0] == listed
     bpy.ops.vellus.add_hair(guide_count=5, strand_count=20, length=0.2)
     assert bpy.context.object.data.vellus.kind == "HAIR" and bpy.context.object.visible_get()
-    assert bpy.data.objects["Guides"].name in bpy.context.view_layer.objects
+    assert bpy.data.objects["Hair Guides"].name in bpy.context.view_layer.objects
     bpy.ops.vellus.hair_tubes(tube_count=3)
     (tubes,) = (o for o in bpy.data.objects if o.type == "MESH" and o != sphere)
     assert tubes.visible_get()

@@ -26,7 +26,7 @@ def hair(scene):
     group = grid.vertex_groups.new(name="Scalp")
     group.add([vertex.index for vertex in grid.data.vertices], 1.0, "REPLACE")
     bpy.ops.vellus.add_hair(guide_count=40, strand_count=400, length=0.2, density_group="Scalp")
-    guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    guides, hair = bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"]
     bent = points(guides)
     bent[:, :, 0] += np.linspace(0.0, 0.3, bent.shape[1]) ** 2
     write_points(guides, bent)
@@ -108,7 +108,7 @@ EDITS = {edit.__name__: edit for edit in (join, extrude, separate, delete, cut)}
 
 @pytest.mark.parametrize("name", EDITS)
 def test_strands_stay_whose_face_is_left_alone(hair, name):
-    guides, before = bpy.data.objects["Guides"], points(hair)
+    guides, before = bpy.data.objects["Hair Guides"], points(hair)
     guides_before, lost = points(guides), faces_of(hair, 2)
     counts = faces_of(guides, 2).sum(), lost.sum()
     kept = np.ones(len(before), bool) if name == "join" else ~lost
@@ -165,7 +165,7 @@ def test_a_remeshed_surface_has_its_strands_at_the_nearest_points(hair):
     bpy.ops.object.voxel_remesh()
     bpy.context.view_layer.update()
     assert np.linalg.norm(points(hair)[:, 0] - before[:, 0], axis=1).max() < 0.04
-    assert "400 strands" in bpy.data.objects["Guides"].data.vellus.status
+    assert "400 strands" in bpy.data.objects["Hair Guides"].data.vellus.status
 
 
 def test_a_mask_that_is_painted_in_the_same_edit_places_strands_again(hair):
@@ -186,7 +186,7 @@ def test_a_quad_that_is_cut_otherwise_keeps_its_strands(scene):
     bpy.context.collection.objects.link(skin)
     bpy.context.view_layer.objects.active = skin
     bpy.ops.vellus.add_hair(guide_count=40, strand_count=300, length=0.2)
-    guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    guides, hair = bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"]
     before, combed = points(hair)[:, 0], points(guides)[:, 0]
     mesh.vertices[1].co = (0.3, 0.6, 0.0)
     mesh.calc_loop_triangles()

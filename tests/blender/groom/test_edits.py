@@ -32,7 +32,7 @@ def in_world(curves_object):
 
 def test_hair_is_added_in_one_step(sphere):
     assert bpy.ops.vellus.add_hair(guide_count=20, strand_count=100) == {"FINISHED"}
-    guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    guides, hair = bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"]
     assert (len(guides.data.curves), len(hair.data.curves)) == (20, 100)
     assert hair.data.vellus.guide_curves == guides.data
     assert bpy.context.object == hair
@@ -170,7 +170,7 @@ def test_applying_the_scale_moves_nothing(sphere, scale):
     sphere.scale = scale
     bpy.context.view_layer.update()
     bpy.ops.vellus.add_hair(guide_count=20, strand_count=50)
-    guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    guides, hair = bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"]
     combed = points(guides)
     combed[:, -1] += 0.05
     write_points(guides, combed)

@@ -52,7 +52,7 @@ def test_a_mask_that_is_chosen_after_gives_the_same_sizes(mask_first):
     assert not any(whole[name] == value for name, value in mask_first.items()), "all of them depend on the mask"
     choose_mask(hair)
     assert sizes_of(hair) == mask_first
-    length = np.linalg.norm(np.diff(points(bpy.data.objects["Guides"]), axis=1), axis=-1).sum(axis=1)
+    length = np.linalg.norm(np.diff(points(bpy.data.objects["Hair Guides"]), axis=1), axis=-1).sum(axis=1)
     assert np.median(length) == pytest.approx(mask_first["length"], rel=0.1)
     width = np.empty(len(hair.points), np.float32)
     hair.attributes["radius"].data.foreach_get("value", width)
@@ -99,7 +99,7 @@ def test_what_an_operator_or_a_script_gives_stays(mask_first, sphere):
 
 def test_regenerated_guides_follow_on(mask_first):
     hair = add(**COUNTS)
-    guides = bpy.data.objects["Guides"]
+    guides = bpy.data.objects["Hair Guides"]
     write_points(guides, points(guides) * np.float32(1.2))
     bpy.context.view_layer.update()
     combed = sizes_of(hair)

@@ -29,7 +29,7 @@ def new_guides(**settings):
 def test_new_hair_on_a_dome_is_draped(dome):
     guides = new_guides(**dome)
     assert guides.vellus.guides.drape and not guides.vellus.status
-    draped_height = points(bpy.data.objects["Guides"])[..., 2].mean()
+    draped_height = points(bpy.data.objects["Hair Guides"])[..., 2].mean()
     bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
     stiff = new_guides(**dome, drape=False)
     standing = next(o for o in bpy.data.objects if o.data == stiff)

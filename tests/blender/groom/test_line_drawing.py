@@ -113,6 +113,17 @@ def test_combing_stops_where_it_began(hair):
     assert "Comb Guides" in buttons()
 
 
+def test_guides_of_the_first_system_are_named_after_it_too(sphere):
+    """Guides that a script made on their own keep their name until their hair is named."""
+    bpy.ops.vellus.add_hair(guide_count=10, strand_count=20)
+    hair = bpy.context.object
+    guides = hair.data.vellus.guide_curves
+    (shown,) = [o for o in bpy.data.objects if o.data == guides]
+    assert (hair.name, shown.name, guides.name) == ("Hair", "Hair Guides", "Hair Guides")
+    hair.vellus_system.title = "Fringe"
+    assert (shown.name, guides.name) == ("Fringe Guides", "Fringe Guides")
+
+
 def test_guides_are_named_after_their_hair(hair):
     guides = bpy.data.objects["Guides"]
     hair_systems.rename(hair, "Fringe")

@@ -159,7 +159,7 @@ def test_roots_stay_on_a_surface_that_an_armature_bends(arm, tmp_path, window):
     bpy.ops.object.select_all(action="DESELECT")
     arm.select_set(True)
     bpy.ops.vellus.add_hair(guide_count=40, length=0.4, strand_count=200)
-    guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    guides, hair = bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"]
     simulate(guides, tmp_path)
     there = played(guides, 1, 9)
     pose = guide_poses.read(guides.data, bpy.context.evaluated_depsgraph_get(), 1.0)

@@ -217,7 +217,7 @@ def head(found, _folder):
     surface.matrix_world.identity()
     weigh(surface, "scalp", np.clip((vertices(surface)[:, 2] - 0.76) / 0.01, 0.0, 1.0))
     bpy.ops.vellus.add_hair(guide_count=80, strand_count=3000, density_group="scalp", length=0.15, gravity=0.8)
-    guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    guides, hair = bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"]
     hair.data.vellus.marschner.size = 64
     api.shade(hair, "AUBURN", mode="classic", random_color=0.0)
     film(0.8, 0.75)

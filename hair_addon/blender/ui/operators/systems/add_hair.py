@@ -65,8 +65,7 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
         setting_properties.show(self, hair.vellus.hair, HairSettings)
         context.view_layer.update()  # to evaluate the new objects
         hair_object = object_of(hair, context.view_layer)
-        if guides.name != "Guides":  # there were others before
-            name_guides(hair_object)
+        name_guides(hair_object)
         make_active(hair_object, context.view_layer)
 
     def _settings(self):
