@@ -58,7 +58,7 @@ _OPERATORS = {
     "systems": ("delete_system",),
     "groom_library": ("save_groom", "apply_groom"),
     "use_as_guides": ("use_as_guides",),
-    "use_as_hair": ("use_as_hair", "convert_particles"),
+    "use_as_hair": ("use_as_hair", "import_groom", "convert_particles"),
     "transfer_groom": ("transfer_groom",),
     "rendering": ("toggle_composite",),
     "cards": ("hair_cards", "hair_tubes"),

@@ -104,7 +104,7 @@ def curves_of(path, wanted, surface_object, is_open=False):
     path = Path(path)
     require_readable(path)
     if path.suffix.lower() != ".blend":
-        yield _made(path, wanted, surface_object)
+        yield made_of(path, read(path, wanted.axis), wanted, surface_object)
         return
     if wanted.said != Convention():
         raise HairError("{path} has its own unit and axes: leave out those that were given.", path=path)
@@ -134,9 +134,23 @@ def curves_of(path, wanted, surface_object, is_open=False):
 # ---------------------------------------------------------------------------------------------------- files
 
 
-def _made(path, wanted, surface_object):
-    """What is `Found` in a file of another program, or of arrays."""
-    file = read(path, wanted.axis)
+def reading(path):
+    """`read` as work in steps, in another thread. Raises `HairError`."""
+    path = Path(path)
+    require_readable(path)
+    if path.suffix.lower() == ".blend":
+        raise HairError("{path} is a .blend file: append its objects instead.", path=path)
+
+    def compute(progress):
+        progress("Reading curves", 0.0)
+        return read(path)
+
+    return (yield compute)
+
+
+def made_of(path, file, wanted, surface_object):
+    """What is `Found` in a `CurveFile`, made in the open scene. Raises `HairError`."""
+    path = Path(path)
     chosen, guides = _chosen_sets(path, file.sets, wanted)
     reading = curve_units.choose(file, [*chosen, *guides], wanted.said, _mesh(surface_object), str(path))
     notes = [*file.notes, *reading.notes, *_notes_on_groups(path, chosen)]

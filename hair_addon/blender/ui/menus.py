@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Menu entries: Add ▸ Curve, File ▸ Export, and the Object menu."""
+"""Menu entries: Add ▸ Curve, File ▸ Import and Export, and the Object menu."""
 
 import bpy
 
 from ..groom.foreign import particle_hair
 from ..groom.foreign.foreign_curves import is_foreign
-from ..groom.selection import guides_of, hair_of, parts_of
+from ..groom.selection import guides_of, hair_of, parts_of, surface_of
 from ..live import unlocked_renders
 from ..render.frames import composite
 from ..settings.translations import CONTEXT, interface_text
@@ -142,7 +142,13 @@ def _in_export_menu(menu, context):
         menu.layout.operator("vellus.export_groom", text="Hair for Unreal, USD (.abc/.usd*)")
 
 
+def _in_import_menu(menu, context):
+    if surface_of(context.object) is not None:
+        menu.layout.operator("vellus.import_groom", text="Hair on This Mesh (.abc/.usd*/.npz)")
+
+
 _ENTRIES = (
+    ("TOPBAR_MT_file_import", _in_import_menu),
     ("TOPBAR_MT_file_export", _in_export_menu),
     ("VIEW3D_MT_curve_add", _in_add_menu),
     ("VIEW3D_MT_object", _in_object_menu),

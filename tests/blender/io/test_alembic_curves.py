@@ -9,7 +9,7 @@ from hair_addon import api
 from hair_addon.core.files import alembic_grooms
 from tests.support.commands import load, run_here
 from tests.support.dynamics.following import update
-from tests.support.exchange.alembic_files import File
+from tests.support.exchange.alembic_files import of_maya
 from tests.support.exchange.imported import curves_object, lines_on, world
 
 
@@ -43,16 +43,6 @@ def test_blenders_curves_are_read_as_they_are_seen_in_every_frame(scene, lines, 
     for frame in (1, 3, 4):
         scene.frame_set(frame)
         np.testing.assert_allclose(placed.motion.points_at(frame - 1), world(made), atol=1e-5)
-
-
-def of_maya(path, lines):
-    """A file in centimetres with Y up, with an object for each curve, and diameters of a tenth of a millimetre."""
-    file, children = File("Maya 2026"), []
-    for number, line in enumerate(100.0 * lines[..., [0, 2, 1]] * [1.0, 1.0, -1.0]):
-        width = file.writer.array("width", "float32", np.float32([0.01]))
-        shape = file.curves(f"curveShape{number}", line - [3.0, 0.0, 0.0], [len(line)], extra=[width])
-        children.append(file.transform(f"curve{number}", [shape], [1], [3.0, 0.0, 0.0]))
-    file.write(path, *children)
 
 
 def test_one_object_a_curve_is_hair_of_all_of_them(scene, sphere, lines, tmp_path):

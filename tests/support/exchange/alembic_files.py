@@ -57,3 +57,13 @@ class File:
     def write(self, path, *children):
         self.writer.close(children)
         path.write_bytes(self.bytes.getvalue())
+
+
+def of_maya(path, lines):
+    """A file in centimetres with Y up, with an object for each curve, and diameters of a tenth of a millimetre."""
+    file, children = File("Maya 2026"), []
+    for number, line in enumerate(100.0 * lines[..., [0, 2, 1]] * [1.0, 1.0, -1.0]):
+        width = file.writer.array("width", "float32", np.float32([0.01]))
+        shape = file.curves(f"curveShape{number}", line - [3.0, 0.0, 0.0], [len(line)], extra=[width])
+        children.append(file.transform(f"curve{number}", [shape], [1], [3.0, 0.0, 0.0]))
+    file.write(path, *children)

@@ -28,7 +28,9 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         if is_on:
             names = ("composite_shadow", "sample_count", "multiple_scattering")
             setting_rows.rows(layout, state, RenderSettings, names)
-        layout.operator("vellus.export_groom", icon="FILE_3D", text="Export Groom…")
+        column = layout.column(align=True)
+        column.operator("vellus.export_groom", icon="EXPORT", text="Export Groom…")
+        column.operator("vellus.import_groom", icon="IMPORT", text="Import Groom…")
         column = layout.column(align=True)
         column.operator_context = "INVOKE_DEFAULT"
         column.operator("vellus.hair_cards", icon="MESH_PLANE", text="Hair Cards…")

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Import Groom: files by our own readers, with unit, axis and all objects, onto the active mesh."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon import api
+from hair_addon.blender.ui import menus, panels
+from tests.support.dynamics.following import update
+from tests.support.exchange.alembic_files import of_maya
+from tests.support.exchange.imported import curves_object, lines_on, world
+from tests.support.interface.layout import draw
+from tests.support.reading import points
+
+
+@pytest.fixture
+def lines(sphere, rng):
+    """12 lines of 5 points out of a sphere that is elsewhere, in the world."""
+    sphere.location, sphere.scale = (0.4, -0.3, 1.5), (0.1, 0.1, 0.1)
+    update()
+    return np.float32(list(lines_on(sphere, rng, 12, 5, 5)))
+
+
+def run(path, **given):
+    """(guides, hair) objects that are new; None for no hair."""
+    before = set(bpy.data.objects)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
+    assert bpy.ops.vellus.import_groom(filepath=str(path), **given) == {"FINISHED"}
+    update()
+    made = {one.data.vellus.kind: one for one in set(bpy.data.objects) - before}
+    return made["GUIDES"], made.get("HAIR")
+
+
+def in_world(shown):
+    matrix = np.array(shown.matrix_world)
+    return points(shown) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def test_curves_of_another_program_are_hair_where_they_belong(scene, sphere, lines, tmp_path):
+    """One object a curve, centimeters, Y up: found, or as is said; what is wrong leaves nothing behind."""
+    path = tmp_path / "curves.abc"
+    of_maya(path, lines)
+    for said in ({}, {"unit": "cm", "up": "Y"}):
+        guides, hair = run(path, guide_count=4, **said)
+        np.testing.assert_allclose(in_world(hair), lines, atol=1e-6)
+        assert hair.data.surface == sphere and len(guides.data.curves) == 4
+        radii = np.array([one.value for one in hair.data.attributes["radius"].data])
+        np.testing.assert_allclose(0.1 * radii, 0.5e-4, rtol=1e-5)
+        assert bpy.context.object == hair
+    _guides, hair = run(path, object_name="curve3")
+    np.testing.assert_allclose(in_world(hair), lines[3:4], atol=1e-6)
+    before = sorted(bpy.data.objects.keys()), sorted(bpy.data.hair_curves.keys())
+    bpy.context.view_layer.objects.active = sphere
+    for wrong, words in (({"unit": "m"}, "in centimeters with Y up"), ({"object_name": "fringe"}, "no curves")):
+        with pytest.raises(RuntimeError, match=words):
+            bpy.ops.vellus.import_groom(filepath=str(path), **wrong)
+    monkey = bpy.data.meshes.new("No faces")
+    lone = bpy.data.objects.new("No faces", monkey)
+    scene.collection.objects.link(lone)
+    bpy.context.view_layer.objects.active = lone
+    with pytest.raises(RuntimeError, match="no faces"):
+        bpy.ops.vellus.import_groom(filepath=str(path))
+    bpy.data.objects.remove(lone)
+    assert (sorted(bpy.data.objects.keys()), sorted(bpy.data.hair_curves.keys())) == before
+
+
+@pytest.mark.parametrize("ending", [".usdc", ".abc", ".npz"])
+def test_our_own_grooms_come_back(hair, tmp_path, ending):
+    """Guides as guides and hair as hair, which brings its guides, to the last micrometer."""
+    path = tmp_path / f"groom{ending}"
+    guides = bpy.data.objects["Guides"]
+    bpy.data.objects["Sphere"].location = (1.0, 2.0, 3.0)
+    update()
+    if ending == ".npz":
+        np.savez(path, guide_points=api.points(guides), strand_points=api.points(hair), up="Z")
+    else:
+        api.export_groom(path, [hair])
+    expected = in_world(guides), in_world(hair)
+    its_guides, read = run(path)
+    np.testing.assert_allclose(in_world(read), expected[1], atol=2e-6)
+    np.testing.assert_allclose(in_world(its_guides), expected[0], atol=2e-6)
+    its_guides, read = run(path, kind="GUIDES")
+    np.testing.assert_allclose(in_world(its_guides), expected[0], atol=2e-6)
+    assert read.data.vellus.guide_curves == its_guides.data and len(read.data.curves) > 100
+
+
+@pytest.mark.parametrize("is_saved", [True, False])
+def test_hair_that_moves_plays_where_the_scene_was_saved(scene, sphere, lines, tmp_path, is_saved, capfd):
+    made = curves_object(lines)
+    expected = []
+    for frame in (1, 2):
+        made.location = (0.1 * (frame - 1), 0.0, 0.0)
+        made.keyframe_insert("location", frame=frame)
+    for frame in (1, 2):
+        scene.frame_set(frame)
+        expected.append(world(made))
+    bpy.ops.wm.usd_export(filepath=str(tmp_path / "moving.usdc"), export_animation=True, selected_objects_only=False)
+    bpy.data.objects.remove(made)
+    scene.frame_set(1)
+    if is_saved:
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    _guides, hair = run(tmp_path / "moving.usdc", object_name="Imported")
+    bpy.context.scene.frame_set(2)
+    np.testing.assert_allclose(world(hair), expected[1 if is_saved else 0], atol=1e-5)
+    assert ("are read at frame 1 alone" in capfd.readouterr().out) != is_saved
+
+
+def test_it_is_in_the_menu_and_in_the_panel(hair, monkeypatch):
+    assert draw(bpy.types.VELLUS_PT_output).drawn["vellus.import_groom"] == 1
+    assert ("TOPBAR_MT_file_import", menus._in_import_menu) in menus._ENTRIES
+    assert panels.CLASSES and bpy.ops.vellus.import_groom.poll()
+    bpy.context.view_layer.objects.active = None
+    assert not bpy.ops.vellus.import_groom.poll()
