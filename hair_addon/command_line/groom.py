@@ -12,7 +12,7 @@ from ..core.grooming.groom import GuideSettings, HairSettings
 from ..core.long_work import run_now
 from ..core.params import declared
 from ..core.shading.presets import PRESETS
-from . import curve_options, opening, options, style_options
+from . import curve_options, import_mesh, opening, options, style_options
 
 blender = lazy.Package("..blender", __package__)
 
@@ -187,6 +187,8 @@ def _curves_of(kind, given, surface, file_axes, console):
     path = given.guides_from or given.hair_from
     wanted = curve_options.wanted(kind, given, file_axes)
     is_open = path.resolve() == given.input.resolve()
+    if not is_open:
+        import_mesh.try_curves(path, console)
     with blender.io.curve_files.curves_of(path, wanted, surface, is_open) as found:
         for note in found.notes:
             console.warn(str(note))

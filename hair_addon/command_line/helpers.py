@@ -3,10 +3,12 @@
 
 import contextlib
 import json
+import math
 import queue
 import signal
 import subprocess
 import threading
+import time
 
 from .console import PROGRAM
 
@@ -15,10 +17,13 @@ _PATIENCE = 30.0  # [s] for a process to end that was asked to
 
 
 class Failed:
-    """A process that failed: its exit status, below 0 where a signal ended it, and what it complained of."""
+    """A process that failed: its exit status, below 0 where a signal ended it, and what it complained of.
 
-    def __init__(self, status, complaint=""):
-        self.status, self.complaint = status, complaint
+    is_late: whether it was ended because it took too long.
+    """
+
+    def __init__(self, status, complaint="", is_late=False):
+        self.status, self.complaint, self.is_late = status, complaint, is_late
 
     @property
     def cause(self):
@@ -33,17 +38,22 @@ class Failed:
         return f"A worker process ended with {self.cause} and without an error message."
 
 
-def run(commands, console, hear, step=""):
+def run(commands, console, hear, step="", seconds=math.inf):
     """Run commands in parallel until all have ended; returns a `Failed` for each that failed.
 
-    commands: argument lists of processes that print lines of JSON; hear(values): called with each; step: what they do.
+    commands: argument lists of processes that print lines of JSON; hear(values): called with each; step: what they do;
+    seconds: after which they are ended.
     """
     heard = queue.Queue()
     helpers = []
+    is_late, end = False, time.monotonic() + seconds
     try:
         helpers += [_Helper(words, heard) for words in commands]
         while any(helper.is_at_work for helper in helpers) or not heard.empty():
             console.progress(step or f"{len(helpers)} processes", 0.0)
+            if time.monotonic() > end:
+                is_late = True
+                break
             try:
                 values = heard.get(timeout=_LOOK)
             except queue.Empty:
@@ -51,8 +61,8 @@ def run(commands, console, hear, step=""):
             hear(values)
     finally:
         for helper in helpers:
-            helper.stop()
-    return [Failed(helper.status, helper.complaint) for helper in helpers if helper.status != 0]
+            helper.stop(_PATIENCE if not is_late else 0.0)
+    return [Failed(helper.status, helper.complaint, is_late) for helper in helpers if helper.status != 0]
 
 
 class _Helper:
@@ -93,14 +103,15 @@ class _Helper:
         """What it said last of why it failed; empty if it said nothing."""
         return self._complaints[-1] if self._complaints else ""
 
-    def stop(self):
-        """Terminate the process: at its next step, or at once if that takes too long."""
+    def stop(self, patience):
+        """Terminate the process: at its next step, or at once if that takes longer [s]."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
             try:
-                self._process.wait(_PATIENCE)
+                self._process.wait(patience)
             except subprocess.TimeoutExpired:
                 self._process.kill()
+                self._process.wait()
         for thread in self._threads:
             thread.join()
         for stream in (self._process.stdout, self._process.stderr):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mesh files whose importers end Blender where a file is damaged: they are read by a process of its own.
+"""Files whose readers are native code, which ends, or never ends, on damaged files: a process of its own reads them.
 
-`import`, the command of that process, makes a .blend of the file. It is for commands that read meshes, not for people,
-and not listed.
+`import`, the command of that process, makes a .blend of a mesh file, or tries to read the curves of one. It is for
+commands that read such files, not for people, and not listed.
 """
 
 import tempfile
@@ -16,35 +16,60 @@ from . import helpers
 
 blender = lazy.Package("..blender", __package__)
 
+# [s] for a file, and for each byte of it: several times what the slowest reader takes on a slow machine.
+_PATIENCE, _PATIENCE_A_BYTE = 120.0, 5e-6
+
 
 def add(verbs):
     """Add the command's options."""
     parser = verbs.add_parser("import")
     parser.add_argument("input")
-    parser.add_argument("--out", required=True)
+    parser.add_argument("--out", help="the .blend")
+    parser.add_argument("--curves", action="store_true", help="read all curves")
     parser.add_argument("--up", choices=("Y", "Z"), default="Z")
     parser.set_defaults(run=run, json=True, quiet=False, verbose=False)
 
 
 def run(given, console):
-    """Import, evaluate, write."""
+    """Read all curves; import, evaluate, write."""
     blender.host.memory.limit_this_process()  # a damaged file may ask for any amount
+    if given.curves and blender.io.curve_files.is_read_natively(given.input):
+        blender.io.curve_files.read_all(given.input)
+    if given.out is None:
+        return
     file_axes = blender.io.mesh_files.open_file(given.input, up=given.up)
     blender.io.mesh_files.save_scene(given.out)
     console.result({"file_axes": file_axes.tolist()}, "")
 
 
-def open_apart(path, up, console):
-    """`mesh_files.open_file` by a process of its own. Raises `HairError`, also where that process is ended."""
+def open_apart(path, up, console, has_curves=False):
+    """`mesh_files.open_file` by a process of its own. Raises `HairError`, also where that process is ended.
+
+    has_curves: whether this process is going to read curves of the file, which are tried there.
+    """
     heard = []
     with tempfile.TemporaryDirectory(prefix="vellus_", ignore_cleanup_errors=True) as folder:
         made = Path(folder) / "made.blend"
-        words = [*blender.host.cli_command.words(), "import", str(path.absolute()), f"--out={made}", "--up", up]
-        for failed in helpers.run([words], console, heard.append, "Reading"):
-            raise HairError(
-                failed.complaint
-                or f"{path} cannot be read: Blender's importer ended without a word ({failed.cause}), "
-                "as it does where a file is damaged."
-            )
+        options = [f"--out={made}", "--up", up, *(["--curves"] if has_curves else [])]
+        _run(path, options, console, heard.append)
         blender.io.mesh_files.load_scene(made)
     return np.array(heard[-1]["file_axes"])
+
+
+def try_curves(path, console):
+    """Raise `HairError` where a process that reads the curves of a file is ended, or has an error to tell."""
+    if blender.io.curve_files.is_read_natively(path):
+        _run(path, ["--curves"], console, lambda _values: None)
+
+
+def _run(path, options, console, hear):
+    words = [*blender.host.cli_command.words(), "import", str(path.absolute()), *options]
+    seconds = _PATIENCE + _PATIENCE_A_BYTE * path.stat().st_size
+    for failed in helpers.run([words], console, hear, "Reading", seconds):
+        if failed.is_late:
+            raise HairError(f"{path} cannot be read: its reader came to no end, as it does where a file is damaged.")
+        raise HairError(
+            failed.complaint
+            or f"{path} cannot be read: its reader ended without a word ({failed.cause}), "
+            "as it does where a file is damaged."
+        )

@@ -26,7 +26,7 @@ def run(given, console):
     """Read and print."""
     describe = {".npz": _arrays, ".json": _settings, ".exr": _tables}.get(given.input.suffix.lower())
     if describe is None:
-        opening.open_file(given, console)
+        opening.open_file(given, console, has_curves=True)
         values = blender.io.inspection.open_file()
         if given.input.suffix.lower() in blender.io.curve_files.OF_OTHERS:
             values["curves"] = blender.io.curve_files.summary(given.input)

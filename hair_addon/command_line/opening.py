@@ -7,14 +7,17 @@ from . import import_mesh
 blender = lazy.Package("..blender", __package__)
 
 
-def open_file(given, console):
-    """Open `given.input`; returns (3, 3), Blender's axes → the file's. Raises `HairError`."""
+def open_file(given, console, has_curves=False):
+    """Open `given.input`; returns (3, 3), Blender's axes → the file's. Raises `HairError`.
+
+    has_curves: whether its curves are read afterwards.
+    """
     blender.require_registered()
     blender.io.mesh_files.require_readable(given.input)
     asks = blender.io.mesh_files.asks_for_axis(given.input)
     up = (asks and getattr(given, "up", None)) or "Z"
     if blender.io.mesh_files.ends_blender(given.input):
-        return import_mesh.open_apart(given.input, up, console)
+        return import_mesh.open_apart(given.input, up, console, has_curves)
     file_axes = blender.io.mesh_files.open_file(given.input, up=up, runs_scripts=given.enable_scripts)
     kept = blender.io.mesh_files.scripts_kept_from_running()
     if kept:

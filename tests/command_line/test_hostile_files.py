@@ -21,7 +21,7 @@ SMALL = ("--guides", 5, "--strands", 20)
 @pytest.fixture(autouse=True)
 def one_process(monkeypatch):
     """Files that have a process of their own (test_meshes_apart.py) are read in this one, which is quicker."""
-    monkeypatch.setattr(import_mesh, "open_apart", lambda path, up, _console: mesh_files.open_file(path, up=up))
+    monkeypatch.setattr(import_mesh, "open_apart", lambda path, up, *_others: mesh_files.open_file(path, up=up))
 
 
 @pytest.fixture

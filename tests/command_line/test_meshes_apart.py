@@ -10,7 +10,8 @@ import pytest
 
 from hair_addon.blender.host import cli_command
 from hair_addon.blender.io import mesh_files
-from tests.support.commands import run_here
+from hair_addon.command_line import import_mesh
+from tests.support.commands import HEAD, run_here
 
 GROOM = ("--guides", 5, "--strands", 20, "--out")
 
@@ -65,8 +66,20 @@ def test_an_importer_that_ends_its_process_is_one_sentence(files, tmp_path, monk
     ended = run_here(verb, files[ending], *([*GROOM, tmp_path / "out.npz"] if verb == "groom" else []))
     assert (ended.status, ended.out) == (1, "") and set(tmp_path.iterdir()) == before
     assert ended.errors == (
-        f"vellus: {files[ending]} cannot be read: Blender's importer ended without a word (signal 11), as it does "
+        f"vellus: {files[ending]} cannot be read: its reader ended without a word (signal 11), as it does "
         "where a file is damaged.\n"
+    )
+
+
+def test_curves_are_tried_apart(files, tmp_path, monkeypatch):
+    """A damaged file may keep USD's reader for ever."""
+    script = "import time; time.sleep(600)"
+    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", script])
+    monkeypatch.setattr(import_mesh, "_PATIENCE", 0.2)
+    ended = run_here("groom", HEAD, "--guides-from", files[".usdc"], "--out", tmp_path / "out.npz")
+    assert (ended.status, ended.out) == (1, "")
+    assert ended.errors == (
+        f"vellus: {files['.usdc']} cannot be read: its reader came to no end, as it does where a file is damaged.\n"
     )
 
 

@@ -10,15 +10,26 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize("run_count, seed", [(3, 1), pytest.param(10, 3, marks=pytest.mark.long)])
-def test_random_operations_raise_no_exception(run_count, seed):
-    """200 operations a run; the seed fixes the way."""
+def check(module, run_count, seed, limit):
+    """200 operations a run; the seed fixes the way; limit: [s]."""
     walked = subprocess.run(
-        [sys.executable, "-u", "-m", "tests.support.walk.walk_operations", str(run_count), "200", str(seed)],
+        [sys.executable, "-u", "-m", f"tests.support.walk.{module}", str(run_count), "200", str(seed)],
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=limit,
     )
     way = "\n".join(walked.stdout.splitlines()[-40:])
     assert walked.returncode == 0 and walked.stdout.endswith("walked\n"), f"{way}\n{walked.stderr[-4000:]}"
+
+
+@pytest.mark.parametrize("run_count, seed", [(3, 1), pytest.param(10, 3, marks=pytest.mark.long)])
+def test_random_operations_raise_no_exception(run_count, seed):
+    check("walk_operations", run_count, seed, limit=240)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(1, 11))
+def test_all_operators_and_settings(seed):
+    """Ten times a thousand steps, with surfaces that move, and undo, redo, saving and loading that change nothing."""
+    check("walk_everything", 5, seed, limit=1200)

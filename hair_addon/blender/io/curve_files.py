@@ -78,6 +78,18 @@ def read(path, axis="Z"):
     return reader(path, axis) if reader is array_grooms.read else reader(path)
 
 
+def read_all(path):
+    """`read`, and the points of each time, which are only read when they are asked for. Raises `HairError`."""
+    for one in read(path).sets:
+        for index in range(0 if one.motion is None else len(one.motion.times)):
+            one.motion.points_at(index)
+
+
+def is_read_natively(path):
+    """Whether a file is read by native code, which a damaged one may end."""
+    return Path(path).suffix.lower() in _USD
+
+
 def summary(path):
     """[{name: value}] of the objects of curves in a file that is no .blend. Raises `HairError`."""
     kinds = {True: "guides", False: "strands", None: "curves"}

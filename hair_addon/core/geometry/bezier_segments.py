@@ -219,7 +219,7 @@ def polylines(segments: Segments, lines: np.ndarray) -> tuple[np.ndarray, np.nda
     after = strands.curve_offsets(lines)[:-1] + np.cumsum(has_any)[owners]
     in_order = np.argsort(lines, kind="stable")
     numbers, begins = np.unique(lines[in_order], return_index=True)
-    for number, alike in zip(numbers, np.split(in_order, begins[1:]), strict=True):
+    for number, alike in zip(numbers, np.split(in_order, begins)[1:], strict=True):
         parts = np.arange(1, number + 1) / number
         for first in range(0, len(alike), _AT_ONCE):
             some = alike[first : first + _AT_ONCE]

@@ -192,3 +192,10 @@ def test_non_finite_points_harm_no_other_curve(rng):
     wanted, (count,), _places = bezier_segments.polylines(alone, bezier_segments.line_counts(alone))
     np.testing.assert_array_equal(values[-count:], wanted)
     assert counts[2] == count and not np.isfinite(values[counts[0] : counts[0] + counts[1]]).all()
+
+
+def test_curves_without_segments_are_no_polylines():
+    """As all of a file may be, where its numbers of points are too small for its basis."""
+    none = bezier_segments.Segments(np.zeros((0, 4, 3)), np.zeros(2, np.int64), np.zeros((0, 2)))
+    values, counts, places = bezier_segments.polylines(none, np.zeros(0, np.int64))
+    assert values.shape == (0, 3) and counts.tolist() == [0, 0] and places.shape == (0,)

@@ -361,7 +361,7 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
         always.all_is_well()
 
 
-def walk(run_count, operation_count, number):
+def walk(run_count, operation_count, number, artist=Artist):
     """Raises what goes wrong first."""
     limits = settings(
         max_examples=run_count,
@@ -371,7 +371,7 @@ def walk(run_count, operation_count, number):
         phases=[Phase.generate],  # a shorter way to the same failure would take minutes to find
         suppress_health_check=list(HealthCheck),
     )
-    seed(number)(get_state_machine_test(Artist, settings=limits))()
+    seed(number)(get_state_machine_test(artist, settings=limits))()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The walk of `walk_operations.py` with all operators and settings, on surfaces that move, and more that must hold.
+
+python -m tests.support.walk.walk_everything RUNS OPERATIONS SEED
+"""
+
+import faulthandler
+import gc
+import random
+import sys
+from pathlib import Path
+
+import bpy
+import gpu
+import numpy as np
+import pytest
+import warp as wp
+from hypothesis import strategies as st
+from hypothesis.stateful import invariant
+
+import hair_addon
+from hair_addon.blender.data.strands import curves as curves_door
+from hair_addon.blender.host import running
+from hair_addon.blender.render import hair_cache
+from hair_addon.core.errors import HairError
+from hair_addon.core.params import Settings
+from tests.support import always
+from tests.support.always import activate, changed, chosen, objects, operate, ours
+from tests.support.scenes import shrink_shadows
+from tests.support.walk import any_values
+from tests.support.walk.walk_operations import Artist, walk
+from tests.support.walk.walk_steps import needs_room, pick, step
+
+seeds = st.integers(0, 2**31)
+
+_NEAR = 2e-3  # of a surface's size, between a root and the surface: faces are triangles there
+_MORE_BLOCKS = 40  # datablocks that come with the first use of a function: materials, node groups, images
+
+
+class Everyone(Artist):
+    """An artist who uses all that there is."""
+
+    most_alive = None  # after the first run of the process: what Python held then
+
+    def teardown(self):
+        super().teardown()
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        alive = things_alive()
+        most = Everyone.most_alive
+        Everyone.most_alive = max(alive, most or 0)
+        assert most is None or alive <= most + 200, f"{alive} things are held after a file was closed, {most} before"
+
+    @step(number=pick, place=pick, seed=seeds)
+    @needs_room
+    def any_operator(self, number, place, seed):
+        """Any operator of the add-on, with any of its settings, on any object with another one selected."""
+        source, names = random.Random(seed), any_values.operators()
+        name = chosen(names, number)
+        there = objects("MESH") + objects("CURVES")
+        if there:
+            activate(chosen(there, place))
+            bpy.data.objects[chosen(there, place // 7)].select_set(True)
+        bpy.context.scene.frame_end = 3
+        wanted = {}
+        for declared in any_values.properties(name):
+            is_needed = declared.identifier in any_values.NEEDED
+            if is_needed or source.random() < 0.3:
+                wanted[declared.identifier] = any_values.value(declared, source, Path(self.folder.name), odd=0.1)
+        print(" ", name, wanted, flush=True)
+        try:
+            operate(getattr(bpy.ops.vellus, name), **wanted)
+        except TypeError as error:  # a choice that is offered for other hair: Blender refuses the call
+            assert "enum" in str(error), error
+        bpy.context.view_layer.update()
+
+    @step(number=pick, seed=seeds, is_odd=st.booleans())
+    def any_setting(self, number, seed, is_odd):
+        """Any property that the add-on stores in any datablock."""
+        source = random.Random(seed)
+        owners = [*sorted(ours(), key=lambda c: c.name), *bpy.data.objects, *bpy.data.scenes]
+        owner = chosen(owners, number)
+        if owner.library is not None:
+            return
+        found = [(group, p) for group in any_values.groups(owner) for p in any_values.settings(group)]
+        if found:
+            group, declared = source.choice(found)
+            value = any_values.value(declared, source, Path(self.folder.name), odd=0.3 if is_odd else 0.0)
+            print(" ", owner.name, type(group).__name__, declared.identifier, repr(value), flush=True)
+            setattr(group, declared.identifier, value)
+            changed("setting")
+
+    @step(number=pick, seed=seeds)
+    def place_surface(self, number, seed):
+        """Move, turn and scale a surface, unevenly and mirrored too."""
+        if objects("MESH"):
+            source, surface = random.Random(seed), bpy.data.objects[chosen(objects("MESH"), number)]
+            surface.location = [source.uniform(-2.0, 2.0) for _ in range(3)]
+            surface.rotation_euler = [source.uniform(-3.0, 3.0) for _ in range(3)]
+            surface.scale = [source.choice([1.0, 1.0, -1.0, 0.5, 2.0, 0.01]) for _ in range(3)]
+            changed("place")
+
+    @step(number=pick, angle=st.floats(-3.0, 3.0), is_shown=st.booleans())
+    def deform_surface(self, number, angle, is_shown):
+        if objects("MESH"):
+            surface = bpy.data.objects[chosen(objects("MESH"), number)]
+            modifier = surface.modifiers.get("Twist") or surface.modifiers.new("Twist", "SIMPLE_DEFORM")
+            modifier.angle, modifier.show_viewport = angle, is_shown
+            changed("deform")
+
+    @step(steps=st.integers(1, 3))
+    def undo_and_redo(self, steps):
+        """As before."""
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message="here")
+        before = state()
+        for _ in range(steps):
+            if not bpy.ops.ed.undo.poll():
+                return
+            bpy.ops.ed.undo()
+        bpy.context.view_layer.update()
+        for _ in range(steps):
+            if not bpy.ops.ed.redo.poll():
+                return
+            bpy.ops.ed.redo()
+        bpy.context.view_layer.update()
+        is_as(before)
+
+    @step()
+    def save_and_load_all(self):
+        """As before, but for what nobody uses."""
+        bpy.context.view_layer.update()
+        before = state()
+        self._save_and_load()
+        bpy.context.view_layer.update()
+        is_as(before)
+
+    @invariant()
+    def more_is_well(self):
+        """Roots are on their surface, strands have lengths, and the file does not fill up."""
+        roots_are_on_surfaces()
+        assert len(bpy.data.all_ids) < 20 * (len(bpy.data.objects) + 4) + _MORE_BLOCKS
+        assert running.job() is None
+
+
+def state():
+    """{name: what hair is} of all that somebody uses."""
+    return {one.name: _state_of(one) for one in ours() if one.users}
+
+
+def _state_of(datablock):
+    points = curves_door.read_points(datablock)
+    roots = {a.name: _values(a) for a in datablock.attributes if a.name.startswith("root_")}
+    values = {}
+    for group in any_values.groups(datablock):
+        for declared in any_values.settings(group):
+            values[f"{group.path_from_id()}.{declared.identifier}"] = any_values.plain(group, declared)
+    return points, np.diff(curves_door.curve_offsets(datablock)), roots, values, datablock.vellus.status
+
+
+def _values(attribute):
+    width = 3 if attribute.data_type == "FLOAT_VECTOR" else 1
+    found = np.empty(len(attribute.data) * width, np.int32 if attribute.data_type == "INT" else np.float32)
+    attribute.data.foreach_get("vector" if width == 3 else "value", found)
+    return found
+
+
+def is_as(before):
+    """Assert that `state` is what it was, name by name, so that a failure says what is other."""
+    after = state()
+    assert after.keys() == before.keys()
+    for name, (points, counts, roots, values, status) in before.items():
+        now = after[name]
+        assert {k: (v, now[3].get(k)) for k, v in values.items() if now[3].get(k) != v} == {}, name
+        assert now[4] == status, name
+        assert np.array_equal(now[1], counts), (name, len(counts), len(now[1]))
+        assert np.array_equal(now[0], points), (name, float(abs(now[0] - points).max()))
+        assert now[2].keys() == roots.keys() and all(np.array_equal(now[2][k], v) for k, v in roots.items()), name
+
+
+def roots_are_on_surfaces():
+    """Of hair that is drawn, live and without a complaint."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for one in (o for o in bpy.context.view_layer.objects if o.type == "CURVES"):
+        hair = one.data
+        surface, state_of = hair.surface, hair.vellus
+        if state_of.kind != "HAIR" or surface is None or state_of.status or state_of.is_stale or not state_of.is_live:
+            continue
+        guides = state_of.guide_curves
+        is_plain = guides is not None and not guides.vellus.status and not guides.vellus.is_stale and len(hair.curves)
+        if not is_plain or surface.name not in bpy.context.view_layer.objects or surface.mode != "OBJECT":
+            continue
+        try:
+            strands = hair_cache.strands_on_gpu(hair).points
+        except HairError:
+            continue
+        assert np.isfinite(strands).all(), one.name
+        evaluated = surface.evaluated_get(depsgraph)
+        size = max(evaluated.dimensions[:]) / max(min(map(abs, evaluated.scale)), 1e-9)
+        if not len(evaluated.data.polygons) or abs(evaluated.matrix_world.determinant()) < 1e-12:
+            continue
+        away = []
+        to_surface = evaluated.matrix_world.inverted() @ one.matrix_world
+        for root in strands[:: max(len(strands) // 5, 1), 0]:
+            local = to_surface @ _vector(root)
+            found, nearest, _normal, _face = evaluated.closest_point_on_mesh(local)
+            away.append((nearest - local).length if found else 0.0)
+        assert max(away) <= _NEAR * size, f"{one.name} on {surface.name}: a root is {max(away)} away, of {size}"
+
+
+def _vector(values):
+    import mathutils
+
+    return mathutils.Vector(map(float, values))
+
+
+def things_alive():
+    """How many of our objects and of Warp's arrays Python holds."""
+    gc.collect()
+    kinds = [type(each) for each in gc.get_objects()]
+    of_ours = [k for k in kinds if k is wp.array or str(getattr(k, "__module__", "")).startswith("hair_addon")]
+    return sum(not issubclass(kind, Settings) for kind in of_ours)
+
+
+if __name__ == "__main__":
+    faulthandler.enable()
+    sys.stderr = always.Echo(sys.stderr)
+    hair_addon.register()
+    gpu.init()
+    shrink_shadows(pytest.MonkeyPatch())
+    walk(*map(int, sys.argv[1:]), Everyone)
+    hair_addon.unregister()
+    print("walked")
