@@ -7,7 +7,7 @@ import numpy as np
 
 from .caches import Cache
 
-_LARGEST = 1e15  # squares of single-precision numbers must stay finite
+LARGEST = 1e15  # squares of single-precision numbers must stay finite
 
 
 said_cache = Cache()  # sentence → True
@@ -39,7 +39,7 @@ def text_of(owner, name):
 def can_be_drawn(datablock, *values):
     """Whether numbers of a datablock are finite and not absurdly large; if not, say that it is left out."""
     # Written so that NaN fails too: every comparison with it is false.
-    if all((np.abs(np.asarray(value, np.float64)) <= _LARGEST).all() for value in values):
+    if all((np.abs(np.asarray(value, np.float64)) <= LARGEST).all() for value in values):
         return True
     say(f"{name_of(datablock)!r} is skipped: it has infinite or NaN values.")
     return False

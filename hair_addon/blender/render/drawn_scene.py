@@ -20,7 +20,7 @@ from ..gpu import (
 from ..gpu import lights as light_door
 from ..gpu.shadows import ShadowMaps
 from ..host.notices import can_be_drawn
-from . import hair_cache, hair_places, made_strands
+from . import hair_cache, hair_places, made_strands, read_strands
 
 # The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke of the
 # comb.
@@ -195,14 +195,14 @@ def _hair_receivers(hair, owners):
     ]
 
 
-def read_render(depsgraph, known, refused, progress=no_progress):
+def read_render(depsgraph, known, refused, noted, progress=no_progress):
     """The same for a render, whose depsgraph may be at another time than the file: evaluated hair is read.
 
-    refused: called with the datablock and the `HairError` of hair that cannot be drawn, and is left out; known:
-    {session_uid: (points, radii, random numbers, StrandsOnGPU)} of what was drawn a moment before, changed: what stands
-    still is not uploaded again.
+    refused: called with the datablock and the `HairError` of hair that cannot be drawn, and is left out; noted: the
+    same of hair some strands of which are; known: {session_uid: (points, radii, random numbers, StrandsOnGPU)} of what
+    was drawn a moment before, changed: what stands still is not uploaded again.
     """
-    unlit = read_unlit(depsgraph, known, refused, part_of(progress, 0.0, 0.5))
+    unlit = read_unlit(depsgraph, known, refused, noted, part_of(progress, 0.0, 0.5))
     progress("Reading lights", 0.5)
     world = light_door.read_world(depsgraph.scene_eval, depsgraph.view_layer_eval)
     hair_receivers = _hair_receivers(unlit.hair, [owner[1::-1] for owner in unlit.owners])
@@ -213,12 +213,12 @@ def read_render(depsgraph, known, refused, progress=no_progress):
     return _lit(drawn, lamps, scene_lights.new_maps(lamps.record, is_wide=True), hair_receivers)
 
 
-def read_unlit(depsgraph, known, refused, progress=no_progress):
+def read_unlit(depsgraph, known, refused, noted, progress=no_progress):
     """The same without lighting, for motion vectors."""
     count = sum(_is_hair(instance.object) for instance in depsgraph.object_instances)
     progress("Reading hair", 0.0)
     found = []
-    for one in _read_rendered_hair(depsgraph, known, refused):
+    for one in _read_rendered_hair(depsgraph, known, refused, noted):
         found.append(one)
         progress("Reading hair", 0.6 * len(found) / count)
     progress("Reading surfaces", 0.6)
@@ -309,7 +309,7 @@ def _is_hair(evaluated):
     return len(evaluated.data.curves) > 0
 
 
-def _read_rendered_hair(depsgraph, known, refused):
+def _read_rendered_hair(depsgraph, known, refused, noted):
     for instance in depsgraph.object_instances:
         hair_object = instance.object
         if not _is_hair(hair_object):
@@ -319,10 +319,12 @@ def _read_rendered_hair(depsgraph, known, refused):
         if not can_be_drawn(hair_object, to_world):
             continue
         try:
-            arrays = hair_cache.read_strands(hair_object.data)
+            read = read_strands.read(hair_object.data)
+            if read.note is not None:
+                noted(original, read.note)
             uid = hair_object.original.session_uid
-            if uid not in known or not all(map(np.array_equal, arrays, known[uid])):
-                known[uid] = (*arrays, strand_textures.upload_strands(*arrays))
+            if uid not in known or not all(map(np.array_equal, read.arrays, known[uid])):
+                known[uid] = (*read.arrays, strand_textures.upload_strands(*read.arrays))
             strands = known[uid][-1]
             shading = hair_cache.shading_of(original.evaluated_get(depsgraph), strands)  # its settings may be keyed
         except HairError as error:

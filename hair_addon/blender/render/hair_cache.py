@@ -12,22 +12,18 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core import geometry
 from ...core.errors import HairError
 from ...core.files import table_cache, table_exr
-from ...core.geometry import strands
-from ...core.grooming import groom
 from ...core.kernels.checks import require_count, require_indices
 from ...core.shading import appearance
 from ...core.shading.tables import lookup_tables, strand_tables
-from ..data.strands import attributes, curves, posed_strands, simulated_guides, stored_roots
+from ..data.strands import curves, posed_strands, simulated_guides, stored_roots
 from ..gpu import hair_shading, strand_textures
 from ..groom import bindings
 from ..host import paths
 from ..host.caches import Cache
-from ..host.notices import name_of
 from ..settings import preferences, properties, shared_wetness
-from . import made_strands, refused_strands
+from . import made_strands, read_strands, refused_strands
 from .refused_strands import Refused
 
 # Tables of this many settings are kept: one groom and the last few positions of a slider.
@@ -45,6 +41,7 @@ class _KeptStrands:
     places: tuple | None  # roots as `stored_roots.places` returns them, None for none
     rooted_on: tuple  # (session_uid of the surface, its topology)
     may_float: bool  # whether strands may begin apart from it
+    note: HairError | None = None  # what is left out of the strands of the datablock
     growing: Future | None = None  # of these points, which other threads may be computing; None where they are read
     on_gpu: strand_textures.StrandsOnGPU | None = None  # where `pose` carried them
     pose: posed_strands.Pose | None = None  # None where no surface carries them
@@ -148,6 +145,12 @@ def drawn_bytes(datablock):
         return None
     textures = [*kept.on_gpu.textures, *kept.making.textures]
     return strand_textures.bytes_of(textures) + strand_textures.seen_bytes(kept.on_gpu)
+
+
+def note_of(datablock):
+    """What viewports draw of a Curves datablock in part or not at all, as a `HairError`; None where it is all drawn."""
+    kept = strand_cache.get(datablock.session_uid)
+    return refused_strands.error_of(kept) or getattr(kept, "note", None)
 
 
 def refuse(datablock, error):
@@ -292,9 +295,12 @@ def _read(datablock, bound, shown):
     shown: the `BoundHair` whose points are read, which may be without the styles of `bound`.
     """
     if bound is None:
+        read = _shown_strands(datablock)
         places = None if datablock.surface is None else stored_roots.places(datablock, np.inf)
+        if places is not None and read.is_sound is not None:
+            places = tuple(values[read.is_sound] for values in places)
         rooted = places, _rooted_on(datablock, datablock.vellus.topology), stored_roots.may_float(datablock)
-        return _KeptStrands(*_shown_strands(datablock), *rooted)
+        return _KeptStrands(*read.arrays, *rooted, read.note)
     if bound.is_written or bound.has_moved_only:
         randoms, wetness = curves.read_randoms(datablock), curves.read_wetness(datablock)
     else:
@@ -302,38 +308,17 @@ def _read(datablock, bound, shown):
     # Roots too are those of the binding: the datablock may store those of earlier strands.
     places, rooted_on = bound.surface.places(bound.binding.roots), _rooted_on(datablock, bound.surface.topology)
     radii = np.tile(bound.radii, (len(shown.points), 1))
-    return _KeptStrands(shown.points, radii, randoms, wetness, places, rooted_on, False, shown.growing)
+    return _KeptStrands(shown.points, radii, randoms, wetness, places, rooted_on, False, growing=shown.growing)
 
 
 def _shown_strands(datablock):
-    """`read_strands`, where dynamics has moved them if they are guides that it moves."""
-    points, radii, randoms, wetness = read_strands(datablock)
+    """`ReadStrands` of a datablock, where dynamics has moved them if they are guides that it moves."""
+    read = read_strands.read(datablock)
     simulated = simulated_guides.point_cache.get(datablock.session_uid)
-    if simulated is None or len(simulated) != len(points):
-        return points, radii, randoms, wetness
-    even = np.repeat(radii.mean(axis=1, keepdims=True), simulated.shape[1], axis=1)
-    return simulated, even, randoms, wetness
-
-
-def read_strands(datablock):
-    """(S, P, 3) points, (S, P) radii in local coordinates, (S,) random numbers and (S,) wetness of Curves.
-
-    Stored or evaluated ones; the wetness is None where strands do not differ in it. Curves of fewer points than the
-    longest are resampled to as many, and Catmull-Rom splines to the points that strands have. Raises `HairError`.
-    """
-    counts = curves.point_counts(datablock)
-    if not len(counts):
-        raise HairError('"{name}" has no strands to draw.', name=name_of(datablock))
-    points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
-    wetness = curves.read_wetness(datablock)
-    most, is_smooth = int(counts.max()), attributes.are_smooth(datablock)
-    if is_smooth.any():
-        most = max(most, groom.POINT_COUNT)
-    if (counts == most).all():
-        return points.reshape(-1, most, 3), radii.reshape(-1, most), randoms, wetness
-    starts = curves.curve_offsets(datablock)
-    even = geometry.resampling.resample(points, starts, most, is_smooth)
-    return even, strands.resample_values(radii, points, starts, most), randoms, wetness
+    if simulated is None or len(simulated) != len(read.points):
+        return read
+    even = np.repeat(read.radii.mean(axis=1, keepdims=True), simulated.shape[1], axis=1)
+    return replace(read, points=simulated, radii=even)
 
 
 def shading_of(datablock, strands=None):

@@ -112,13 +112,14 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         others = self._others(depsgraph, size, views, part_of(told, 0.0, before)) if before else {}
         world_texture.check_image()
         told(_EVALUATING, before)
-        known, refused, each = {}, {}, (1.0 - before) / len(offsets)
+        known, refused, noted, each = {}, {}, {}, (1.0 - before) / len(offsets)
         for index in scene_time.visit(blender_scene, offsets, self.frame_set):
             told.moment = interface_text("Motion step {number} of {count}", number=index + 1, count=len(offsets))
             begun, end = before + each * index, before + each * (index + 1)
             drawn_from = begun + _READING * each
             with drawing.ALONE:
-                drawn = drawn_scene.read_render(depsgraph, known, refused.__setitem__, part_of(told, begun, drawn_from))
+                told_here, heard = part_of(told, begun, drawn_from), (refused.__setitem__, noted.__setitem__)
+                drawn = drawn_scene.read_render(depsgraph, known, *heard, told_here)
             for number, (view, frame) in enumerate(frames.items()):
                 with drawing.ALONE:
                     camera = self._camera(depsgraph, view, size)
@@ -136,6 +137,10 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         # without some of the hair is not a valid result.
         for error in refused.values():
             self._refuse(blender_scene, error_text(error))
+        for note in noted.values():
+            composite.refuse(blender_scene, error_text(note))
+            if not bpy.app.background:  # the console has it already
+                self.report({"WARNING"}, error_text(note))
 
     def _views(self, view_layer):
         """Names of the views of a stereo picture; of other pictures the empty name."""
@@ -181,7 +186,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         for index in scene_time.visit(depsgraph.scene, [-1.0, 1.0], self.frame_set):
             with drawing.ALONE:
                 told = part_of(progress, 0.5 * index, 0.5 * (index + 1))
-                there = drawn_scene.read_unlit(depsgraph, {}, _unheard, told)
+                there = drawn_scene.read_unlit(depsgraph, {}, _unheard, _unheard, told)
                 for view, places in found.items():
                     places.append(motion_vectors.places(there, *self._camera(depsgraph, view, size)))
         return found

@@ -8,7 +8,7 @@ from ...data.scene import triangle_count
 from ...data.strands.curves import is_hand_made
 from ...groom.diagnostics import parting_warnings, sharing_note
 from ...groom.selection import active_of_kind, guides_of, hair_of
-from ...render import hair_cache, refused_strands
+from ...render import hair_cache
 from ...settings.translations import error_text, interface_text
 from .. import setting_rows
 from .tab import HairTab, draw_work, megabytes, split, write, write_stale, write_status
@@ -32,7 +32,7 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
             return
         state = hair.vellus
         write_status(layout, context, state)
-        error = refused_strands.error_of(hair_cache.strand_cache.get(hair.session_uid))
+        error = hair_cache.note_of(hair)
         if error is not None:
             write(layout, context, error_text(error), "ERROR")
         if is_hand_made(hair):

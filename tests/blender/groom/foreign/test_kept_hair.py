@@ -8,7 +8,7 @@ import pytest
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import pipeline
-from hair_addon.blender.render import hair_cache
+from hair_addon.blender.render import read_strands
 from tests.support.dynamics.following import update
 from tests.support.exchange.imported import curves_object, lines_on, select, stored, world
 
@@ -143,7 +143,8 @@ def test_strands_of_any_point_counts_are_drawn_with_their_radii(sphere, rng):
     radii = np.concatenate([np.linspace(0.002, 0.001, count) for count in np.diff(starts)]).astype(np.float32)
     hair.data.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", radii)
     use(sphere, hair)
-    points, drawn, _randoms, _wetness = hair_cache.read_strands(hair.data)
+    read = read_strands.read(hair.data)
+    points, drawn = read.points, read.radii
     assert points.shape[1] == np.diff(starts).max()
     np.testing.assert_allclose(drawn[:, 0], 0.002, rtol=1e-6)
     np.testing.assert_allclose(drawn[:, -1], 0.001, rtol=1e-6)
@@ -156,7 +157,7 @@ def test_splines_are_drawn_round(sphere):
     arc = np.stack([0.2 * np.sin(angles), np.zeros(4), 1.0 + 0.2 * (1.0 - np.cos(angles))], axis=1)
     hair = curves_object([arc, arc + np.array([0.0, 0.1, 0.0])], kind="CATMULL_ROM")
     use(sphere, hair, guide_count=1)
-    points = hair_cache.read_strands(hair.data)[0]
+    points = read_strands.read(hair.data).points
     turns = np.diff(points[0], axis=0)
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
     assert np.sum(turns[1:] * turns[:-1], axis=1).min() > np.cos(np.radians(25.0))

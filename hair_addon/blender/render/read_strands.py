@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands of Curves as they are drawn: of one point count, without those that have no place."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...core import geometry
+from ...core.errors import HairError
+from ...core.geometry import strands
+from ...core.grooming import groom
+from ..data.strands import attributes, curves
+from ..host import notices
+from ..host.notices import name_of
+
+
+@dataclass(frozen=True)
+class ReadStrands:
+    """Strands in local coordinates, none of which is broken."""
+
+    points: np.ndarray  # (S, P, 3) float32
+    radii: np.ndarray  # (S, P) float32
+    randoms: np.ndarray  # (S,) float32
+    wetness: np.ndarray | None  # (S,) float32, None where strands do not differ
+    is_sound: np.ndarray | None  # (N,) bool: which of the curves they are, None for all
+    note: HairError | None  # what is left out
+
+    @property
+    def arrays(self) -> tuple[np.ndarray | None, ...]:
+        """Arguments of `strand_textures.upload_strands`."""
+        return self.points, self.radii, self.randoms, self.wetness
+
+
+def read(datablock: Any) -> ReadStrands:
+    """The strands of Curves, stored or evaluated ones; those with a coordinate that is no place are left out.
+
+    That is said once for all strands of Curves. Curves of fewer points than the longest are resampled to as many, and
+    Catmull-Rom splines to the points that strands have. Raises `HairError` where nothing can be drawn.
+    """
+    counts = curves.point_counts(datablock)
+    if not len(counts):
+        raise HairError('"{name}" has no strands to draw.', name=name_of(datablock))
+    points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
+    wetness, is_smooth, note = curves.read_wetness(datablock), attributes.are_smooth(datablock), None
+    is_sound = _are_sound(points, radii, counts)
+    if is_sound is not None:
+        note = _left_out(datablock, is_sound)
+        of_point = np.repeat(is_sound, counts)
+        points, radii = points[of_point], radii[of_point]
+        counts, randoms, is_smooth = counts[is_sound], randoms[is_sound], is_smooth[is_sound]
+        wetness = None if wetness is None else wetness[is_sound]
+    most = int(counts.max())
+    if is_smooth.any():
+        most = max(most, groom.POINT_COUNT)
+    if (counts == most).all():
+        points, radii = points.reshape(-1, most, 3), radii.reshape(-1, most)
+    else:
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        radii = strands.resample_values(radii, points, starts, most)
+        points = geometry.resampling.resample(points, starts, most, is_smooth)
+    return ReadStrands(points, radii, randoms, wetness, is_sound, note)
+
+
+def _are_sound(points, radii, counts):
+    """(N,) bool: whether all of a curve can be drawn; None where all curves can be. points: (M, 3), curve by curve."""
+    flat = points.ravel()
+    # The sum of squares tells it in a tenth of the time, where it is not that large itself.
+    with np.errstate(over="ignore", invalid="ignore"):
+        is_small = flat @ flat <= notices.LARGEST
+    if is_small and radii.max(initial=0.0) <= notices.LARGEST:
+        return None
+    with np.errstate(invalid="ignore"):
+        is_point_sound = (np.abs(points) <= notices.LARGEST).all(axis=1) & (radii <= notices.LARGEST)
+    if is_point_sound.all():
+        return None
+    broken = np.repeat(np.arange(len(counts)), counts)[~is_point_sound]
+    is_sound = np.ones(len(counts), bool)
+    is_sound[broken] = False
+    return is_sound
+
+
+def _left_out(datablock, is_sound):
+    """Say once that some strands of Curves are left out. Raises `HairError` where that is all of them."""
+    name = name_of(datablock)
+    if not is_sound.any():
+        raise HairError('"{name}" is not drawn: all of its strands have non-finite coordinates.', name=name)
+    sentence = '"{name}" is drawn without the strands that have non-finite coordinates: undo, or delete those strands.'
+    note = HairError(sentence, name=name)
+    notices.say(str(note))
+    return note
