@@ -3,6 +3,7 @@
 
 import contextlib
 import os
+import re
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -10,6 +11,9 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import HairError
+
+# Two slashes of either kind, or the name by which Windows knows its devices, of which networks are one.
+_ELSEWHERE = re.compile(r"[\\/]([\\/]|\?\?[\\/])")
 
 
 def resolve(path, library=None):
@@ -23,10 +27,19 @@ def resolve(path, library=None):
         raise HairError("The path contains an invalid character: type it again.")
     if path.startswith("//") and library is None and not bpy.data.filepath:
         raise HairError("{path} is relative to the .blend file: save the file first.", path=path)
-    if path.startswith("\\\\"):
-        sentence = "{path} is on another computer, to which Vellus does not write: pick a local folder."
+    if names_other_computer(path):
+        sentence = "{path} is on another computer, where Vellus neither reads nor writes: pick a local folder."
         raise HairError(sentence, path=path)
     return Path(bpy.path.abspath(path, library=library)).resolve()
+
+
+def names_other_computer(path):
+    """Whether Windows would look for a path of Blender's on another computer: a .blend could so learn who opens it.
+
+    Either slash counts there, and a path below `//` that begins with one is not below it. One that is relative to a
+    file on another computer is where the artist has the file.
+    """
+    return _ELSEWHERE.match(path.removeprefix("//")) is not None
 
 
 def from_open_file(library):

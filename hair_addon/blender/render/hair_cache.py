@@ -20,7 +20,7 @@ from ...core.shading.tables import lookup_tables, strand_tables
 from ..data.strands import curves, posed_strands, simulated_guides, stored_roots
 from ..gpu import hair_shading, strand_textures
 from ..groom import bindings
-from ..host import paths
+from ..host import notices, paths
 from ..host.caches import Cache
 from ..settings import preferences, properties, shared_wetness
 from . import made_strands, read_strands, refused_strands
@@ -361,16 +361,24 @@ def _kept_shading(settings, make):
 
 def _tables(settings, folder):
     """The tables of these settings: from the folder while it holds just those, else from the cache, or baked now."""
-    if folder:
-        path = Path(bpy.path.abspath(folder))
-        if path.is_dir():
-            tables = table_exr.read_tables(path)
-            if tables.settings == settings:
-                return tables
+    path = _usable(folder) if folder else None
+    if path is not None and path.is_dir():
+        tables = table_exr.read_tables(path)
+        if tables.settings == settings:
+            return tables
     cache = cache_folder()
     if cache is None:
         return lookup_tables.bake(settings, preferences.device())
     return table_cache.tables(cache, settings, paths.addon_version(), device=preferences.device())
+
+
+def _usable(folder):
+    """A folder that a file names, as a `Path`; None where nothing is read from: that is said, and tables are baked."""
+    try:
+        return paths.resolve(folder)
+    except HairError as error:
+        notices.say(str(error))
+        return None
 
 
 def cache_folder():
