@@ -29,6 +29,7 @@ from . import (
     stale_marks,
     stored_guide_maps,
     unlocked_renders,
+    updates,
 )
 
 # Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
@@ -41,12 +42,13 @@ _is_undone = False
 @persistent
 def after_depsgraph_update(scene, depsgraph):
     """Invalidate changed GPU data, and regenerate Curves with changed settings or inputs."""
+    reports = updates.read(depsgraph, bpy.app.handlers.depsgraph_update_post, after_depsgraph_update)
     if not scene_time.is_shown(depsgraph):
         return
     global _is_opening, _is_undone
     file_changes.follow([scene])
-    events.scene_changed(is_hair_only=_is_hair_only(depsgraph))
-    if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
+    events.scene_changed(is_hair_only=_is_hair_only(reports))
+    if any(report.is_of(bpy.types.Scene) for report in reports):
         looks.follow_guides(depsgraph.view_layer)
         composite.follow(scene)
     # Blender does not report a scene that was copied or deleted.
@@ -57,16 +59,16 @@ def after_depsgraph_update(scene, depsgraph):
         animated.follow(depsgraph)
         _evaluate(depsgraph, {})  # what a script has set since
         return
-    deformed = _deformed(depsgraph)
+    deformed = updates.deformed(reports)
     moving_surfaces.shape_changed(deformed & _surfaces())
-    changed = [u.id.original for u in depsgraph.updates if u.is_updated_geometry and not _is_only_carried(u, deformed)]
+    changed = updates.originals([u for u in reports if not _is_only_carried(u, deformed)], is_geometry=True)
     for surface_object in deformed:
         events.surface_moved(surface_object)
         # Hair waits until the surface leaves edit and paint modes, and until copies of its faces are told apart.
         if surface_object.mode == "OBJECT" and not _tells_apart(surface_object):
             is_edited = surface_object.data in changed and not moving_surfaces.is_to_be_checked_later(surface_object)
             stale_marks.follow_surface(surface_object, depsgraph, is_edited)
-    moved = [u.id.original for u in depsgraph.updates if u.is_updated_geometry or u.is_updated_transform]
+    moved = updates.originals(reports, is_geometry=True, is_transform=True)
     stale_marks.follow_partings(moved, depsgraph)
     stale_marks.follow_flow(moved, depsgraph)
     stale_marks.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
@@ -77,9 +79,9 @@ def after_depsgraph_update(scene, depsgraph):
         for datablock in _of_kind("HAIR"):
             if datablock.vellus.is_live and staleness.is_left_by_undo(datablock):
                 datablock.vellus.is_stale = True
-    if any(isinstance(update.id, bpy.types.Image | bpy.types.World) for update in depsgraph.updates):
+    if any(report.is_of(bpy.types.Image, bpy.types.World) for report in reports):
         events.image_changed()
-    painted = {update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Image)}
+    painted = {report.datablock for report in reports if report.is_of(bpy.types.Image)} - {None}
     _mark_painted(painted, depsgraph)
     combed = {}
     for datablock in changed:
@@ -95,8 +97,8 @@ def after_depsgraph_update(scene, depsgraph):
     _evaluate(depsgraph, combed)
     simulated_hair.note_combed(combed, scene)
     if running.job() is None:
-        stored_guide_maps.follow(depsgraph)
-        live_hair.follow_masks(_painted(depsgraph), depsgraph)
+        stored_guide_maps.follow(reports, depsgraph)
+        live_hair.follow_masks(_painted(reports), depsgraph)
 
 
 def _tells_apart(surface_object):
@@ -114,50 +116,44 @@ def _surfaces():
 
 def _is_only_carried(update, deformed):
     """Whether Blender reports paused Curves because their surface moved: what was tagged by itself has all flags."""
-    datablock = update.id.original
+    datablock = update.datablock
     if not isinstance(datablock, bpy.types.Curves) or datablock.surface not in deformed:
         return False
-    return paused_hair.is_paused(datablock) and not (update.is_updated_transform or update.is_updated_shading)
+    return paused_hair.is_paused(datablock) and not (update.is_transform or update.is_shading)
 
 
-def _painted(depsgraph):
+def _painted(reports):
     """The mesh objects in a paint mode whose colors or weights may have changed."""
-    found = {o for o in _deformed(depsgraph) if o.mode in {"WEIGHT_PAINT", "VERTEX_PAINT"}}
-    if not any(isinstance(update.id, bpy.types.Image) for update in depsgraph.updates):
+    found = {o for o in updates.deformed(reports) if o.mode in {"WEIGHT_PAINT", "VERTEX_PAINT"}}
+    if not any(report.is_of(bpy.types.Image) for report in reports):
         return found
     surfaces = {hair.surface for hair in _of_kind("HAIR")} - {None}
     return found | {surface for surface in surfaces if surface.mode == "TEXTURE_PAINT"}
 
 
-def _is_hair_only(depsgraph):
+def _is_hair_only(reports):
     """Whether nothing but the geometry of Curves has changed: surfaces, lights and the world are as they were."""
     # Blender reports no datablock for changes of visibility.
-    return len(depsgraph.updates) > 0 and all(_are_curves(update) for update in depsgraph.updates)
+    return len(reports) > 0 and all(map(_are_curves, reports))
 
 
-def _is_hair_only_in_frame(depsgraph):
+def _is_hair_only_in_frame(reports):
     """The same of a change of the frame, of which Blender reports all that it evaluates, but no images."""
     if any(image.source in {"SEQUENCE", "MOVIE"} for image in bpy.data.images):
         return False
-    others = [update for update in depsgraph.updates if not isinstance(update.id, bpy.types.Action | bpy.types.Camera)]
-    return all(_are_curves(update) or _is_camera(update.id) for update in others)
+    others = [report for report in reports if not report.is_of(bpy.types.Action, bpy.types.Camera)]
+    return all(_are_curves(report) or _type_of_object(report) == "CAMERA" for report in others)
 
 
-def _is_camera(changed):
-    return isinstance(changed, bpy.types.Object) and changed.type == "CAMERA"
+def _type_of_object(report):
+    """Blender's type of an object; None for other datablocks, and for what is gone."""
+    return report.datablock.type if report.is_of(bpy.types.Object) and report.datablock is not None else None
 
 
-def _are_curves(update):
-    changed = update.id
-    if isinstance(changed, bpy.types.Object):
-        return changed.type == "CURVES" and not update.is_updated_transform
-    return isinstance(changed, bpy.types.Curves)
-
-
-def _deformed(depsgraph):
-    """The mesh objects whose evaluated shape may have changed."""
-    updated = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
-    return {o for o in updated if isinstance(o, bpy.types.Object) and o.type == "MESH"}
+def _are_curves(report):
+    if report.is_of(bpy.types.Object):
+        return _type_of_object(report) == "CURVES" and not report.is_transform
+    return report.is_of(bpy.types.Curves)
 
 
 def _mark_painted(images, depsgraph):
@@ -241,9 +237,10 @@ def before_frame_change(_scene, _depsgraph):
 @persistent
 def after_frame_change(scene, depsgraph):
     """Deform strands with their surfaces in this frame; regenerate animated hair, in renders too."""
+    reports = updates.read(depsgraph, bpy.app.handlers.frame_change_post, after_frame_change)
     if scene_time.is_shown(depsgraph):
-        events.scene_changed(is_hair_only=_is_hair_only_in_frame(depsgraph))
-        deformed = _deformed(depsgraph)
+        events.scene_changed(is_hair_only=_is_hair_only_in_frame(reports))
+        deformed = updates.deformed(reports)
         moving_surfaces.frame_changed(deformed & _surfaces())
         for surface_object in deformed:
             events.surface_moved(surface_object)

@@ -10,13 +10,13 @@ from ..host.notices import text_of
 from . import live_hair
 
 
-def follow(depsgraph):
-    """Store the guide weights of hair that nodes read them of, and that has none."""
-    changed = [update.id.original for update in depsgraph.updates]
-    have_nodes_changed = any(isinstance(i, bpy.types.NodeTree | bpy.types.Material) for i in changed)
+def follow(reports, depsgraph):
+    """Store the guide weights of hair that nodes read them of, and that has none; reports: `updates.Update`s."""
+    have_nodes_changed = any(report.is_of(bpy.types.NodeTree, bpy.types.Material) for report in reports)
     if have_nodes_changed:
         guide_map_readers.reading_cache.clear()
-    of_changed_objects = {i.data for i in changed if isinstance(i, bpy.types.Object) and i.type == "CURVES"}
+    objects = {report.datablock for report in reports if report.is_of(bpy.types.Object)} - {None}
+    of_changed_objects = {one.data for one in objects if one.type == "CURVES"}
     for hair in bpy.data.hair_curves if have_nodes_changed else of_changed_objects:
         if _lacks_map(hair) and guide_map_readers.are_read(hair):
             _store(hair, depsgraph)
