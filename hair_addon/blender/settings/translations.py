@@ -6,7 +6,6 @@ here. languages/ has a dictionary for each language, in gettext's format.
 """
 
 import json
-import re
 import string
 import sys
 from functools import lru_cache
@@ -58,11 +57,36 @@ def _taken_apart(status):
     """(sentence, {name: text}) of a status, of the sentence that has most words of its own; (status, {}) of none."""
     if status in _sentences():
         return status, {}
-    for sentence, pattern in _patterns():
-        found = pattern.fullmatch(status)
-        if found:
-            return sentence, found.groupdict()
+    for sentence, words, names in _patterns():
+        values = _values_between(words, names, status)
+        if values is not None:
+            return sentence, values
     return status, {}
+
+
+def _values_between(words, names, status):
+    """{name: text} of a sentence with values that a status is; None where it is another.
+
+    words: around its values, in turn; names: of these. Each value is as long as it may be, those before others first:
+    so words are looked for from the end, which takes a hostile status no longer than its length.
+    """
+    if not (status.startswith(words[0]) and status.endswith(words[-1])):
+        return None
+    first, end, texts = len(words[0]), len(status) - len(words[-1]), []
+    for some in reversed(words[1:-1]):
+        place = status.rfind(some, first, end)
+        if place < 0:
+            return None
+        texts.append(status[place + len(some) : end])
+        end = place
+    if end < first:
+        return None
+    texts.append(status[first:end])
+    values = {}
+    for name, text in zip(names, reversed(texts), strict=True):
+        if values.setdefault(name, text) != text:  # it stands there twice
+            return None
+    return values
 
 
 @lru_cache(maxsize=1)
@@ -72,18 +96,18 @@ def _sentences():
 
 @lru_cache(maxsize=1)
 def _patterns():
-    """[(sentence, regular expression)] of all sentences with values, those with most words of their own first."""
+    """[(sentence, words around its values, names of these)] of all with values, those with most words first."""
     found = []
     for sentence in _sentences():
-        pattern, length, names = "", 0, set()
-        for words, name, _form, _conversion in string.Formatter().parse(sentence):
-            pattern, length = pattern + re.escape(words), length + len(words)
+        words, names = [""], []
+        for some, name, _form, _conversion in string.Formatter().parse(sentence):
+            words[-1] += some
             if name:
-                pattern += f"(?P={name})" if name in names else f"(?P<{name}>.*)"
-                names.add(name)
+                names.append(name)
+                words.append("")
         if names:
-            found.append((-length, sentence, re.compile(pattern, re.DOTALL)))
-    return [(sentence, pattern) for _length, sentence, pattern in sorted(found, key=lambda entry: entry[:2])]
+            found.append((-sum(map(len, words)), sentence, words, names))
+    return [tuple(rest) for _length, *rest in sorted(found, key=lambda entry: entry[:2])]
 
 
 def _filled(sentence, values):

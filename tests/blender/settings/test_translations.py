@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every string that an artist reads is in every dictionary, with the same values in it, and nothing else is."""
 
+import itertools
+import random
+import re
 import string
 
 import bpy
@@ -16,6 +19,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import sampling
 from hair_addon.core.geometry.mesh import TriMesh, check_mesh
 from tests.support.interface import spoken
+from tests.support.interface.layout import draw
 
 LANGUAGES = translations.dictionaries()
 
@@ -85,6 +89,52 @@ def test_a_stored_sentence_is_translated_as_it_was_raised(german):
 
 def test_a_stored_sentence_of_nobody_is_shown_as_it_is(german):
     assert translations.status_text("Something {else} went wrong.") == "Something {else} went wrong."
+
+
+def test_values_are_as_long_as_they_may_be(german):
+    """The same as of a greedy regular expression, which takes hours of a hostile status."""
+    texts = ("a", "b", ": ", '"', " ", "of ", "x")
+    sentences = [sentence for sentence, _words, _names in translations._patterns()][:40]
+    generator = random.Random(5)
+    for sentence in sentences:
+        pattern, names = "", set()
+        for words, name, _form, _conversion in string.Formatter().parse(sentence):
+            pattern += re.escape(words)
+            if name:
+                pattern += f"(?P={name})" if name in names else f"(?P<{name}>.*)"
+                names.add(name)
+        words, held = next(entry[1:] for entry in translations._patterns() if entry[0] == sentence)
+        for _try in range(5):
+            values = {name: "".join(generator.choices(texts, k=4)) for name in names}
+            status = "".join(w + values.get(n, "") for w, n in itertools.zip_longest(words, held, fillvalue=""))
+            expected = re.fullmatch(pattern, status, re.DOTALL)
+            found = translations._values_between(words, held, status)
+            assert found == (expected and expected.groupdict()) or len(names) < len(held), (sentence, status)
+
+
+class Counted(str):
+    """A text that counts the characters that are searched in it."""
+
+    searched = 0
+
+    def rfind(self, words, first, end):
+        Counted.searched += max(end - first, 0)
+        return super().rfind(words, first, end)
+
+
+@pytest.mark.parametrize("repeated", ['": ', "of ", '"', "x"])
+def test_a_hostile_status_is_searched_once_for_each_word_of_a_sentence(repeated):
+    status = Counted(repeated * (30_000 // len(repeated)))
+    for _sentence, words, names in translations._patterns():
+        for around in (words, ["", *words[1:-1], ""]):  # as if its ends fitted
+            Counted.searched = 0
+            translations._values_between(around, names, status)
+            assert Counted.searched <= len(names) * len(status)
+
+
+def test_a_panel_shows_the_beginning_of_a_hostile_status(hair):
+    hair.data.vellus.status = 'of ": ' * 5000
+    assert len("".join(draw(bpy.types.VELLUS_PT_interpolation).texts)) < 3000
 
 
 def lost_guides(hair):

@@ -10,6 +10,7 @@ from ..operators.systems.comb_guides import is_combing
 _CHARACTER_WIDTH = 6.8  # pixels of Blender's interface font on average, at a scale of one
 _ICON_AND_MARGINS = 66.0
 _NARROWEST = 18  # characters
+_LONGEST = 1500  # characters, more than any sentence has: a damaged file may hold a book
 
 LONG, LARGE = 2.0, 500e6  # [s], [bytes]: smaller estimates are not shown
 
@@ -33,6 +34,7 @@ def split(layout):
 def write(layout, context, text, icon="NONE"):
     """A sentence, translated already, over as many lines as the sidebar's width asks for."""
     room = context.region.width / context.preferences.system.ui_scale - _ICON_AND_MARGINS
+    text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
     lines = textwrap.wrap(text, max(int(room / _CHARACTER_WIDTH), _NARROWEST)) or [""]
     column = layout.column(align=True)
     column.scale_y = 0.8 if len(lines) > 1 else 1.0
