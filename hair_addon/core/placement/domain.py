@@ -17,6 +17,8 @@ from ..geometry.texture import Texture
 GRID_SIZE = 32  # cells along each axis of the grid that sites are found by; farther ones wrap around
 LONGEST_EDGE = 2.5  # of a piece, by the spacing of sites: a piece is shared among few cells
 LONGEST_GRADED_EDGE = 1.5  # where the density varies: it is constant in a piece
+SLIVER_LENGTH, SLIVER_WIDTH = 8.0, 0.5  # of its longest and its shortest edge, by the longest that a piece may have
+MOST_SLICES = 64  # of a sliver at once: the density may vary along it
 LEAST_COSINE = -1.0 / 3.0  # between normals of one side of a surface
 LEAST_PIECES = 2000  # minimum site count for the cutting: the density is constant in a piece
 PLASTIC = 0.7548776662466927, 0.5698402909980532  # steps of the evenest sequence in a square [Roberts18]
@@ -253,15 +255,47 @@ def _spacing(amount, count):
 
 
 def cut(parts: Parts, longest: float, density_of: Callable[[Parts], np.ndarray | float]) -> Parts:
-    """Parts halved across their longest edges until none is longer than `longest`, where the density is one."""
+    """Parts none of which has an edge longer than `longest`, where the density is one.
+
+    They are halved across their longest edges, and slivers sliced across both of theirs.
+    """
     done = []
     while len(parts.areas):
         edges = parts.corners - parts.corners[:, (1, 2, 0)]
         squares = np.einsum("qcx,qcx->qc", edges, edges)
-        is_long = squares.max(axis=1) > longest**2 / density_of(parts)
+        limits = np.broadcast_to(longest**2 / density_of(parts), len(squares))
+        is_long = squares.max(axis=1) > limits
         done.append(parts.chosen(~is_long))
-        parts = _halved(parts.chosen(is_long), squares[is_long].argmax(axis=1))
+        parts, squares, limits = parts.chosen(is_long), squares[is_long], limits[is_long]
+        # With each halving of its length a sliver would become three, of which two are halved slivers again.
+        lengths = np.sqrt(squares / limits[:, None])
+        is_sliver = (lengths.max(axis=1) > SLIVER_LENGTH) & (lengths.min(axis=1) <= SLIVER_WIDTH)
+        halved = _halved(parts.chosen(~is_sliver), squares[~is_sliver].argmax(axis=1))
+        parts = halved.joined(_sliced(parts.chosen(is_sliver), lengths[is_sliver])) if is_sliver.any() else halved
     return done[0].joined(*done[1:])
+
+
+def _sliced(parts, lengths):
+    """Each sliver as slices, of two triangles but for the tip's; lengths (Q, 3): of edges, by the longest allowed."""
+    rows, base = np.arange(len(lengths)), lengths.argmin(axis=1)
+    length, width = lengths.max(axis=1), lengths[rows, base]
+    counts = np.minimum(np.ceil(length / (1.0 - width)), MOST_SLICES).astype(int)  # so that no diagonal is too long
+    of_part = np.repeat(rows, counts)
+    slices = np.arange(len(of_part)) - np.repeat(np.cumsum(counts) - counts, counts)
+    near, far = slices / counts[of_part], (slices + 1) / counts[of_part]
+    pieces = [[], []]
+    for corners in (parts.barycentric, parts.corners):
+        one, other, tip = (corners[rows, (base + turn) % 3][of_part] for turn in range(3))
+        ways = [(end - tip).astype(np.float64) for end in (one, other)]
+        ends = [[(tip + at[:, None] * way).astype(corners.dtype) for way in ways] for at in (near, far)]
+        (near_one, near_other), (far_one, far_other) = ends
+        pieces[0].append(np.stack([near_one, far_one, far_other], axis=1))
+        pieces[1].append(np.stack([near_one, far_other, near_other], axis=1)[slices > 0])
+    whole = parts.areas[of_part] / counts[of_part] ** 2
+    areas = whole * (slices + 1), (whole * slices)[slices > 0]
+    triangles = parts.triangle[of_part], parts.triangle[of_part][slices > 0]
+    one, other = (Parts(*rest) for rest in zip(triangles, *zip(*pieces, strict=True), areas, strict=True))
+    return one.joined(other)
 
 
 def _halved(parts, edge):

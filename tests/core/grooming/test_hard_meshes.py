@@ -16,7 +16,7 @@ from hair_addon.core.geometry.sampling import sample_surface
 from hair_addon.core.grooming import groom
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.placement import cvt
-from hair_addon.core.placement.domain import Domain
+from hair_addon.core.placement.domain import Domain, Parts, cut
 from tests.support.devices import DEVICE
 from tests.support.meshes import flat_grid
 from tests.support.strands.evenness import measure
@@ -166,6 +166,25 @@ def test_slivers_alone_are_shared_out_soon():
     for strip in range(4):
         row = np.sort(places[np.abs(places[:, 1] - 0.1 * strip) < 0.05, 0])
         assert len(row) == 10 and np.diff(row).min() > 0.09
+
+
+@pytest.mark.parametrize("width", [1e-6, 1e-3, 4e-3, 0.1])
+def test_slivers_are_sliced_and_nothing_of_them_is_lost(width):
+    """In a number that grows with their length alone, not with its power of log 3 / log 2."""
+    corners = np.array([[(0, 0, 0), (1, 0, 0), (1, width, 0)], [(0, width, 0), (0, 0, 0), (1, 0.5 * width, 0)]])
+    corners = np.concatenate([corners, np.roll(corners, 1, axis=1), np.roll(corners, 2, axis=1)])
+    areas = np.full(len(corners), 0.5 * width)
+    barycentric = np.broadcast_to(np.eye(3), corners.shape)
+    pieces = cut(Parts(np.arange(len(corners)), barycentric, corners, areas), 0.01, lambda parts: 1.0)
+    edges = pieces.corners - np.roll(pieces.corners, -1, axis=1)
+    assert np.linalg.norm(edges, axis=2).max() <= 0.01 * (1.0 + 1e-9)
+    assert len(pieces.areas) < len(corners) * 6 * (100 + width * 1e4)
+    exact = 0.5 * np.cross(edges[:, 0], edges[:, 1])[:, 2]
+    whole = 0.5 * np.cross(*np.moveaxis(np.diff(corners, axis=1), 1, 0))[:, 2]
+    np.testing.assert_allclose(exact, pieces.areas * np.sign(whole)[pieces.triangle], rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(np.bincount(pieces.triangle, pieces.areas), areas, rtol=1e-9)
+    places = np.einsum("qck,qkx->qcx", pieces.barycentric, corners[pieces.triangle])
+    np.testing.assert_allclose(places, pieces.corners, atol=1e-12)
 
 
 @pytest.mark.parametrize("corners", [3, 4, 7, 50])
