@@ -72,7 +72,7 @@ def run(given, said):
         said.fail(NO_BLENDER)
         return 1
     except MemoryError:
-        said.fail("Not enough memory: use fewer strands or a smaller picture.")
+        said.fail("Not enough memory: use fewer strands or points, or a smaller picture.")
         return 1
     except BrokenPipeError:  # the reader is gone
         return 1

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The one exception that is meant for the user's eyes, and what other exceptions say."""
 
+import contextlib
+from collections.abc import Iterator
+
 
 class HairError(Exception):
     """An error that the user can fix: one sentence with the problem and the fix.
@@ -11,6 +14,15 @@ class HairError(Exception):
     def __init__(self, sentence: str, **values: object) -> None:
         super().__init__(sentence.format(**values) if values else sentence)
         self.sentence, self.values = sentence, values
+
+
+@contextlib.contextmanager
+def memory_as_sentence() -> Iterator[None]:
+    """Raise a `HairError` where memory is used up in a context, or in a function that this decorates."""
+    try:
+        yield
+    except MemoryError as error:
+        raise HairError("Not enough memory: use fewer strands or points, or a smaller picture.") from error
 
 
 def cause_of(error: Exception) -> str:

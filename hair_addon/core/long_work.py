@@ -11,6 +11,8 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any
 
+from .errors import memory_as_sentence
+
 Progress = Callable[[str, float], None]  # told a step and the part of the work that is done
 Compute = Callable[[Progress], Any]
 type Work[T] = Generator[Compute, Any, T]
@@ -46,9 +48,10 @@ def run_now[T](work: Work[T], progress: Progress = no_progress) -> T:
     After an error, of a computation or of progress, it is closed: what it had begun is undone by then.
     """
     try:
-        compute = next(work)
-        while True:
-            compute = work.send(compute(progress))
+        with memory_as_sentence():
+            compute = next(work)
+            while True:
+                compute = work.send(compute(progress))
     except StopIteration as end:
         return end.value
     finally:
@@ -101,7 +104,8 @@ class Job:
         """The result; waits for it. Re-raises exceptions of the computation, `Stopped` if it was stopped."""
         self.wait()
         if self._error is not None:
-            raise self._error
+            with memory_as_sentence():
+                raise self._error
         if self.is_stopping:
             raise Stopped
         return self._result

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         followed_names,
         grown_guides,
         guide_maps,
+        hair_memory,
         hair_systems,
         mask_suggestions,
         paused_hair,

@@ -14,6 +14,7 @@ import numpy as np
 from bpy.types import Curves, Depsgraph
 
 from ...core import interpolation
+from ...core.errors import memory_as_sentence
 from ...core.geometry.strands import Strands
 from ...core.grooming import following, groom
 from ...core.grooming.groom import HairSettings
@@ -58,7 +59,8 @@ class BoundHair:
     @property
     def points(self) -> np.ndarray:
         """(S, P, 3) float32 at rest, in the surface's local coordinates; waits until they are computed."""
-        return _grown(self.growing).result()
+        with memory_as_sentence():
+            return _grown(self.growing).result()
 
     @property
     def radii(self) -> np.ndarray:
@@ -140,6 +142,7 @@ class BoundHair:
         moved, styling = self.reach.of(combed), self.styles.styling
         return moved if styling is None or not len(combed) else styling.reached(combed, moved)
 
+    @memory_as_sentence()
     def grow(self, chosen: np.ndarray | None = None) -> None:
         """Compute strands for `guides`, in other threads or, where they are (M,) indices of some, at once."""
         self.let_go()

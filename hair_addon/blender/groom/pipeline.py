@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 from bpy.types import Curves, Depsgraph, Object
 
-from ...core.errors import HairError
+from ...core.errors import HairError, memory_as_sentence
 from ...core.geometry import strands
 from ...core.grooming import following, groom, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
@@ -23,7 +23,7 @@ from ..data.surfaces import cage_of
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items
-from . import bindings, grown_guides, read_surfaces, size_fitting, styled_hair, writing
+from . import bindings, grown_guides, hair_memory, read_surfaces, size_fitting, styled_hair, writing
 from .bindings import BoundHair
 from .styled_hair import ReadStyles, StyledHair
 
@@ -56,6 +56,7 @@ def distributing_guides(
     mask = masks.own(settings).read(surface_object, surface, depsgraph)
     sized = size_fitting.of_guides(settings, surface, mask, target if keeps_roots else None, may_drape)
     settings, key = sized.settings, sized.root_key
+    hair_memory.require_guides(settings, len(surface.mesh.triangles))
     roots = _kept_roots(target, surface, key, settings.guide_count) if keeps_roots else None
     flow = drawn_lines.read(surface_object, surface, settings.flow_lines, depsgraph)
     place, target = Remembered(surface_object), Remembered(target)
@@ -108,6 +109,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     mask = masks.of_strands(settings, guide_curves.vellus.guides).read(guide_curves.surface, surface, depsgraph)
     sized = size_fitting.of_hair(settings, surface, mask, len(guides.roots), target)
     settings, key = sized.settings, sized.root_key
+    hair_memory.require_strands(settings, target)
     parting = partings.read(guide_curves.surface, surface, guide_curves, settings, depsgraph)
     styles = new_styles if target is None else style_items.styles_of(target.vellus)
     read = styled_hair.read_styles(styles, guide_curves.surface, surface, guide_curves, depsgraph, target)
@@ -185,6 +187,8 @@ def adding_hair(
     sized, read = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph, may_drape)
     (of_guides, of_hair), (mask, hair_mask) = sized, read
     guide_settings, hair_settings = of_guides.settings, of_hair.settings
+    guide_bytes = hair_memory.guide_bytes(guide_settings, len(surface.mesh.triangles))
+    hair_memory.require_strands(hair_settings, other_bytes=guide_bytes)
     parting = partings.read(surface_object, surface, None, hair_settings, depsgraph)
     flow = drawn_lines.read(surface_object, surface, guide_settings.flow_lines, depsgraph)
     styling = styled_hair.read_styles(styles, surface_object, surface, None, depsgraph)
@@ -215,6 +219,7 @@ def hair_between(
 
     density: (V,) where strands grow, None for the vertex group that settings name.
     """
+    hair_memory.require_strands(settings)
     painted, texture = masks.own(settings).read(surface_object, surface, depsgraph)
     parting = partings.read(surface_object, surface, None, settings, depsgraph)
     device = preferences.device()
@@ -308,6 +313,7 @@ def _kept_roots(target, surface, key, count):
     return stored_roots.points(target, surface, is_complete=True)
 
 
+@memory_as_sentence()
 def restyle(
     target: Curves, depsgraph: Depsgraph, is_drawn: Callable[[BoundHair, StyledHair], bool] = lambda *_given: False
 ) -> bool:

@@ -7,7 +7,7 @@ from concurrent.futures import Future
 import numpy as np
 from bpy.types import Curves, Object
 
-from ...core.errors import HairError
+from ...core.errors import HairError, memory_as_sentence
 from ...core.geometry.strands import Strands, lengths
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
@@ -84,6 +84,7 @@ def write_strands(target: Curves | None, surface_object: Object, guide_curves: C
     return target
 
 
+@memory_as_sentence()
 def write_hair(target: Curves) -> None:
     """Bring a hair Curves datablock up to what it is bound to, if it is: the one place where hair is written."""
     bound, state = bindings.of(target), target.vellus

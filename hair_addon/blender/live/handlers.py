@@ -10,7 +10,7 @@ from ..data import orientation, rest_nodes, surface_space
 from ..data.strands import curves_objects
 from ..groom import bindings, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
-from ..host import running, scene_time
+from ..host import memory, running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
 from ..render.frames import composite
@@ -192,6 +192,8 @@ def _evaluate(depsgraph, combed):
         return
     # Called last to first. An error that nobody expects is raised when all were called, so that it stops no other hair.
     with contextlib.ExitStack() as stack:
+        # What takes much memory is asked for by an operator; a render is not to lack it.
+        stack.enter_context(memory.asking(running.has_window() and not bpy.app.is_job_running("RENDER")))
         stack.callback(live_hair.show_styles, depsgraph)
         for hair in reversed(_of_kind("HAIR")):
             stack.callback(_evaluate_hair, hair, depsgraph, combed)

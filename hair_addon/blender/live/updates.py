@@ -2,7 +2,8 @@
 """What Blender reports as updated, copied before anything else is done.
 
 Handlers of other add-ons may have run before ours, and deleted what is reported: Blender's reports lead to it all the
-same, where its memory was. Its evaluated copy is there, which the depsgraph owns: by that those that are left are known.
+same, where its memory was. Its evaluated copy is there, which the depsgraph owns: by it
+what is left is known.
 """
 
 from collections.abc import Sequence

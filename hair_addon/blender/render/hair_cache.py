@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.errors import HairError
+from ...core.errors import HairError, memory_as_sentence
 from ...core.files import table_cache, table_exr
 from ...core.kernels.checks import require_count, require_indices
 from ...core.shading import appearance
@@ -60,6 +60,7 @@ pose_cache = Cache()  # session_uid of an object that strands grow on → Pose
 shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
 
 
+@memory_as_sentence()
 def hair_on_gpu(datablock, is_viewport=True):
     """(`StrandsOnGPU`, `Shading`) of a hair Curves datablock. Raises `HairError`.
 

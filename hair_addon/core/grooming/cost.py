@@ -20,6 +20,11 @@ _SEEN_STEP, _SEEN_BYTES = 4, 16
 # While it is worked on. A triangle of the surface, a guide, a strand.
 _FACE_WORK_BYTES, _GUIDE_WORK_BYTES, _STRAND_WORK_BYTES = 760, 3300, 680
 
+# Of strands while they are made and are kept, measured (tests/blender/groom/test_hair_memory.py): a point here, in
+# Blender's Curves and its evaluated copy, with styles, and where it is drawn from; a strand, its roots and its guides.
+_MADE_POINT_BYTES, _STYLED_POINT_BYTES, _DRAWN_POINT_BYTES = 36, 12, 12
+_MADE_STRAND_BYTES = 380
+
 # Placing: a triangle of the surface and a guide, once, and once in each round.
 _FACE_SECONDS, _FACE_ROUND_SECONDS = 5e-6, 2e-7
 _GUIDE_SECONDS, _GUIDE_ROUND_SECONDS = 4e-5, 9e-6
@@ -45,6 +50,12 @@ _TEXEL_SECONDS = 1.5e-6  # of all of the Marschner tables together
 def curves_bytes(strand_count: int, point_count: int = POINT_COUNT, slot_count: int = 0) -> int:
     """Memory of strands as a Curves datablock [bytes]; slot_count: guides of each strand that are stored with it."""
     return strand_count * (point_count * _POINT_BYTES + _CURVE_BYTES + slot_count * _SLOT_BYTES)
+
+
+def strand_bytes(strand_count: int, point_count: int = POINT_COUNT, slot_count: int = 0) -> int:
+    """Memory that strands take at most, from when they are made [bytes]; slot_count: guides that each follows."""
+    point_bytes = _MADE_POINT_BYTES + _STYLED_POINT_BYTES + _DRAWN_POINT_BYTES
+    return strand_count * (point_count * point_bytes + _MADE_STRAND_BYTES + slot_count * _SLOT_BYTES)
 
 
 def gpu_bytes(strand_count: int, point_count: int = POINT_COUNT) -> int:

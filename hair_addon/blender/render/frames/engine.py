@@ -6,7 +6,7 @@ import contextlib
 import bpy
 import numpy as np
 
-from ....core.errors import HairError
+from ....core.errors import HairError, memory_as_sentence
 from ....core.imaging import pixel_sampling
 from ....core.long_work import Stopped, no_progress, part_of
 from ...data import scene
@@ -89,6 +89,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         self.report({"ERROR"}, sentence)
         composite.refuse(blender_scene, sentence)
 
+    @memory_as_sentence()
     def _render(self, depsgraph):
         blender_scene, view_layer = depsgraph.scene, depsgraph.view_layer
         _require_supported(self.camera_override)

@@ -6,8 +6,10 @@ import bpy
 from ....core.grooming import cost
 from ...data.scene import triangle_count
 from ...data.strands.curves import is_hand_made
+from ...groom import hair_memory
 from ...groom.diagnostics import parting_warnings, sharing_note
 from ...groom.selection import active_of_kind, guides_of, hair_of
+from ...host import memory
 from ...render import hair_cache
 from ...settings.translations import error_text, interface_text
 from .. import setting_rows
@@ -49,6 +51,10 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
         setting_rows.row(layout, state, "is_live")
         write_stale(layout, context, state)
         _draw_cost(layout, state.hair, hair_cache.drawn_bytes(hair))
+        share = memory.share_of_free(hair_memory.strand_bytes(state.hair, hair))
+        if share > memory.MUCH:
+            text = interface_text("These strands take {percent}% of the free memory", percent=round(100.0 * share))
+            layout.label(text=text, icon="ERROR", translate=False)
         if hair.surface is not None:
             face_count = triangle_count(hair.surface, context.view_layer)
             costs = cost.hair_seconds, cost.hair_work_bytes
@@ -63,8 +69,10 @@ def _draw_cost(layout, group, drawn_bytes):
     slot_count = group.neighbour_limit if group.guide_map else 0
     text = interface_text(
         "{memory}, {gpu_memory} on the GPU",
-        memory=megabytes(cost.curves_bytes(group.strand_count, slot_count=slot_count)),
-        gpu_memory=megabytes(cost.gpu_bytes(group.strand_count) if drawn_bytes is None else drawn_bytes),
+        memory=megabytes(cost.curves_bytes(group.strand_count, group.point_count, slot_count)),
+        gpu_memory=megabytes(
+            cost.gpu_bytes(group.strand_count, group.point_count) if drawn_bytes is None else drawn_bytes
+        ),
     )
     layout.label(text=text, icon="MEMORY", translate=False)
 

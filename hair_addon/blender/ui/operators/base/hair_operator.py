@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Base of all operators: when they can run; `HairError` is reported without changes."""
 
-from .....core.errors import HairError
+from .....core.errors import HairError, memory_as_sentence
 from ....groom.selection import guides_of, hair_of
 from ....settings.translations import CONTEXT, error_text, report_text
 
@@ -46,7 +46,8 @@ class HairOperator:
     def execute(self, context):
         """`change`, or report why not."""
         try:
-            said = self.change(context)
+            with memory_as_sentence():
+                said = self.change(context)
         except HairError as error:
             return self.refuse(error)
         if said is not None:

@@ -7,9 +7,9 @@ which may compile kernels, run in a thread, with a progress bar and Esc to cance
 
 import bpy
 
-from .....core.errors import HairError
+from .....core.errors import HairError, memory_as_sentence
 from .....core.long_work import Job, Stopped, run_now
-from ....host import running
+from ....host import memory, running
 from ....settings.translations import interface_text, report_text
 from .hair_operator import HairOperator
 
@@ -23,6 +23,8 @@ class LongOperator(HairOperator):
     """Mixin of operators that implement `work`, `seconds` and `message`."""
 
     has_run = False  # in this session: its kernels are loaded
+    _takes_much = False  # whether the artist has agreed that the next one does, of the free memory
+    _asks = _is_confirming = False
     _said = ""  # in the status bar
 
     def work(self, context):
@@ -47,8 +49,10 @@ class LongOperator(HairOperator):
     def after(self, context, made):
         """Select the result."""
 
-    def invoke(self, context, _event):
+    def invoke(self, context, event):
         """Compute at once, or begin to."""
+        self._event, self._asks = event, running.has_window() and not type(self)._takes_much
+        LongOperator._takes_much = False
         self.prefill(context)
         try:
             is_quick = type(self).has_run and self.seconds(context) < PATIENCE
@@ -58,10 +62,17 @@ class LongOperator(HairOperator):
 
     def execute(self, context):
         """Compute at once."""
+        if self._is_confirming:
+            LongOperator._takes_much = True
+            return self._begin_as_set() & {"FINISHED"} or {"CANCELLED"}
         try:
             if running.job() is not None:
                 raise HairError("Hair is being computed: wait until it is done, or press Esc to cancel.")
-            return self._done(context, run_now(self.work(context)))
+            with memory.asking(self._asks):
+                made = run_now(self.work(context))
+            return self._done(context, made)
+        except memory.MuchMemory as much:
+            return self._confirm(context, much)
         except HairError as error:
             return self.refuse(error)
 
@@ -70,8 +81,12 @@ class LongOperator(HairOperator):
         try:
             if running.job() is not None:
                 raise HairError("Hair is being computed: wait until it is done, or press Esc to cancel.")
-            self._work = self.work(context)
-            running.begin(context, Job(next(self._work)), self._work)
+            with memory.asking(self._asks), memory_as_sentence():
+                self._work = self.work(context)
+                first = next(self._work)
+            running.begin(context, Job(first), self._work)
+        except memory.MuchMemory as much:
+            return self._confirm(context, much)
         except HairError as error:
             return self.refuse(error)
         context.window_manager.modal_handler_add(self)
@@ -80,9 +95,24 @@ class LongOperator(HairOperator):
 
     def begin_anew(self):
         """Invoke an operator like this one, after a dialog or a file browser, which Blender does not wait for."""
+        return self._invoke_anew(self.as_keywords())
+
+    def _invoke_anew(self, values):
         category, name = self.bl_idname.split("_OT_")
         run = getattr(getattr(bpy.ops, category.lower()), name)
-        return run("INVOKE_DEFAULT", **self.as_keywords())
+        return run("INVOKE_DEFAULT", **values)
+
+    def _confirm(self, context, much):
+        """Ask whether work is to take so much memory; Blender executes the operator if it is."""
+        self._is_confirming = True
+        title = interface_text("Use {percent}% of the Free Memory?", percent=much.percent)
+        said = interface_text("These strands take {needed} GB.", needed=much.needed)
+        return context.window_manager.invoke_confirm(self, self._event, title=title, message=said, icon="WARNING")
+
+    def _begin_as_set(self):
+        """Invoke an operator like this one, with what is set in it alone."""
+        names = [name for name in self.as_keywords() if self.properties.is_property_set(name)]
+        return self._invoke_anew({name: getattr(self, name) for name in names})
 
     def modal(self, context, event):
         """Wait for the thread; write when it is done."""
@@ -103,7 +133,9 @@ class LongOperator(HairOperator):
 
     def _advance(self, context, job):
         try:
-            running.begin(context, Job(self._work.send(job.result())), self._work)
+            with memory_as_sentence():
+                following = self._work.send(job.result())
+            running.begin(context, Job(following), self._work)
             self._show(context)
             return {"RUNNING_MODAL"}
         except StopIteration as end:

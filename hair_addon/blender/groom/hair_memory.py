@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether there is memory for guides and strands, before any of it is taken."""
+
+from bpy.types import Curves
+
+from ...core.grooming import cost
+from ...core.grooming.groom import GuideSettings, HairSettings
+from ..host import memory
+
+
+def strand_bytes(settings: HairSettings, target: Curves | None = None) -> int:
+    """Memory that strands would take beside that of `target` now, which is free when they are made [bytes].
+
+    settings: `HairSettings`, or properties of the same names.
+    """
+    slot_count = settings.neighbour_limit
+    needed = cost.strand_bytes(settings.strand_count, settings.point_count, slot_count)
+    if target is None or not len(target.curves):
+        return needed
+    strands, points = len(target.curves), len(target.points)
+    return needed - cost.strand_bytes(strands, -(-points // strands), slot_count)
+
+
+def require_strands(settings: HairSettings, target: Curves | None = None, other_bytes: int = 0) -> None:
+    """Raise `HairError` where strands would take more memory than there is to spare, as `memory.require_for_hair`.
+
+    other_bytes: that something else takes with them.
+    """
+    memory.require_for_hair(strand_bytes(settings, target) + other_bytes)
+
+
+def guide_bytes(settings: GuideSettings, face_count: int) -> int:
+    """Memory of guides while they are made, and afterwards [bytes]."""
+    return cost.guide_work_bytes(settings, face_count) + cost.curves_bytes(settings.guide_count)
+
+
+def require_guides(settings: GuideSettings, face_count: int) -> None:
+    """As `require_strands`."""
+    memory.require_for_hair(guide_bytes(settings, face_count))
