@@ -91,6 +91,7 @@ def grow(place):
     select(body)
     bpy.ops.vellus.add_hair(guide_count=GUIDES, strand_count=STRANDS, length=0.3 * size, radius=0.001 * size)
     hair, guides = bpy.data.objects["Hair"], bpy.data.objects["Hair Guides"]
+    guides.name = guides.data.name = "Guides"
     for style in ("CURL", "FRIZZ"):
         bpy.context.view_layer.objects.active = hair
         bpy.ops.vellus.add_style(style=style)

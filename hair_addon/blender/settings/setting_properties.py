@@ -11,7 +11,7 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.params import declared, from_surface, label_of
 from ..host.notices import text_of
-from . import fitted_sizes
+from . import fitted_sizes, length_steps
 from .translations import CONTEXT
 
 _SMALL_WORDS = {"in", "of", "per", "to", "with"}  # stay lower case in titles
@@ -36,6 +36,8 @@ def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, ove
             details = replace(details, high=highs.get(name, details.high))
             is_unkeyed = details.is_structural or name in unkeyed
             made[name] = _property(name, default, details, update, is_unkeyed, set(override))
+            if mark is not None and _is_length(default, details):
+                made[length_steps.coarse_name(name)] = _coarse_property(name, details)
             if details.diameter is not None:
                 shown, description = details.diameter
                 made[shown] = _diameter_property(name, shown, description, details, update)
@@ -65,8 +67,22 @@ def _property(name, default, details, update, is_unkeyed, override):
     limits["precision"] = details.precision
     if isinstance(default, tuple):
         return bpy.props.FloatVectorProperty(size=len(default), subtype=details.subtype, **common, **limits)
+    if update is not None and _is_length(default, details):
+        limits["step"] = length_steps.FINE
     # A subtype such as DISTANCE or ANGLE implies its unit.
     return bpy.props.FloatProperty(subtype=details.subtype, unit=details.unit, **common, **limits)
+
+
+def _is_length(default, details):
+    return isinstance(default, float) and details.unit == "LENGTH" and details.diameter is None
+
+
+def _coarse_property(name, details):
+    """What shows a length of a property group in coarser steps."""
+    common = {"name": _title(label_of(name, details)), "description": details.description}
+    common |= {"translation_context": CONTEXT, "subtype": details.subtype, "unit": details.unit}
+    limits = _limits(replace(details, soft_high=100.0 * details.soft_high), False)
+    return length_steps.coarse_property(name, precision=details.precision, **common, **limits)
 
 
 def _diameter_property(radius, name, description, details, update):

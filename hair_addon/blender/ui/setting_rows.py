@@ -9,7 +9,7 @@ from ...core.params import declared
 from ...core.styling.base import ProfiledSettings, StyleSettings
 from ...core.styling.kinds import KINDS
 from ..host.notices import text_of
-from ..settings import fitted_sizes, setting_properties, style_items
+from ..settings import fitted_sizes, length_steps, setting_properties, style_items
 from ..settings.translations import interface_text
 
 # Blender's own property split gives names 40 % of the width, which cuts them in a sidebar of its default width.
@@ -50,13 +50,14 @@ def row(layout, owner, name, size=""):
     size: of a property that may be fitted to the surface, the name that its flag is called by.
     """
     value_side = _below_name(layout, owner, name) if name in WIDE else _value_side(layout, owner, name)
-    flag = fitted_sizes.flag_of(size or name)
-    if flag not in owner.bl_rna.properties:
-        value_side.prop(owner, name, text="")
-        return
-    sides = value_side.row(align=True)
-    sides.prop(owner, name, text="")
-    sides.prop(owner, flag, text="", icon="LINKED")
+    shown, flag = length_steps.shown_name(owner, name), fitted_sizes.flag_of(size or name)
+    has_flag, is_coarse = flag in owner.bl_rna.properties, shown != name
+    sides = value_side.row(align=True) if has_flag or is_coarse else value_side
+    sides.prop(owner, shown, text="")
+    if has_flag:
+        sides.prop(owner, flag, text="", icon="LINKED")
+    if is_coarse:
+        sides.prop_decorator(owner, name)  # to key it
 
 
 def _below_name(layout, owner, name):

@@ -66,6 +66,10 @@ class Layout:
         assert name in owner.bl_rna.properties
         self.drawn[name] += 1
 
+    def prop_decorator(self, owner, name):
+        assert name in owner.bl_rna.properties
+        self.drawn[f"key of {name}"] += 1
+
     def prop_search(self, owner, name, source, collection, text="", results_are_suggestions=False):
         self.picked[name] = getattr(source, collection)
         self.prop(owner, name)
