@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fixtures that every suite shares."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -13,10 +15,14 @@ LONG_FILES = {"test_install.py", "test_any_operation.py", "test_kernel_cache.py"
 
 
 def pytest_configure():
-    """Load the kernels that `make build` has compiled of these sources, if it has, instead of compiling them again."""
+    """Load the kernels that `make build` has compiled of these sources, if it has, instead of compiling them again.
+
+    So do the processes that tests start.
+    """
     folder = build_extension.kernel_folder()
     if compile_kernels.are_up_to_date(folder):
         compiled_kernels.FOLDER = folder
+        os.environ[compiled_kernels.VARIABLE] = str(folder)
 
 
 def pytest_collection_modifyitems(items):

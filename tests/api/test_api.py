@@ -3,6 +3,7 @@
 
 import doctest
 import math
+import os
 import re
 import subprocess
 import sys
@@ -26,6 +27,7 @@ from hair_addon import (
     api_tables,
 )
 from hair_addon.api_blender import NO_BLENDER
+from hair_addon.core.kernels import compiled_kernels
 from hair_addon.core.placement import cvt
 from hair_addon.core.shading import appearance
 from tests.support.dynamics.following import update
@@ -87,9 +89,9 @@ def test_examples_of_functions_run(scalp, coarse_shadows, tmp_path, monkeypatch)
 
 
 def run_python(program, folder):
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=folder, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
-    )
+    kept = {name: os.environ[name] for name in (compiled_kernels.VARIABLE,) if name in os.environ}
+    line, environment = [sys.executable, "-c", program], kept | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -8,6 +8,7 @@ file was compiled for, and Warp's hash of the module's sources and options is th
 
 import hashlib
 import json
+import os
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import warp as wp
 
-FOLDER = Path(__file__).resolve().parents[3] / "kernels"
+VARIABLE = "VELLUS_KERNELS"  # of the environment: names another folder, as of a checkout, whose build has one
+FOLDER = Path(os.environ.get(VARIABLE) or Path(__file__).resolve().parents[3] / "kernels")
 INDEX = "index.json"
 
 _PACKAGE = __name__.removesuffix("core.kernels.compiled_kernels")  # prefix of Warp's names of our modules

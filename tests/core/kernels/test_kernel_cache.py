@@ -10,9 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from hair_addon.core.kernels import kernel_cache
+from hair_addon.core.kernels import compiled_kernels, kernel_cache
 
 ROOT = Path(__file__).resolve().parents[3]
+
+# Of a process that is given no compiled kernels.
+ENVIRONMENT = {name: value for name, value in os.environ.items() if name != compiled_kernels.VARIABLE}
 
 # Five modules, two of them loaded together as grooming does it, three as they are launched.
 WORK = """
@@ -46,7 +49,7 @@ print(*(module.get_module_identifier(block_dim=1) for module in modules))
 
 def work(cache, temporary, before=()):
     """Do the work in a process of its own; returns the folder that its kernels came from."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "WARP_CACHE_PATH": str(cache), "TMPDIR": str(temporary)}
+    environment = ENVIRONMENT | {"PYTHONPATH": str(ROOT), "WARP_CACHE_PATH": str(cache), "TMPDIR": str(temporary)}
     line = [*before, sys.executable, "-c", WORK]
     done = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
@@ -59,7 +62,8 @@ def compiled(tmp_path_factory):
     """A cache that holds the five modules, and no others."""
     folder = tmp_path_factory.mktemp("compiled")
     # In a process of its own, as all others here: a name follows from all that Warp has seen in its process.
-    done = subprocess.run([sys.executable, "-c", WORK + NAMES], cwd=ROOT, capture_output=True, text=True, check=True)
+    line = [sys.executable, "-c", WORK + NAMES]
+    done = subprocess.run(line, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, check=True)
     *_, version, cached, names = done.stdout.splitlines()
     for name in names.split():
         shutil.copytree(Path(cached) / name, folder / version / name)
