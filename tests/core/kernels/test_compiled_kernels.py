@@ -149,9 +149,24 @@ def made_by(*folders, environment=None):
     return found
 
 
+def test_no_kernel_is_compiled_for_gradients():
+    """Nothing asks for them, and they take as long to compile as all else."""
+    assert [module.name for module in compile_kernels._warp_modules() if module.options["enable_backward"]] == []
+
+
 def test_native_code_is_among_the_sources():
     native = {path for path in (ROOT / "hair_addon").rglob("*") if path.suffix in {".cpp", ".cu", ".h"}}
     assert native and native <= set(compile_kernels.sources())
+
+
+@pytest.mark.parametrize(("named", "expected"), [("/elsewhere", "/elsewhere"), ("", ROOT / "kernels")])
+def test_a_folder_is_named_by_the_environment(named, expected):
+    """So that processes of tests load what `make build` has compiled."""
+    program = "from hair_addon.core.kernels import compiled_kernels; print(compiled_kernels.FOLDER)"
+    environment = os.environ | {compiled_kernels.VARIABLE: named}
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == str(expected)
 
 
 @pytest.mark.usefixtures("folder")

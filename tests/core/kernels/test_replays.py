@@ -8,6 +8,8 @@ import warp as wp
 from hair_addon.core.kernels import kernel_cache
 from hair_addon.core.kernels.replays import Replays
 
+wp.set_module_options({"enable_backward": False})
+
 
 @wp.kernel
 def _add(values: wp.array[float], factor: float, sums: wp.array[float]):

@@ -14,6 +14,8 @@ import warp as wp
 
 from ...kernels import kernel_cache, native_code
 
+wp.set_module_options({"enable_backward": False})
+
 _FARTHEST = wp.constant(15)  # cells that are looked at: farther vertices know that they are as far as that
 _MOST_CELLS_ALONG = 64
 _SLACK = wp.constant(1e-3)  # of a cell, that triangles are larger

@@ -15,6 +15,8 @@ from tests.support.brute_force import distances
 from tests.support.dynamics.contacts import bumpy, sheet
 from tests.support.meshes import flat_grid
 
+wp.set_module_options({"enable_backward": False})
+
 
 @wp.kernel
 def _ask(grid: DistanceGrid, points: wp.array[wp.vec3], out_distances: wp.array[float]):

@@ -10,6 +10,8 @@ from hair_addon.core.shading.fibre.angles import fibre_angles
 from hair_addon.core.shading.light_paths import fibre_walk
 from hair_addon.core.shading.tables import lookup_tables
 
+wp.set_module_options({"enable_backward": False})
+
 SETTINGS = lookup_tables.Settings(
     mode="energy", sigma_a=(0.02, 0.3, 1.5), roughness=0.4, radial_roughness=0.4, tilt=0.05, coat=0.3
 )

@@ -8,6 +8,8 @@ import warp as wp
 from hair_addon.core.shading.light_paths import surface_walk
 from hair_addon.core.shading.tables import surface_albedo
 
+wp.set_module_options({"enable_backward": False})
+
 UP = 0.0, 0.0, 1.0
 # Base color, (roughness, metallic, reflectance at normal incidence).
 USUAL = (0.8, 0.8, 0.8), (0.5, 0.0, 0.04)

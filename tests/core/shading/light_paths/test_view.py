@@ -7,6 +7,8 @@ import warp as wp
 
 from hair_addon.core.shading.light_paths import view
 
+wp.set_module_options({"enable_backward": False})
+
 
 @wp.kernel
 def _look(

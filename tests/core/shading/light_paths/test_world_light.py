@@ -9,6 +9,8 @@ import warp as wp
 from hair_addon.core.shading.light_paths import gather, seen_rays, world_light
 from tests.core.shading.light_paths.test_gather import ALONG_Y, found_by, grid_of, ratio, strands_in_a_box, surroundings
 
+wp.set_module_options({"enable_backward": False})
+
 
 @wp.kernel
 def _directions(
