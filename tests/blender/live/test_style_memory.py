@@ -15,6 +15,15 @@ from hair_addon.core.styling.kinds import KINDS, OFFERS
 FEW, MANY = 3, 6
 
 
+@pytest.fixture(scope="module", autouse=True)
+def earlier_things_are_left_out():
+    """All that Python held before, a million things by the end of all tests, is not looked through again each time."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
+
+
 def things_alive():
     """How many of our objects and of Warp's arrays Python holds: what is large hangs on them, but not on settings."""
     gc.collect()
