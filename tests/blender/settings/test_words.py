@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The words of the interface: US spelling, and labels that fit a sidebar of its default width."""
 
-import ast
 import re
 
 import blf
@@ -23,18 +22,8 @@ BRITISH = re.compile(
 )
 
 
-def errors():
-    """The fixed parts of all sentences of `HairError`, those with values in f-strings too."""
-    for path in sorted(spoken.ADDON.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "HairError" and node.args:
-                for part in ast.walk(node.args[0]):
-                    if isinstance(part, ast.Constant) and isinstance(part.value, str):
-                        yield part.value
-
-
 def test_the_interface_has_us_spelling():
-    texts = {*spoken.strings_of_classes(), *spoken.strings_of_sources(), *errors()}
+    texts = {*spoken.strings_of_classes(), *spoken.strings_of_sources(), *spoken.parts_of_errors()}
     assert sorted(text for text in texts if BRITISH.search(text)) == []
 
 

@@ -2,6 +2,8 @@
 """Every string of the add-on that an artist reads: of its registered classes, and of its sources."""
 
 import ast
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import bpy
@@ -56,10 +58,32 @@ def strings_of_sources():
     """{string: where it stands} of literals that are reported, drawn as labels or raised."""
     found = {}
     for path in sorted((ADDON / "blender").rglob("*.py")) + sorted((ADDON / "core").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            for text in _spoken(node):
-                found[text] = f"{path.relative_to(ADDON)}:{node.lineno}"
+        found |= {text: f"{path.relative_to(ADDON)}:{line}" for text, line in _read()[path].spoken}
     found.pop("", None)
+    return found
+
+
+def parts_of_errors():
+    """The fixed parts of all sentences of `HairError`, those with values in f-strings too."""
+    return {text for read in _read().values() for text in read.errors}
+
+
+@dataclass(frozen=True)
+class _Read:
+    spoken: list  # of (string, line)
+    errors: list
+
+
+@cache
+def _read():
+    """{path: `_Read`} of all sources, which take seconds to parse."""
+    found = {}
+    for path in ADDON.rglob("*.py"):
+        read = found[path] = _Read([], [])
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            read.spoken.extend((text, node.lineno) for text in _spoken(node))
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "HairError" and node.args:
+                read.errors.extend(_literals(ast.walk(node.args[0])))
     return found
 
 
