@@ -10,10 +10,10 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def check(module, run_count, seed, limit):
-    """200 operations a run; the seed fixes the way; limit: [s]."""
+def check(module, run_count, operation_count, seed, limit):
+    """Some operations a run; the seed fixes the ways; limit: [s]."""
     walked = subprocess.run(
-        [sys.executable, "-u", "-m", f"tests.support.walk.{module}", str(run_count), "200", str(seed)],
+        [sys.executable, "-u", "-m", f"tests.support.walk.{module}", *map(str, (run_count, operation_count, seed))],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -23,13 +23,13 @@ def check(module, run_count, seed, limit):
     assert walked.returncode == 0 and walked.stdout.endswith("walked\n"), f"{way}\n{walked.stderr[-4000:]}"
 
 
-@pytest.mark.parametrize("run_count, seed", [(3, 1), pytest.param(10, 3, marks=pytest.mark.long)])
-def test_random_operations_raise_no_exception(run_count, seed):
-    check("walk_operations", run_count, seed, limit=240)
+@pytest.mark.parametrize("counts, seed", [((3, 80), 1), pytest.param((10, 200), 3, marks=pytest.mark.long)])
+def test_random_operations_raise_no_exception(counts, seed):
+    check("walk_operations", *counts, seed, limit=240)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(1, 11))
 def test_all_operators_and_settings(seed):
     """Ten times a thousand steps, with surfaces that move, and undo, redo, saving and loading that change nothing."""
-    check("walk_everything", 5, seed, limit=1200)
+    check("walk_everything", 5, 200, seed, limit=1200)
