@@ -68,7 +68,7 @@ def run(given, console):
     numbers = list(numbers or [blender.host.scene_time.present_frame()])
     blender.io.frames.require_pattern(given.out, len(numbers))
     blender.io.frames.require_view_layer()
-    blender.groom.dynamics.frame_folders.require_baked(numbers)
+    blender.groom.dynamics.frame_folders.require_baked(numbers, blender.host.scene_time.present_scene())
     without = blender.io.frames.missing_files(numbers, given.allow_missing)
     if without:
         console.warn(without)

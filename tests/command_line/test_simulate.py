@@ -9,13 +9,20 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon import api
 from hair_addon.blender.groom.dynamics import broken_guides, frame_folders, guide_baking
 from hair_addon.blender.host import memory
 from hair_addon.blender.live import simulated_hair
+from hair_addon.blender.render.viewport import viewport
 from hair_addon.core import dynamics
+from hair_addon.core.errors import HairError
 from tests.support.commands import ROOT, command, run, run_here
 from tests.support.dynamics.swung import simulate, swing
 from tests.support.reading import evaluated_points, read_picture
+
+
+def guides_of():
+    return bpy.data.hair_curves["Guides"]
 
 
 @pytest.fixture
@@ -121,6 +128,62 @@ def test_frames_that_are_not_baked_are_not_rendered(shot, tmp_path):
     assert not list(tmp_path.glob("*.png"))
 
 
+def test_a_frame_that_cannot_be_read_is_refused_as_a_missing_one(shot, tmp_path):
+    """By sequences, in one process or in two, single frames, exports and pictures; baking again mends it alone."""
+    run_here("simulate", shot)
+    whole = {path.name: path.read_bytes() for path in frame_folders.folder_of(guides_of()).glob("*.npz")}
+    damaged = frame_folders.folder_of(guides_of()) / "+00000005.npz"
+    turned = bytearray(whole[damaged.name])
+    turned[-400] ^= 1  # a bit of its points
+    size = ("--width", "16", "--height", "16", "--samples", "1", "--engine", "cycles")
+    out = tmp_path / "f_##.png"
+    sentence = 'Frame 5 of the guides "Guides" cannot be read: bake it again.'
+    for content in (turned, whole[damaged.name][:-1], b""):
+        damaged.write_bytes(content)
+        for words in (("--frames", "4-6"), ("--frames", "4-6", "--jobs", "2"), ("--frames", "5")):
+            refused = run_here("render", shot, "--out", out, *words, *size)
+            assert refused.status == 1 and sentence in refused.errors
+    assert not list(tmp_path.glob("*.png"))
+    assert run_here("info", shot, "--json").results[0]["guides"][0]["baked"]["missing"] == [5]
+    for refused in (lambda: api.render(out, frame=5, width=16, height=16), lambda: api.draw(width=16, height=16)):
+        bpy.context.scene.frame_set(5)
+        with pytest.raises(HairError, match="Frame 5 of the guides"):
+            refused()
+    with pytest.raises(HairError, match="Frame 5 of the guides"):
+        api.export_groom(tmp_path / "groom.usdc", animation="ALL")
+    bpy.context.scene.frame_set(5)
+    with pytest.raises(HairError, match="Frame 5 of the guides"):
+        api.export_groom(tmp_path / "groom.usdc")
+    with pytest.raises(RuntimeError, match="Frame 5 of the guides"):  # as Blender's own menu renders
+        bpy.context.scene.render.engine = viewport.ENGINE
+        bpy.ops.render.render()
+    assert bpy.data.hair_curves["Guides"].vellus.dynamics_status == sentence
+    bpy.context.scene.frame_set(4)
+    assert bpy.data.hair_curves["Guides"].vellus.dynamics_status == ""
+    done = run_here("simulate", shot, "--json")
+    assert done.status == 0 and [line["frame"] for line in done.results] == [*range(2, 8)]
+    assert {path.name: path.read_bytes() for path in damaged.parent.glob("*.npz")} == whole
+    assert run_here("render", shot, "--out", out, "--frames", "4-6", *size).status == 0
+    bpy.context.scene.frame_set(5)
+    assert bpy.data.hair_curves["Guides"].vellus.dynamics_status == ""
+
+
+def test_frames_that_an_exposure_reads_are_whole_too(shot):
+    """Motion blur shows the frames beside a picture's."""
+    run_here("simulate", shot)
+    folder, scene = frame_folders.folder_of(guides_of()), bpy.context.scene
+    (folder / "+00000005.npz").write_bytes(b"damaged")
+    frame_folders.require_baked([4], scene)
+    scene.render.use_motion_blur = True
+    frame_folders.require_baked([1, 2], scene)
+    with pytest.raises(HairError, match="Frame 5 of the guides"):
+        frame_folders.require_baked([4], scene)
+    (folder / "+00000006.npz").unlink()
+    scene.render.motion_blur_position = "START"
+    with pytest.raises(HairError, match="Frame 6 of the guides"):
+        frame_folders.require_baked([5], scene)
+
+
 def test_files_without_simulated_guides_are_refused(shot):
     assert "no guides" in run_here("simulate", shot, "--guides", "Nobody").errors
     bpy.data.objects["Guides"].data.vellus.simulates = False
@@ -136,7 +199,7 @@ def test_files_without_simulated_guides_are_refused(shot):
 def test_only_what_is_rendered_is_simulated_if_needed(shot):
     """As render says itself: guides that start after the last frame need no frames, nor those of delivered hair."""
     assert run_here("simulate", shot, "--if-needed", "--last-frame", "1", "--json").results == []
-    frame_folders.require_baked([1])
+    frame_folders.require_baked([1], bpy.context.scene)
     assert [line["frame"] for line in run_here("simulate", shot, "--if-needed", "--json").results] == [*range(2, 8)]
     out = shot.with_name("delivered.blend")
     assert run_here("simulate", shot, "--deliver", out).status == 0
@@ -176,7 +239,7 @@ def test_a_delivered_file_needs_no_cache(shot, tmp_path):
     bpy.data.hair_curves["Guides"].vellus.cache_folder = "//nothing"
     bpy.context.scene.frame_set(5)
     np.testing.assert_allclose(evaluated_points(bpy.data.objects["Hair"]), live, atol=1e-6)
-    frame_folders.require_baked(range(1, 7))
+    frame_folders.require_baked(range(1, 7), bpy.context.scene)
     for name in (shot, tmp_path / "delivered.usdc"):
         assert run_here("simulate", shot, "--deliver", name).status == 1
 

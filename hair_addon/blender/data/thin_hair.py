@@ -19,6 +19,18 @@ def show_thin(blender_scene):
         blender_scene.render.hair_type = "STRIP"
 
 
+def state_of(blender_scene):
+    """(Whether `show_thin` was done in a scene, how EEVEE draws strands there)."""
+    return _SET in blender_scene, blender_scene.render.hair_type
+
+
+def restore(blender_scene, was_set, hair_type):
+    """Bring back what `state_of` gave, before `show_thin`."""
+    if not was_set and _SET in blender_scene:
+        del blender_scene[_SET]
+        blender_scene.render.hair_type = hair_type
+
+
 def follow(blender_scenes):
     """Do it in those of some scenes that show hair of ours: in their own objects, in instances or in the background."""
     waiting = [one for one in blender_scenes if one.library is None and _SET not in one]

@@ -20,6 +20,6 @@ def paint(group: VertexGroup, weights: np.ndarray, leaves_out_zero: bool = True)
     order = np.argsort(weights, kind="stable")
     if leaves_out_zero:
         order = order[np.count_nonzero(weights <= 0.0) :]
-    levels, starts = np.unique(weights[order], return_index=True)
-    for level, vertices in zip(levels, np.split(order, starts[1:]), strict=True):
-        group.add(vertices.tolist(), float(level), "REPLACE")
+    levels, starts, counts = np.unique(weights[order], return_index=True, return_counts=True)
+    for level, first, count in zip(levels, starts, counts, strict=True):  # none where nothing has weight
+        group.add(order[first : first + count].tolist(), float(level), "REPLACE")

@@ -16,7 +16,7 @@ from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.long_work import Work, part_of, run_now
 from ...core.styling.base import StyleSettings
-from ..data import masks, scene, surface_space
+from ..data import masks, scene, surface_space, whole_changes
 from ..data.scene import Surface
 from ..data.strands import curves, drawn_lines, partings, stored_roots
 from ..data.surfaces import cage_of
@@ -43,6 +43,7 @@ def distribute_guides(
     return run_now(distributing_guides(surface_object, settings, depsgraph, target, keeps_roots))
 
 
+@whole_changes.whole_if_new
 def distributing_guides(
     surface_object: Object,
     settings: GuideSettings,
@@ -75,6 +76,7 @@ def interpolate_hair(
     return run_now(interpolating_hair(guide_curves, settings, depsgraph, target))
 
 
+@whole_changes.whole_if_new
 def interpolating_hair(
     guide_curves: Curves,
     settings: HairSettings,
@@ -169,6 +171,7 @@ def _completed(surface_object, surface, guide_settings, hair_settings, depsgraph
     return (guides, hair), (of_guides, of_hair)
 
 
+@whole_changes.whole
 def adding_hair(
     surface_object: Object,
     guide_settings: GuideSettings,

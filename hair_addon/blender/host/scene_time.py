@@ -89,6 +89,12 @@ def exposure_times(blender_scene, steps):
     return [render.motion_blur_shutter * (center + index / count - 0.5) for index in range(count + 1)]
 
 
+def exposed_frames(blender_scene, frame):
+    """Return the range of frames that an exposure of a frame lies between: that frame alone without motion blur."""
+    ends = exposure_times(blender_scene, 0)
+    return range(math.floor(frame + ends[0]), math.ceil(frame + ends[-1]) + 1)
+
+
 def visit(blender_scene, offsets, set_frame):
     """Change a scene to several times in turn, and back afterwards: a generator of the indices of `offsets`.
 

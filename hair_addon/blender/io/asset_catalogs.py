@@ -2,19 +2,26 @@
 """Catalogs of an asset library: lines of blender_assets.cats.txt, UUID:path:name."""
 
 import uuid
+from dataclasses import dataclass
 from pathlib import Path
 
 from ...core.errors import HairError, cause_of
-from ...core.files.whole_file import whole_file
 
 FILE = "blender_assets.cats.txt"
 _HEAD = "# This is an Asset Catalog Definition file for Blender.\n#\n# Other lines are UUID:path:name.\n\nVERSION 1\n\n"
 
 
-def identifier(folder: Path, catalog: str) -> str:
-    """The UUID of a catalog such as "Hair/Short" in a library's folder, which gets it if it lacks it; its other lines
-    stay. Raises `HairError`.
-    """
+@dataclass(frozen=True)
+class Catalog:
+    """The UUID of a catalog and the library's list of them; text: the list with it, None where it has it already."""
+
+    identifier: str
+    path: Path
+    text: str | None
+
+
+def read(folder: Path, catalog: str) -> Catalog:
+    """A catalog such as "Hair/Short" in a library's folder. Raises `HairError`."""
     catalog = "/".join(part.strip() for part in catalog.replace(":", "-").split("/") if part.strip())
     if not catalog or any(ord(character) < 32 for character in catalog):
         raise HairError("The catalog has no name: type one, or clear the field.")
@@ -26,12 +33,10 @@ def identifier(folder: Path, catalog: str) -> str:
     for line in text.splitlines():
         found = line.split(":")
         if len(found) >= 2 and found[1] == catalog and _is_uuid(found[0]):  # Blender leaves out other lines
-            return found[0]
+            return Catalog(found[0], path, None)
     made = str(uuid.uuid4())
     line = f"{made}:{catalog}:{catalog.replace('/', '-')}\n"
-    with whole_file(path) as partial:
-        partial.write_text(text + ("" if text.endswith("\n") else "\n") + line, encoding="utf-8")
-    return made
+    return Catalog(made, path, text + ("" if text.endswith("\n") else "\n") + line)
 
 
 def _is_uuid(text):

@@ -12,7 +12,7 @@ from ...core.errors import HairError
 from ...core.files import file_names
 from ...core.files.whole_file import require_place, whole_file
 from ...core.long_work import Stage
-from ..data import scene
+from ..data import scene, whole_changes
 from ..data.strands import curves, delivered_hair, simulated_guides
 from ..groom import selection
 from ..groom.dynamics import frame_folders
@@ -62,6 +62,7 @@ def path_of(guides, blend_path=None):
     return place(file_names.free_stem(name_of(guides), lambda stem: str(place(stem).resolve()).casefold() in played))
 
 
+@whole_changes.whole
 def delivering(guides, path, blender_scene):
     """Write the hair of baked guides to a file and let it play that, as work in steps: a computation a sample.
 

@@ -134,6 +134,7 @@ def write_frame(path, frame, engine, settings, partial=None, progress=no_progres
     partials = view_files.files_of(partial)
     with whole_files(files, partials), _rendering(blender_scene, partial, engine, settings):
         missing_files([frame], allows_missing)
+        frame_folders.require_readable([frame], blender_scene)
         scene_time.go_to(blender_scene, frame)
         progress(f"Frame {frame}", 0.0)
         try:

@@ -106,11 +106,14 @@ def _opened(partial, path, chosen, first_frame, blender_scene):
 
 
 def _simulated(chosen, frames):
-    """The guides of hair that simulate, where time passes; they have to be baked."""
-    if frames == [None]:
-        return []
+    """The guides of hair that simulate, where time passes; they have to be baked. Raises `HairError`."""
     guides = {hair.vellus.guide_curves for hair in chosen} - {None}
     simulated = [one for one in guides if frame_folders.is_simulated(one)]
+    if frames == [None]:
+        for fault in (frame_folders.fault_of(one, [scene_time.present_frame()]) for one in simulated):
+            if fault is not None:
+                raise fault
+        return []
     for one in simulated:
         frame_folders.require_frames(one, frames)
     return [Remembered(one) for one in simulated]

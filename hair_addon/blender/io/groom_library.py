@@ -15,10 +15,10 @@ import numpy as np
 from ...core import geometry, grooming
 from ...core.errors import HairError, cause_of
 from ...core.files import file_names, settings_file
-from ...core.files.whole_file import require_place, whole_file
+from ...core.files.whole_file import require_place, whole_files
 from ...core.geometry.mesh import SurfacePoints, check_mesh
 from ...core.long_work import Stage, Work
-from ..data import scene
+from ..data import scene, whole_changes
 from ..data.made import groom_assets
 from ..data.strands import attributes, curves
 from ..groom import selection
@@ -75,6 +75,7 @@ def _require_replaceable(path):
         raise HairError("{path} has more than grooms in it: choose another file.", path=path)
 
 
+@whole_changes.whole
 def saving(
     hair: bpy.types.Curves, path: Path, name: str = "", catalog: str = "", picture: np.ndarray | None = None
 ) -> Work[Path]:
@@ -117,18 +118,22 @@ def write(path: Path, grooms: Iterable[tuple[LibraryGroom, np.ndarray | None]], 
     catalog: "Hair/Short" for instance, which the library's list of catalogs gets; empty for none. The file appears
     whole or not at all. Raises `HairError`.
     """
-    identifier = asset_catalogs.identifier(path.parent, catalog) if catalog else ""
+    listed = asset_catalogs.read(path.parent, catalog) if catalog else None
     made: list[bpy.types.Object] = []
     renamed: list[tuple[bpy.types.Object, str]] = []
     try:
-        for groom, picture in grooms:
-            renamed += _make_way(groom.name)
-            made.append(_asset(groom, picture, identifier))
-        with whole_file(path) as partial:
-            bpy.data.libraries.write(str(partial), set(made), compress=True)
+        with whole_changes.whole_change():
+            for groom, picture in grooms:
+                renamed += _make_way(groom.name)
+                made.append(_asset(groom, picture, "" if listed is None else listed.identifier))
+            new_list = [] if listed is None or listed.text is None else [listed.path]
+            with whole_files([path, *new_list]) as partials:
+                bpy.data.libraries.write(str(partials[0]), set(made), compress=True)
+                for partial in partials[1:]:
+                    partial.write_text(listed.text, encoding="utf-8")
+            for asset in made:
+                _remove(asset)
     finally:
-        for asset in made:
-            _remove(asset)
         for other, name in renamed:
             other.name = name
 

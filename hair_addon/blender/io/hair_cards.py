@@ -12,6 +12,7 @@ from ...core.files import file_names
 from ...core.files.whole_file import require_place
 from ...core.geometry import clusters
 from ...core.long_work import Stage, part_of
+from ..data import whole_changes
 from ..data.made import armature_weights, card_images, made_meshes
 from ..materials import card_material
 from ..render import card_pictures
@@ -43,6 +44,7 @@ class _Drawn:
     picture_count: int
 
 
+@whole_changes.whole
 def making_cards(hair, settings, folder=None):
     """Make cards of hair Curves, as work in steps; returns [`CardLevel`], the finest first. Raises `HairError`.
 
@@ -121,9 +123,7 @@ def _written(read, drawn, folder):
     surface_object = read.surface_object.find()
     name = f"{read.name} Cards"
     stem = "" if folder is None else _stem(read.name, card_images.files_of_others(f"{name} LOD", folder))
-    images = []
-    for index, level in enumerate(drawn):
-        images.append(card_images.new_images(f"{name} LOD{index}", level.maps, folder, f"{stem}{index}"))
+    images = [card_images.new_images(f"{name} LOD{index}", level.maps) for index, level in enumerate(drawn)]
     collection, made = made_meshes.new_collection(name, surface_object), []
     for index, (level, its) in enumerate(zip(drawn, images, strict=True)):
         title = f"{name} LOD{index}"
@@ -134,4 +134,5 @@ def _written(read, drawn, folder):
             made_meshes.hide(mesh_object)
         counts = level.card_count, level.picture_count, level.mesh.triangle_count
         made.append(CardLevel(mesh_object, its, *counts, read.notes))
+    card_images.keep(images, folder, stem)  # last: files that are replaced do not come back
     return made

@@ -12,7 +12,7 @@ from ...core.geometry.mesh import TriMesh
 from ...core.long_work import Stage
 from ...core.shading import strand_colors
 from ...core.shading.appearance import Appearance
-from ..data import scene
+from ..data import scene, whole_changes
 from ..data.made import armature_weights, made_meshes
 from ..data.strands import curves, exported_curves
 from ..host import scene_time
@@ -94,6 +94,7 @@ class MadeTubes:
     notes: list[HairError]
 
 
+@whole_changes.whole
 def making_tubes(hair, settings):
     """Make a mesh object of strands as tubes, as work in steps; returns `MadeTubes`. Raises `HairError`."""
     settings.require_size(strand_count(hair))

@@ -68,7 +68,7 @@ def _baked(guides):
         "first": manifest.first,
         "last": manifest.last,
         "state": manifest.state,
-        "missing": [number for number in wanted if number not in there],
+        "missing": [number for number in wanted if number not in there or frames.fault_of(number) is not None],
         "outdated": _changed_parts(guides, manifest),
     }
 

@@ -6,7 +6,7 @@ import contextlib
 import bpy
 from bpy.app.handlers import persistent
 
-from ..data import orientation, rest_nodes, surface_space
+from ..data import orientation, surface_space
 from ..data.strands import curves_objects
 from ..groom import bindings, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
@@ -16,6 +16,7 @@ from ..materials import looks
 from ..render.frames import composite
 from ..settings import animated, style_items
 from . import (
+    copied_faces,
     events,
     every_frame,
     file_changes,
@@ -62,10 +63,15 @@ def after_depsgraph_update(scene, depsgraph):
     deformed = updates.deformed(reports)
     moving_surfaces.shape_changed(deformed & _surfaces())
     changed = updates.originals([u for u in reports if not _is_only_carried(u, deformed)], is_geometry=True)
+    told_apart = []
     for surface_object in deformed:
         events.surface_moved(surface_object)
         # Hair waits until the surface leaves edit and paint modes, and until copies of its faces are told apart.
-        if surface_object.mode == "OBJECT" and not _tells_apart(surface_object):
+        if surface_object.mode != "OBJECT":
+            continue
+        if copied_faces.tell_apart(surface_object):
+            told_apart.append(surface_object)
+        else:
             is_edited = surface_object.data in changed and not moving_surfaces.is_to_be_checked_later(surface_object)
             stale_marks.follow_surface(surface_object, depsgraph, is_edited)
     moved = updates.originals(reports, is_geometry=True, is_transform=True)
@@ -99,14 +105,8 @@ def after_depsgraph_update(scene, depsgraph):
     if running.job() is None:
         stored_guide_maps.follow(reports, depsgraph)
         live_hair.follow_masks(_painted(reports), depsgraph)
-
-
-def _tells_apart(surface_object):
-    """Whether nodes were added to a surface of our hair, or moved, with which Blender will report it again."""
-    if not surface_object.add_rest_position_attribute:
-        return False
-    is_ours = any(one.surface == surface_object and one.vellus.kind != "NONE" for one in bpy.data.hair_curves)
-    return is_ours and rest_nodes.tell_apart(surface_object)
+    if told_apart:  # last: the update that it asks for calls this again
+        copied_faces.follow(told_apart, scene.view_layers[depsgraph.view_layer.name])
 
 
 def _surfaces():

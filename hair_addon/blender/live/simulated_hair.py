@@ -5,6 +5,7 @@ The frame after the last one is simulated on the spot and kept in memory; a jump
 on to Blender's data: simulations are kept by the guides' session UID.
 """
 
+import math
 import sys
 from dataclasses import dataclass, field
 
@@ -62,14 +63,18 @@ def follow_frame(blender_scene, depsgraph):
             _show(guides, None, shown_in)
             guides.vellus.dynamics_status = str(error)
         else:
-            _say(guides, blender_scene, points)
+            _say(guides, blender_scene, points, time)
 
 
-def _say(guides, blender_scene, points):
-    """Say what is known of guides, which are shown at some points; or what is wrong with their settings."""
+def _say(guides, blender_scene, points, time):
+    """Say what is known of guides, which are shown at some points; or what is wrong with settings or a baked frame."""
     try:
         _note_state(guides, blender_scene)
-        if points is not None or played_cache.get(guides.session_uid) is not None:
+        fault = frame_folders.fault_of(guides, sorted({math.floor(time), math.ceil(time)}))
+        if fault is not None:
+            raise fault
+        is_known = frame_folders.has_frames(guides) or played_cache.get(guides.session_uid) is not None
+        if points is not None or is_known:
             guides.vellus.dynamics_status = ""
     except HairError as error:
         guides.vellus.dynamics_status = str(error)

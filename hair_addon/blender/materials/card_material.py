@@ -75,8 +75,14 @@ def _new_shader(tree, look, color, target, height):
 
 
 def _new_images(tree, images):
-    """The nodes of textures, of the normals in them and of the direction across strands."""
+    """The nodes of textures, of the normals in them and of the direction across strands.
+
+    Textures that no shader here shows have nodes too: Blender saves and appends them with the material.
+    """
     nodes = {}
+    for row, kind in enumerate(kind for kind in images if kind not in ("color", "normal")):
+        node = tree.nodes.new("ShaderNodeTexImage")
+        node.image, node.label, node.location = images[kind], kind, (-1260.0, 160.0 - 320.0 * row)
     for row, kind in enumerate(("color", "normal")):
         node = nodes[kind] = tree.nodes.new("ShaderNodeTexImage")
         node.image, node.location = images[kind], (-900.0, 160.0 - 320.0 * row)

@@ -14,6 +14,8 @@ from ...core.long_work import Stage, run_now
 from ..data import scene
 from ..data.pictures import camera_lens, panoramic_camera
 from ..gpu import drawing, world_texture
+from ..groom.dynamics import frame_folders
+from ..host import scene_time
 from . import drawn_scene, film, light_paths
 
 
@@ -47,6 +49,8 @@ def drawing_picture(settings, drawn=None, lens_passes=None):
     if max(size) * per_side + 2 * film.BORDER > largest:
         sentence = f"{width * per_side} × {height * per_side} samples exceed the graphics driver's {largest} a side"
         raise HairError(f"{sentence}: use fewer.")
+    if drawn is None:
+        frame_folders.require_readable([scene_time.frame_of(context.scene)], context.scene)
     yield Stage("Drawing shadows", 0.0)
     world_texture.check_image()
     if context.scene.camera is not None and panoramic_camera.is_panoramic(context.scene.camera):

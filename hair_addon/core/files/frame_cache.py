@@ -61,6 +61,9 @@ class FrameCache:
         self.folder = folder
         self._told: set[str] = set()
         self._complaints: list[HairError] = []
+        self._checked: dict[
+            int, tuple[tuple[int, ...], HairError | None]
+        ] = {}  # by frame: marks of its file, its fault
         self.manifest: Manifest | None = None
         self.space = Affine.identity()  # from the coordinates that guides were made in to those that they are in now
         self.read_manifest()
@@ -83,11 +86,27 @@ class FrameCache:
         """Numbers of the frames after which a state seems to be there, in order."""
         return _numbers(self.folder, True)
 
+    def fault_of(self, number: int) -> HairError | None:
+        """Why the file of a frame that is there cannot be read whole; None where it can, or there is none.
+
+        A file is read once until it changes.
+        """
+        marks, known = _marks_of(self.folder / _name(number, False)), self._checked.get(number)
+        if marks is None:
+            return None
+        if known is None or known[0] != marks:
+            read_with = self.manifest
+            is_whole = self._frame_arrays(number) is not None
+            if not is_whole and self.read_manifest() != read_with:  # baked by another process meanwhile
+                self._frame_arrays(number)
+            known = self._checked.get(number)
+        return None if known is None else known[1]
+
     def read_frame(self, number: int) -> Frame | None:
         """Return a frame of any simulation that the manifest names, None for a missing one."""
         if self.manifest is None:
             return None
-        arrays = self._read(self.manifest, _name(number, False), self.manifest.frame_layout, number)
+        arrays = self._frame_arrays(number)
         if arrays is None:
             return None
         key = arrays["key"].tobytes().hex()
@@ -143,15 +162,25 @@ class FrameCache:
         if not os.path.lexists(path):
             return None
         try:
-            arrays = array_file.read(path, layout)
+            return _arrays(path, manifest, layout, number)
         except HairError as error:
             self._complain(name, error)
             return None
-        key = arrays["key"].tobytes().hex()
-        if int(arrays["frame"]) != number or manifest.changed_parts(key) is None:
-            self._complain(name, HairError("{path} is a frame of another simulation.", path=path))
+
+    def _frame_arrays(self, number):
+        """The arrays of a frame's file, None without one; what is wrong with it is kept for `fault_of`."""
+        path = self.folder / _name(number, False)
+        marks, fault = _marks_of(path), None
+        if marks is None or self.manifest is None:
             return None
-        return arrays
+        try:
+            return _arrays(path, self.manifest, self.manifest.frame_layout, number)
+        except HairError as error:
+            fault = error
+            self._complain(path.name, error)
+            return None
+        finally:
+            self._checked[number] = marks, fault
 
     def _complain(self, name, error):
         if name not in self._told:
@@ -279,6 +308,23 @@ def between(
     )
     a, b, c, d = map(np.float32, weights)
     return a * before + b * start + c * end + d * after
+
+
+def _marks_of(path):
+    """What differs where a file was written anew; None where there is none."""
+    try:
+        status = path.lstat()
+    except OSError:
+        return None
+    return status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
+
+
+def _arrays(path, manifest, layout, number):
+    """The arrays of a frame's or a state's file. Raises `HairError`."""
+    arrays = array_file.read(path, layout)
+    if int(arrays["frame"]) != number or manifest.changed_parts(arrays["key"].tobytes().hex()) is None:
+        raise HairError("{path} is a frame of another simulation.", path=path)
+    return arrays
 
 
 def _name(number, is_state):

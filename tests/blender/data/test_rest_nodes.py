@@ -11,7 +11,7 @@ from mathutils.bvhtree import BVHTree
 from hair_addon.blender.data import rest_nodes
 from hair_addon.blender.groom import diagnostics
 from tests.support.dynamics.following import grow, update
-from tests.support.reading import evaluated_points, points
+from tests.support.reading import evaluated_points, points, write_points
 
 
 @pytest.fixture
@@ -154,3 +154,46 @@ def test_copies_of_deformed_faces_are_named(half):
     assert any('"Solidify"' in warning.text for warning in diagnostics.warnings_of(half, []))
     half.modifiers.move(1, 0)
     assert rest_nodes.lost_copies(half) is None
+
+
+@pytest.mark.parametrize("copying", [mirror, solidify])
+def test_a_modifier_that_is_added_to_hair_has_it_grow_on_the_copies_at_once(copying, half):
+    """As it grows on the mesh with the modifier; without it again, hair is as before. No other update is needed."""
+    bpy.ops.ed.undo_push(message="before")
+    grow_upright(half)
+    bpy.ops.ed.undo_push(message="grown")
+    before = points(bpy.data.objects["Hair"])
+    modifier = copying(half)
+    modifier.show_viewport = True
+    bpy.ops.ed.undo_push(message="modifier")
+    update()
+    added = points(bpy.data.objects["Hair"])
+    bpy.ops.ed.undo()
+    update()
+    assert np.array_equal(points(bpy.data.objects["Hair"]), before)
+    bpy.ops.ed.redo()
+    update()
+    assert np.array_equal(points(bpy.data.objects["Hair"]), added)
+    half = bpy.data.objects["Sphere"]
+    half.modifiers.remove(half.modifiers[0])
+    update()
+    assert np.array_equal(points(bpy.data.objects["Hair"]), before)
+    bpy.ops.ed.undo()
+    bpy.ops.ed.undo()
+    half = bpy.data.objects["Sphere"]
+    assert "Hair" not in bpy.data.objects
+    copying(half)
+    grow_upright(half)
+    assert np.abs(points(bpy.data.objects["Hair"]) - added).max() < 1e-6
+
+
+def test_combed_guides_stay_and_their_hair_spreads_over_mirrored_faces(half):
+    guides, hair = grow_upright(half)
+    combed = points(guides) + np.float32([0.0, 0.0, 0.05]) * np.linspace(0.0, 1.0, 41, dtype=np.float32)[:, None]
+    write_points(guides, combed)
+    assert points(hair)[:, 0, 0].min() > -1e-3
+    mirror(half)
+    update()
+    assert np.abs(points(guides) - combed).max() < 1e-6
+    share = np.mean(points(hair)[:, 0, 0] < 0.0)
+    assert 0.35 < share < 0.65

@@ -119,7 +119,7 @@ def test_the_file_is_an_asset_with_a_picture_in_a_catalog(groom, library):
     with bpy.data.libraries.load(str(library), assets_only=True) as (_there, wanted):
         wanted.objects = ["Bob"]
     asset = wanted.objects[0]
-    assert asset.asset_data.catalog_id == asset_catalogs.identifier(library.parent, "Hair/Short")
+    assert asset.asset_data.catalog_id == asset_catalogs.read(library.parent, "Hair/Short").identifier
     np.testing.assert_allclose(groom_assets.read_picture(asset), PICTURE, atol=0.003)
     lines = (library.parent / asset_catalogs.FILE).read_text().splitlines()
     assert sum("Hair/Short" in line for line in lines) == 1

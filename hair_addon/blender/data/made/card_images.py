@@ -11,26 +11,24 @@ from ....core.files.whole_file import whole_files
 from ...host.notices import name_of
 
 
-def new_images(name, maps, folder, stem):
-    """{map: image} of `texels.maps`; "color" has alpha too.
-
-    name: that images begin with; folder: that .png files are written to, whole or not at all, named after `stem` and
-    the map; None packs images into the .blend. Raises `HairError`.
-    """
+def new_images(name, maps):
+    """{map: image} of `texels.maps`, not kept yet; "color" has alpha too. name: that images begin with."""
     pixels = {"color": np.dstack([texels.srgb(maps["color"]), maps["alpha"]])}
     pixels |= {kind: maps[kind] for kind in texels.MAPS if kind != "color"}
-    made = {kind: _new_image(f"{name} {kind}", kind, values) for kind, values in pixels.items()}
-    try:
-        if folder is None:
-            for image in made.values():
-                image.pack()
-        else:
-            _save(made, [folder / f"{stem}_{kind}.png" for kind in made])
-    except BaseException:
-        for image in made.values():
-            bpy.data.images.remove(image)
-        raise
-    return made
+    return {kind: _new_image(f"{name} {kind}", kind, values) for kind, values in pixels.items()}
+
+
+def keep(levels, folder, stem):
+    """Pack the images of levels into the .blend, or write them as .png files, all or none. Raises `HairError`.
+
+    levels: [`new_images`]; folder: of the files, None to pack; they are named after `stem`, the level and the map.
+    """
+    images = [(f"{stem}{index}_{kind}", image) for index, made in enumerate(levels) for kind, image in made.items()]
+    if folder is None:
+        for _name, image in images:
+            image.pack()
+    else:
+        _save([image for _name, image in images], [folder / f"{name}.png" for name, _image in images])
 
 
 def files_of_others(name, folder):
@@ -54,12 +52,12 @@ def _new_image(name, kind, values):
     return image
 
 
-def _save(made, paths):
+def _save(images, paths):
     with whole_files(paths) as partials:
-        for image, partial in zip(made.values(), partials, strict=True):
+        for image, partial in zip(images, partials, strict=True):
             image.filepath_raw = str(partial)
             image.save()
-    for image, path in zip(made.values(), paths, strict=True):
+    for image, path in zip(images, paths, strict=True):
         image.filepath_raw = str(path)
         image.source = "FILE"
         image.alpha_mode = "CHANNEL_PACKED"

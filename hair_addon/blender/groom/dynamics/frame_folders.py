@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy.types import Curves
+from bpy.types import Curves, Scene
 
 from ....core.errors import HairError
 from ....core.files import frame_cache, frame_manifest
@@ -138,14 +138,31 @@ def new_folder(guides: Curves) -> Path:
     return folder_of(guides)
 
 
-def require_baked(numbers: Iterable[int]) -> None:
-    """Raise `HairError` unless all guides that simulate have baked frames of these numbers, from their start frame on.
+def require_baked(numbers: Iterable[int], scene: Scene) -> None:
+    """Raise `HairError` unless all guides that simulate have whole baked frames for pictures of frames of a scene.
 
-    Renders of sequences ask: they never simulate. Hair that plays delivered frames needs no others.
+    From their start frame on. Renders of sequences ask: they never simulate. Hair that plays delivered frames needs no
+    others.
     """
     numbers = list(numbers)
-    for guides in rendered(max(numbers)):
-        require_frames(guides, numbers)
+    exposed = sorted({frame for number in numbers for frame in scene_time.exposed_frames(scene, number)})
+    for guides in rendered(exposed[-1]):
+        require_frames(guides, exposed)
+    require_readable(numbers, scene)
+
+
+def require_readable(numbers: Iterable[int], scene: Scene) -> None:
+    """Raise `HairError` where baked frames that pictures of frames of a scene show cannot be read whole.
+
+    Motion is read of the frames beside them, too. Every picture asks: those guides would be as combed in it.
+    """
+    is_moving = scene.render.use_motion_blur or any(layer.use_pass_vector for layer in scene.view_layers)
+    beside = range(-2, 3) if is_moving else range(1)
+    shown = sorted({number + offset for number in numbers for offset in beside})
+    for guides in rendered(shown[-1]):
+        fault = fault_of(guides, shown)
+        if fault is not None:
+            raise fault
 
 
 def rendered(last: int) -> list[Curves]:
@@ -163,7 +180,7 @@ def require_frames(guides: Curves, numbers: Iterable[int]) -> None:
     """Raise `HairError` unless guides simulate, and have baked frames of these numbers from their start frame on."""
     if not is_simulated(guides):
         raise HairError('The guides "{name}" do not simulate: switch Dynamics on.', name=name_of(guides))
-    start = guides.vellus.dynamics.start_frame
+    numbers, start = list(numbers), guides.vellus.dynamics.start_frame
     baked = frames_of(guides)
     is_theirs = baked is not None and baked.manifest is not None and baked.manifest.guide_count == len(guides.curves)
     there = set(baked.frame_numbers()) if baked is not None and is_theirs else set()
@@ -174,6 +191,24 @@ def require_frames(guides: Curves, numbers: Iterable[int]) -> None:
             frame=missing[0],
             name=name_of(guides),
         )
+    fault = fault_of(guides, numbers)
+    if fault is not None:
+        raise fault
+
+
+def fault_of(guides: Curves, numbers: Iterable[int]) -> HairError | None:
+    """Which of the baked frames of guides cannot be read whole, the first of these numbers; None where all can.
+
+    Frames that are missing are none of them.
+    """
+    baked = frames_of(guides)
+    if baked is None or baked.manifest is None or baked.manifest.guide_count != len(guides.curves):
+        return None
+    for number in numbers:
+        if number >= guides.vellus.dynamics.start_frame and baked.fault_of(number) is not None:
+            sentence = 'Frame {frame} of the guides "{name}" cannot be read: bake it again.'
+            return HairError(sentence, frame=f"{number:g}", name=name_of(guides))
+    return None
 
 
 def simulating() -> list[Curves]:

@@ -7,7 +7,7 @@ Baking goes on where it was stopped, from the last state that was written, and c
 import contextlib
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bpy.types import Curves, Scene
@@ -153,7 +153,8 @@ def baking(
     with contextlib.ExitStack() as stack:
         stack.callback(_end, its_scene, present, [Remembered(guides) for guides in guides_list])
         stack.enter_context(quiet_hair.unevaluated(guides_list, scene))
-        tasks = [_begin(guides, last, scene, starts_over, stack) for guides in guides_list]
+        begun = [_begin(guides, last, scene) for guides in guides_list]  # what is refused has changed nothing
+        tasks = [_open(*one, last, starts_over, stack) for one in begun]
         yield Stage("Baking", 0.0)
         yield from bake_resuming.going_on(tasks, its_scene)
         first = min((task.done for task in tasks), default=last)
@@ -211,17 +212,15 @@ def _end(its_scene, present, baked):
             frame_folders.have_changed(remembered.find())
 
 
-def _begin(guides, last, scene, starts_over, stack):
-    """A `Task` in its first frame."""
+def _begin(guides, last, scene):
+    """Guides in their first frame, which stays as it is: they, their `GuideSimulation`, the `Manifest` of their frames,
+    the digest of the animation, and their points.
+    """
     start = properties.dynamics_of(guides.vellus).start_frame
     if last < start:
         raise HairError(
             "The simulation begins in frame {start}, after the last frame to bake, {last}.", start=start, last=last
         )
-    folder = frame_folders.new_folder(guides)
-    frame_folders.forget(guides)
-    if starts_over and (folder / frame_manifest.NAME).exists():
-        frame_cache.remove(folder)
     scene_time.go_to(scene, start)
     simulated = guide_simulation.begin(guides, scene, scenes.present_depsgraph())
     rate = scene_time.animation_rate(scene)
@@ -232,19 +231,29 @@ def _begin(guides, last, scene, starts_over, stack):
     parted_by = _parted_by(guides)
     space = tuple(surface_space.applied(guides).matrix.ravel().tolist())
     spaces = () if space == frame_manifest.UNMOVED else (space,)
-    before = FrameCache(folder).manifest if (folder / frame_manifest.NAME).exists() else None
-    worst = broken_guides.noted(before if before is not None and before.keys[-1] == keys[0] else None)
-    told = {"notes": worst.notes, "parted_by": parted_by, "spaces": spaces}
+    told = {"parted_by": parted_by, "spaces": spaces}
     manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout, **told)
-    writer = stack.enter_context(frame_cache.baking(folder, manifest))
-    guides_named, there = Remembered(guides), FrameCache(folder)
-    numbers = {number for number in there.state_numbers() if start < number <= last + _BEYOND}
     digest = bake_resuming.digest_of(guides, scene, properties.dynamics_of(guides.vellus))
+    return Remembered(guides), simulated, manifest, digest, combed
+
+
+def _open(named, simulated, manifest, digest, combed, last, starts_over, stack):
+    """A `Task` in its first frame, whose folder this process has claimed."""
+    guides, start = named.find(), manifest.first
+    folder = frame_folders.new_folder(guides)
+    frame_folders.forget(guides)
+    if starts_over and (folder / frame_manifest.NAME).exists():
+        frame_cache.remove(folder)
+    before = FrameCache(folder).manifest if (folder / frame_manifest.NAME).exists() else None
+    worst = broken_guides.noted(before if before is not None and before.key == manifest.key else None)
+    writer = stack.enter_context(frame_cache.baking(folder, replace(manifest, notes=worst.notes)))
+    there = FrameCache(folder)
+    numbers = {number for number in there.state_numbers() if start < number <= last + _BEYOND}
     found = there.read_frame(start)
     if found is None or (found.key, found.digest) != (manifest.key, digest):
         numbers = set()
         writer.write_frame(start, combed, digest)
-    return Task(name_of(guides), guides_named, simulated, writer, start, there, worst=worst, numbers=numbers)
+    return Task(name_of(guides), named, simulated, writer, start, there, worst=worst, numbers=numbers)
 
 
 def _read(task, scene, depsgraph):

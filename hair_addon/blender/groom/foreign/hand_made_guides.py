@@ -22,7 +22,7 @@ from ....core.grooming.groom import HairSettings
 from ....core.grooming.rooted_curves import RootedCurves, reversal
 from ....core.long_work import Work, part_of, run_now
 from ....core.params import Param, plain_value
-from ...data import masks, scene, surface_space, usable_surfaces, vertex_groups
+from ...data import masks, scene, surface_space, usable_surfaces, vertex_groups, whole_changes
 from ...data.scene import Surface
 from ...data.strands import attributes, curves, curves_objects, follow_nodes, posed_strands
 from ...host.datablocks import Remembered
@@ -119,6 +119,7 @@ def use_as_guides(curves_object: Object, surface_object: Object, depsgraph: Deps
     return run_now(using_as_guides(curves_object, surface_object, depsgraph, **options))
 
 
+@whole_changes.whole
 def using_as_guides(
     curves_object: Object,
     surface_object: Object,
@@ -243,6 +244,7 @@ def write(
     kind: str = "GUIDES",
 ) -> bpy.types.Curves:
     """Make an object's curves GUIDES or HAIR that settings do not change; returns its Curves. Raises `HairError`."""
+    whole_changes.keep_copy(curves_object)
     datablock = foreign_curves.take(curves_object, applies_modifiers)
     if len(datablock.points) != seen.starts[-1]:
         raise HairError('"{name}" was changed while its guides were being computed.', name=name_of(curves_object))

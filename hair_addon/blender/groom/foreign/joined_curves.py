@@ -9,12 +9,14 @@ import numpy as np
 from bpy.types import Object
 
 from ....core.long_work import Work
+from ...data import whole_changes
 from ...data.strands import attributes
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from . import foreign_curves, hand_made_guides
 
 
+@whole_changes.whole
 def using(
     objects: Sequence[Object],
     surface_object: Object,
@@ -32,12 +34,9 @@ def using(
         hand_made_guides.require_usable(one, surface_object)
     name, used, joined = name_of(objects[0]), [Remembered(one) for one in objects], _joined(objects, applies_modifiers)
     copy = Remembered(joined)
-    try:
-        made = yield from use(joined, True)
-    except BaseException:  # Esc too
-        _remove(copy.find())
-        raise
+    made = yield from use(joined, True)
     for one in used:
+        whole_changes.keep_copy(one.find())
         _remove(one.find())
     _rename(copy.find(), name)
     return made
@@ -50,14 +49,9 @@ def _rename(curves_object, name):
 def _joined(objects, applies_modifiers):
     """A new object with the curves of all, in the coordinates of the first, where that is."""
     copies, before = [], {data.session_uid for data in _all_data()}
-    try:
-        for one in objects:
-            copies.append(_copy(one))
-            foreign_curves.take(copies[-1], applies_modifiers)
-    except BaseException:
-        for copy in copies:
-            _remove(copy)
-        raise
+    for one in objects:
+        copies.append(_copy(one))
+        foreign_curves.take(copies[-1], applies_modifiers)
     _unite_radii(copies)
     first = copies[0]
     with bpy.context.temp_override(

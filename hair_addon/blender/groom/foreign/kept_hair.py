@@ -22,7 +22,7 @@ from ....core.grooming.groom import HairSettings
 from ....core.grooming.rooted_curves import RootedCurves
 from ....core.long_work import Work, part_of
 from ....core.params import Param, declared, plain_value
-from ...data import scene, surface_space, thin_hair
+from ...data import scene, surface_space, thin_hair, whole_changes
 from ...data.scene import Surface
 from ...data.strands import attributes, curves, curves_objects, exported_curves, kept_shapes
 from ...host.datablocks import Remembered
@@ -52,6 +52,7 @@ class KeptHair:
         return HandMade(self.guides, self.hair, self.rooted).notes()
 
 
+@whole_changes.whole
 def using_as_hair(
     curves_object: Object,
     surface_object: Object,

@@ -8,6 +8,7 @@ import bpy
 from bpy.types import Object, ParticleSystem
 
 from ....core.errors import HairError
+from ...data import whole_changes
 from ...data.strands import curves
 from ...host.notices import name_of
 
@@ -41,20 +42,14 @@ def as_curves(surface: Object) -> Iterator[Object]:
     modifier = next(m for m in surface.modifiers if m.type == "PARTICLE_SYSTEM" and m.particle_system == system)
     if not (modifier.show_viewport and surface.visible_get()):
         raise HairError('"{name}" or its particle system is hidden: show it first.', name=name_of(surface))
-    _convert(surface, system.settings)
-    made = next((o for o in bpy.data.objects if o not in before and o.type == "CURVES"), None)
-    try:
+    with whole_changes.whole_change(surface):
+        _convert(surface, system.settings)
+        made = next((o for o in bpy.data.objects if o not in before and o.type == "CURVES"), None)
         if made is None or not len(made.data.curves):
             raise HairError('The particle system "{system}" has no hair yet.', system=name)
         made.name = made.data.name = name
         made.data.surface = surface
         yield made
-    except BaseException:
-        if made is not None:
-            data = made.data
-            bpy.data.objects.remove(made)
-            bpy.data.hair_curves.remove(data)
-        raise
     modifier = surface.modifiers[modifier.name]
     modifier.show_viewport = modifier.show_render = False
 

@@ -46,14 +46,15 @@ def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
         name = mask or _new_name(hair, item)
         painted = surface.vertex_groups.get(name) or surface.vertex_groups.new(name=name)
         surface.vertex_groups.active = painted
-        if mask != painted.name:
-            group.mask = painted.name
+        mask = painted.name
     selection.reveal(surface, context.view_layer, _viewport(context))
     selection.make_active(surface, context.view_layer)
     try:
         bpy.ops.object.mode_set(mode=mode)
     except RuntimeError as error:  # hidden by a library or a driver
         raise HairError('"{name}" cannot be painted: {cause}.', name=name_of(surface), cause=cause_of(error)) from error
+    if group.mask != mask:
+        group.mask = mask  # last: nothing is left to fail
 
 
 def stop(surface: Object, context: Context) -> None:
@@ -82,14 +83,16 @@ def from_selection(hair: Curves, item: PropertyGroup) -> int:
     group = style_items.group_of(item)
     name = group.mask if _is_guide_mask(hair, group.mask) else _new_name(hair, item)
     write(guides, name, "FLOAT", "CURVE", weights)
-    group.mask = name
-    for follower in curves.followers(guides):
+    followers, count = curves.followers(guides), int(np.count_nonzero(weights))
+    for follower in followers:
         bound = bindings.of(follower)
         if bound is not None and not bound.is_written and follower.library is None:
             writing.write_hair(follower)  # as hair that is ahead of its datablock has other weights
+    group.mask = name
+    for follower in followers:
         follower.vellus.is_stale = True
         follower.update_tag()
-    return int(np.count_nonzero(weights))
+    return count
 
 
 def _require_paintable(surface, context):

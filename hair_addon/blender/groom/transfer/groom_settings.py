@@ -8,7 +8,7 @@ from ....core.files.settings_file import GroomSettings
 from ....core.grooming.groom import GuideSettings
 from ....core.long_work import Work
 from ....core.shading.appearance import TABLE_FIELDS, Appearance
-from ...data import scene
+from ...data import scene, whole_changes
 from ...data.strands import curves
 from ...materials import looks
 from ...settings import fitted_sizes, properties, setting_properties, style_items
@@ -63,6 +63,7 @@ def assign_dynamics(guides: Curves, settings: DynamicsSettings) -> None:
         setting_properties.assign(guides.vellus.dynamics, settings)
 
 
+@whole_changes.whole
 def adding_hair(surface_object: Object, settings: GroomSettings, depsgraph: Depsgraph) -> Work[tuple[Curves, Curves]]:
     """Guides and hair of some `GroomSettings` on a mesh object, as work in steps; returns the Curves of both."""
     growing = pipeline.adding_hair(surface_object, settings.guides, settings.hair, depsgraph, settings.styles)
@@ -73,6 +74,7 @@ def adding_hair(surface_object: Object, settings: GroomSettings, depsgraph: Deps
     return guides, hair
 
 
+@whole_changes.whole
 def using_as_guides(
     curves_object: Object, surface_object: Object, settings: GroomSettings, depsgraph: Depsgraph
 ) -> Work[hand_made_guides.HandMade]:

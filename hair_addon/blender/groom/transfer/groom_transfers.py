@@ -20,7 +20,7 @@ from ....core.grooming.groom import HairSettings
 from ....core.grooming.groom_transfer import Ground, Places
 from ....core.grooming.transfer_settings import TransferSettings
 from ....core.long_work import Work
-from ...data import landmarks, scene, surface_space, usable_surfaces
+from ...data import landmarks, scene, surface_space, usable_surfaces, whole_changes
 from ...data.scene import Surface
 from ...data.strands import attributes, curves, curves_objects, guide_curves, kept_shapes
 from ...host.datablocks import Remembered
@@ -73,6 +73,7 @@ class TransferredGroom:
         return said
 
 
+@whole_changes.whole
 def transferring(
     guides: Curves, hair: Curves | None, target: Object, settings: TransferSettings, depsgraph: Depsgraph
 ) -> Work[TransferredGroom]:
@@ -107,24 +108,18 @@ def transferring(
 
     places, points, painted, has_overlap = yield compute
     guides, hair, target = (one.find() for one in remembered)
-    made = []
-    try:
-        names = carried_masks.paint(target, surface, painted)
-        made += [(target, name) for name in names]
-        new_guides = _copy(guides, target, made, is_rendered=False)
-        _write_guides(new_guides, surface, places, points, source.surface.scale * places.scale)
-        cleared = transferred_names.clear(new_guides, hair=None, target=target)
-        new_hair = None
-        if hair is not None:
-            new_hair = _copy(hair, target, made, is_rendered=True)
-            new_hair.vellus.guide_curves = new_guides
-            cleared += transferred_names.clear(new_guides, new_hair, target)
-        new_guides.vellus.is_stale = False  # settings changed with what they describe
-        if new_hair is not None:
-            yield from _growing(new_guides, new_hair, surface, places, made)
-    except BaseException:  # canceled, too: all is left as it was
-        _remove(made)
-        raise
+    names = carried_masks.paint(target, surface, painted)
+    new_guides = _copy(guides, target, is_rendered=False)
+    _write_guides(new_guides, surface, places, points, source.surface.scale * places.scale)
+    cleared = transferred_names.clear(new_guides, hair=None, target=target)
+    new_hair = None
+    if hair is not None:
+        new_hair = _copy(hair, target, is_rendered=True)
+        new_hair.vellus.guide_curves = new_guides
+        cleared += transferred_names.clear(new_guides, new_hair, target)
+    new_guides.vellus.is_stale = False  # settings changed with what they describe
+    if new_hair is not None:
+        yield from _growing(new_guides, new_hair, surface, places)
     looks.evaluate_guides(new_guides)
     cleared = tuple(dict.fromkeys(cleared))
     return TransferredGroom(new_guides, new_hair, len(source.roots), places, tuple(names), cleared, has_overlap)
@@ -168,28 +163,18 @@ def _through_landmarks(own, others):
     return geometry.landmark_warp.through_landmarks([own[name] for name in names], [others[name] for name in names])
 
 
-def _copy(datablock, target, made, is_rendered):
-    """A copy of Curves in a new object on a mesh; both are noted in a list."""
+def _copy(datablock, target, is_rendered):
+    """A copy of Curves in a new object on a mesh."""
     copy = datablock.copy().make_local(clear_liboverride=True)
-    made.append(copy)
     copy.surface = target
     kept_shapes.forget(copy)
     surface_space.forget_applied(copy)
     state = copy.vellus
     state.root_key = state.parting_key = state.flow_key = state.followed = ""
     state.cache_identity = state.delivered_key = state.status = ""
-    made.append(curves_objects.link_object(name_of(datablock), copy, target, is_rendered))
+    curves_objects.link_object(name_of(datablock), copy, target, is_rendered)
     state.is_stale = False
     return copy
-
-
-def _remove(made):
-    for one in reversed(made):
-        if isinstance(one, tuple):
-            owner, name = one
-            owner.vertex_groups.remove(owner.vertex_groups[name])
-        else:
-            (bpy.data.objects if isinstance(one, Object) else bpy.data.hair_curves).remove(one)
 
 
 def _write_guides(guides, surface: Surface, places: Places, points, scale):
@@ -212,7 +197,7 @@ def _write_guides(guides, surface: Surface, places: Places, points, scale):
     transferred_names.scale_lengths(guides.vellus.dynamics, places.scale)
 
 
-def _growing(guides, hair, surface, places, made):
+def _growing(guides, hair, surface, places):
     """Grow copied hair between copied guides, as work in steps."""
     state = hair.vellus
     transferred_names.scale_lengths(state.hair, places.scale)
@@ -221,7 +206,6 @@ def _growing(guides, hair, surface, places, made):
     if not (state.hair.density_group or state.hair.density_image or guides.vellus.guides.density_group):
         name = hand_made_guides.paint_area(guides.surface, surface, places.roots)
         if name:
-            made.append((guides.surface, name))
             state.hair.density_group = name
     was_live, state.is_live = state.is_live, False  # or the update would grow it, before this does
     bpy.context.view_layer.update()

@@ -5,7 +5,6 @@ A groom is in metres and in the axes of its surface's object without that object
 object carries it exactly.
 """
 
-import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -20,9 +19,8 @@ from ....core.files import library_settings
 from ....core.files.settings_file import GroomSettings
 from ....core.geometry.mesh import SurfacePoints, TriMesh, check_mesh
 from ....core.long_work import Work
-from ...data import scene, surface_collections, usable_surfaces
+from ...data import scene, surface_collections, usable_surfaces, whole_changes
 from ...data.strands import attributes, curves
-from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...settings import setting_properties
 from .. import pipeline
@@ -141,6 +139,7 @@ def _turned_mesh(mesh, rotation):
     return TriMesh(_turned(mesh.vertices, rotation), mesh.triangles)
 
 
+@whole_changes.whole
 def adding_groom(
     surface_object: Object,
     groom: LibraryGroom,
@@ -169,26 +168,18 @@ def adding_groom(
     settings = settings if changed is None else changed(settings)
     settings = replace(settings, hair=_with_mask_of_guides(settings))
     painted = _painted(surface_object, surface, groom, target, found, depsgraph)
-    settings = library_settings.renamed(settings, {mask: name for mask, (name, _is_new) in painted.items()})
-    place = Remembered(surface_object)
+    settings = library_settings.renamed(settings, painted)
     drawn = _drawn(groom, surface_object, places.kept, surface.to_local(_turned(points, rotation)[None])[0])
-    its_place = Remembered(drawn)
-    try:
-        bpy.context.view_layer.update()
-        # Attributes of guides are found when these are written.
-        unparted = replace(settings, hair=replace(settings.hair, region_attribute=""))
-        made = yield from groom_settings.using_as_guides(drawn, surface_object, unparted, scene.present_depsgraph())
-    except BaseException:
-        with contextlib.suppress(HairError):  # they are gone
-            _remove(its_place.find())
-            _remove_groups(place.find(), [name for name, is_new in painted.values() if is_new])
-        raise
+    bpy.context.view_layer.update()
+    # Attributes of guides are found when these are written.
+    unparted = replace(settings, hair=replace(settings.hair, region_attribute=""))
+    made = yield from groom_settings.using_as_guides(drawn, surface_object, unparted, scene.present_depsgraph())
     _keep_settings(made, settings)
     return Applied(made, found.method, places.lost_count, len(groom.counts), groom.left)
 
 
 def _painted(surface_object, surface, groom, target, found, depsgraph):
-    """{mask: (name of the vertex group of the surface, whether it is new)}; equal groups are used again."""
+    """{mask: name of the vertex group of the surface}; equal groups are used again, others are new."""
     if not groom.masks:
         return {}
     weights = np.stack(list(groom.masks.values()), axis=1)
@@ -199,7 +190,7 @@ def _painted(surface_object, surface, groom, target, found, depsgraph):
         is_there = mask in surface_object.vertex_groups and (
             np.abs(scene.read_vertex_group(surface_object, depsgraph, mask) - values).max(initial=0.0) <= _UNEQUAL
         )
-        painted[mask] = (mask, False) if is_there else (carried_masks.new_group(surface_object, mask, own_values), True)
+        painted[mask] = mask if is_there else carried_masks.new_group(surface_object, mask, own_values)
     return painted
 
 
@@ -232,14 +223,3 @@ def _keep_settings(made, settings):
     for target in (made.guides, made.hair):
         target.vellus.is_stale = False
     made.guides.vellus.status = ""
-
-
-def _remove(drawn):
-    datablock = drawn.data
-    bpy.data.objects.remove(drawn)
-    bpy.data.hair_curves.remove(datablock)
-
-
-def _remove_groups(surface_object, names):
-    for name in names:
-        surface_object.vertex_groups.remove(surface_object.vertex_groups[name])

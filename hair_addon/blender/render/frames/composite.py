@@ -10,6 +10,7 @@ import bpy
 
 from ....core.errors import HairError
 from ....core.imaging.pixel_sampling import RenderSettings
+from ...data import whole_changes
 from ...data.pictures import composite_nodes
 from ...data.strands import curves_objects
 from ...host import running_operators
@@ -44,30 +45,56 @@ def turn_on(blender_scene):
         raise HairError("The scene is linked from another file and cannot be changed.")
     if blender_scene.render.engine == viewport.ENGINE:
         raise HairError("The render engine Vellus renders hair with its surfaces: choose Cycles or EEVEE.")
-    hair_scene = _new_hair_scene(blender_scene)
-    try:
-        composite_nodes.insert(blender_scene, hair_scene)
-    except HairError:
-        bpy.data.scenes.remove(hair_scene)
-        raise
-    hair_scene[_COMPOSITED] = blender_scene.render.use_compositing
-    blender_scene.render.use_compositing = True
-    blender_scene.vellus.hair_scene = hair_scene
-    follow(blender_scene)
+    was_composited = blender_scene.render.use_compositing
+    with whole_changes.whole_change():
+        hair_scene = _new_hair_scene(blender_scene)
+        try:
+            composite_nodes.insert(blender_scene, hair_scene)
+            hair_scene[_COMPOSITED] = was_composited
+            blender_scene.render.use_compositing = True
+            blender_scene.vellus.hair_scene = hair_scene
+            follow(blender_scene)
+        except BaseException:
+            blender_scene.render.use_compositing = was_composited
+            _leave(blender_scene)
+            raise
 
 
 def turn_off(blender_scene):
     """Leave everything as it was before `turn_on`, but for what the artist has changed since."""
     hair_scene = blender_scene.vellus.hair_scene
+    _leave(blender_scene)
+    if hair_scene is not None and _is_ours(hair_scene):
+        blender_scene.render.use_compositing = bool(hair_scene[_COMPOSITED])
+        if not _users_of(hair_scene):
+            _remove(hair_scene)
+    follow_all()  # hair of this scene may be in another that composites it
+
+
+def _leave(blender_scene):
+    """Take the nodes away, and show hair to Cycles and EEVEE again."""
     composite_nodes.remove(blender_scene)
     blender_scene.vellus.hair_scene = None
     for hair_object in _hair_objects(blender_scene):
         curves_objects.show_again(hair_object)
-    if hair_scene is not None:
-        blender_scene.render.use_compositing = bool(hair_scene.get(_COMPOSITED, True))
-        if not any(other.vellus.hair_scene == hair_scene for other in bpy.data.scenes):
-            bpy.data.scenes.remove(hair_scene)
-    follow_all()  # hair of this scene may be in another that composites it
+
+
+def _is_ours(hair_scene):
+    """Whether a scene was made by `turn_on`, and is not one that an artist has let the setting point to."""
+    return hair_scene.library is None and _COMPOSITED in hair_scene
+
+
+def _users_of(hair_scene):
+    """The scenes whose hair a scene renders."""
+    return [one for one in bpy.data.scenes if one.vellus.hair_scene == hair_scene]
+
+
+def _remove(hair_scene):
+    """Remove a scene that we have made, which is empty then; with an artist's objects in it, it is the artist's."""
+    if hair_scene.collection.objects or hair_scene.collection.children:
+        del hair_scene[_COMPOSITED]
+    else:
+        bpy.data.scenes.remove(hair_scene)
 
 
 def suspend():
@@ -93,20 +120,24 @@ def follow(blender_scene):
     state = blender_scene.vellus
     if state.hair_scene is None:
         return
-    if state.hair_scene.background_set == blender_scene and blender_scene.library is None:
+    is_its = _is_ours(state.hair_scene) and state.hair_scene.background_set == blender_scene
+    if is_its and blender_scene.library is None:
         _bring_up_to_date(blender_scene, state.hair_scene)
     for hair_object in _hair_objects(blender_scene):
         curves_objects.hide_from_engines(hair_object, is_seen_by_rays=state.composite_shadow == "ENGINE")
 
 
 def needs_repair(blender_scene):
-    """Whether a scene's hair is rendered by the hair's scene of another, of which it is a copy, or by a deleted one."""
+    """Whether a scene's hair is rendered by the hair's scene of another, of which it is a copy, or by a deleted one.
+
+    Or by its own that has lost its background set. A scene that we have not made is an artist's choice, and is left.
+    """
     if blender_scene.library is not None:
         return False
     hair_scene = blender_scene.vellus.hair_scene
     if hair_scene is None:
         return composite_nodes.have_lost_scene(blender_scene)
-    return hair_scene.background_set != blender_scene
+    return _is_ours(hair_scene) and hair_scene.background_set != blender_scene
 
 
 def repair():
@@ -116,8 +147,12 @@ def repair():
     """
     for blender_scene in list(bpy.data.scenes):
         if needs_repair(blender_scene):
-            if blender_scene.vellus.hair_scene is None:
+            hair_scene = blender_scene.vellus.hair_scene
+            if hair_scene is None:
                 turn_off(blender_scene)
+            elif hair_scene.background_set not in _users_of(hair_scene):  # an artist has set another one, or none
+                hair_scene.background_set = blender_scene
+                follow(blender_scene)
             else:
                 _separate(blender_scene)
                 follow(blender_scene)
@@ -137,7 +172,7 @@ def refusals(blender_scene):
 
 
 def _is_of_another(blender_scene):
-    return any(other.vellus.hair_scene == blender_scene.original for other in bpy.data.scenes)
+    return bool(_users_of(blender_scene.original))
 
 
 def is_in_sequence(blender_scene):

@@ -94,7 +94,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         blender_scene, view_layer = depsgraph.scene, depsgraph.view_layer
         _require_supported(self.camera_override)
         if self.is_animation or composite.is_in_sequence(blender_scene):
-            frame_folders.require_baked([scene_time.frame_of(blender_scene)])
+            frame_folders.require_baked([scene_time.frame_of(blender_scene)], blender_scene)
+        frame_folders.require_readable([scene_time.frame_of(blender_scene)], blender_scene)
         if bpy.app.background and _listener is no_progress:  # `io.frames` has asked by itself
             rendered_files.require(blender_scene.original, [scene_time.frame_of(blender_scene)])
         size, window = scene.picture_size(blender_scene.render)

@@ -138,3 +138,43 @@ def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composite
     found = [bpy.data.images.load(str(tmp_path / f"frame_000{frame}.png")) for frame in (1, 2)]
     first, second = (np.reshape(image.pixels, (-1, 4))[:, 3].max() for image in found)
     assert first > 0.1 and second == 0.0
+
+
+def test_a_scene_of_an_artist_is_never_deleted_or_changed(composited):
+    """Whose scene it is follows from the mark of what was made, not from what the setting points to."""
+    scene = bpy.context.scene
+    own = bpy.data.scenes.new("Own")
+    own.background_set, own.frame_start = scene, 3
+    own.collection.objects.link(bpy.data.objects["Sphere"])
+    scene.vellus.hair_scene = own
+    bpy.context.view_layer.update()
+    handlers.before_reading()
+    bpy.ops.vellus.toggle_composite()
+    assert bpy.data.scenes.get("Own") == own and own.frame_start == 3 and len(own.objects) == 1
+
+
+def test_objects_that_are_put_into_the_hair_s_scene_stay_in_it(composited):
+    scene = bpy.context.scene
+    hair_scene = scene.vellus.hair_scene
+    lamp = bpy.data.objects.new("Rim", bpy.data.lights.new("Rim", "AREA"))
+    hair_scene.collection.objects.link(lamp)
+    bpy.ops.vellus.toggle_composite()
+    assert lamp.users_scene == (hair_scene,) and scene.vellus.hair_scene is None
+    bpy.ops.vellus.toggle_composite()
+    assert scene.vellus.hair_scene != hair_scene
+    bpy.ops.vellus.toggle_composite()
+    assert len(bpy.data.scenes) == 2 and [*hair_scene.objects] == [lamp]
+
+
+@pytest.mark.parametrize("is_other", [False, True])
+def test_another_background_set_makes_no_scenes(composited, is_other):
+    scene = bpy.context.scene
+    hair_scene, other = scene.vellus.hair_scene, bpy.data.scenes.new("Other")
+    for _ in range(3):
+        hair_scene.background_set = other if is_other else None
+        bpy.context.view_layer.update()
+        handlers.before_reading()
+    assert len(bpy.data.scenes) == 3 and scene.vellus.hair_scene == hair_scene
+    assert hair_scene.background_set == scene
+    bpy.ops.vellus.toggle_composite()
+    assert {*bpy.data.scenes} == {scene, other}

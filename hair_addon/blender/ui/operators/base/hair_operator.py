@@ -2,6 +2,7 @@
 """Base of all operators: when they can run; `HairError` is reported without changes."""
 
 from .....core.errors import HairError, memory_as_sentence
+from ....data import whole_changes
 from ....groom.selection import guides_of, hair_of
 from ....settings.translations import CONTEXT, error_text, report_text
 
@@ -46,7 +47,7 @@ class HairOperator:
     def execute(self, context):
         """`change`, or report why not."""
         try:
-            with memory_as_sentence():
+            with memory_as_sentence(), whole_changes.whole_change(getattr(context, "object", None)):
                 said = self.change(context)
         except HairError as error:
             return self.refuse(error)

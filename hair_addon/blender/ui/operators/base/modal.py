@@ -9,6 +9,7 @@ import bpy
 
 from .....core.errors import HairError, memory_as_sentence
 from .....core.long_work import Job, Stopped, run_now
+from ....data import whole_changes
 from ....host import memory, running
 from ....settings.translations import interface_text, report_text
 from .hair_operator import HairOperator
@@ -30,6 +31,17 @@ class LongOperator(HairOperator):
     def work(self, context):
         """The work in steps (core/long_work.py)."""
         raise NotImplementedError
+
+    def _whole_work(self, context):
+        """`work` and what comes after it, which leave nothing behind where they fail; gives the report."""
+
+        def working(_changed):
+            made = yield from self.work(context)
+            self.after(context, made)
+            sentence, values = self.message(made)
+            return report_text(sentence, **values)
+
+        return whole_changes.whole(working)(getattr(context, "object", None))
 
     def seconds(self, context):
         """How long the work will take, estimated."""
@@ -69,8 +81,8 @@ class LongOperator(HairOperator):
             if running.job() is not None:
                 raise HairError("Hair is being computed: wait until it is done, or press Esc to cancel.")
             with memory.asking(self._asks):
-                made = run_now(self.work(context))
-            return self._done(context, made)
+                said = run_now(self._whole_work(context))
+            return self._done(said)
         except memory.MuchMemory as much:
             return self._confirm(context, much)
         except HairError as error:
@@ -82,7 +94,7 @@ class LongOperator(HairOperator):
             if running.job() is not None:
                 raise HairError("Hair is being computed: wait until it is done, or press Esc to cancel.")
             with memory.asking(self._asks), memory_as_sentence():
-                self._work = self.work(context)
+                self._work = self._whole_work(context)
                 first = next(self._work)
             running.begin(context, Job(first), self._work)
         except memory.MuchMemory as much:
@@ -139,7 +151,7 @@ class LongOperator(HairOperator):
             self._show(context)
             return {"RUNNING_MODAL"}
         except StopIteration as end:
-            return self._end(context, self._done(context, end.value))
+            return self._end(context, self._done(end.value))
         except Stopped:
             self.report({"INFO"}, self.stopped())
             return self._end(context, {"CANCELLED"})
@@ -149,11 +161,9 @@ class LongOperator(HairOperator):
             self._end(context, {"CANCELLED"})
             raise
 
-    def _done(self, context, made):
+    def _done(self, said):
         type(self).has_run = True
-        self.after(context, made)
-        sentence, values = self.message(made)
-        self.report({"INFO"}, report_text(sentence, **values))
+        self.report({"INFO"}, said)
         return {"FINISHED"}
 
     def _end(self, context, outcome):

@@ -1,0 +1,303 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Changes of the open file that happen as a whole or not at all: after an error, or Esc, everything is as it was.
+
+Whatever is made meanwhile is known before it is filled, as what was not there at the beginning: datablocks, and on
+those that are changed vertex groups, attributes, modifiers, materials, styles and flags.
+"""
+
+import contextlib
+import functools
+import inspect
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+from bpy.types import ID, Curves, Mesh, Object, Scene
+
+from ...core.long_work import Work
+from . import thin_hair
+
+# Of Blender's windows, and of files that are linked: not the scene's. And all together.
+_NOT_OURS = {"all_ids", "libraries", "screens", "window_managers", "workspaces"}
+
+_open: list["_Change"] = []  # changes that are under way, the outermost first; none between calls
+
+
+def whole[**P, T](work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
+    """Work in steps that leaves nothing behind where it fails or is stopped.
+
+    What its arguments name is what it changes: objects, Curves, and their surfaces.
+    """
+
+    @functools.wraps(work)
+    def working(*given: P.args, **options: P.kwargs) -> Work[T]:
+        change, steps, answer = _Change([*given, *options.values()]), None, None
+        try:
+            with change.noting():
+                steps = work(*given, **options)
+            while True:
+                with change.noting():
+                    step, ended = _next(steps, answer)
+                if step is None:
+                    change.end()
+                    return ended
+                answer = yield step
+        except BaseException:  # Esc too
+            if steps is not None:
+                with change.noting():
+                    steps.close()
+            change.undo()
+            raise
+
+    return working
+
+
+def whole_if_new[**P, T](work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
+    """`whole` of work that makes something, as its argument `target` is None; other work is done at each update."""
+    guarded, signature = whole(work), inspect.signature(work)
+
+    @functools.wraps(work)
+    def chosen(*given: P.args, **options: P.kwargs) -> Work[T]:
+        is_new = signature.bind(*given, **options).arguments.get("target") is None
+        return (guarded if is_new else work)(*given, **options)
+
+    return chosen
+
+
+@contextlib.contextmanager
+def whole_change(*given: Any) -> Iterator[None]:
+    """The same of a change at once; given: what it changes."""
+    change = _Change(given)
+    try:
+        with change.noting():
+            yield
+    except BaseException:
+        change.undo()
+        raise
+    change.end()
+
+
+def keep_copy(curves_object: Object) -> None:
+    """Let an object come back as it is now where the change that is under way fails: it is to become another in place.
+
+    Its place in the file is then taken by a copy.
+    """
+    if _open:
+        _open[0].keep_copy(curves_object)
+
+
+def _next(steps, answer):
+    """(The next step, None), or (None, the result)."""
+    try:
+        return steps.send(answer), None
+    except StopIteration as end:
+        return None, end.value
+
+
+@dataclass(frozen=True)
+class _Copy:
+    """An object's copy, by session UIDs: its own, its data's, of the object's data; both names; its collections."""
+
+    uid: int
+    data: int
+    own_data: int
+    name: str
+    data_name: str
+    collections: tuple[int, ...]
+
+
+class _Change:
+    """What is there before a change. It holds no reference to a datablock: an undo step may come between two steps."""
+
+    def __init__(self, given: Iterable[Any]) -> None:
+        self._there = {*_datablocks()}
+        self._made: set[int] = set()  # session UIDs
+        self._copies: dict[int, _Copy] = {}  # by the object's
+        self._owners = {owner.session_uid: _state_of(owner) for owner in _owners(given)}
+        self._without_rest = {o.session_uid for o in bpy.data.objects if not o.add_rest_position_attribute}
+        scene, layer = bpy.context.scene, bpy.context.view_layer
+        active = None if layer is None else layer.objects.active
+        self._active = (0, "OBJECT") if active is None else (active.session_uid, active.mode)
+        self._selected = set() if layer is None else {o.session_uid for o in layer.objects.selected if o is not None}
+        self._thin = None if scene is None else (scene.session_uid, *thin_hair.state_of(scene))
+
+    @contextlib.contextmanager
+    def noting(self):
+        """Note what is made meanwhile."""
+        before = _datablocks().keys()
+        _open.append(self)
+        try:
+            yield
+        finally:
+            _open.remove(self)
+            self._made |= _datablocks().keys() - before
+
+    def keep_copy(self, curves_object):
+        if curves_object.session_uid in self._copies:
+            return
+        copy = curves_object.copy()
+        copy.data = curves_object.data.copy()
+        names = curves_object.name, curves_object.data.name
+        collections = tuple(one.session_uid for one in curves_object.users_collection)
+        kept = _Copy(copy.session_uid, copy.data.session_uid, curves_object.data.session_uid, *names, collections)
+        self._copies[curves_object.session_uid] = kept
+
+    def copies(self):
+        """The session UIDs of the copies that may be needed yet, and of their data."""
+        return {uid for kept in self._copies.values() for uid in (kept.uid, kept.data)}
+
+    def end(self):
+        """Nothing is to be undone any more, but by a change that this is a part of."""
+        if _open:
+            _open[-1]._owners = self._owners | _open[-1]._owners
+        present = _datablocks()
+        for kept in self._copies.values():
+            if kept.uid in present:
+                _remove_object(present[kept.uid])
+        self._copies.clear()
+
+    def undo(self):
+        """Bring back what was there."""
+        layer = bpy.context.view_layer
+        active = None if layer is None else layer.objects.active
+        if active is not None and (active.session_uid, active.mode) != self._active and active.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        present = _datablocks()
+        for uid, state in self._owners.items():
+            if uid in present:
+                _restore(present[uid], state)
+        for one in bpy.data.objects:
+            if one.session_uid in self._without_rest and one.add_rest_position_attribute:
+                one.add_rest_position_attribute = False
+        if self._thin is not None and self._thin[0] in present:
+            thin_hair.restore(present[self._thin[0]], *self._thin[1:])
+        for uid, kept in self._copies.items():
+            if uid in self._there and kept.uid in present:
+                _put_back(present, uid, kept)
+                self._made -= {kept.uid, kept.data}
+        _remove(self._made - {uid for outer in _open for uid in outer.copies()})
+        present = _datablocks()
+        for uid, kept in self._copies.items():
+            if uid in self._there and kept.uid in present:
+                present[kept.uid].name, present[kept.uid].data.name = kept.name, kept.data_name
+        if layer is not None:
+            layer.update()  # otherwise it still lists removed objects, as None
+            self._select(layer)
+
+    def _select(self, layer):
+        selected = self._selected | {self._copies[uid].uid for uid in self._selected & self._copies.keys()}
+        for one in layer.objects:
+            if one.select_get(view_layer=layer) != (one.session_uid in selected):
+                one.select_set(one.session_uid in selected, view_layer=layer)
+        uid, mode = self._active
+        uid = self._copies[uid].uid if uid in self._copies else uid
+        active = next((one for one in layer.objects if one.session_uid == uid), None)
+        if layer.objects.active != active:
+            layer.objects.active = active
+        if active is not None and active.mode != mode:
+            bpy.ops.object.mode_set(mode=mode)
+
+
+def _datablocks():
+    """{session UID: datablock} of the open file."""
+    collections = (p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION")
+    kinds = (getattr(bpy.data, kind) for kind in collections if kind not in _NOT_OURS)
+    return {one.session_uid: one for kind in kinds for one in kind}
+
+
+def _owners(given):
+    """The objects and Curves among arguments, with their data, guides and surfaces."""
+    listed = [one for value in given for one in (value if isinstance(value, list | tuple) else [value])]
+    found: list[ID] = []
+    waiting = [one for one in listed if isinstance(one, Object | Curves)]
+    while waiting:
+        one = waiting.pop()
+        if one is None or one in found:
+            continue
+        found.append(one)
+        if isinstance(one, Object):
+            waiting += [one.data] if isinstance(one.data, Curves | Mesh) else []
+        elif isinstance(one, Curves):
+            waiting += [one.surface, one.vellus.guide_curves, *(o for o in bpy.data.objects if o.data == one)]
+    return found
+
+
+def _state_of(owner):
+    """What is there of a datablock, to be compared with what is there later."""
+    if isinstance(owner, Object):
+        return {
+            "vertex_groups": [group.name for group in owner.vertex_groups],
+            "modifiers": {m.name: (m.show_viewport, m.show_render) for m in owner.modifiers},
+            "active_group": owner.vertex_groups.active_index,
+        }
+    state: dict[str, Any] = {"attributes": {one.name for one in owner.attributes}, "materials": len(owner.materials)}
+    if isinstance(owner, Mesh):
+        return state | {"active_uv": owner.uv_layers.active_index}
+    guides = owner.vellus.guide_curves
+    styles = [item.name for item in owner.vellus.styles]
+    return state | {"guides": None if guides is None else guides.session_uid, "styles": styles}
+
+
+def _restore(owner, state):
+    """Take away what was not there. What is as it was is not written, so that nothing is evaluated again."""
+    if isinstance(owner, Object):
+        for collection, names in ((owner.vertex_groups, "vertex_groups"), (owner.modifiers, "modifiers")):
+            for one in [one for one in collection if one.name not in state[names]]:
+                collection.remove(one)
+        for modifier in owner.modifiers:
+            shown = state["modifiers"][modifier.name]
+            if (modifier.show_viewport, modifier.show_render) != shown:
+                modifier.show_viewport, modifier.show_render = shown
+        if owner.vertex_groups.active_index != state["active_group"]:
+            owner.vertex_groups.active_index = state["active_group"]
+        return
+    for name in [one.name for one in owner.attributes if one.name not in state["attributes"]]:
+        owner.attributes.remove(owner.attributes[name])
+    while len(owner.materials) > state["materials"]:
+        owner.materials.pop()
+    if isinstance(owner, Mesh):
+        if owner.uv_layers.active_index != state["active_uv"]:
+            owner.uv_layers.active_index = state["active_uv"]
+        return
+    styles, guides = owner.vellus.styles, owner.vellus.guide_curves
+    for place in reversed([index for index, item in enumerate(styles) if item.name not in state["styles"]]):
+        styles.remove(place)
+    if (None if guides is None else guides.session_uid) != state["guides"]:
+        found = (one for one in bpy.data.hair_curves if one.session_uid == state["guides"])
+        owner.vellus.guide_curves = next(found, None)
+
+
+def _put_back(present, uid, kept):
+    """Let the copy of an object take its place, also where it is gone."""
+    changed, copy, own_data = present.get(uid), present[kept.uid], present.get(kept.own_data)
+    is_converted = changed is not None and own_data is not None and changed.data != own_data
+    if changed is not None:
+        changed.user_remap(copy)
+        _remove_object(changed)
+    masters = {one.collection.session_uid: one.collection for one in bpy.data.scenes}
+    for collection in (masters.get(uid, present.get(uid)) for uid in kept.collections):
+        if collection is not None and copy.name not in collection.objects:
+            collection.objects.link(copy)
+    if is_converted:  # Blender leaves what it converts as it was
+        of_copy, copy.data = copy.data, own_data
+        bpy.data.batch_remove([of_copy])
+
+
+def _remove_object(one):
+    data = one.data
+    bpy.data.objects.remove(one)
+    if data is not None and not data.users:
+        bpy.data.batch_remove([data])
+
+
+def _remove(made):
+    """Remove datablocks, but for those that something else uses now, which would lose them."""
+    present = _datablocks()
+    bpy.data.batch_remove([one for uid, one in present.items() if uid in made and isinstance(one, Object)])
+    present = _datablocks()
+    left = {one for uid, one in present.items() if uid in made}
+    users = bpy.data.user_map(subset=left)
+    placed = (bpy.types.Collection, Scene)
+    used = {one for one in left if not isinstance(one, placed) and any(user not in left for user in users[one])}
+    bpy.data.batch_remove(left - used)
