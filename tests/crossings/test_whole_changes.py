@@ -14,7 +14,7 @@ from hair_addon.blender.data import whole_changes
 from hair_addon.blender.io import groom_library
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
-from tests.support import file_digest
+from tests.support import file_digest, folder_digest
 from tests.support.exchange.imported import curves_object, lines_on, select
 
 PACKAGE = str(Path(whole_changes.__file__).parents[1])
@@ -235,14 +235,14 @@ def test_what_fails_half_way_leaves_nothing(hair, tmp_path, name, begin, setting
     bpy.context.view_layer.update()
     whole = tmp_path.with_suffix(".blend")
     bpy.ops.wm.save_as_mainfile(filepath=str(whole))
-    files = file_digest.of_folder(tmp_path)
+    files = folder_digest.of_folder(tmp_path)
     assert run(name, settings, tmp_path)
-    for path in file_digest.of_folder(tmp_path).keys() - files.keys():
+    for path in folder_digest.of_folder(tmp_path).keys() - files.keys():
         path.unlink()
     bpy.ops.wm.open_mainfile(filepath=str(whole))
     with Fault() as counted:  # what is kept of the first time is not computed again
         assert run(name, settings, tmp_path)
-    written = {path: data for path, data in file_digest.of_folder(tmp_path).items() if path not in files}
+    written = {path: data for path, data in folder_digest.of_folder(tmp_path).items() if path not in files}
     failed = 0
     for part in parts:
         for path in written:
@@ -257,7 +257,7 @@ def test_what_fails_half_way_leaves_nothing(hair, tmp_path, name, begin, setting
             left = file_digest.changes(before, file_digest.of_file())
             # UV coordinates of roots are written again at any time.
             assert [key for key in left if "surface_uv_coordinate" not in key] == [], (part, fault.number)
-            left = file_digest.of_folder(tmp_path)
+            left = folder_digest.of_folder(tmp_path)
             assert {path for path in left if path not in files} <= written.keys()
     assert failed >= len(parts) // 2
 
@@ -341,12 +341,12 @@ def test_a_refusal_changes_nothing(hair, tmp_path, name, begin, settings):
     FOLDER[:] = [tmp_path]
     begin(np.random.default_rng(1))
     bpy.context.view_layer.update()
-    before, files = file_digest.of_file(), file_digest.of_folder(tmp_path)
+    before, files = file_digest.of_file(), folder_digest.of_folder(tmp_path)
     with pytest.raises(RuntimeError) as refused:
         run(name, settings, tmp_path)
     assert "Traceback" not in str(refused.value)
     assert file_digest.changes(before, file_digest.of_file()) == {}
-    assert file_digest.of_folder(tmp_path) == files
+    assert folder_digest.of_folder(tmp_path) == files
 
 
 def test_settings_that_the_interface_refuses_leave_the_surface_as_it_was(hair, tmp_path):

@@ -23,11 +23,6 @@ def of_file():
     return found
 
 
-def of_folder(folder):
-    """{path: bytes} of all files in a folder."""
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
 def changes(before, after):
     """{path of keys: (before, after)} of what differs, in words for an assertion."""
     found = {}

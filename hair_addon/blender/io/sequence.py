@@ -9,12 +9,13 @@ the files that the scene reads, so that another command, or one with another tex
 import contextlib
 import hashlib
 import json
+import os
 import time
 from pathlib import Path
 
 from ...core.errors import HairError, cause_of
 from ...core.files.file_lock import claim, claim_of
-from ...core.files.whole_file import partial_of, require_place, whole_file
+from ...core.files.whole_file import leftovers, require_place, whole_file
 from ...core.imaging import picture_checks
 from ...core.long_work import no_progress
 from ..data.pictures import rendered_files
@@ -159,10 +160,11 @@ def _is_done(path):
 
 def _sweep(pattern, numbers):
     """Remove partial files of killed processes, for frames that others have rendered since."""
+    left = leftovers(Path(pattern).parent)
     for path in [frames.path_of(pattern, number) for number in numbers]:
-        partials = view_files.files_of(partial_of(path))
-        if any(file.exists() for file in (*partials, claim_of(path))):
+        partials = [partial for file in view_files.files_of(path) for partial in left.get(file.name, ())]
+        if partials or os.path.lexists(claim_of(path)):
             with _claimed(path) as is_ours:
                 if is_ours:
-                    for file in partials:
-                        file.unlink(missing_ok=True)
+                    for partial in partials:
+                        partial.unlink(missing_ok=True)

@@ -8,6 +8,7 @@ any way: so killed processes do not block others.
 import contextlib
 import errno
 import os
+import stat
 import sys
 from collections.abc import Generator
 from pathlib import Path
@@ -18,6 +19,8 @@ else:
     import fcntl
 
 _HELD = {errno.EACCES, errno.EAGAIN, errno.EDEADLK, errno.EWOULDBLOCK}
+# No link is followed, and no pipe is waited for: others may have prepared the folder.
+_NEVER_ELSEWHERE = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.EINVAL}
 
 
@@ -52,11 +55,15 @@ def claim_of(path: str | Path) -> Path:
 def _locked(path):
     """A descriptor that holds the lock of a file, or None where another process does."""
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        if os.path.islink(path):  # where the system has no O_NOFOLLOW
+            raise OSError(errno.ELOOP, "it is a link", str(path))
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | _NEVER_ELSEWHERE, 0o666)
         try:
+            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+                raise OSError(errno.EINVAL, "it is not a file", str(path))
             _lock(descriptor)
         except OSError as error:
-            if error.errno in _NO_LOCKS:
+            if error.errno in _NO_LOCKS and stat.S_ISREG(os.fstat(descriptor).st_mode):
                 return descriptor
             os.close(descriptor)
             if error.errno in _HELD:
@@ -76,6 +83,6 @@ def _lock(descriptor):
 
 def _is_at(descriptor, path):
     try:
-        return os.path.samestat(os.fstat(descriptor), os.stat(path))
+        return os.path.samestat(os.fstat(descriptor), os.lstat(path))
     except FileNotFoundError:
         return False

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Frames of simulated guides in a folder, and the states that a simulation goes on from.
 
-A folder has a manifest (frame_manifest.py), `+00000123.npz` for each frame and `state_+00000120.npz` for some. Each
-file appears whole; one that is not what this project writes for the manifest's counts is a missing frame. Only what
-has such a name, in a folder with a manifest, is ever removed.
+A folder has a marker by which it is ours, a manifest (frame_manifest.py), `+00000123.npz` for each frame and
+`state_+00000120.npz` for some. Each file appears whole; one that is not what this project writes for the manifest's
+counts is a missing frame. Nothing is written to a folder that others have prepared, nor through a link. Only what has
+such a name, in a folder of ours, is ever removed.
 """
 
 import contextlib
@@ -24,7 +25,10 @@ from .frame_manifest import Manifest
 from .whole_file import whole_file
 
 _NAME = re.compile(r"(state_)?([+-](?!0{8})[0-9]{8}|\+0{8})\.npz", re.ASCII)  # frame 0 has one name
-_LEFT_OVER = re.compile(r"\.vellus_[0-9a-f]{8}\.(npz|json)", re.ASCII)  # of a killed process, as whole_file names it
+# Of a killed process, as whole_file names it; of older versions with eight digits.
+_LEFT_OVER = re.compile(r"\.vellus_[0-9a-f]{8}(?:[0-9a-f]{8})?\.(npz|json)", re.ASCII)
+MARKER = ".vellus_cache"  # the file by which a folder is known to be ours
+_MARK = b"Baked frames of Vellus\n"
 _IDENTITY = re.compile(r"[0-9a-f]{16}", re.ASCII)
 
 
@@ -250,8 +254,10 @@ def baking(folder: Path, manifest: Manifest) -> Generator[Writer]:
     with contextlib.ExitStack() as stack:
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            _require_own(folder)
             is_ours = stack.enter_context(claim(folder / frame_manifest.NAME))
             if is_ours:
+                _mark(folder)
                 _remove(folder, _LEFT_OVER.fullmatch)
         except (OSError, ValueError) as error:  # ValueError: a character not allowed in file names
             raise HairError("{path} cannot be written: {cause}.", path=folder, cause=cause_of(error)) from error
@@ -284,9 +290,45 @@ def remove(folder: Path, numbers: Iterable[int] | None = None) -> int:
             _remove(folder, lambda name: name == frame_manifest.NAME)
     except OSError as error:
         raise HairError("{path} cannot be removed: {cause}.", path=folder, cause=cause_of(error)) from error
-    with contextlib.suppress(OSError):  # other files are in it
-        folder.rmdir()
+    with contextlib.suppress(OSError):
+        if set(os.listdir(folder)) <= {MARKER}:  # else other files are in it, and it is still ours
+            _remove(folder, lambda name: name == MARKER)
+            folder.rmdir()
     return count
+
+
+def is_marked(folder: Path) -> bool:
+    """Whether a folder has our marker: the contents of a plain file, not its name."""
+    try:
+        return plain_file.read(folder / MARKER, len(_MARK)) == _MARK
+    except HairError:
+        return False
+
+
+def _require_own(folder):
+    """Raise `HairError` unless a folder is ours or empty, and no link to one that may be."""
+    if folder.is_symlink():
+        raise HairError("{path} is a link: remove it, or choose another cache folder.", path=folder)
+    if is_marked(folder):
+        return
+    own = {claim_of(folder / frame_manifest.NAME).name}
+    if all(name in own or _LEFT_OVER.fullmatch(name) for name in os.listdir(folder)):
+        return
+    try:
+        frame_manifest.read(folder)  # of an older version, which left no marker
+    except HairError as error:
+        sentence = "{path} has files of another program: move them, or choose another cache folder."
+        raise HairError(sentence, path=folder) from error
+
+
+def _mark(folder):
+    """Leave our marker in a folder that this process has claimed. Raises OSError."""
+    _require_own(folder)
+    if is_marked(folder):
+        return
+    flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0)  # which follow no link
+    with os.fdopen(os.open(folder / MARKER, flags, 0o666), "wb") as file:
+        file.write(_MARK)
 
 
 def between(

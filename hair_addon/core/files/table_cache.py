@@ -17,6 +17,7 @@ from pathlib import Path
 from ..errors import HairError
 from ..shading.tables import lookup_tables
 from . import table_exr
+from .whole_file import whole_file
 
 CAPACITY = 64  # sets of some 2 MB
 
@@ -56,8 +57,8 @@ def _name(settings, version):
 
 def _mark_used(place):
     """Touch a set's `used` file, for finding the least recently used."""
-    with contextlib.suppress(OSError):  # a read-only folder keeps its order
-        (place / "used").write_text(str(time.time_ns()))
+    with contextlib.suppress(HairError), whole_file(place / "used", is_forced=False) as partial:
+        partial.write_text(str(time.time_ns()))  # a read-only folder keeps its order
 
 
 def _last_used(place):

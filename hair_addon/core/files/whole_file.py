@@ -3,12 +3,15 @@
 
 import contextlib
 import os
+import re
 import secrets
 from collections.abc import Generator, Iterable
 from pathlib import Path
 
 from ..errors import HairError, cause_of
 from . import plain_file
+
+_PARTIAL = re.compile(r"\.vellus_[0-9a-f]{16}_(.+)", re.ASCII | re.DOTALL)
 
 
 @contextlib.contextmanager
@@ -52,13 +55,24 @@ def whole_files(
 
 
 def new_partial_of(path: Path) -> Path:
-    """Return a path for writing a file that nothing else is written to."""
-    return path.with_name(f".vellus_{secrets.token_hex(4)}{path.suffix}")
+    """Return a path for writing a file that nothing else is written to: nobody can guess it and put a link there."""
+    return path.with_name(f".vellus_{secrets.token_hex(8)}{path.suffix}")
 
 
 def partial_of(path: Path) -> Path:
-    """Return the path for writing a claimed file: leftovers of killed processes are replaced there."""
-    return path.with_name(f".vellus_{path.name}")
+    """Return such a path for writing a claimed file, by which `leftovers` finds what a killed process leaves there."""
+    return path.with_name(f".vellus_{secrets.token_hex(8)}_{path.name}")
+
+
+def leftovers(folder: Path) -> dict[str, list[Path]]:
+    """{name of a file: partial ones that `partial_of` named} in a folder, which has none if it cannot be listed."""
+    found: dict[str, list[Path]] = {}
+    with contextlib.suppress(OSError):
+        for name in sorted(os.listdir(folder)):
+            named = _PARTIAL.fullmatch(name)
+            if named:
+                found.setdefault(named[1], []).append(folder / name)
+    return found
 
 
 def require_room(path: Path, byte_count: int) -> None:
@@ -80,8 +94,8 @@ def require_place(path: str | Path) -> None:
     _require_file(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(f".vellus_{secrets.token_hex(4)}")
-        partial.touch()
+        partial = path.with_name(f".vellus_{secrets.token_hex(8)}")
+        os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # which follows no link
         partial.unlink()
     except OSError as error:
         raise HairError("{path} cannot be written: {cause}.", path=path, cause=cause_of(error)) from error

@@ -18,8 +18,8 @@ import pytest
 from hair_addon.blender.io import frames, sequence
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import file_lock
-from hair_addon.core.files.file_lock import claim
-from hair_addon.core.files.whole_file import whole_file
+from hair_addon.core.files.file_lock import claim, claim_of
+from hair_addon.core.files.whole_file import partial_of, whole_file
 from tests.support.commands import ROOT, command, largest_file, run, run_here
 
 COUNT = 5
@@ -27,7 +27,7 @@ COUNT = 5
 HOLD = """
 import sys, time
 from pathlib import Path
-from hair_addon.core.files.file_lock import claim
+from hair_addon.core.files.file_lock import claim, claim_of
 with claim(sys.argv[1]):
     print(flush=True)
     time.sleep(2)
@@ -281,3 +281,31 @@ def test_an_unwritten_file_does_not_replace_another(tmp_path):
         with pytest.raises(HairError, match="was not written"), whole_file(tmp_path / "f.exr") as partial:
             write(partial)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("f.exr", "before")]
+
+
+def test_frames_are_not_written_through_links_that_others_have_prepared(tmp_path):
+    """Names of files that are being written cannot be guessed; a claim that is a link is refused."""
+    victim, pattern = tmp_path / "victim", tmp_path / "shots" / "f_#.png"
+    victim.write_text("mine")
+    pattern.parent.mkdir()
+    for name in (".vellus_f_1.png", ".vellus_f_2.png", "f_2.png"):
+        os.symlink(victim, pattern.with_name(name))
+
+    def write(path, number):
+        with whole_file(path, partial_of(path)) as partial:
+            partial.write_text(f"frame {number}")
+
+    assert [number for number, _path in sequence.make(pattern, [1, 2], write)] == [1, 2]
+    assert victim.read_text() == "mine" and pattern.with_name("f_2.png").read_text() == "frame 2"
+    left = partial_of(pattern.with_name("f_1.png"))
+    os.symlink(victim, left)
+    assert sequence.missing_frames(pattern, [1]) == [1]  # no picture
+    assert not left.is_symlink() and victim.read_text() == "mine"
+    os.symlink(tmp_path / "made", claim_of(pattern.with_name("f_3.png")))
+    with pytest.raises(HairError, match="cannot be written"):
+        list(sequence.make(pattern, [3], write))
+    assert not (tmp_path / "made").exists()
+
+
+def test_two_writers_of_a_frame_write_to_different_files(tmp_path):
+    assert partial_of(tmp_path / "f.png") != partial_of(tmp_path / "f.png")

@@ -95,3 +95,16 @@ def test_without_locks_everybody_may(tmp_path, monkeypatch):
 def test_a_folder_that_is_not_there_is_an_error(tmp_path):
     with pytest.raises(OSError, match="No such file"), claim(tmp_path / "none" / "frame"):
         pass
+
+
+@pytest.mark.parametrize("is_link", [True, False])
+def test_what_others_have_put_in_place_of_a_claim_is_left_alone(tmp_path, is_link):
+    """A link, behind which no file is made, or a pipe, for which nobody waits."""
+    beside = claim_of(tmp_path / "frame")
+    if is_link:
+        os.symlink(tmp_path / "victim", beside)
+    else:
+        os.mkfifo(beside)
+    with pytest.raises(OSError, match=r"link|not a file"), claim(tmp_path / "frame"):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == [beside.name]

@@ -4,6 +4,7 @@
 import dataclasses
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import frame_cache, frame_manifest, plain_file
 from hair_addon.core.files.frame_cache import FrameCache, baking, between, remove
+from tests.support import folder_digest
 from tests.support.cached_frames import (
     DIGEST,
     ENVIRONMENT,
@@ -134,7 +136,7 @@ def test_disk_full_at_fifty_places(folder):
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
         check_whole(folder)
-        assert not list(folder.glob(".*"))
+        assert [path.name for path in folder.glob(".*")] == [frame_cache.MARKER]
     assert refused > 40
     bake(folder, [4])
     assert check_whole(folder)[0] == list(range(-2, 5))
@@ -181,7 +183,7 @@ def check_killed(folder, rounds, kills):
         check_whole(folder)
     bake(folder, range(-2, 4))
     assert check_whole(folder)[0] == list(range(-2, 4))
-    assert not list(folder.glob(".*"))
+    assert [path.name for path in folder.glob(".*")] == [frame_cache.MARKER]
 
 
 def test_frames_are_whole_after_kills(tmp_path):
@@ -264,7 +266,7 @@ def test_only_names_of_ours_are_removed_and_never_through_links(folder, tmp_path
     assert remove(folder, [1, 2, 50, 51]) == 4
     assert FrameCache(folder).frame_numbers() == [-2, -1, 0, 3, 50, 51]
     assert remove(folder) == 4 * 2 + 1
-    assert sorted(os.listdir(folder)) == sorted([*others, "+00000050.npz", "+00000051.npz"])
+    assert sorted(os.listdir(folder)) == sorted([*others, "+00000050.npz", "+00000051.npz", frame_cache.MARKER])
     assert kept.read_bytes() == b"kept"
 
 
@@ -277,6 +279,67 @@ def test_a_folder_that_is_a_link_keeps_its_frames(folder, tmp_path):
     with pytest.raises(HairError, match="is a link"):
         remove(tmp_path / "link")
     check_whole(folder)
+
+
+def linked(folder, victim):
+    os.symlink(victim, folder)
+
+
+def with_files(folder, victim):
+    shutil.copytree(victim, folder)
+
+
+def with_claim_link(folder, victim):
+    folder.mkdir()
+    os.symlink(victim / "made", folder / ".manifest.json.claim")
+
+
+def with_marker_link(folder, victim):
+    with_files(folder, victim)
+    (victim / "marker").write_bytes(b"Baked frames of Vellus\n")
+    os.symlink(victim / "marker", folder / frame_cache.MARKER)
+
+
+def with_other_marker(folder, victim):
+    with_files(folder, victim)
+    (folder / frame_cache.MARKER).write_bytes(b"mine")
+
+
+PREPARED = [linked, with_files, with_claim_link, with_marker_link, with_other_marker]
+
+
+@pytest.mark.parametrize("prepare", PREPARED, ids=lambda prepare: prepare.__name__)
+def test_nothing_is_written_to_a_folder_that_others_have_prepared(tmp_path, prepare):
+    """Nor anywhere else by it: the folder of a web application with its own manifest.json and numbered files."""
+    victim, folder = tmp_path / "application", tmp_path / "cache"
+    victim.mkdir()
+    (victim / "manifest.json").write_text('{"name": "application"}')
+    (victim / "+00000001.npz").write_bytes(b"mine")
+    prepare(folder, victim)
+    before = [folder_digest.of_folder(one) for one in (victim, folder)], sorted(os.listdir(folder))
+    with pytest.raises(HairError, match=r"is a link|another program|cannot be written"):
+        bake(folder, [1, 2])
+    assert ([folder_digest.of_folder(one) for one in (victim, folder)], sorted(os.listdir(folder))) == before
+    with pytest.raises(HairError):
+        remove(folder)
+    assert folder_digest.of_folder(victim) == before[0][0]
+
+
+def test_a_folder_is_known_by_its_marker(folder):
+    """Also where its manifest is damaged, or frees all frames but is left for a file of others."""
+    (folder / "manifest.json").write_bytes(b"damaged")
+    bake(folder, [1])
+    assert check_whole(folder)[0][:1] == [-2]
+    (folder / "notes.txt").write_text("mine")
+    remove(folder)
+    assert sorted(os.listdir(folder)) == [frame_cache.MARKER, "notes.txt"]
+    bake(folder, [1])
+    (folder / "notes.txt").unlink()
+    (folder / frame_cache.MARKER).unlink()  # as older versions leave it
+    bake(folder, [2])
+    assert frame_cache.is_marked(folder) and check_whole(folder)[0] == [1, 2]
+    remove(folder)
+    assert not folder.exists()
 
 
 def test_folders_are_named_by_identities_alone(tmp_path):
