@@ -133,6 +133,11 @@ def save_groom(path, name=""):
     run_now(groom_library.saving(hair, path, name, "Hair/Short", picture))
 
 
+def on_exported(_rng):
+    api.export_groom(FOLDER[0] / "read.abc", [bpy.data.hair_curves["Hair"]])
+    on_sphere(_rng)
+
+
 FOLDER = []  # of files, for the test that runs
 FEW = {"guide_count": 6, "relax_iterations": 0}
 # Operators that make data, or files: (what is done before, settings).
@@ -142,6 +147,7 @@ MAKING = {
     "interpolate_hair": [(on_guides, {"strand_count": 20})],
     "use_as_guides": [(on_drawn, {"strand_count": 20}), (on_splines, {"strand_count": 20}), (on_two, {})],
     "use_as_hair": [(on_drawn, {"guide_count": 4}), (on_two, {"guide_count": 4})],
+    "import_groom": [(on_exported, {"filepath": "read.abc", "guide_count": 4})],
     "convert_particles": [(on_particles, {"guide_count": 4})],
     "transfer_groom": [(on_other_mesh, {"target": "Other"})],
     "make_own_guides": [(on_shared_guides, {})],
@@ -178,7 +184,7 @@ CASES = [pytest.param(name, *case, id=f"{name}-{case[0].__name__}") for name, ca
 
 
 def test_every_operator_is_one_that_makes_data_or_not():
-    assert {*dir(bpy.ops.vellus)} == MAKING.keys() | OTHERS
+    assert {*dir(bpy.ops.vellus)} == MAKING.keys() | OTHERS, "say in this file whether it makes data"
 
 
 def run(name, settings, folder):

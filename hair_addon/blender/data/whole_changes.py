@@ -16,6 +16,7 @@ import bpy
 from bpy.types import ID, Curves, Mesh, Object, Scene
 
 from ...core.long_work import Work
+from ..host.notices import name_of
 from . import thin_hair
 
 # Of Blender's windows, and of files that are linked: not the scene's. And all together.
@@ -138,7 +139,7 @@ class _Change:
             return
         copy = curves_object.copy()
         copy.data = curves_object.data.copy()
-        names = curves_object.name, curves_object.data.name
+        names = name_of(curves_object), name_of(curves_object.data)
         collections = tuple(one.session_uid for one in curves_object.users_collection)
         kept = _Copy(copy.session_uid, copy.data.session_uid, curves_object.data.session_uid, *names, collections)
         self._copies[curves_object.session_uid] = kept
@@ -227,15 +228,18 @@ def _state_of(owner):
     """What is there of a datablock, to be compared with what is there later."""
     if isinstance(owner, Object):
         return {
-            "vertex_groups": [group.name for group in owner.vertex_groups],
-            "modifiers": {m.name: (m.show_viewport, m.show_render) for m in owner.modifiers},
+            "vertex_groups": [name_of(group) for group in owner.vertex_groups],
+            "modifiers": {name_of(m): (m.show_viewport, m.show_render) for m in owner.modifiers},
             "active_group": owner.vertex_groups.active_index,
         }
-    state: dict[str, Any] = {"attributes": {one.name for one in owner.attributes}, "materials": len(owner.materials)}
+    state: dict[str, Any] = {
+        "attributes": {name_of(one) for one in owner.attributes},
+        "materials": len(owner.materials),
+    }
     if isinstance(owner, Mesh):
         return state | {"active_uv": owner.uv_layers.active_index}
     guides = owner.vellus.guide_curves
-    styles = [item.name for item in owner.vellus.styles]
+    styles = [name_of(item) for item in owner.vellus.styles]
     return state | {"guides": None if guides is None else guides.session_uid, "styles": styles}
 
 
@@ -243,16 +247,16 @@ def _restore(owner, state):
     """Take away what was not there. What is as it was is not written, so that nothing is evaluated again."""
     if isinstance(owner, Object):
         for collection, names in ((owner.vertex_groups, "vertex_groups"), (owner.modifiers, "modifiers")):
-            for one in [one for one in collection if one.name not in state[names]]:
+            for one in [one for one in collection if name_of(one) not in state[names]]:
                 collection.remove(one)
         for modifier in owner.modifiers:
-            shown = state["modifiers"][modifier.name]
+            shown = state["modifiers"][name_of(modifier)]
             if (modifier.show_viewport, modifier.show_render) != shown:
                 modifier.show_viewport, modifier.show_render = shown
         if owner.vertex_groups.active_index != state["active_group"]:
             owner.vertex_groups.active_index = state["active_group"]
         return
-    for name in [one.name for one in owner.attributes if one.name not in state["attributes"]]:
+    for name in [name_of(one) for one in owner.attributes if name_of(one) not in state["attributes"]]:
         owner.attributes.remove(owner.attributes[name])
     while len(owner.materials) > state["materials"]:
         owner.materials.pop()
@@ -261,7 +265,7 @@ def _restore(owner, state):
             owner.uv_layers.active_index = state["active_uv"]
         return
     styles, guides = owner.vellus.styles, owner.vellus.guide_curves
-    for place in reversed([index for index, item in enumerate(styles) if item.name not in state["styles"]]):
+    for place in reversed([index for index, item in enumerate(styles) if name_of(item) not in state["styles"]]):
         styles.remove(place)
     if (None if guides is None else guides.session_uid) != state["guides"]:
         found = (one for one in bpy.data.hair_curves if one.session_uid == state["guides"])
@@ -277,7 +281,7 @@ def _put_back(present, uid, kept):
         _remove_object(changed)
     masters = {one.collection.session_uid: one.collection for one in bpy.data.scenes}
     for collection in (masters.get(uid, present.get(uid)) for uid in kept.collections):
-        if collection is not None and copy.name not in collection.objects:
+        if collection is not None and all(one != copy for one in collection.objects):
             collection.objects.link(copy)
     if is_converted:  # Blender leaves what it converts as it was
         of_copy, copy.data = copy.data, own_data

@@ -144,6 +144,21 @@ def test_textures_are_written_to_a_folder(hair, tmp_path):
     np.testing.assert_array_equal(pixels(again), pixels(made))
 
 
+def test_all_textures_are_saved_with_the_file_and_appended_with_the_cards(hair, tmp_path):
+    bpy.ops.vellus.hair_cards(card_count=4, segment_count=2, texture_size=64, level_count=1)
+    found = {image.name: pixels(image) for image in bpy.data.images if image.name.startswith("Hair Cards")}
+    assert {*found} == {f"Hair Cards LOD0 {kind}" for kind in texels.MAPS}
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "cards.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "cards.blend")) as (_there, here):
+        here.objects = ["Hair Cards LOD0"]
+    for name, values in found.items():
+        np.testing.assert_array_equal(pixels(bpy.data.images[name]), values)
+    bpy.data.objects.remove(here.objects[0])
+    bpy.ops.outliner.orphans_purge(do_recursive=True)
+    assert not [image for image in bpy.data.images if image.name.startswith("Hair Cards")]
+
+
 def test_textures_replace_those_of_the_same_hair_and_of_no_other(hair, tmp_path):
     def files(name):
         hair.data.name = name

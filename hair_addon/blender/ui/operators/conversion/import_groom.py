@@ -110,28 +110,19 @@ class VELLUS_OT_import_groom(BrowsedOperator, bpy.types.Operator):
 
 
 def _importing(path, wanted, surface, settings):
-    """Read a file and use its curves, as work in steps; of what fails, nothing is left."""
+    """Read a file and use its curves, as work in steps."""
     place = Remembered(surface)
     file = yield from io.curve_files.reading(path)
-    surface, before = place.find(), {one.session_uid for one in bpy.data.objects}
+    surface = place.find()
     found = io.curve_files.made_of(path, file, wanted, surface)
-    try:
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        if wanted.kind == "GUIDES":
-            using = hand_made_guides.using_as_guides(found.curves, surface, depsgraph, hair_settings=HairSettings())
-        else:
-            using = kept_hair.using_as_hair(found.curves, surface, depsgraph, settings, guides_object=found.guides)
-        made = yield from using
-    except BaseException:
-        _remove([one for one in bpy.data.objects if one.session_uid not in before])
-        raise
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    if wanted.kind == "GUIDES":
+        using = hand_made_guides.using_as_guides(found.curves, surface, depsgraph, hair_settings=HairSettings())
+    else:
+        using = kept_hair.using_as_hair(found.curves, surface, depsgraph, settings, guides_object=found.guides)
+    made = yield from using
     if found.motion is not None:
         yield Stage("Writing frames", 0.9)
         beside = io.played_hair.path_beside(Path(bpy.data.filepath), made.hair)
         io.played_hair.playing(made.hair, found.motion, made.rooted.point_order(found.starts), beside)(no_progress)
     return _Imported(made, found.notes)
-
-
-def _remove(objects):
-    data = [one.data for one in objects]
-    bpy.data.batch_remove([*objects, *data])
