@@ -62,16 +62,12 @@ def groups(owner):
     while pending:
         group = pending.pop()
         found.append(group)
-        for declared in group.bl_rna.properties:
-            if declared.type == "POINTER" and issubclass(_class_of(declared), bpy.types.PropertyGroup):
-                pending.append(getattr(group, declared.identifier))
-            elif declared.type == "COLLECTION" and declared.identifier != "bl_rna":
-                pending += list(getattr(group, declared.identifier))
+        for declared in (p for p in group.bl_rna.properties if p.identifier != "rna_type"):
+            if declared.type in ("POINTER", "COLLECTION"):
+                held = getattr(group, declared.identifier)
+                held = [held] if declared.type == "POINTER" else held
+                pending += [one for one in held if isinstance(one, bpy.types.PropertyGroup)]
     return found
-
-
-def _class_of(declared):
-    return getattr(bpy.types, declared.fixed_type.identifier, bpy.types.ID)
 
 
 def plain(group, declared):

@@ -24,7 +24,7 @@ from hair_addon.blender.host import running
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.errors import HairError
 from hair_addon.core.params import Settings
-from tests.support import always
+from tests.support import always, rooted
 from tests.support.always import activate, changed, chosen, objects, operate, ours
 from tests.support.scenes import shrink_shadows
 from tests.support.walk import any_values
@@ -33,7 +33,6 @@ from tests.support.walk.walk_steps import needs_room, pick, step
 
 seeds = st.integers(0, 2**31)
 
-_NEAR = 2e-3  # of a surface's size, between a root and the surface: faces are triangles there
 _MORE_BLOCKS = 40  # datablocks that come with the first use of a function: materials, node groups, images
 
 
@@ -41,6 +40,22 @@ class Everyone(Artist):
     """An artist who uses all that there is."""
 
     most_alive = None  # after the first run of the process: what Python held then
+
+    @step(is_grid=st.booleans())
+    @needs_room
+    def add_surface(self, is_grid):
+        """One that hair grows on: `Artist` has others, on which nothing happens for most of a walk."""
+        if bpy.context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        if is_grid:
+            bpy.ops.mesh.primitive_grid_add(x_subdivisions=4, y_subdivisions=4)
+        else:
+            bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+        changed("surface")
+
+    @step(number=pick, how=st.sampled_from(["move", "subdivide", "no UVs", "rename UVs"]))
+    def change_mesh(self, number, how):
+        self.change_mesh_as(number, how)
 
     def teardown(self):
         super().teardown()
@@ -110,9 +125,8 @@ class Everyone(Artist):
     @step(steps=st.integers(1, 3))
     def undo_and_redo(self, steps):
         """As before."""
-        bpy.context.view_layer.update()
-        bpy.ops.ed.undo_push(message="here")
         before = state()
+        bpy.ops.ed.undo_push(message="here")
         for _ in range(steps):
             if not bpy.ops.ed.undo.poll():
                 return
@@ -122,16 +136,13 @@ class Everyone(Artist):
             if not bpy.ops.ed.redo.poll():
                 return
             bpy.ops.ed.redo()
-        bpy.context.view_layer.update()
         is_as(before)
 
     @step()
     def save_and_load_all(self):
         """As before, but for what nobody uses."""
-        bpy.context.view_layer.update()
         before = state()
         self._save_and_load()
-        bpy.context.view_layer.update()
         is_as(before)
 
     @invariant()
@@ -142,8 +153,23 @@ class Everyone(Artist):
         assert running.job() is None
 
 
+# All steps are taken as often as each other, but for these.
+for _number in range(2, 17):
+    setattr(Everyone, f"any_operator_{_number}", Everyone.any_operator)
+for _number in range(2, 9):
+    setattr(Everyone, f"any_setting_{_number}", Everyone.any_setting)
+for _number in range(2, 4):
+    setattr(Everyone, f"undo_and_redo_{_number}", Everyone.undo_and_redo)
+
+
 def state():
-    """{name: what hair is} of all that somebody uses."""
+    """{name: what hair is} of all that somebody uses, once each has had an update.
+
+    What a script removes, as guides of hair, is not told to what uses it; undo and loading update everything.
+    """
+    for one in ours():
+        one.update_tag()
+    bpy.context.view_layer.update()
     return {one.name: _state_of(one) for one in ours() if one.users}
 
 
@@ -171,7 +197,7 @@ def is_as(before):
     for name, (points, counts, roots, values, status) in before.items():
         now = after[name]
         assert {k: (v, now[3].get(k)) for k, v in values.items() if now[3].get(k) != v} == {}, name
-        assert now[4] == status, name
+        assert now[4] == status, (name, status, now[4])
         assert np.array_equal(now[1], counts), (name, len(counts), len(now[1]))
         assert np.array_equal(now[0], points), (name, float(abs(now[0] - points).max()))
         assert now[2].keys() == roots.keys() and all(np.array_equal(now[2][k], v) for k, v in roots.items()), name
@@ -180,37 +206,14 @@ def is_as(before):
 def roots_are_on_surfaces():
     """Of hair that is drawn, live and without a complaint."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    for one in (o for o in bpy.context.view_layer.objects if o.type == "CURVES"):
-        hair = one.data
-        surface, state_of = hair.surface, hair.vellus
-        if state_of.kind != "HAIR" or surface is None or state_of.status or state_of.is_stale or not state_of.is_live:
-            continue
-        guides = state_of.guide_curves
-        is_plain = guides is not None and not guides.vellus.status and not guides.vellus.is_stale and len(hair.curves)
-        if not is_plain or surface.name not in bpy.context.view_layer.objects or surface.mode != "OBJECT":
-            continue
+    for one in (o for o in bpy.context.view_layer.objects if o.type == "CURVES" and rooted.should_be_rooted(o)):
         try:
-            strands = hair_cache.strands_on_gpu(hair).points
+            strands = hair_cache.strands_on_gpu(one.data).points
         except HairError:
             continue
         assert np.isfinite(strands).all(), one.name
-        evaluated = surface.evaluated_get(depsgraph)
-        size = max(evaluated.dimensions[:]) / max(min(map(abs, evaluated.scale)), 1e-9)
-        if not len(evaluated.data.polygons) or abs(evaluated.matrix_world.determinant()) < 1e-12:
-            continue
-        away = []
-        to_surface = evaluated.matrix_world.inverted() @ one.matrix_world
-        for root in strands[:: max(len(strands) // 5, 1), 0]:
-            local = to_surface @ _vector(root)
-            found, nearest, _normal, _face = evaluated.closest_point_on_mesh(local)
-            away.append((nearest - local).length if found else 0.0)
-        assert max(away) <= _NEAR * size, f"{one.name} on {surface.name}: a root is {max(away)} away, of {size}"
-
-
-def _vector(values):
-    import mathutils
-
-    return mathutils.Vector(map(float, values))
+        away = rooted.far_root(one, strands, depsgraph)
+        assert not away, away
 
 
 def things_alive():

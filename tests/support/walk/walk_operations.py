@@ -197,6 +197,10 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
 
     @step(number=pick, how=st.sampled_from(["move", "subdivide", "no faces", "not a number", "no UVs", "rename UVs"]))
     def change_mesh(self, number, how):
+        self.change_mesh_as(number, how)
+
+    def change_mesh_as(self, number, how):
+        """Move a vertex, subdivide, or make the mesh unusable."""
         if not objects("MESH"):
             return
         surface = bpy.data.objects[chosen(objects("MESH"), number)]
