@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.host import cli_command
-from hair_addon.blender.io import mesh_files
+from hair_addon.blender.io import mesh_checks, mesh_files
 from hair_addon.command_line import import_mesh
+from hair_addon.core.errors import HairError
 from tests.support.commands import HEAD, run_here
 
 GROOM = ("--guides", 5, "--strands", 20, "--out")
@@ -88,3 +89,16 @@ def test_what_the_other_process_says_is_said(files):
     ended = run_here("info", files[".usdc"])
     assert (ended.status, ended.out) == (1, "")
     assert ended.errors == f"vellus: {files['.usdc']} is not a valid USD file: it is damaged, or has another format.\n"
+
+
+def test_faces_of_vertices_that_are_not_there_are_refused(scene):
+    """As an importer makes them of some damaged files."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+    mesh_checks.require_imported("a.abc")
+    for corner, vertex in ((3, 42), (5, -1)):
+        loop = bpy.context.object.data.loops[corner]
+        before, loop.vertex_index = loop.vertex_index, vertex
+        with pytest.raises(HairError, match=r"a\.abc is damaged: the faces of its mesh Icosphere do not match"):
+            mesh_checks.require_imported("a.abc")
+        loop.vertex_index = before
+    mesh_checks.require_imported("a.abc")

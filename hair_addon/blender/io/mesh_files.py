@@ -123,6 +123,7 @@ def open_file(path, *, up="Z", runs_scripts=False):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         if import_(str(path), up) != {"FINISHED"}:
             raise HairError(f"{path} cannot be read: it is damaged, or has another format.")
+        mesh_checks.require_imported(path)
     except (OSError, RuntimeError) as error:
         raise HairError(f"{path} cannot be read: {cause_of(error)}.") from error
     if ending in _UP_IS_ASKED:
