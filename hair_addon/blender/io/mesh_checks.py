@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.errors import HairError
 from ...core.files import alembic_reader
+from ..data import whole_meshes
 
 # The keyword of an .obj line, and the number of values that must follow.
 _OBJ_WORDS = {"v": 3, "vn": 3, "vt": 1, "f": 3}
@@ -75,15 +76,7 @@ def require_usd(path):
 def require_imported(path):
     """Raise `HairError` where an importer has made a mesh whose faces name vertices or corners that it lacks."""
     for mesh in bpy.data.meshes:
-        corners = np.empty(len(mesh.loops), np.int32)
-        mesh.loops.foreach_get("vertex_index", corners)
-        starts, totals = (np.empty(len(mesh.polygons), np.int32) for _ in range(2))
-        mesh.polygons.foreach_get("loop_start", starts)
-        mesh.polygons.foreach_get("loop_total", totals)
-        ends = starts.astype(np.int64) + totals
-        is_whole = corners.min(initial=0) >= 0 and corners.max(initial=-1) < len(mesh.vertices)
-        is_whole &= min(starts.min(initial=0), totals.min(initial=0)) >= 0 and ends.max(initial=0) <= len(corners)
-        if not is_whole:
+        if not whole_meshes.is_whole(mesh):
             raise HairError(f"{path} is damaged: the faces of its mesh {mesh.name} do not match its points.")
 
 

@@ -53,6 +53,20 @@ class Everyone(Artist):
             bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
         changed("surface")
 
+    @step(number=pick, amount=st.sampled_from([0.0, 0.1, 5.0]))
+    def comb(self, number, amount):
+        """Roots stay, as with brushes."""
+        seen = sorted({o.data.name for o in bpy.context.view_layer.objects if o.type == "CURVES"})
+        if seen:
+            curves = bpy.data.hair_curves[chosen(seen, number)]
+            points, firsts = curves_door.read_points(curves), curves_door.curve_offsets(curves)[:-1]
+            is_free = np.ones((len(points), 1), np.float32)
+            is_free[firsts] = 0.0
+            if len(points):
+                curves.attributes["position"].data.foreach_set("vector", (points + amount * is_free).ravel())
+                curves.update_tag()
+                changed("comb")
+
     @step(number=pick, how=st.sampled_from(["move", "subdivide", "no UVs", "rename UVs"]))
     def change_mesh(self, number, how):
         self.change_mesh_as(number, how)
@@ -197,7 +211,7 @@ def is_as(before):
     for name, (points, counts, roots, values, status) in before.items():
         now = after[name]
         assert {k: (v, now[3].get(k)) for k, v in values.items() if now[3].get(k) != v} == {}, name
-        assert now[4] == status, (name, status, now[4])
+        assert bool(now[4]) == bool(status), (name, status, now[4])  # which of several objects it names is other
         assert np.array_equal(now[1], counts), (name, len(counts), len(now[1]))
         assert np.array_equal(now[0], points), (name, float(abs(now[0] - points).max()))
         assert now[2].keys() == roots.keys() and all(np.array_equal(now[2][k], v) for k, v in roots.items()), name
