@@ -5,6 +5,7 @@ A guide moves rigidly with the surface at its root, as hair does (posed_strands.
 object is scaled unevenly, its mean scale counts.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -66,7 +67,7 @@ class GuidePose:
         axes = np.swapaxes(posed[:, 1:] - posed[:, :1], 1, 2) / size  # columns
         rotation = self._polar[0] @ _nearest_rotations(axes)
         turns = dynamics.rod.rotations.from_matrices(rotation)
-        return dynamics.root_motion.RootPose(self._to_world(posed[:, 0]), turns, self.scale / start.scale)
+        return dynamics.root_motion.RootPose(self._to_world(posed[:, 0]), turns, _rounded(self.scale / start.scale))
 
     def to_rest(self, points: np.ndarray) -> np.ndarray:
         """Points (G, P, 3) [m] in the world → (G, P, 3) float32, local coordinates at rest."""
@@ -88,6 +89,15 @@ class GuidePose:
 
     def _to_world(self, points):
         return points @ self.matrix[:, :3].T + self.matrix[:, 3]
+
+
+def _rounded(factor):
+    """A factor to 20 bits: an object that only turns has a matrix in single precision, whose size is not quite one.
+
+    To another size guides would be given another shape at rest, in each frame.
+    """
+    mantissa, exponent = math.frexp(factor)
+    return math.ldexp(round(math.ldexp(mantissa, 20)), exponent - 20)
 
 
 def read(guides, depsgraph, metres):

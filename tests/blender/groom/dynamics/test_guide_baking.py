@@ -108,6 +108,24 @@ def test_a_folder_that_goes_away_ends_baking(swung):
     assert frame_cache.FrameCache(frame_folders.folder_of(guides.data)).manifest.state == "complete"
 
 
+def test_a_surface_that_only_turns_keeps_its_size(swung):
+    """In whatever direction; guides would be given their shape at rest anew in each frame, half the time of a bake."""
+    guides, _hair = swung
+    scene, sphere = bpy.context.scene, bpy.data.objects["Sphere"]
+    sphere.rotation_euler, sphere.scale = (0.3, 0.2, 0.1), (1.7, 1.7, 1.7)
+
+    def pose_in(frame):
+        scene.frame_set(frame)
+        return guide_poses.read(guides.data, bpy.context.evaluated_depsgraph_get(), 1.0)
+
+    start = pose_in(1)
+    assert {pose_in(frame).root_pose(start).scale for frame in range(1, 17)} == {1.0}
+    sphere.scale = (3.4, 3.4, 3.4)
+    assert pose_in(1).root_pose(start).scale == pytest.approx(2.0, rel=1e-6)
+    sphere.scale = (0.017, 0.017, 0.017)
+    assert pose_in(1).root_pose(start).scale == pytest.approx(0.01, rel=2e-6)
+
+
 def test_roots_stay_on_a_surface_that_bends(arm, tmp_path):
     """Points that are carried back to rest, and forward by the nodes, are where they were simulated."""
     bpy.context.view_layer.objects.active = arm
