@@ -63,6 +63,12 @@ def rest_before(curves):
     return None if kept is None else np.array(kept["rest"], np.float32).reshape(-1, 3)
 
 
+def vertex_count_before(curves):
+    """How many vertices the surface had that `keep_surface` stored, or None."""
+    kept = curves.get(_STOOD_ON)
+    return None if kept is None else len(kept["rest"]) // 3
+
+
 def to_world_before(curves):
     """The `Affine` that was stored with the surface, or None: files of older versions have none."""
     kept = curves.get(_STOOD_ON)

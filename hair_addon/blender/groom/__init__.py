@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         edited_surfaces,
         edits,
         followed_names,
+        frame_faces,
         grown_guides,
         guide_maps,
         hair_memory,

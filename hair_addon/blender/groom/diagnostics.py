@@ -14,7 +14,7 @@ from ..data import orientation, rest_nodes, rest_sources, usable_surfaces
 from ..data.strands import follow_nodes
 from ..host.notices import name_of, text_of
 from ..settings.translations import interface_text
-from . import copied_hair
+from . import copied_hair, frame_faces
 from .selection import has_object, is_shown
 
 
@@ -31,6 +31,9 @@ def warnings_of(surface: Object | None, parts: Iterable[Curves]) -> list[Warning
     partings = [warning for part in parts if part.vellus.kind == "HAIR" for warning in parting_warnings(part)]
     there = None if surface is None or usable_surfaces.is_deleted(surface) else surface
     first = [*_of_library(surface, parts), *_of_surface(there, parts), *_of_uv_map(there, parts)]
+    if there is not None and any(map(frame_faces.are_others, parts)):
+        text = '"{name}" has other faces in this frame: hair stays on those of the frame that it was made in.'
+        first.append(Warning(interface_text(text, name=name_of(there))))
     flows = [warning for part in parts if part.vellus.kind == "GUIDES" for warning in flow_warnings(part)]
     return [*first, *_of_guides(parts), *dict.fromkeys([*partings, *flows])]
 

@@ -12,7 +12,7 @@ from ...core.geometry.mesh import require_finite
 from ..data import scene, surface_space
 from ..data.strands import attributes, curves, stored_roots
 from ..data.surfaces import cage_of, faces_of
-from . import applied_transforms, edited_faces
+from . import applied_transforms, edited_faces, frame_faces
 
 _ROOTED_AGAIN = {
     "GUIDES": '{guides} guides and {strands} strands lost their faces of "{name}": rooted at the nearest points.',
@@ -47,7 +47,7 @@ def follow_surface(
     roots = stored_roots.places(guide_curves, len(surface.rest))
     stored = stored_roots.points(guide_curves, surface)
     if faces_of(state.topology) != faces_of(surface.topology) or roots is None or stored is None:
-        if not follows_edits:
+        if not follows_edits or frame_faces.came_with_the_frame(guide_curves, surface):
             return False
         curves.require_not_linked(guide_curves)
         lost, lost_between = edited_faces.root_again(guide_curves, surface, depsgraph)

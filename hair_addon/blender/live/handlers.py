@@ -8,7 +8,7 @@ from bpy.app.handlers import persistent
 
 from ..data import orientation, surface_space
 from ..data.strands import curves_objects
-from ..groom import bindings, paused_hair, pipeline, staleness
+from ..groom import bindings, frame_faces, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import memory, running, scene_time
 from ..host.notices import name_of
@@ -244,6 +244,7 @@ def after_frame_change(scene, depsgraph):
         events.scene_changed(is_hair_only=_is_hair_only_in_frame(reports))
         deformed = updates.deformed(reports)
         moving_surfaces.frame_changed(deformed & _surfaces())
+        frame_faces.note(deformed & _surfaces(), depsgraph)
         for surface_object in deformed:
             events.surface_moved(surface_object)
     if not scene_time.may_write(scene, depsgraph):

@@ -10,7 +10,7 @@ from ..data.pictures import drawn_meshes
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, surface_textures, world_texture
-from ..groom import bindings, copied_hair, edited_faces, followed_names, paused_hair
+from ..groom import bindings, copied_hair, edited_faces, followed_names, frame_faces, paused_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..groom.guides import guide_states
 from ..host import notices
@@ -50,6 +50,7 @@ OTHERS = (
     scene.surface_cache,
     drawn_meshes.layout_cache,
     edited_faces.left_cache,
+    frame_faces.count_cache,
     subdivided_surfaces.smooth_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,

@@ -8,7 +8,7 @@ import bpy
 from ...core.errors import HairError
 from ..data import masks, scene
 from ..data.strands import curves, drawn_lines
-from ..groom import applied_transforms, bindings, edited_surfaces, staleness
+from ..groom import applied_transforms, bindings, edited_surfaces, frame_faces, staleness
 from ..host.notices import text_of
 from ..settings import style_items
 from . import events, reported
@@ -31,7 +31,8 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
                 state.is_stale = state.is_stale or (is_mesh_edited and not was_edited)
                 applied |= {guides} if was_edited else set()
                 continue
-            is_placed = not curves.is_hand_made(guides)  # where its mask says
+            # Where its mask says, whose weights on the faces of another frame tell nothing.
+            is_placed = not (curves.is_hand_made(guides) or frame_faces.are_others(guides))
             if is_mesh_edited and not was_edited and is_placed and _may_be_painted(guides, depsgraph):
                 state.is_stale = True
         except HairError as error:
@@ -47,6 +48,8 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
             continue
         if not state.is_live:
             state.is_stale = state.is_stale or state.guide_curves not in applied
+            continue
+        if frame_faces.are_others(hair):
             continue
         with _refusal_as_status(state):
             if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.strands import stored_roots
+from tests.support.interface.layout import draw
 from tests.support.reading import attribute, evaluated_points, points, write_points
 
 GRID = 8  # faces along a side, 1 m wide
@@ -226,3 +227,64 @@ def test_strands_that_were_edited_by_hand_are_carried_too(hair):
     is_moved = ((corners >= 30) & (corners < 50)).all(axis=0)  # with all of their faces
     assert is_moved.sum() > 20
     np.testing.assert_allclose(points(hair)[is_moved, 0], turned[is_moved, 0] + (0.25, 0.0, 0.0), atol=2e-5)
+
+
+@pytest.fixture
+def changing(hair, scene):
+    """The hair, on a skin that loses most of its faces until frame 10 by a keyed modifier; an undo step in frame 1."""
+    decimate = bpy.data.objects["Skin"].modifiers.new("Decimate", "DECIMATE")
+    for frame, ratio in ((1, 1.0), (10, 0.2)):
+        decimate.ratio = ratio
+        decimate.keyframe_insert("ratio", frame=frame)
+    scene.frame_set(1)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="made")
+    return hair
+
+
+def step(name):
+    """Undo or redo, and what Blender evaluates for it."""
+    getattr(bpy.ops.ed, name)()
+    bpy.context.view_layer.update()
+
+
+def test_undo_across_frames_of_changing_faces_roots_nothing_again(changing, scene):
+    """Faces that came with the frame are no edit, by whatever the surface is reported."""
+    before = {name: points(bpy.data.objects[name]) for name in ("Hair", "Hair Guides")}
+    topology = bpy.data.objects["Hair"].data.vellus.topology
+    scene.frame_set(5)
+    bpy.ops.ed.undo_push(message="another frame")
+    panel = " ".join(draw(bpy.types.VELLUS_PT_surface).texts)
+    assert '"Skin" has other faces in this frame: hair stays on those of the frame that it was made in' in panel
+    for name in ("undo", "redo", "undo", "redo"):
+        step(name)
+    assert bpy.context.scene.frame_current == 5
+    bpy.data.objects["Skin"].data.update_tag()
+    bpy.context.view_layer.update()
+    for name, expected in before.items():
+        assert bpy.data.objects[name].data.vellus.status == ""
+        np.testing.assert_array_equal(points(bpy.data.objects[name]), expected)
+    bpy.context.scene.frame_set(1)
+    assert bpy.data.objects["Hair"].data.vellus.topology == topology
+    assert "other faces" not in " ".join(draw(bpy.types.VELLUS_PT_surface).texts)
+
+
+def test_an_edit_in_such_a_frame_is_followed(changing, scene):
+    scene.frame_set(5)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Skin"]
+    select(0, 1, 2)
+    with edit_mode():
+        bpy.ops.mesh.delete(type="FACE")
+    assert "lost their faces" in bpy.data.objects["Hair Guides"].data.vellus.status
+
+
+def test_a_setting_that_is_changed_back_is_an_edit_too(hair, scene):
+    """Though as many faces as before were those of the frame."""
+    decimate = bpy.data.objects["Skin"].modifiers.new("Decimate", "DECIMATE")
+    topologies = []
+    for frame, ratio in ((1, 0.5), (2, 0.5), (2, 1.0), (2, 0.5)):
+        scene.frame_set(frame)
+        decimate.ratio = ratio
+        bpy.context.view_layer.update()
+        topologies.append(bpy.data.objects["Hair"].data.vellus.topology)
+    assert topologies[0] == topologies[1] == topologies[3] != topologies[2]
