@@ -2,6 +2,7 @@
 """Registration of all Blender classes, in order of dependence."""
 
 import atexit
+import sys
 
 import bpy
 
@@ -28,6 +29,8 @@ CLASSES = (
     *asset_shelf.CLASSES,
 )
 
+_PATIENCE = 0.5  # [s] between two looks at whether a render has ended
+
 
 def require_registered():
     """Register the add-on in a checkout. Raises `HairError` where it is an extension that is disabled."""
@@ -40,6 +43,10 @@ def require_registered():
 
 def register():
     """Register classes, then handlers and drawing."""
+    if bpy.app.timers.is_registered(_unregister_after_render):  # disabled a moment ago, and enabled again
+        bpy.app.timers.unregister(_unregister_after_render)
+        _show_in_status_bars(None)
+        return
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     translations.register()
@@ -60,7 +67,35 @@ def register():
 
 
 def unregister():
-    """Undo `register` in reverse."""
+    """Undo `register` in reverse: at once, or when the render of a window has ended.
+
+    Blender would wait for the thread of the render, and this for Python, which Blender holds meanwhile.
+    """
+    if not running.is_rendering():
+        _unregister()
+    elif not bpy.app.timers.is_registered(_unregister_after_render):
+        bpy.app.timers.register(_unregister_after_render, first_interval=_PATIENCE, persistent=True)
+        said = translations.interface_text("Blender renders: Vellus is disabled when the render has ended.")
+        print(f"Vellus: {said}", file=sys.stderr)
+        _show_in_status_bars(said)
+
+
+def _unregister_after_render():
+    """For `bpy.app.timers`."""
+    if running.is_rendering():
+        return _PATIENCE
+    _show_in_status_bars(None)
+    _unregister()
+    return None
+
+
+def _show_in_status_bars(text):
+    """Show a text in all windows; None: what Blender shows there."""
+    for workspace in bpy.data.workspaces if running.has_window() else ():
+        workspace.status_text_set(text)
+
+
+def _unregister():
     running.end(bpy.context)
     first_setup.unregister()
     viewport.unregister()

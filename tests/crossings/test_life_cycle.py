@@ -12,6 +12,7 @@ import pytest
 
 import hair_addon
 from hair_addon.blender.data.strands import curves
+from hair_addon.blender.host import running
 from hair_addon.blender.host.caches import Cache
 from hair_addon.blender.live import handlers, invalidation
 from hair_addon.blender.render import hair_cache, offscreen
@@ -237,6 +238,29 @@ def test_hair_is_drawn_once_when_the_addon_is_enabled_again(hair):
     assert bpy.app.timers.is_registered(handlers._take_over)
     handlers._take_over()  # as Blender does with its next redraw
     assert (hair.display_type, bpy.data.objects["Guides"].display_type) == (shown, "BOUNDS")
+
+
+@pytest.mark.parametrize("is_enabled_again", [False, True])
+def test_it_is_disabled_when_the_render_of_a_window_has_ended(hair, monkeypatch, capsys, is_enabled_again):
+    wait = hair_addon.blender._unregister_after_render
+    monkeypatch.setattr(running, "is_rendering", lambda: True)
+    hair_addon.unregister()
+    hair_addon.blender.unregister()  # somebody clicks again
+    try:
+        assert capsys.readouterr().err.count("Vellus is disabled when the render has ended") == 1
+        assert bpy.app.timers.is_registered(wait) and wait() > 0.0
+        assert hair.data.vellus.kind == "HAIR" and hair_addon.blender.engine.VellusRenderEngine.is_registered
+        monkeypatch.setattr(running, "is_rendering", lambda: False)
+        if is_enabled_again:
+            hair_addon.register()
+            assert not bpy.app.timers.is_registered(wait) and hair.data.vellus.kind == "HAIR"
+        else:
+            assert wait() is None and not hasattr(bpy.types.Curves, "vellus")
+    finally:
+        if bpy.app.timers.is_registered(wait):
+            bpy.app.timers.unregister(wait)
+        if not hasattr(bpy.types.Curves, "vellus"):
+            hair_addon.register()
 
 
 @pytest.mark.parametrize("how", ["factory", "homefile"])

@@ -12,6 +12,7 @@ from ...core import geometry
 from ...core.errors import HairError
 from ...core.geometry.mesh import Faces, TriMesh, interpolate
 from ...core.geometry.texture import Texture
+from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn, name_of
 from . import subdivided_surfaces, surface_space
@@ -170,8 +171,9 @@ def read_own_mesh(surface_object, to_world_axes):
 
 
 def present_depsgraph():
-    """The dependency graph of the context's scene and view layer, evaluated."""
-    return bpy.context.evaluated_depsgraph_get()
+    """The dependency graph of the context's scene and view layer, evaluated. Raises `HairError` within a driver."""
+    with scene_time.outside_drivers():
+        return bpy.context.evaluated_depsgraph_get()
 
 
 def triangle_count(surface_object, view_layer):

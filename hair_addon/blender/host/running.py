@@ -20,6 +20,11 @@ def has_window():
     return not bpy.app.background
 
 
+def is_rendering():
+    """Whether a window renders, in a thread of its own."""
+    return bpy.app.is_job_running("RENDER")
+
+
 def job():
     """The `Job` that runs now, or None."""
     return _job

@@ -5,9 +5,12 @@ Code that depends on time uses these functions. A viewport's dependency graph is
 has a dependency graph of its own. `live/handlers.py` reacts to frame changes.
 """
 
+import contextlib
 import math
 
 import bpy
+
+from ...core.errors import HairError
 
 
 def frame_of(blender_scene):
@@ -130,3 +133,14 @@ def is_rendered(depsgraph):
 def may_write(blender_scene, depsgraph):
     """Whether data may be written now: a render runs in parallel to the interface unless that is locked."""
     return is_shown(depsgraph) or bpy.app.background or blender_scene.render.use_lock_interface
+
+
+@contextlib.contextmanager
+def outside_drivers():
+    """Raise a `HairError` where Blender is asked, in a context, to evaluate a scene while it evaluates it."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise HairError(
+            "Blender evaluates the scene right now: call this from an operator or a handler, not from a driver."
+        ) from error

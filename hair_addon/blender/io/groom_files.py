@@ -9,6 +9,7 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.files.whole_file import require_place, require_room, whole_file
 from ...core.geometry.strands import curve_offsets
+from ..data import scene
 from ..data.strands import attributes, exported_curves
 from ..groom.selection import object_of
 from ..host import paths, scene_time
@@ -136,6 +137,6 @@ def _say_unit(path, scale):
 
 
 def _alembic_bytes(guides, hair):
-    mesh = guides.surface.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = guides.surface.evaluated_get(scene.present_depsgraph()).data
     strands = sum(len(curves.points) * _POINT_BYTES for curves in (guides, hair))
     return 100_000 + len(mesh.vertices) * _VERTEX_BYTES + len(mesh.loops) * _CORNER_BYTES + strands

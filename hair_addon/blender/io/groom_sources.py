@@ -11,6 +11,7 @@ from ...core.files import groom_curves
 from ...core.files.groom_curves import GroomCurves
 from ...core.geometry import strands
 from ...core.shading import strand_colors
+from ..data import scene
 from ..data.strands import attributes, curves, exported_curves, simulated_guides
 from ..groom import guide_maps, hair_systems, selection
 from ..groom.dynamics import frame_folders
@@ -95,7 +96,7 @@ def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
     guides = hair.vellus.guide_curves
     guide_count = 0 if guides is None else len(guides.curves)
     # Without guides in the file there are none to name.
-    depsgraph = bpy.context.evaluated_depsgraph_get()
+    depsgraph = scene.present_depsgraph()
     guide_map = guide_maps.of(hair, depsgraph) if guide_count and settings.has_guides else None
     ids, weights = (None, None) if guide_map is None else groom_curves.closest_guides(*guide_map, first_id)
     look, randoms = properties.look_of(hair.vellus), curves.read_randoms(hair)

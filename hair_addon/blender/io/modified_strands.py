@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
+from ..data import scene
 from ..data.strands import attributes, curves, delivered_hair, follow_nodes
 from ..groom import selection
 from ..host.notices import name_of
@@ -22,7 +23,7 @@ def curves_of(datablock):
     others = [m for m in shown.modifiers if m != follow_nodes.modifier_of(shown)]
     if not shown.visible_get() or any(m.show_viewport != m.show_render for m in others):
         return None
-    evaluated = shown.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    evaluated = shown.evaluated_get(scene.present_depsgraph()).data
     if not isinstance(evaluated, bpy.types.Curves):
         return None
     is_same = np.array_equal(curves.point_counts(evaluated), curves.point_counts(datablock))

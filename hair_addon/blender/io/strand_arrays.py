@@ -9,8 +9,10 @@ from ...core.errors import HairError
 from ...core.files.groom_curves import Rows, slices
 from ...core.geometry import strands
 from ...core.grooming import groom
+from ..data import scene
 from ..data.strands import attributes, curves, exported_curves, posed_strands, stored_roots
 from ..groom import selection
+from ..host import scene_time
 from ..host.notices import name_of
 from ..live import live_hair
 from . import modified_strands
@@ -74,7 +76,7 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
         points, counts = exported_curves.points_kept(datablock), exported_curves.counts_kept(datablock)
     else:
         points, counts = local.reshape(-1, 3), np.full(*local.shape[:2])
-    pose = posed_strands.read_pose(datablock.surface, bpy.context.evaluated_depsgraph_get())
+    pose = posed_strands.read_pose(datablock.surface, scene.present_depsgraph())
     starts, stored = strands.curve_offsets(counts), stored_roots.places(datablock, np.inf)
     may_float = stored_roots.may_float(datablock)
     places = pose.rooted(datablock.vellus.topology, stored, points[starts[:-1]], may_float)
@@ -125,7 +127,8 @@ def other_places(datablock):
 def bring_up_to_date():
     """Let strands follow what was changed, and objects that are new be evaluated."""
     live_hair.write_all()
-    bpy.context.view_layer.update()
+    with scene_time.outside_drivers():
+        bpy.context.view_layer.update()
 
 
 def shape_of(datablock):

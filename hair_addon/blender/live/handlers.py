@@ -193,7 +193,7 @@ def _evaluate(depsgraph, combed):
     # Called last to first. An error that nobody expects is raised when all were called, so that it stops no other hair.
     with contextlib.ExitStack() as stack:
         # What takes much memory is asked for by an operator; a render is not to lack it.
-        stack.enter_context(memory.asking(running.has_window() and not bpy.app.is_job_running("RENDER")))
+        stack.enter_context(memory.asking(running.has_window() and not running.is_rendering()))
         stack.callback(live_hair.show_styles, depsgraph)
         for hair in reversed(_of_kind("HAIR")):
             stack.callback(_evaluate_hair, hair, depsgraph, combed)

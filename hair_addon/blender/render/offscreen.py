@@ -37,7 +37,7 @@ def drawing_picture(settings, drawn=None, lens_passes=None):
         )
     start_gpu()
     context = bpy.context
-    depsgraph = context.evaluated_depsgraph_get()
+    depsgraph = scene.present_depsgraph()
     lens = camera_lens.read_lens(context.scene, depsgraph)
     per_side, pass_count = settings.samples_per_side, 1
     if lens is not None:  # a pass for each of its points
@@ -68,12 +68,19 @@ def drawing_picture(settings, drawn=None, lens_passes=None):
 
 
 def start_gpu():
-    """Initialise the GPU, which Blender does not do in background mode."""
+    """Initialise the GPU, which Blender does not do in background mode. Raises `HairError` where nobody can draw."""
     if bpy.app.background:
         try:
             gpu.init()
         except SystemError as error:
             raise HairError(f"Drawing is not possible: this machine has no OpenGL driver ({error}).") from error
+    try:
+        gpu.types.GPUTexture((1, 1), format="R32F")
+    except RuntimeError as error:
+        sentence = (
+            "Blender lends its graphics to nobody while it renders: draw before the render, or after it has ended."
+        )
+        raise HairError(sentence) from error
 
 
 def write_picture(pixels, path, blender_scene):

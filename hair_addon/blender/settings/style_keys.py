@@ -8,7 +8,7 @@ import re
 
 import bpy
 
-_PATH = re.compile(r'vellus\.styles\[(?:(\d+)|"((?:[^"\\]|\\.)*)")\](.*)', re.DOTALL)
+_PATH = re.compile(r'vellus\.styles\[(?:(\d{1,6})|"((?:[^"\\]|\\.)*)")\](.*)', re.DOTALL)
 
 
 class Rearrangement:

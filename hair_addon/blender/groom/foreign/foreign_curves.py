@@ -10,6 +10,7 @@ import numpy as np
 from bpy.types import Curves, Object
 
 from ....core.errors import HairError
+from ...data import scene
 from ...data.strands import attributes, curves
 from ...host.notices import name_of
 
@@ -113,7 +114,7 @@ def _read(datablock):
 
 def _evaluated(curves_object):
     """The `GeometrySet` of an object after its modifiers, which has curves."""
-    geometry = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).evaluated_geometry()
+    geometry = curves_object.evaluated_get(scene.present_depsgraph()).evaluated_geometry()
     if geometry.curves is None and curves_object.type == "CURVE" and not curves_object.data.splines:
         raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
     if geometry.curves is None:

@@ -230,7 +230,7 @@ def _bind_to_group(bound, surface_object, roots):
     if not name:
         return
     bound.settings = replace(bound.settings, density_group=name)
-    painted = scene.read_cage_weights(surface_object, bpy.context.evaluated_depsgraph_get(), name)
+    painted = scene.read_cage_weights(surface_object, scene.present_depsgraph(), name)
     bound.root_key = staleness.root_key(bound.settings, painted)
 
 

@@ -91,7 +91,7 @@ def transferring(
     curves.require_overridable(guides)
     source = guide_tools.open_guides(guides, depsgraph)
     curves_objects.keep_rest(target)
-    surface = scene.read_surface(target, bpy.context.evaluated_depsgraph_get())
+    surface = scene.read_surface(target, scene.present_depsgraph())
     check_mesh(surface.mesh)
     warp = _warp(guides.surface, source.surface, target, surface, settings, depsgraph)
     own_ground, ground = (Ground(one.mesh, one.corner_uvs) for one in (source.surface, surface))
@@ -132,7 +132,7 @@ def _warp(its_object, its_surface: Surface, target, surface: Surface, settings, 
     if settings.method == "LANDMARKS":
         return _through_landmarks(
             landmarks.read(its_object, its_surface, depsgraph),
-            landmarks.read(target, surface, bpy.context.evaluated_depsgraph_get()),
+            landmarks.read(target, surface, scene.present_depsgraph()),
         )
     if settings.alignment == "BOXES":
         return geometry.landmark_warp.between_boxes(its_surface.mesh.vertices, surface.mesh.vertices)

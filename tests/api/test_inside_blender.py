@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Functions that are called where Blender forbids it: in a driver, and while it renders. One sentence each."""
+
+import bpy
+import pytest
+
+from hair_addon import api
+from hair_addon.blender.settings.style_keys import Rearrangement
+from tests.support.rendering import add_orthographic_camera, configure
+
+
+@pytest.fixture
+def heard():
+    """What calls of a function that it returns have raised."""
+    said = []
+
+    def attempt(call):
+        try:
+            call()
+        except Exception as error:
+            said.append(error)
+        return 1.0
+
+    attempt.said = said
+    return attempt
+
+
+def test_a_driver_that_reads_points_hears_that_the_scene_is_evaluated(hair, heard):
+    bpy.app.driver_namespace["hair_reader"] = lambda: heard(lambda: api.points(hair.data))
+    hair.driver_add("location", 0).driver.expression = "hair_reader()"
+    try:
+        bpy.context.view_layer.update()
+    finally:
+        hair.driver_remove("location")
+        del bpy.app.driver_namespace["hair_reader"]
+    assert heard.said and all(isinstance(error, api.HairError) for error in heard.said)
+    assert "not from a driver" in str(heard.said[0])
+
+
+def test_a_handler_of_a_render_that_draws_hears_that_blender_has_the_graphics(hair, scene, heard):
+    add_orthographic_camera(scene)
+    configure(resolution_x=8, resolution_y=8, sample_count=1)
+
+    def listen(*_args):
+        heard(lambda: api.draw(width=8, height=8))
+
+    bpy.app.handlers.render_post.append(listen)
+    try:
+        assert bpy.ops.render.render() == {"FINISHED"}
+    finally:
+        bpy.app.handlers.render_post.remove(listen)
+    (error,) = heard.said
+    assert isinstance(error, api.HairError) and "lends its graphics to nobody while it renders" in str(error)
+    assert api.draw(width=8, height=8).shape == (8, 8, 4)
+
+
+@pytest.mark.parametrize("digits", [4299, 4301, 5000])
+def test_a_key_with_an_index_of_any_length_is_of_no_style(digits):
+    """Python refuses to read a number of so many digits."""
+    moved = Rearrangement(["Clump", "Curl"], [1, 0], ["Curl", "Clump"])
+    path = f"vellus.styles[{'9' * digits}].curl.radius"
+    assert moved.path(path) == moved.path_of_target(path) == path
+    assert moved.path("vellus.styles[0].curl.radius") == "vellus.styles[1].curl.radius"
