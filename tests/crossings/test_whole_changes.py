@@ -364,3 +364,18 @@ def test_settings_that_the_interface_refuses_leave_the_surface_as_it_was(hair, t
     with pytest.raises(HairError, match="landmarks"):
         api.transfer_groom(bpy.data.hair_curves["Hair"], things("Other"), method="LANDMARKS")
     assert file_digest.changes(before, file_digest.of_file()) == {}
+
+
+def test_a_mask_that_was_never_painted_is_saved_and_transferred(hair, tmp_path):
+    """Its vertex group has no vertices."""
+    on_styled(None)
+    bpy.ops.vellus.paint_style_mask()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    mask = bpy.data.hair_curves["Hair"].vellus.styles[0].curl.mask
+    save_groom(tmp_path / "saved.blend")
+    masks = groom_library.read(tmp_path / "saved.blend").masks
+    assert [*masks] == [mask] and not masks[mask].any()
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, location=(4.0, 0.0, 0.0))
+    other = bpy.context.object
+    api.transfer_groom(bpy.data.hair_curves["Hair"], other)
+    assert mask in other.vertex_groups and not any(vertex.groups for vertex in other.data.vertices)
