@@ -31,15 +31,15 @@ def add(verbs):
 
 
 def run(given, console):
-    """Read all curves; import, evaluate, write."""
+    """Import, evaluate, write; read all curves."""
     blender.host.memory.limit_this_process()  # a damaged file may ask for any amount
+    file_axes = None
+    if given.out is not None:
+        file_axes = blender.io.mesh_files.open_file(given.input, up=given.up).tolist()
+        blender.io.mesh_files.save_scene(given.out)
     if given.curves and blender.io.curve_files.is_read_natively(given.input):
         blender.io.curve_files.read_all(given.input)
-    if given.out is None:
-        return
-    file_axes = blender.io.mesh_files.open_file(given.input, up=given.up)
-    blender.io.mesh_files.save_scene(given.out)
-    console.result({"file_axes": file_axes.tolist()}, "")
+    console.result({"file_axes": file_axes}, "")
 
 
 def open_apart(path, up, console, has_curves=False):

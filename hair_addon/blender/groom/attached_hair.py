@@ -31,7 +31,10 @@ def attach(
     for part in parts:
         curves.require_editable(part)
     moved = [part for part in parts if surface_object not in (None, _surface_before(part))]
-    changes = {part: surface_space.to_world(surface_object).inverse @ _place(part, place_before) for part in moved}
+    to_world = surface_space.to_world(surface_object) if moved else Affine.identity()
+    if not to_world.is_valid:
+        raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(surface_object))
+    changes = {part: to_world.inverse @ _place(part, place_before) for part in moved}
     kept = {part for part in moved if len(part.curves) and _stays(part)}
     carried, surface = {}, None
     if kept:

@@ -211,6 +211,20 @@ def test_guides_without_object_and_surface_wait_for_a_surface(hair):
         bpy.ops.vellus.restore_guides()
 
 
+def test_a_flat_surface_is_not_attached_to(hair):
+    """It was a traceback, as its coordinates have no inverse."""
+    before = points(hair)
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=1.0)
+    other = bpy.context.object
+    other.scale.z = 0.0
+    bpy.context.view_layer.update()
+    activate("Hair")
+    other.select_set(True)
+    with pytest.raises(RuntimeError, match="has a scale of zero: change its scale"):
+        bpy.ops.vellus.attach_to_surface()
+    assert hair.data.surface == bpy.data.objects["Sphere"] and np.array_equal(points(hair), before)
+
+
 def test_hair_that_lost_its_surface_is_attached_to_another(hair):
     bpy.data.objects.remove(bpy.data.objects["Sphere"])
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=1.0)
