@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fixtures that every suite shares."""
 
+import gc
 import os
 
 import numpy as np
@@ -23,6 +24,21 @@ def pytest_configure():
     if compile_kernels.are_up_to_date(folder):
         compiled_kernels.FOLDER = folder
         os.environ[compiled_kernels.VARIABLE] = str(folder)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collect tests without looking for garbage meanwhile, of which there is none; nor later in all that it makes.
+
+    A million objects, through which Python would look a dozen times, a tenth of the time of collecting.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.collect()
+        gc.freeze()
 
 
 def pytest_collection_modifyitems(items):
