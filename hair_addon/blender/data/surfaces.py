@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core import geometry
 from ...core.geometry.mesh import Faces, TriMesh, check_mesh
+from ...core.geometry.mirror import Mirror
 from ...core.kernels.checks import require_indices
 
 # What does not follow from where vertices are posed, and is kept in another pose.
@@ -136,10 +137,11 @@ class Surface:
         return named[0] == named[1] and all(map(np.array_equal, mine, its))
 
     @property
-    def mirror_normal(self):
-        """(3,) unit: of the plane across the object's own X axis."""
-        normal = self.to_local_axes[0]
-        return normal / np.linalg.norm(normal)
+    def mirror(self):
+        """The `Mirror` across the object's own X axis."""
+        normal = self.to_local_axes[0] / np.linalg.norm(self.to_local_axes[0])
+        axis = self.to_world_axes[:, 0]
+        return Mirror(normal, axis / (axis @ normal))
 
     @cached_property
     def shape(self):

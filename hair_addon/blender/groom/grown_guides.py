@@ -63,7 +63,7 @@ def grow(
         settings,
         density=density,
         texture=texture,
-        mirror_normal=surface.mirror_normal,
+        mirror=surface.mirror,
         shape=surface.shape,
         roots=roots,
         flow=flow,
@@ -80,7 +80,7 @@ def grow(
             settings,
             density=density,
             texture=texture,
-            mirror_normal=surface.mirror_normal,
+            mirror=surface.mirror,
             progress=part_of(progress, _GROWN, 1.0),
         )
     except HairError as error:

@@ -15,13 +15,13 @@ import warp as wp
 from .. import grooming
 from ..geometry import resampling
 from ..geometry.mesh import TriMesh, positions
+from ..geometry.mirror import ACROSS_X, Mirror
 from ..geometry.strands import Strands, from_numpy
 from ..geometry.texture import Texture
 from ..grooming import groom_defaults
 from ..grooming.groom import GuideSettings, distribute_guides
 from ..kernels import kernel_setup
 from ..long_work import Progress, no_progress, part_of
-from ..placement.domain import Mirror
 from . import draping
 from .collision import contact_queries, contact_substep
 from .rod import detail, rod_solver, rods
@@ -42,8 +42,8 @@ def grow(mesh: TriMesh, settings: GuideSettings, *, progress: Progress = no_prog
     guides = distribute_guides(mesh, settings, progress=part_of(progress, 0.0, _GROWN), **ground)
     mask = ground.get("density"), ground.get("texture")
     settings = groom_defaults.complete(settings, mesh, *mask)
-    normal = ground.get("mirror_normal", (1.0, 0.0, 0.0))
-    return settled(guides, mesh, settings, *mask, mirror_normal=normal, progress=part_of(progress, _GROWN, 1.0))
+    mirror = ground.get("mirror", ACROSS_X)
+    return settled(guides, mesh, settings, *mask, mirror=mirror, progress=part_of(progress, _GROWN, 1.0))
 
 
 def settled(
@@ -53,7 +53,7 @@ def settled(
     density: np.ndarray | None = None,
     texture: Texture | None = None,
     *,
-    mirror_normal: Any = (1.0, 0.0, 0.0),
+    mirror: Mirror = ACROSS_X,
     progress: Progress = no_progress,
 ) -> Strands:
     """Guides that have grown on a mesh, where they come to rest. settings: completed for the mesh.
@@ -78,7 +78,6 @@ def settled(
     points = (points / metres + center).astype(np.float32)
     points[:, 0] = grown[:, 0]  # to the last bit: where the surface has them
     if settings.symmetric:
-        mirror = Mirror(np.asarray(mirror_normal, np.float64))
         points = grooming.guide_growth.mirrored(points, positions(mesh, guides.roots), mirror)
     return from_numpy(points, guides.roots, device)
 

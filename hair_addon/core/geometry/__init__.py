@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         hash_grid,
         landmark_warp,
         mesh,
+        mirror,
         nearest_rotation,
         orientation,
         packed_strands,

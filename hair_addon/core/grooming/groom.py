@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .. import geometry, grooming, interpolation, placement, styling
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, check_points, positions
+from ..geometry.mirror import ACROSS_X, Mirror
 from ..geometry.strands import Strands
 from ..geometry.texture import Texture
 from ..interpolation.hair_binding import HairBinding
@@ -226,7 +226,7 @@ def distribute_guides(
     *,
     density: np.ndarray | None = None,
     texture: Texture | None = None,
-    mirror_normal: ArrayLike = (1.0, 0.0, 0.0),
+    mirror: Mirror = ACROSS_X,
     shape: TriMesh | None = None,
     roots: SurfacePoints | None = None,
     flow: np.ndarray | None = None,
@@ -238,7 +238,7 @@ def distribute_guides(
 
     mesh: `TriMesh` [m]; settings: `GuideSettings`; those that are None follow from the mesh (groom_defaults.py);
     density: (V,) per vertex, at least 0, or None for uniform; texture: `Texture` that multiplies it, or None;
-    mirror_normal: of the plane through the origin that symmetric guides mirror; shape: `TriMesh` that was turned and
+    mirror: by which symmetric guides are; shape: `TriMesh` that was turned and
     scaled evenly to be `mesh`, its mirror across the X axis: guides are placed on it, and so in the same places however
     it was turned and scaled; None where there is none; roots: `SurfacePoints` that guides have already, None to place
     them; flow: (L, 2, 3) segments [m] of flow lines and drawn_on (V, 3), as lines and drawn_on of `bind_hair`;
@@ -249,7 +249,6 @@ def distribute_guides(
 
     settings = groom_defaults.complete(settings, mesh, density, texture)
     relaxing = part_of(progress, 0.1, 0.9)
-    mirror = placement.domain.Mirror(np.asarray(mirror_normal, np.float64)) if settings.symmetric else None
     if roots is None:
         placed_on = mesh if shape is None else shape
         if settings.curvature:
@@ -262,7 +261,7 @@ def distribute_guides(
             settings.relax_iterations,
             density=density,
             texture=texture,
-            mirror=mirror if mirror is None or shape is None else placement.domain.Mirror(np.array([1.0, 0.0, 0.0])),
+            mirror=(mirror if shape is None else ACROSS_X) if settings.symmetric else None,
             device=device,
             progress=lambda part: relaxing("Spreading guides", part),
         )
@@ -281,7 +280,7 @@ def distribute_guides(
         control_point_count=CONTROL_POINT_COUNT,
         device=device,
     )
-    if mirror is not None:
+    if settings.symmetric:
         controls = grooming.guide_growth.mirrored(controls, positions(mesh, roots), mirror)
     return Strands(geometry.bspline.evaluate(controls, POINT_COUNT, device), roots)
 

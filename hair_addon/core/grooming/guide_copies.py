@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry.mirror import Mirror
 from ..geometry.strands import lengths as lengths_of
 from .guide_mirror import nearest
 from .guide_segments import blended, only, rotations, unit
@@ -29,8 +30,8 @@ class Matches:
     matrices: np.ndarray
 
 
-def matched(sources: Places, targets: Places, mapping: str, mirror_normal: np.ndarray) -> Matches:
-    """The `Matches` of targets: `CopySettings.mapping` says how; mirror_normal: (3,) unit, of a plane through zero.
+def matched(sources: Places, targets: Places, mapping: str, mirror: Mirror) -> Matches:
+    """The `Matches` of targets: `CopySettings.mapping` says how; mirror: for MIRRORED.
 
     FITTED lays the targets over the sources: their middle, their mean normal and their size. Shapes are turned by the
     least rotation from normal to normal that keeps up what is up, where the surface is steep enough to say.
@@ -38,15 +39,16 @@ def matched(sources: Places, targets: Places, mapping: str, mirror_normal: np.nd
     roots, normals = (np.asarray(array, np.float64) for array in (targets.roots, targets.normals))
     reflection = np.eye(3)
     if mapping == "MIRRORED":
-        reflection = np.eye(3) - 2.0 * np.outer(mirror_normal, mirror_normal)
-        roots = roots @ reflection
+        reflection = mirror.matrix
+        roots = mirror.image(roots)
     elif mapping == "FITTED":
         turn = upright_rotations(_mean_normal(sources.normals), _mean_normal(normals))[0]
         (middle, size), (its_middle, its_size) = _extent(roots), _extent(np.asarray(sources.roots, np.float64))
         scale = its_size / size if size > 0.0 else 1.0
         roots = its_middle + scale * (roots - middle) @ turn
     found = nearest(sources.roots, roots)[0][:, 0]
-    reflected = np.asarray(sources.normals, np.float64)[found] @ reflection
+    # Normals by the inverse transpose, and a mirror is its own inverse.
+    reflected = unit(np.asarray(sources.normals, np.float64)[found] @ reflection)
     return Matches(found, upright_rotations(reflected, normals) @ reflection)
 
 

@@ -10,8 +10,8 @@ import warp as wp
 from ..geometry.bspline import controls_through, greville_abscissae
 from ..geometry.closest_point import SurfaceQuery, normal_and_offset
 from ..geometry.mesh import SurfacePoints, TriMesh, normals, positions
+from ..geometry.mirror import Mirror
 from ..kernels import kernel_cache
-from ..placement.domain import Mirror
 from . import flow_lines
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.

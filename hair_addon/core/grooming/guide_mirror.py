@@ -10,7 +10,7 @@ from ..errors import HairError
 from ..geometry import hash_grid
 from ..geometry.closest_point import SurfaceQuery
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
-from ..placement.domain import Mirror
+from ..geometry.mirror import Mirror
 
 _EVERYWHERE = 1e15  # [m]: a distance to search that leaves nothing out
 _MIDDLE = 0.1  # of the distance between guides: nearer to the plane than this, they are on it

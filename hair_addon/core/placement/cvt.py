@@ -21,8 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
+from ..geometry.mirror import Mirror
 from ..geometry.texture import Texture
-from .domain import Domain, Mirror
+from .domain import Domain
 from .exact_cells import CutCells
 from .farthest import farthest
 from .lbfgs import Memory

@@ -11,6 +11,7 @@ from ..errors import HairError
 from ..geometry.closest_point import SurfaceQuery
 from ..geometry.connected_components import connected_components
 from ..geometry.mesh import SurfacePoints, TriMesh, interpolate, positions
+from ..geometry.mirror import Mirror
 from ..geometry.sampling import check_density, corner_masses
 from ..geometry.texture import Texture
 
@@ -22,17 +23,6 @@ MOST_SLICES = 64  # of a sliver at once: the density may vary along it
 LEAST_COSINE = -1.0 / 3.0  # between normals of one side of a surface
 LEAST_PIECES = 2000  # minimum site count for the cutting: the density is constant in a piece
 PLASTIC = 0.7548776662466927, 0.5698402909980532  # steps of the evenest sequence in a square [Roberts18]
-
-
-@dataclass(frozen=True)
-class Mirror:
-    """A plane through the origin [m]; normal (3,), unit."""
-
-    normal: np.ndarray
-
-    def image(self, vectors: np.ndarray) -> np.ndarray:
-        """(N, 3) positions or directions, mirrored."""
-        return vectors - 2.0 * (vectors @ self.normal)[:, None] * self.normal
 
 
 @dataclass(frozen=True)
@@ -208,8 +198,8 @@ class Domain:
         """The parts above the mirror, cut along it; the mirror is flipped if its lower side has more."""
         above, below = (self._cut_at_mirror(parts, sign) for sign in (1.0, -1.0))
         above_amount, below_amount = ((side.areas * self.density_at(side.centres())).sum() for side in (above, below))
-        if below_amount > above_amount * (1.0 + 1e-6):
-            self._mirror = Mirror(-self._normal)
+        if self._mirror is not None and below_amount > above_amount * (1.0 + 1e-6):
+            self._mirror = self._mirror.flipped()
             return below
         return above
 

@@ -12,10 +12,11 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import mesh as mesh_math
 from hair_addon.core.geometry.curvature import bend_density
 from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh
+from hair_addon.core.geometry.mirror import Mirror
 from hair_addon.core.geometry.sampling import sample_surface
 from hair_addon.core.geometry.texture import Texture
 from hair_addon.core.placement import cvt, voronoi
-from hair_addon.core.placement.domain import Domain, Mirror
+from hair_addon.core.placement.domain import Domain
 from hair_addon.core.placement.exact_cells import CutCells
 from hair_addon.core.placement.voronoi import sites_on
 from tests.support.devices import DEVICE

@@ -9,7 +9,7 @@ from bpy.types import Object, ParticleSystem
 
 from ....core.errors import HairError
 from ...data import whole_changes
-from ...data.strands import curves
+from ...data.strands import curves, curves_objects
 from ...host.notices import name_of
 
 
@@ -49,6 +49,9 @@ def as_curves(surface: Object) -> Iterator[Object]:
             raise HairError('The particle system "{system}" has no hair yet.', system=name)
         made.name = made.data.name = name
         made.data.surface = surface
+        # Its points are in the surface's coordinates, but Blender gives it a transform without the surface's shear.
+        curves_objects.stand_on(made, surface)
+        bpy.context.view_layer.update()
         yield made
     modifier = surface.modifiers[modifier.name]
     modifier.show_viewport = modifier.show_render = False

@@ -4,7 +4,7 @@
 import numpy as np
 from bpy.types import Curves, Depsgraph
 
-from ....core import geometry, grooming, placement
+from ....core import geometry, grooming
 from ....core.errors import HairError
 from ....core.geometry import mesh as mesh_math
 from ....core.geometry import strands
@@ -43,8 +43,8 @@ def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) ->
     Raises `HairError` before anything changes.
     """
     guides = guide_tools.read(datablock, settings, depsgraph)
-    mesh, sign = guides.surface.mesh, 1.0 if settings.direction == "FROM_POSITIVE" else -1.0
-    plane = placement.domain.Mirror(sign * guides.surface.mirror_normal)
+    mesh, mirror = guides.surface.mesh, guides.surface.mirror
+    plane = mirror if settings.direction == "FROM_POSITIVE" else mirror.flipped()
     places = mesh_math.positions(mesh, guides.roots)
     found = grooming.guide_mirror.mirroring(mesh, places, plane, guides.weights >= 0.5)
     additions = []

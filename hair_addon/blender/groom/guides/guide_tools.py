@@ -231,7 +231,7 @@ def copy_shape(datablock: Curves, settings: CopySettings, depsgraph: Depsgraph) 
     sources, targets = np.flatnonzero(is_source), np.flatnonzero(weights > 0.0)
     copies = grooming.guide_copies
     its, own = (copies.Places(guides.first_points[rows], guides.normals[rows]) for rows in (sources, targets))
-    matches = copies.matched(its, own, settings.mapping, guides.surface.mirror_normal)
+    matches = copies.matched(its, own, settings.mapping, guides.surface.mirror)
 
     def shaped(points, chosen):
         rows = np.searchsorted(targets, chosen)
