@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair → meshes for games: strands as arrays beside their surface, and tubes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,8 +47,7 @@ class HairBeside:
 
     def local(self, made: PolygonMesh) -> PolygonMesh:
         """A mesh in the surface's local coordinates."""
-        faces = made.faces
-        return replace(made, vertices=(made.vertices @ self.to_local.T).astype(np.float32), faces=faces)
+        return made.transformed(self.to_local)
 
 
 def read_hair(hair):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A mesh of polygons with UV coordinates, as arrays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,18 @@ class PolygonMesh:
     vertices: np.ndarray
     faces: Faces
     uvs: np.ndarray
+
+    def transformed(self, axes: np.ndarray) -> "PolygonMesh":
+        """The same by (3, 3) axes of other coordinates; faces go around the other way where these are mirrored."""
+        vertices = (self.vertices @ axes.T).astype(np.float32)
+        if np.linalg.det(axes) > 0.0:
+            return replace(self, vertices=vertices)
+        starts = self.faces.starts
+        # From the last corner of each face to its first.
+        ends = np.repeat(starts[:-1] + starts[1:] - 1, np.diff(starts))
+        order = ends - np.arange(len(self.faces.corner_vertices))
+        faces = Faces(np.ascontiguousarray(self.faces.corner_vertices[order]), starts)
+        return PolygonMesh(vertices, faces, np.ascontiguousarray(self.uvs[order]))
 
     @property
     def triangle_count(self) -> int:

@@ -23,6 +23,8 @@ def clusters(features: np.ndarray, count: int, progress: Progress = no_progress)
     """
     if not 1 <= count <= len(features):
         raise HairError("{rows} strands cannot form {count} clumps.", rows=len(features), count=count)
+    # Squares of coordinates far from the origin would leave nothing of the distances between.
+    features = features - features.mean(axis=0, dtype=np.float64).astype(np.float32)
     labels = _boxes(features, count)
     for turn in range(_ROUNDS):
         centres = cluster_means(features, labels, count)
