@@ -95,7 +95,7 @@ Passed pass_across(inout Walk walk, int i, vec2 offset, float keep_length)
   float facing = dot(walk.t_below, walk.t_above);
   if (facing < 0.0) {
     float bulge = -facing * 4.0 * part * (1.0 - part);
-    vec3 between = (facing > 1e-6 - 1.0) ? walk.t_below + walk.t_above : cross(walk.t_below, walk.u_below);
+    vec3 between = (facing > 1e-6 - 1.0) ? walk.t_below + walk.t_above : upward_of(walk.t_below, walk.u_below);
     between = unit_or(between, 1e-6, walk.t_below);
     t_between += between * bulge;
     u_between += turned(walk.u_below, walk.t_below, between) * bulge;
@@ -104,7 +104,7 @@ Passed pass_across(inout Walk walk, int i, vec2 offset, float keep_length)
   passed.sideways = unit_or(
       u_between - passed.forwards * dot(u_between, passed.forwards), 1e-6, walk.u_below
   );
-  passed.upward = cross(passed.forwards, passed.sideways);
+  passed.upward = upward_of(passed.forwards, passed.sideways);
   if (d > 1e-12) {
     vec3 nearly = (passed.forwards * passed.forward + passed.sideways * w.x + passed.upward * w.y) / size;
     // Unit but for rounding, which a step of Newton's method takes away.

@@ -18,7 +18,7 @@ void bend(Step row)
       u = turned(u, t_before, t);
     }
     put_next(i, u, 0.0);
-    toward += vec2(dot(strand_normal, u), dot(strand_normal, cross(t, u)));
+    toward += vec2(dot(strand_normal, u), dot(strand_normal, upward_of(t, u)));
     t_before = t;
   }
   float size = length(toward);
@@ -31,7 +31,7 @@ void bend(Step row)
     arc += own.w;
     vec2 bent = sine_and_cosine(base_amount * angle * profile(course, arc * per_total));
     vec3 across = next_at(i).xyz;
-    vec3 sideways = across * way.x + cross(own.xyz, across) * way.y;
+    vec3 sideways = across * way.x + upward_of(own.xyz, across) * way.y;
     put_segment(i, unit_or(own.xyz * bent.y + sideways * bent.x, 1e-6, own.xyz), own.w);
   }
 }

@@ -46,7 +46,7 @@ Beside begin_beside(vec3 at_centre, vec3 u_first)
   vec3 first = segment_at(1).xyz;
   float facing = in_lock * smoothstep(0.0, 1.0, dot(first, axis));
   beside.lead = facing * dot(beside.away, axis);
-  turn_by(beside, facing, turned(beside.frame, axis, first), u_first, cross(first, u_first));
+  turn_by(beside, facing, turned(beside.frame, axis, first), u_first, upward_of(first, u_first));
   return beside;
 }
 

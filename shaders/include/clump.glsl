@@ -54,7 +54,7 @@ void clump(Step row)
       axis_before = axis;
       // Rodrigues' rotation.
       vec2 turn = sine_and_cosine(twist * wanted * base_amount);
-      away = away * turn.y + cross(axis, away) * turn.x + axis * (dot(axis, away) * (1.0 - turn.y));
+      away = away * turn.y + upward_of(axis, away) * turn.x + axis * (dot(axis, away) * (1.0 - turn.y));
     }
     if (course.at_root > 0.0) {
       wanted -= course.at_root * (1.0 - smoothstep(0.0, 1.0, arc * per_root_distance));

@@ -43,7 +43,7 @@ void frizz(Step row)
     float weight = octave_gain * smoothstep(0.0, 1.0, (per_spacing / frequency - 2.0) * 0.5);
     float phase = (1.0 - coherence) * random_of(row.seed, RANDOM_WAVE_PHASES + wave);
     if (coherence > 0.0) {
-      phase += coherence * coherent_phase(wave, row.seed, (styling.axes * vec4(strand_root, 0.0)).xyz, per_spread);
+      phase += coherence * coherent_phase(wave, row.seed, (styling.axes * vec4(strand_root, 1.0)).xyz, per_spread);
     }
     waves[wave] = weight * sine_and_cosine(phase).yx;
     if (wave % WAVES == WAVES - 1) {

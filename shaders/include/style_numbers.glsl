@@ -106,8 +106,8 @@ float profile(Course course, float x)
   return course.at_root + (course.at_tip - course.at_root) * y;
 }
 
-// The reference of frames across a normal, continuous everywhere but straight below. axes: rotation from the coordinates
-// of the normal to the surface's own axes.
+// The reference of frames across a normal, continuous everywhere but straight below. axes: from the coordinates
+// of the normal to the surface's own.
 vec3 reference(vec3 surface_normal, mat4 axes)
 {
   vec3 n = (axes * vec4(surface_normal, 0.0)).xyz;

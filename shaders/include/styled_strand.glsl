@@ -83,6 +83,12 @@ float random_of(int seed, int purpose)
   return random_number(strand_identity, seed, purpose);
 }
 
+// Across both, the other way where the surface's own axes are mirrored: all styles are mirrored with them.
+vec3 upward_of(vec3 along, vec3 sideways)
+{
+  return cross(along, sideways) * styling.hand;
+}
+
 // The first segment's frame, of the reference at the centre.
 vec3 first_frame(vec3 at_centre)
 {

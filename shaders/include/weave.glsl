@@ -25,7 +25,7 @@ void weave(Step row)
   // The tress of a strand: by the angle about the lock's centre at which it is rooted.
   vec3 at_centre = reference(centre_normal, styling.axes);
   float right = -dot(walk.low.xyz, at_centre);
-  float up = -dot(walk.low.xyz, cross(centre_normal, at_centre));
+  float up = -dot(walk.low.xyz, upward_of(centre_normal, at_centre));
   float tress = 0.0;
   if (is_rope) {
     tress = (right > 0.0) ? 0.5 : 0.0;
@@ -82,7 +82,7 @@ void weave(Step row)
     axis_before = axis;
     vec3 beside = away - axis * dot(away, axis);
     vec3 drawn = middle + away * (1.0 - pull) + beside * (pull * thickness) + frame * to_u
-                 + cross(axis, frame) * to_v;
+                 + upward_of(axis, frame) * to_v;
     vec3 way = drawn - place;
     float distance_on = length(way);
     vec3 direction = (distance_on > 1e-3 * d) ? way / distance_on : own.xyz;

@@ -125,7 +125,7 @@ def main():
     print(f"{device.name or device}: {options.strands:,} strands of {options.points} points")
     copying = best_time(lambda: wp.copy(points, plain), device)
     print(f"  {'copying them':12} {1e3 * copying:8.3f} ms")
-    axes = np.eye(3)
+    axes = np.eye(4)
     for name, styles in STYLES.items():
         program = program_of(styles, len(everything.centres))
         time = best_time(lambda program=program: steps.apply_steps(points, program, data, axes), device)

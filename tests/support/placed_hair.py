@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from hair_addon.blender.settings import style_items
 from tests.support.exchange.imported import curves_object, select
 
 GUIDES, STRANDS = 8, 24
@@ -25,7 +26,7 @@ def add_body():
     return body
 
 
-def _placed(location=(0, 0, 0), rotation=(0, 0, 0), scale=(1, 1, 1)):
+def placed(location=(0, 0, 0), rotation=(0, 0, 0), scale=(1, 1, 1)):
     def place(body):
         body.location, body.rotation_euler, body.scale = location, rotation, scale
 
@@ -64,13 +65,13 @@ _FAR, _TURNED = (3.0, 1.0, -2.0), (0.4, -0.3, 1.2)
 
 # Where a surface may stand: {kind: function of the body}.
 PLACES = {
-    "moved": _placed(_FAR),
-    "turned": _placed((0.2, 0.0, 0.1), _TURNED),
-    "small": _placed(_FAR, _TURNED, (0.01, 0.01, 0.01)),
-    "large": _placed(_FAR, _TURNED, (100.0, 100.0, 100.0)),
-    "uneven": _placed(_FAR, _TURNED, (2.0, 0.5, 1.2)),
-    "mirrored": _placed(_FAR, _TURNED, (-1.0, 1.0, 1.0)),
-    "mirrored and uneven": _placed(_FAR, _TURNED, (1.5, -0.8, 1.0)),
+    "moved": placed(_FAR),
+    "turned": placed((0.2, 0.0, 0.1), _TURNED),
+    "small": placed(_FAR, _TURNED, (0.01, 0.01, 0.01)),
+    "large": placed(_FAR, _TURNED, (100.0, 100.0, 100.0)),
+    "uneven": placed(_FAR, _TURNED, (2.0, 0.5, 1.2)),
+    "mirrored": placed(_FAR, _TURNED, (-1.0, 1.0, 1.0)),
+    "mirrored and uneven": placed(_FAR, _TURNED, (1.5, -0.8, 1.0)),
     "on a scaled rig": _on_a_rig((2.0, 2.0, 2.0), False),
     "on a rig in centimetres": _on_a_rig((0.01, 0.01, 0.01), False),
     "on a sheared rig": _on_a_rig((2.0, 0.6, 1.0), False),
@@ -95,6 +96,7 @@ def grow(place):
     for style in ("CURL", "FRIZZ"):
         bpy.context.view_layer.objects.active = hair
         bpy.ops.vellus.add_style(style=style)
+    style_items.group_of(hair.data.vellus.styles[1]).coherence = 0.5  # which the place on the surface counts for
     comb(guides)
     uses = {"Kept": bpy.ops.vellus.use_as_hair, "Made": lambda: bpy.ops.vellus.use_as_guides(grows_hair=False)}
     for name, use in uses.items():

@@ -150,18 +150,23 @@ class Surface:
         Roots are placed on it, so that rotation and scale of the object do not move them, not even by rounding,
         which relaxation would amplify.
         """
-        axes = self.to_world_axes
-        squares = axes.T @ axes
-        if not np.allclose(squares, np.eye(3) * np.trace(squares) / 3.0, rtol=0.0, atol=1e-5 * np.trace(squares)):
+        if not _is_even(self.to_world_axes):
             return None
         # A mirrored object's triangles are wound the other way, as those of the rest mirrored at its origin are.
         return TriMesh(-self.rest if self.is_mirrored else self.rest, self.mesh.triangles)
 
-    def shape_made_on(self, rest, is_mirroring):
-        """`shape` as it was when its vertices were at rest at (V, 3); is_mirroring: whether left was right then."""
-        if rest is None or self.shape is None:
+    def shape_made_on(self, rest, applied):
+        """`shape` as it was, or the mesh itself, when its vertices were at rest at (V, 3), None if they are now.
+
+        applied: `Affine` from the local coordinates of then to those of now.
+        """
+        if rest is None:
             return self.shape
-        return TriMesh(-rest if self.is_mirrored != is_mirroring else rest, self.mesh.triangles)
+        # To the last bit: Blender's matrices are of single precision.
+        axes = (self.to_world_axes @ applied.axes).astype(np.float32).astype(np.float64)
+        if not _is_even(axes):
+            return TriMesh(transformed(rest, axes), self.mesh.triangles)
+        return TriMesh(-rest if self.is_mirrored != applied.is_mirroring else rest, self.mesh.triangles)
 
     def root_vertices(self, points):
         """(N, 3) int32: the vertices that surface points lie between, in Blender's order of corners."""
@@ -247,7 +252,7 @@ class Surface:
     def identities(self, roots):
         """(S,) int32 identities and (S,) float32 random numbers in [0, 1), independent of the other strands."""
 
-        return geometry.root_frames.identities(roots.wound_otherwise() if self.names_otherwise else roots)
+        return geometry.root_frames.identities(roots, self.names_otherwise)
 
     def uvs(self, points):
         """(N, 2) float32 UV coordinates of surface points; zeros without a UV map."""
@@ -263,6 +268,12 @@ class Surface:
     def swap_winding(self, points):
         """The same points with barycentric coordinates in Blender's order of corners, or back."""
         return points.wound_otherwise() if self.is_mirrored else points
+
+
+def _is_even(axes):
+    """Whether (3, 3) axes turn, mirror and scale alike in all directions."""
+    squares = axes.T @ axes
+    return np.allclose(squares, np.eye(3) * np.trace(squares) / 3.0, rtol=0.0, atol=1e-5 * np.trace(squares))
 
 
 _HALF = 16  # digits of a topology's key

@@ -193,7 +193,7 @@ STEP = Block(
 STYLING = Block(
     "Styling",
     {
-        "axes": "mat4",  # from the coordinates of strands to the surface's own axes
+        "axes": "mat4",  # from the coordinates of strands to the surface's own
         "to_drawn": "mat4",  # from the coordinates of strands to those that are drawn
         "strand_count": "int",
         "point_count": "int",  # a constant of the program too: but loops to a constant take drivers longer to compile
@@ -208,6 +208,7 @@ STYLING = Block(
         "centre_count": "int",  # of all levels, those of guides left out
         "are_centres": "int",  # whether centres are styled
         "step_count": "int",
+        "hand": "float",  # -1 where those own axes are mirrored, 1 elsewhere
         "steps": (STEP, MOST_STEPS),
     },
 )

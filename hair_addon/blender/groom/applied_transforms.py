@@ -62,6 +62,15 @@ def _fitted(strands, surface, rest_before):
     return change if is_found else None
 
 
+def shift_of(rest_before: np.ndarray, surface: Surface) -> Affine | None:
+    """The `Affine` by which all (V, 3) vertices of a surface were moved alike, as *Geometry to Origin* does; else None.
+
+    What follows places on the surface, as noise that neighboring strands share, goes along.
+    """
+    shift = Affine.shift((surface.rest.astype(np.float64) - rest_before).mean(axis=0))
+    return shift if _is_close(shift.points(rest_before), surface.rest, surface) else None
+
+
 def note(strands: list[Curves], surface: Surface, change: Affine) -> None:
     """Note that a transform was applied to what strands are rooted on, before any of them follows.
 

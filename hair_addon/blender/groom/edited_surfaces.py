@@ -69,6 +69,10 @@ def follow_surface(
     if before is not None and follows_edits:
         curves.require_not_linked(guide_curves)
         require_finite(surface.rest)
+        shift = applied_transforms.shift_of(before, surface)
+        if shift is not None:
+            for one in (guide_curves, *applied_transforms.followed_by(guide_curves)):
+                surface_space.note_applied(one, shift, before)
         edited_faces.follow_moved(guide_curves, surface, before)
         surface_space.keep_surface(guide_curves, surface)
         return True

@@ -122,7 +122,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     ground = _ground(surface, mask, parting, device)
     if target is not None:
         made_on = surface_space.made_on(target, surface.rest)
-        ground["shape"] = surface.shape_made_on(made_on, surface_space.applied(target).is_mirroring)
+        ground["shape"] = surface.shape_made_on(made_on, surface_space.applied(target))
 
     def compute(progress):
         if known is None:

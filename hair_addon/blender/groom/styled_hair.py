@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 class ReadStyles:
     """Styles of a hair, and what they name, as read.
 
-    applied: from the local coordinates that the hair was made in, whose axes random shapes follow, to those of now.
+    applied: from the local coordinates that the hair was made in, whose axes and origin random shapes follow, to those
+    of now.
     """
 
     styles: tuple[StyleSettings, ...] = ()
@@ -128,7 +129,7 @@ def bind(
         read.styles,
         make_trees(),
         read.inputs,
-        grooming.hair_styles.rotation_of(surface.to_world_axes @ read.applied.axes),
+        grooming.hair_styles.own_axes((Affine.linear(surface.to_world_axes) @ read.applied).matrix),
     )
     return StyledHair(read, styling, make_trees)
 

@@ -29,6 +29,20 @@ class Affine:
         """The transform that changes nothing."""
         return cls(np.eye(4))
 
+    @classmethod
+    def linear(cls, axes: np.ndarray) -> "Affine":
+        """The transform of (3, 3) axes that leaves the origin where it is."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = axes
+        return cls(matrix)
+
+    @classmethod
+    def shift(cls, offset: np.ndarray) -> "Affine":
+        """The transform that adds (3,) to all points."""
+        matrix = np.eye(4)
+        matrix[:3, 3] = offset
+        return cls(matrix)
+
     def __matmul__(self, first: "Affine") -> "Affine":
         return Affine(self.matrix @ first.matrix)
 

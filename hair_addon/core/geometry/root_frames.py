@@ -88,11 +88,13 @@ def _identify(
     out_numbers[root] = wp.randf(state)
 
 
-def identities(points: SurfacePoints) -> tuple[np.ndarray, np.ndarray]:
+def identities(points: SurfacePoints, is_mirrored: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """What strands rooted at `SurfacePoints` are known by: (N,) int32, and numbers (N,) float32 in [0, 1).
 
+    is_mirrored: whether triangles are wound the other way than where roots are stored.
     Both depend only on the root, so other strands do not change them; collisions are one in some thousand millions.
     """
+    points = points.wound_otherwise() if is_mirrored else points
     count = len(points)
     found, numbers = np.empty(count, np.int32), np.empty(count, np.float32)
     bits = np.ascontiguousarray(points.barycentric, np.float32).view(np.int32)

@@ -15,6 +15,10 @@ class Texture:
     values: np.ndarray
     corner_uvs: np.ndarray
 
+    def wound_otherwise(self) -> "Texture":
+        """The same on triangles whose last two corners have changed places."""
+        return Texture(self.values, np.ascontiguousarray(self.corner_uvs[:, [0, 2, 1]]))
+
     def at(self, points: SurfacePoints) -> np.ndarray:
         """(N,) float64 at `SurfacePoints`: linear between the middles of pixels, repeated beyond the picture."""
         uvs = np.einsum("nc,ncu->nu", points.barycentric, self.corner_uvs[points.triangle].astype(np.float64))

@@ -43,9 +43,16 @@ def clump_trees(
     laid = groom.laid_lines(mesh, lines, drawn_on, device)
     binder = RootBinder(mesh, guide_roots, settings, regions, laid, is_mirrored, device)
 
+    placed_on, its_texture = mesh if shape is None else shape, texture
+    if is_mirrored:  # as roots are stored, so that sites are the same where the surface is mirrored
+        placed_on = TriMesh(-placed_on.vertices, placed_on.triangles[:, [0, 2, 1]])
+        its_texture = None if texture is None else texture.wound_otherwise()
+
     def place(count, seed):
-        placed_on = mesh if shape is None else shape
-        return placement.cvt.place(placed_on, count, seed, _ROUNDS, density=density, texture=texture, device=device)
+        found = placement.cvt.place(
+            placed_on, count, seed, _ROUNDS, density=density, texture=its_texture, device=device
+        )
+        return found.wound_otherwise() if is_mirrored else found
 
     return ClumpTrees(binder, place, groom_defaults.grown_area(mesh, density, texture))
 
@@ -61,16 +68,24 @@ def bind_styles(
 ) -> "Styling | None":
     """The `Styling` of strands; None where strands follow the guides as they are.
 
-    axes: (3, 3) rotation to the surface's own axes, None for none.
+    axes: (4, 4) to the surface's own coordinates, as `own_axes` gives them, None where they are the same.
     """
     if not any(map(styling.base.has_effect, styles)) and settings.point_count == guides.point_count:
         return None
     inputs = Inputs() if inputs is None else inputs
-    axes = np.eye(3) if axes is None else axes
+    axes = np.eye(4) if axes is None else axes
     return styling.stack.bind(binding, guides, styles, inputs, trees, axes, settings.point_count)
 
 
-def rotation_of(to_world_axes: np.ndarray) -> np.ndarray:
-    """(3, 3): the nearest rotation from an object's axes and scale in the world, back to its own axes."""
-    left, _scale, right = np.linalg.svd(np.asarray(to_world_axes, np.float64))
-    return (left @ right).T
+def own_axes(from_own: np.ndarray) -> np.ndarray:
+    """(4, 4): from the coordinates of strands back to a surface's own axes and origin, without scale and shear.
+
+    from_own: (4, 4), from the surface's own coordinates to those of strands; the inverse of the nearest rotation, or
+    rotation and mirror.
+    """
+    matrix = np.asarray(from_own, np.float64)
+    left, _scale, right = np.linalg.svd(matrix[:3, :3])
+    axes = np.eye(4)
+    axes[:3, :3] = (left @ right).T
+    axes[:3, 3] = -axes[:3, :3] @ matrix[:3, 3]
+    return axes

@@ -43,8 +43,7 @@ class HairBinding:
 
         They follow from a strand's root alone: neither another number of strands nor an update of some changes them.
         """
-        roots = self.roots.wound_otherwise() if self.is_mirrored else self.roots
-        return geometry.root_frames.identities(roots)
+        return geometry.root_frames.identities(self.roots, self.is_mirrored)
 
     @cached_property
     def leaders(self) -> np.ndarray:

@@ -80,14 +80,14 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v, const 
       const lanes bulge = higher_of(-facing, lanes(0.0f)) * 4.0f * part * (1.0f - part);
       const auto has_middle = facing > 1.0e-6f - 1.0f;
       const vector half = unit_or(
-          chosen(has_middle, t_below + t_above, cross(t_below, u_below)), lanes(1.0e-6f), t_below
+          chosen(has_middle, t_below + t_above, upward_of(t_below, u_below)), lanes(1.0e-6f), t_below
       );
       t_between = t_between + half * bulge;
       u_between = u_between + turned(u_below, t_below, half) * bulge;
     }
     const vector forwards = unit_or(t_between, lanes(1.0e-6f), t_below);
     const vector sideways = unit_or(plus(u_between, forwards, -dot(u_between, forwards)), lanes(1.0e-6f), u_below);
-    const vector upward = cross(forwards, sideways);
+    const vector upward = upward_of(forwards, sideways);
     const vector made = plus(plus(forwards * forward, sideways, w_u), upward, w_v);
     const auto has_length = d > 1.0e-12f;
     const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));

@@ -9,7 +9,7 @@ put_frames(u);
 lanes toward_u = 0.0f, toward_v = 0.0f;
 for (int i = 1; i < point_count; ++i) {
   toward_u += dot(normal, u[i]);
-  toward_v += dot(normal, cross(t[i], u[i]));
+  toward_v += dot(normal, upward_of(t[i], u[i]));
 }
 const lanes toward = sqrt_of(toward_u * toward_u + toward_v * toward_v);
 const auto has_direction = toward > 1.0e-4f * (point_count - 1);
@@ -24,6 +24,6 @@ for (int i = 1; i < point_count; ++i) {
   arc += length[i];
   lanes sin_angle, cos_angle;
   sine_and_cosine(base * angle * profile(arc * per_total), sin_angle, cos_angle);
-  const vector sideways = plus(u[i] * cos_psi, cross(t[i], u[i]), sin_psi);
+  const vector sideways = plus(u[i] * cos_psi, upward_of(t[i], u[i]), sin_psi);
   t[i] = unit_or(plus(t[i] * cos_angle, sideways, sin_angle), lanes(1.0e-6f), t[i]);
 }

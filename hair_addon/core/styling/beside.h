@@ -67,7 +67,7 @@ if (is_beside) {
   const lanes facing = in_lock * smoothstep(dot(t[1], axis));
   lead = facing * dot(away, axis);
   lanes cosine = 1.0f, sine = 0.0f;
-  turn_by(facing, turned(frame, axis, t[1]), u_first, cross(t[1], u_first), cosine, sine);
+  turn_by(facing, turned(frame, axis, t[1]), u_first, upward_of(t[1], u_first), cosine, sine);
 }
 const auto keep_beside = [&](
     lanes progress, lanes forward, const vector& forwards, const vector& u, const vector& v

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Frames of a strand's segments, by least rotations [Bishop75]: from the centre's reference to the strand's normal, to
-// its first segment, and from each segment to the next. u and t × u are across segment i.
+// its first segment, and from each segment to the next. u and t × u are across segment i, with t × u the other way
+// where the surface's own axes are mirrored: all styles are mirrored with them.
 
+const auto upward_of = [&](const vector& along, const vector& sideways) { return cross(along, sideways) * hand; };
 // The reference across the normal of the clump's centre.
 const auto reference = [&]() {
   // r(n), in the surface's own axes, is continuous everywhere but straight below.

@@ -25,9 +25,9 @@ for (int wave = 0; wave < WAVES * octave_count; ++wave) {
     sine_and_cosine(pick(1), sine, cosine);
     const vector direction = {flat * cosine, flat * sine, z};
     const vector rest = {
-        axes.data[0][0] * root.x + axes.data[0][1] * root.y + axes.data[0][2] * root.z,
-        axes.data[1][0] * root.x + axes.data[1][1] * root.y + axes.data[1][2] * root.z,
-        axes.data[2][0] * root.x + axes.data[2][1] * root.y + axes.data[2][2] * root.z,
+        axes.data[0][0] * root.x + axes.data[0][1] * root.y + axes.data[0][2] * root.z + axes.data[0][3],
+        axes.data[1][0] * root.x + axes.data[1][1] * root.y + axes.data[1][2] * root.z + axes.data[1][3],
+        axes.data[2][0] * root.x + axes.data[2][1] * root.y + axes.data[2][2] * root.z + axes.data[2][3],
     };
     phase += coherence * per_spread * (0.7f + 0.6f * pick(2)) * dot(direction, rest) + coherence * pick(3);
   }

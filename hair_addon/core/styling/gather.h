@@ -40,7 +40,7 @@ const auto gather = [&](float thickness, float twist, lanes joined) {
       // Rodrigues' rotation.
       lanes sine, cosine;
       sine_and_cosine(twist * wanted * base, sine, cosine);
-      away = away * cosine + cross(axis, away) * sine + axis * (dot(axis, away) * (1.0f - cosine));
+      away = away * cosine + upward_of(axis, away) * sine + axis * (dot(axis, away) * (1.0f - cosine));
     }
     if (at_root > 0.0f) wanted = wanted - at_root * (1.0f - smoothstep(arc * per_root_distance));
     // No faster than the strand can follow, however steep the profile is.

@@ -46,16 +46,17 @@ def leans(
     styles: Sequence[StyleSettings],
     mesh: TriMesh,
     roots: SurfacePoints,
+    identities: np.ndarray,
     masks: dict[Any, np.ndarray],
     targets: dict[str, np.ndarray],
     mask_key: Callable[[StyleSettings], Any],
 ) -> list[Lean]:
     """The `Lean` of each style that acts on guides, in order.
 
-    roots: of the guides; masks: (G,) weights by their keys; targets: unit (3,) directions by objects' names.
+    roots: of the guides; identities: (G,) int32 that they are known by; masks: (G,) weights by their keys; targets:
+    unit (3,) directions by objects' names.
     """
     found = []
-    identities = geometry.root_frames.identities(roots)[0]
     for settings in filter(has_effect, styles):
         if not isinstance(settings, lean.Settings | wet.Settings):
             continue

@@ -65,7 +65,7 @@ class Styling:
     trees: ClumpTrees
     program: Program
     data: StrandData
-    axes: np.ndarray  # (3, 3)
+    axes: np.ndarray  # (4, 4)
     followed: FollowedGuides
     point_count: int
     tree_levels: list[tuple[TreeSettings, int]]
@@ -214,8 +214,8 @@ def bind(
 ) -> Styling:
     """Bind styles to strands; sites are placed and searched for where `trees` does not have them yet.
 
-    binding: of the strands; guides: that they follow; inputs: `Inputs` with all that the styles name; axes: (3, 3),
-    from the coordinates of strands to the surface's own axes, a rotation; point_count: of a strand.
+    binding: of the strands; guides: that they follow; inputs: `Inputs` with all that the styles name; axes: (4, 4),
+    from the coordinates of strands to the surface's own, without scale; point_count: of a strand.
     """
     device = binding.positions.device
     levels = programs.tree_levels(styles)
@@ -225,7 +225,7 @@ def bind(
     first_centres = [0, *np.cumsum(counts).tolist()]
     made = programs.strand_steps(styles, inputs.cutters)
     program = programs.compiled(made, keys, first_centres)
-    guide_identities = geometry.root_frames.identities(guides.roots)[0]
+    guide_identities = geometry.root_frames.identities(guides.roots, binding.is_mirrored)[0]
     side = _side(guides, binding.guide_normals.numpy())
     centre_normals = [side * bound.normals.numpy() for bound in bindings]
     shared = {
@@ -260,7 +260,9 @@ def bind(
     if levels:
         trees.keep_only({tree for tree, _level in levels})
     of_guides = {key: inputs.masks[key].of_guides(guides.roots) for key in keys}
-    leaning = leans(styles, trees.binder.mesh, guides.roots, of_guides, dict(inputs.targets), mask_key)
+    leaning = leans(
+        styles, trees.binder.mesh, guides.roots, guide_identities, of_guides, dict(inputs.targets), mask_key
+    )
     return Styling(
         tuple(styles),
         inputs,

@@ -17,7 +17,7 @@
 //   array_t<int> centre_identities      (K,)
 //   array_t<int> choices                (N, CHOICES) of steps.py
 //   array_t<float> numbers              (N, NUMBERS) of steps.py
-//   mat33 axes                          from the coordinates of points to the surface's own axes
+//   mat44 axes                          from the coordinates of points to the surface's own, without scale
 //
 // Constants: WIDTH, MOST points a strand, CHOICES, NUMBERS; the kinds and purposes of steps.py.
 //
@@ -35,6 +35,12 @@ const int point_count = points.shape[1];
 const int first = block * LANES;
 const int left = points.shape[0] - first;
 const int lane_count = left < LANES ? left : LANES;
+// -1 where those own axes are mirrored: by their determinant.
+const auto minor = [&](int i, int j) {
+  return axes.data[1][i] * axes.data[2][j] - axes.data[1][j] * axes.data[2][i];
+};
+const float determinant = axes.data[0][0] * minor(1, 2) + axes.data[0][1] * minor(2, 0) + axes.data[0][2] * minor(0, 1);
+const float hand = determinant < 0.0f ? -1.0f : 1.0f;
 #include "point_rows.h"
 // A style writes directions or lengths that it reads again into the second array, and swaps.
 lanes lengths[2][MOST];

@@ -80,7 +80,7 @@ def variant(width: int, most_points: int, module: wp.Module | None = None) -> Va
         centre_identities: wp.array[int],
         choices: wp.array2d[int],
         numbers: wp.array2d[float],
-        axes: wp.mat33,
+        axes: wp.mat44,
     ): ...
 
     # Blocks of 256 threads, three on a multiprocessor: registers are what keeps a GPU from running more at once.
@@ -97,7 +97,7 @@ def variant(width: int, most_points: int, module: wp.Module | None = None) -> Va
         centre_identities: wp.array[int],
         choices: wp.array2d[int],
         numbers: wp.array2d[float],
-        axes: wp.mat33,
+        axes: wp.mat44,
         first: int,
     ):
         _apply_steps(
@@ -155,8 +155,8 @@ def apply_steps(
 ) -> None:
     """Style strands in place: points (M, P) [m]. One launch for the whole program; none for an empty one.
 
-    data: `StrandData` of S strands, of which chosen (M,) int32 are styled, all where it is None; axes: (3, 3), a
-    rotation from the coordinates of points to the surface's own axes; version: of the kernel, None for the fastest.
+    data: `StrandData` of S strands, of which chosen (M,) int32 are styled, all where it is None; axes: (4, 4),
+    from the coordinates of points to the surface's own, without scale; version: of the kernel, None for the fastest.
     Raises `HairError` where counts or indices do not match.
     """
     if not len(program) or not len(points):
@@ -173,7 +173,7 @@ def apply_steps(
         data.centre_normals,
         data.centre_identities,
         *_copied(program, device),
-        wp.mat33(axes),
+        wp.mat44(axes),
     ]
     share_count = parallel.share_count(block_count, device, LEAST_BLOCKS)
     parallel.launch_shares(version.kernel, block_count, inputs, [[] for _ in range(share_count)], device)

@@ -13,7 +13,7 @@ centre_course course;
 begin_course(course);
 // The tress of a strand: by the angle about the lock's centre at which it is rooted.
 const vector at_centre = reference();
-const lanes right = -dot(course.low, at_centre), up = -dot(course.low, cross(centre_normal, at_centre));
+const lanes right = -dot(course.low, at_centre), up = -dot(course.low, upward_of(centre_normal, at_centre));
 lanes tress = 0.0f;
 if (tress_count == 2) {
   tress = right > 0.0f ? lanes(0.5f) : lanes(0.0f);
@@ -69,7 +69,7 @@ for (int i = 1; i < point_count; ++i) {
   axis_before = axis;
   const vector beside = away - axis * dot(away, axis);
   const vector drawn = middle + away * (1.0f - pull) + beside * (pull * thickness) + frame * to_u
-      + cross(axis, frame) * to_v;
+      + upward_of(axis, frame) * to_v;
   const vector way = drawn - place;
   const lanes distance = sqrt_of(dot(way, way));
   const auto is_far = distance > 1.0e-3f * d;

@@ -224,15 +224,15 @@ def test_arrays_that_do_not_fit_are_refused(hair):
     bound = hair.bound(*STACK)
     strands = from_numpy(np.zeros((7, 41, 3), np.float32), hair.binding.roots[:7], hair.device)
     with pytest.raises(HairError):
-        steps.apply_steps(strands.points, bound.program, bound.data, np.eye(3))
+        steps.apply_steps(strands.points, bound.program, bound.data, np.eye(4))
     wrong = replace(bound.program, choices=np.full_like(bound.program.choices, 99))
     all_strands = from_numpy(np.zeros((500, 41, 3), np.float32), hair.binding.roots, hair.device)
     with pytest.raises(HairError):
-        steps.apply_steps(all_strands.points, wrong, bound.data, np.eye(3))
+        steps.apply_steps(all_strands.points, wrong, bound.data, np.eye(4))
     for point_count in (1, 258):
         strands = from_numpy(np.zeros((500, point_count, 3), np.float32), hair.binding.roots, hair.device)
         with pytest.raises(HairError, match="points"):
-            steps.apply_steps(strands.points, bound.program, bound.data, np.eye(3))
+            steps.apply_steps(strands.points, bound.program, bound.data, np.eye(4))
 
 
 @pytest.mark.parametrize("stack", ["levels", "no clump"])
@@ -245,7 +245,7 @@ def test_strands_and_centres_that_are_not_there_are_refused(hair, stack, member)
     members[0, 3] = member
     data = replace(bound.data, members=wp.array(members, dtype=int, device=hair.device))
     with pytest.raises(HairError, match="clump"):
-        steps.apply_steps(points, bound.program, data, np.eye(3))
+        steps.apply_steps(points, bound.program, data, np.eye(4))
     with pytest.raises(HairError, match="strands"):
         hair.styled(*STACKS[stack], chosen=np.array([3, member]))
 

@@ -9,6 +9,7 @@ import pytest
 import warp as wp
 
 from hair_addon.core.geometry.strands import from_numpy, segment_lengths
+from hair_addon.core.grooming import hair_styles
 from hair_addon.core.styling import bend, clump, curl, frizz, kinds, lean, program, smooth, steps, trim, wet
 from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.style_inputs import Inputs
@@ -177,30 +178,32 @@ def test_the_processor_and_a_gpu_agree(rng, point_count):
         assert largest_move(*made) < 2e-6 * 0.2
 
 
+@pytest.mark.parametrize("is_mirrored", [False, True])
 @pytest.mark.parametrize("name", ON_STRANDS)
-def test_turned_moved_and_scaled_before_or_after(rng, name):
-    """With lengths scaled as well, and the surface's own axes turned with it."""
+def test_turned_moved_scaled_and_mirrored_before_or_after(rng, name, is_mirrored):
+    """With lengths scaled as well, and the surface's own axes and origin taken along."""
     strands = curved_strands(rng, 48)
     normals = rng.normal(UP, 0.2, (48, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     members = np.arange(48) // 8
     turn, scale, shift = rotation(rng), 3.0, np.array([0.4, -0.2, 0.3])
+    if is_mirrored:
+        turn = turn * (-1.0, 1.0, 1.0)
+    from_own = np.eye(4)
+    from_own[:3, :3], from_own[:3, 3] = scale * turn, shift
     style = STYLES[name]
     if name == "FRIZZ":
         style = replace(style, coherence=0.7)
     size = scale * np.ptp(strands)
     after = stepped(strands, style, normals=normals, members=members, centre_normals=normals[::8])
     after = scale * (after @ turn.T) + shift
-    # The surface's own axes have their origin where coordinates have theirs: shifts are for styles without waves.
-    shift_before = shift if name != "FRIZZ" else np.zeros(3)
-    after = after - shift + shift_before
     before = stepped(
-        (scale * (strands @ turn.T) + shift_before).astype(np.float32),
+        (scale * (strands @ turn.T) + shift).astype(np.float32),
         program.base.scaled(style, scale),
         normals=normals @ turn.T,
         members=members,
         centre_normals=normals[::8] @ turn.T,
-        axes=turn.T,
+        axes=hair_styles.own_axes(from_own),
     )
     # Coherent waves, and strands that wind about each other, have large derivatives.
     tolerance = {"FRIZZ": 1e-5, "BRAID": 2e-5, "ROPE": 2e-5}.get(name, 1e-5)

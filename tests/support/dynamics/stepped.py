@@ -63,7 +63,7 @@ def stepped(
     )
     made = programs.compiled(programs.strand_steps(styles, cutters or {}), keys, first_centres)
     styled = there(points, vector, points.shape)
-    steps.apply_steps(styled, made, data, np.eye(3) if axes is None else axes, **launch)
+    steps.apply_steps(styled, made, data, np.eye(4) if axes is None else axes, **launch)
     assert styled.shape[1] == point_count
     return styled.numpy()
 

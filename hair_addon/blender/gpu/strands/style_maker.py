@@ -207,7 +207,8 @@ def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) 
     strand_count = len(styling.data.normals)
     changes = strand_changes.new_changes(strand_count, point_count)
     record = uniforms.STYLING.record()
-    record["axes"][:3, :3], record["axes"][3, 3] = styling.axes.T, 1.0
+    record["axes"] = styling.axes.T
+    record["hand"] = np.sign(np.linalg.det(styling.axes[:3, :3]))
     record["row_packed"] = row_strands_of(point_count)
     record["level_count"] = len(styling.data.members)
     record["row_centres"] = TEXTURE_WIDTH // point_count

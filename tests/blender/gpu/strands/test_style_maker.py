@@ -120,12 +120,15 @@ def test_masks_that_are_painted(hair, rng, one_program):
     assert_same(hair, rng, styles, inputs=Inputs(masks=masks))
 
 
-def test_coordinates_that_are_drawn_and_the_surfaces_own_axes(hair, rng, one_program):
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_coordinates_that_are_drawn_and_the_surfaces_own_axes(hair, rng, one_program, is_mirrored):
     turned = head(STRANDS, 60, device="cpu")
-    turned.axes = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    assert_same(
-        turned, rng, STACKS["locks that curl"], axes=np.array([[0.0, -2.0, 0.0], [0.0, 0.0, 2.0], [-2.0, 0.0, 0.0]])
-    )
+    turned.axes = np.eye(4)
+    turned.axes[:3] = [[0.0, -1.0, 0.0, 0.05], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, -0.02]]
+    if is_mirrored:
+        turned.axes[2] *= -1.0
+    frizzed = (*STACKS["locks that curl"], frizz.Settings(coherence=0.8))
+    assert_same(turned, rng, frizzed, axes=np.array([[0.0, -2.0, 0.0], [0.0, 0.0, 2.0], [-2.0, 0.0, 0.0]]))
 
 
 @pytest.mark.parametrize("point_count", [7, 65])
