@@ -49,3 +49,9 @@ def test_a_medoid_is_a_row_of_its_cluster_and_the_nearest(rng):
 def test_more_clusters_than_rows_are_refused():
     with pytest.raises(HairError, match="3 strands cannot form 4 clumps"):
         clusters.clusters(np.zeros((3, 2), np.float32), 4)
+
+
+def test_rows_far_from_the_origin_are_divided_as_near_it(rng):
+    """Numbers that single precision holds exactly in both places."""
+    features = rng.integers(0, 1024, (200, 12)).astype(np.float32) / 1024.0
+    np.testing.assert_array_equal(clusters.clusters(features + 4096.0, 20), clusters.clusters(features, 20))
