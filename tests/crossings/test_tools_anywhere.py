@@ -94,7 +94,9 @@ def symmetric_file(blender, tmp_path_factory):
     made.free()
     select(body)
     bpy.ops.vellus.add_hair(guide_count=16, strand_count=10, length=0.3, radius=0.001)
-    placed_hair.comb(bpy.data.objects["Guides"])
+    (guides,) = (o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "GUIDES")
+    guides.name = "Guides"
+    placed_hair.comb(guides)
     path = str(tmp_path_factory.mktemp("symmetric") / "symmetric.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     return path

@@ -311,6 +311,8 @@ def test_guides_move_alike_wherever_gravity_is_alike(blender, tmp_path):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     select(placed_hair.add_body())
     bpy.ops.vellus.add_hair(guide_count=8, strand_count=24, length=0.3, radius=0.001)
+    for made in [o for o in bpy.data.objects if o.type == "CURVES"]:
+        made.name = {"HAIR": "Hair", "GUIDES": "Guides"}[made.data.vellus.kind]
     placed_hair.comb(data("Guides"))
     path, found = str(tmp_path / "origin.blend"), {}
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
