@@ -4,12 +4,11 @@
 import numpy as np
 import pytest
 
+from hair_addon.core.geometry.mirror import ACROSS_X
 from hair_addon.core.grooming.guide_copies import Places, copied, matched, upright_rotations
 from hair_addon.core.grooming.guide_segments import unit
 from hair_addon.core.grooming.guide_tool_settings import CopySettings
 from tests.support.strands.combed import lengths, segment_lengths, wavy
-
-ACROSS_X = np.array([1.0, 0.0, 0.0])
 
 
 def a_patch(rng, normal, middle, count=25):
