@@ -38,7 +38,9 @@ def parsed_unit(text: str) -> float:
         metres = 0.0
     if not 0.0 < metres < 1e9:
         raise HairError(
-            "{unit} is not a unit: use {names}, or meters in a unit as a number.", unit=text, names=", ".join(UNITS)
+            "{unit} is not a unit: use {names}, or meters in a unit as a number.",
+            unit=" ".join(text.split()),
+            names=", ".join(UNITS),
         )
     return metres
 

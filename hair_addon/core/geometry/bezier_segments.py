@@ -138,7 +138,9 @@ def nurbs(
     span_counts = counts - orders + 1
     value_starts = strands.curve_offsets(span_counts + 1)
     degree = int(orders.max(initial=2)) - 1
-    kept = [[], [], [], []]  # curve, place along it, controls, places
+    # Curve, place along it, controls, places; of no curves, all of which may have too few points.
+    none = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, degree + 1, values.shape[1])), np.zeros((0, 2))
+    kept = [[empty] for empty in none]
     for order in np.unique(orders):
         its = np.flatnonzero(orders == order)
         own, along = each(span_counts[its])

@@ -53,7 +53,7 @@ def digest(binary: Path, meta: Path) -> str | None:
     """SHA-256 of a module's two files in hexadecimal digits, or None where one of them is missing."""
     try:
         return hashlib.sha256(binary.read_bytes() + meta.read_bytes()).hexdigest()
-    except OSError:
+    except (OSError, ValueError):  # ValueError: a name that no file can have
         return None
 
 

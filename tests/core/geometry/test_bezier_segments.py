@@ -199,3 +199,7 @@ def test_curves_without_segments_are_no_polylines():
     none = bezier_segments.Segments(np.zeros((0, 4, 3)), np.zeros(2, np.int64), np.zeros((0, 2)))
     values, counts, places = bezier_segments.polylines(none, np.zeros(0, np.int64))
     assert values.shape == (0, 3) and counts.tolist() == [0, 0] and places.shape == (0,)
+    for weights in (None, np.zeros(0)):
+        no_counts = np.zeros(0, np.int64)
+        none = bezier_segments.nurbs(np.zeros((0, 3)), weights, no_counts, no_counts, np.zeros(0), None)
+        assert bezier_segments.polylines(none, np.zeros(0, np.int64))[0].shape == (0, 3)
