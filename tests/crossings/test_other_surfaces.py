@@ -4,10 +4,12 @@
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from tests.support import placed_hair
 from tests.support.exchange.imported import curves_object, select
 from tests.support.placed_hair import PLACES, require_carried, seen
+from tests.support.reading import points
 
 COMBED = ("Guides", "Kept", "Made")
 
@@ -66,6 +68,29 @@ def test_attached_hair_stays_where_it_is(placed_file, place, is_deleted, is_pick
         assert attached.parent == attached.data.surface == other and attached.data.vellus.status == ""
     roots = bpy.data.objects["Hair"].data
     assert len(roots.curves) == placed_hair.STRANDS and roots.vellus.status == ""
+
+
+@pytest.mark.parametrize("is_reopened", [False, True])
+def test_hair_without_a_parent_follows_a_surface_that_is_renamed(placed_file, tmp_path, is_reopened):
+    """It was not picked: only its name is another."""
+    bpy.ops.wm.read_homefile(filepath=placed_file)
+    for name in ("Guides", "Kept"):
+        bpy.data.objects[name].parent = None
+    bpy.data.objects["Body"].name = "Head"
+    bpy.context.view_layer.update()
+    if is_reopened:
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "renamed.blend"))
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "renamed.blend"))
+    before = {name: points(bpy.data.objects[name]) for name in ("Guides", "Kept")}
+    mesh = bpy.data.objects["Head"].data
+    mesh.transform(Matrix.Translation((0.0, 0.3, 0.2)))
+    mesh.vertices[0].co.x += 1e-3  # no transform that was applied
+    mesh.update()
+    bpy.context.view_layer.update()
+    for name, stood in before.items():
+        moved = points(bpy.data.objects[name])[:, 0]
+        np.testing.assert_allclose(moved, stood[:, 0] + [0.0, 0.3, 0.2], atol=2e-3)
+        assert bpy.data.objects[name].data.vellus.status == ""
 
 
 def test_hair_far_from_a_mesh_is_not_attached_to_it(placed_file):

@@ -31,7 +31,10 @@ def between(an_object, surface_object):
 def keep_surface(curves, surface):
     """Store a `Surface` at rest and where its object is: strands are transformed from there after an edit."""
     matrix = np.eye(4) if curves.surface is None else np.array(curves.surface.matrix_world)
-    _keep(curves, _STOOD_ON, {"rest": surface.rest.ravel(), "to_world": matrix.ravel(), "name": surface.name})
+    kept = {"rest": surface.rest.ravel(), "to_world": matrix.ravel(), "name": surface.name}
+    if curves.surface is not None:
+        kept["surface"] = curves.surface
+    _keep(curves, _STOOD_ON, kept)
 
 
 def remember_place(curves):
@@ -39,13 +42,18 @@ def remember_place(curves):
     kept = curves.get(_STOOD_ON)
     if kept is not None and curves.surface is not None and curves.library is None and not has_other_surface(curves):
         kept["to_world"], kept["name"] = np.array(curves.surface.matrix_world).ravel(), name_of(curves.surface)
+        kept["surface"] = curves.surface
 
 
 def has_other_surface(curves):
     """Whether a surface was picked for Curves that they do not stand on yet: they are children of no such object."""
     kept = curves.get(_STOOD_ON)
-    stored = None if kept is None else kept.get("name")
-    if curves.surface is None or not isinstance(stored, str) or stored == name_of(curves.surface):
+    if curves.surface is None or kept is None:
+        return False
+    known, name = _stood_on(kept), kept.get("name")
+    # Names do for files of older versions: a surface that was renamed there is taken for another one.
+    is_same = known == curves.surface if known is not None else name == name_of(curves.surface)
+    if is_same or (known is None and not isinstance(name, str)):
         return False
     return not any(user.parent == curves.surface for user in bpy.data.objects if user.data == curves)
 
@@ -54,7 +62,14 @@ def surface_before(curves):
     """The object that Curves stand on, whichever was picked for them since; None where it is gone, or unknown."""
     if not has_other_surface(curves):
         return curves.surface
-    return bpy.data.objects.get(curves[_STOOD_ON]["name"])
+    kept = curves[_STOOD_ON]
+    return _stood_on(kept) or bpy.data.objects.get(kept.get("name", ""))
+
+
+def _stood_on(kept):
+    """The object in what `keep_surface` stored, which Blender renames; None where it is gone, or in older files."""
+    found = kept.get("surface")
+    return found if isinstance(found, bpy.types.Object) else None
 
 
 def rest_before(curves):
