@@ -11,7 +11,7 @@ import bpy
 from bpy.types import Curves, Object
 
 from ..data import orientation, rest_nodes, rest_sources, usable_surfaces
-from ..data.strands import follow_nodes
+from ..data.strands import curves_objects, delivered_hair, follow_nodes
 from ..host.notices import name_of, text_of
 from ..settings.translations import interface_text
 from . import copied_hair, frame_faces
@@ -30,7 +30,8 @@ def warnings_of(surface: Object | None, parts: Iterable[Curves]) -> list[Warning
     """[Warning] about a mesh object, or None where it is missing, and the guide and hair Curves that grow on it."""
     partings = [warning for part in parts if part.vellus.kind == "HAIR" for warning in parting_warnings(part)]
     there = None if surface is None or usable_surfaces.is_deleted(surface) else surface
-    first = [*_of_library(surface, parts), *_of_surface(there, parts), *_of_uv_map(there, parts)]
+    places = () if there is None else _of_places(there, parts)
+    first = [*_of_library(surface, parts), *_of_surface(there, parts), *places, *_of_uv_map(there, parts)]
     if there is not None and any(map(frame_faces.are_others, parts)):
         text = '"{name}" has other faces in this frame: hair stays on those of the frame that it was made in.'
         first.append(Warning(interface_text(text, name=name_of(there))))
@@ -95,6 +96,24 @@ def _of_surface(surface, parts):
         yield Warning(interface_text(text, name=name_of(surface)))
     if surface.mode != "OBJECT" and any(part.vellus.is_stale for part in parts):
         yield Warning(interface_text("Hair updates when you leave this mode."))
+
+
+def _of_places(surface, parts):
+    """About the first object of hair that stands elsewhere than its surface, or will when that moves."""
+    view_layer = bpy.context.view_layer
+    shown = [] if view_layer is None else [o for o in view_layer.objects if o is not None and o.type == "CURVES"]
+    for user in shown:
+        if user.data not in parts or user.library is not None or delivered_hair.modifier_of(user) is not None:
+            continue
+        names = {"hair": name_of(user), "name": name_of(surface)}
+        if curves_objects.is_elsewhere(user, surface):
+            text = '"{hair}" was moved away from "{name}": attach it, and it stands there again.'
+        elif user.parent is None and not user.constraints and user.animation_data is None:
+            text = '"{hair}" has lost its parent and stays behind when "{name}" moves: attach it.'
+        else:
+            continue
+        yield Warning(interface_text(text, **names), "vellus.attach_to_surface")
+        return
 
 
 def _of_uv_map(surface, parts):

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from hair_addon.blender.data import scene
 from hair_addon.blender.host import running
@@ -23,6 +24,7 @@ from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.presets import PRESETS
 from hair_addon.core.shading.tables import lookup_tables
 from tests.support.interface.layout import Context, Layout, draw, draw_all
+from tests.support.reading import points, write_points
 
 TAB = [panel for panel in panels.CLASSES if panel.bl_region_type == "UI"]
 
@@ -133,6 +135,16 @@ def turn_over(sphere):
     bpy.context.view_layer.update()
 
 
+def move_hair(_sphere):
+    bpy.data.objects["Hair"].location.x = 0.5
+    bpy.context.view_layer.update()
+
+
+def clear_parent(_sphere):
+    with bpy.context.temp_override(selected_editable_objects=[bpy.data.objects["Hair"]]):
+        bpy.ops.object.parent_clear(type="CLEAR_KEEP_TRANSFORM")
+
+
 WARNINGS = {
     "no UV map": (lambda sphere: sphere.data.uv_layers.remove(sphere.data.uv_layers[0]), "vellus.make_uv_map"),
     "a renamed UV map": (lambda sphere: setattr(sphere.data.uv_layers[0], "name", "Other"), "vellus.use_uv_map"),
@@ -140,6 +152,8 @@ WARNINGS = {
     "a lost surface": (lambda sphere: bpy.data.objects.remove(sphere), "vellus.attach_to_surface"),
     "a deleted surface": (delete, "vellus.attach_to_surface"),
     "a surface joined to another": (join_to_cube, "vellus.attach_to_surface"),
+    "moved hair": (move_hair, "vellus.attach_to_surface"),
+    "hair without a parent": (clear_parent, "vellus.attach_to_surface"),
     "normals inward": (lambda sphere: turn_over(sphere), "vellus.flip_normals"),
     "no guides' object": (lambda _: bpy.data.objects.remove(bpy.data.objects["Guides"]), "vellus.restore_guides"),
 }
@@ -151,6 +165,26 @@ def test_problems_are_shown_with_the_button_that_fixes_them(hair, case):
     assert operator not in draw(named("surface")).drawn
     break_it(bpy.data.objects["Sphere"])
     assert draw(named("surface")).drawn[operator] == 1
+
+
+@pytest.mark.parametrize("apart", [move_hair, clear_parent])
+def test_hair_apart_from_its_surface_is_attached_again(hair, apart):
+    """Combed guides too, without a word of their settings; hair that its surface takes along is not apart."""
+    sphere, guides = bpy.data.objects["Sphere"], bpy.data.objects["Guides"]
+    sphere.matrix_world = Matrix.Translation((1.0, 2.0, 300.0)) @ Matrix.Rotation(1.0, 4, "X")
+    write_points(guides, points(guides) * np.float32(1.1))
+    bpy.context.view_layer.update()
+    assert not draw(named("surface")).drawn["vellus.attach_to_surface"]
+    apart(sphere)
+    assert draw(named("surface")).drawn["vellus.attach_to_surface"] == 1
+    combed = points(guides)
+    make_active("Hair")
+    assert bpy.ops.vellus.attach_to_surface() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert not draw(named("surface")).drawn["vellus.attach_to_surface"]
+    assert hair.parent == sphere and np.allclose(hair.matrix_world, sphere.matrix_world)
+    np.testing.assert_array_equal(points(guides), combed)
+    assert guides.data.vellus.status == hair.data.vellus.status == ""
 
 
 def test_a_surface_that_no_scene_shows_is_not_missing(hair):

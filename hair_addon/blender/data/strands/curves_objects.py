@@ -84,6 +84,21 @@ def stands_apart(curves_object):
     return curves_object.matrix_parent_inverse != _UNMOVED or curves_object.matrix_basis != _UNMOVED
 
 
+_APART = 1e-4  # parts of a surface's size and of how far it is from the origin, which rounding does not reach
+
+
+def is_elsewhere(curves_object, surface_object):
+    """Whether an object's local coordinates are others than those of its surface, in the world; no geometry is read.
+
+    As far as it is seen: where corners of the surface's box would be.
+    """
+    change = np.array(curves_object.matrix_world) - np.array(surface_object.matrix_world)
+    corners = np.hstack([np.array(surface_object.bound_box, np.float64), np.ones((8, 1))])
+    there = corners @ np.array(surface_object.matrix_world)[:3].T
+    reach = np.linalg.norm(np.ptp(there, axis=0)) + abs(there).max() * 1e-2
+    return bool(abs(corners @ change[:3].T).max() > _APART * reach)
+
+
 def keep_rest(surface_object):
     """Let Blender store the rest positions of a surface's vertices, on which strands are rooted."""
     is_new = not surface_object.add_rest_position_attribute
