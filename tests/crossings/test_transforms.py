@@ -207,6 +207,17 @@ def test_styles_are_mirrored_with_the_surface(place):
         require_carried(before, seen())
 
 
+@pytest.mark.parametrize("change", ["apply scale", "apply all", "apply scale to body and hair"])
+@pytest.mark.parametrize("place", ["uneven", "uneven, subdivided 2"], indirect=True)
+def test_strands_stay_as_they_are_seen_where_uneven_scale_is_applied_to_a_deformed_surface(place, change):
+    """They turn with it by other angles then. Hair between guides is made again, from other shapes at rest."""
+    placed_hair.bend(body())
+    before = seen()
+    CHANGES[change]()
+    require_carried(before, seen(), points=1e-5, names=before.strands.keys() - {"Hair"})
+    assert not curves.is_combed(bpy.data.objects["Hair"].data)
+
+
 @pytest.mark.parametrize("change", ["apply all", "apply scale", "origin to cursor"])
 @pytest.mark.parametrize("place", PLACES, indirect=True)
 def test_changes_without_vellus_are_followed_when_the_file_is_opened(place, change, tmp_path):

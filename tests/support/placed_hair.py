@@ -81,6 +81,18 @@ PLACES = {
 
 # The same where a modifier subdivides the surface.
 SUBDIVIDED = {f"mirrored, subdivided {levels}": _subdivided(levels, PLACES["mirrored"]) for levels in (1, 2)}
+SUBDIVIDED["uneven, subdivided 2"] = _subdivided(2, PLACES["uneven"])
+
+
+def bend(body):
+    """Deform a surface by a shape key, which turns its faces by up to half a right angle."""
+    body.shape_key_add(name="Basis")
+    key = body.shape_key_add(name="Bent")
+    for point in key.data:
+        x, y, z = point.co
+        point.co = (x + 0.3 * z, y + 0.4 * z * z, z - 0.2 * x * x)
+    key.value = 1.0
+    bpy.context.view_layer.update()
 
 
 def grow(place):

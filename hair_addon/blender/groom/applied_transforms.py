@@ -14,7 +14,6 @@ from ...core.errors import HairError
 from ...core.files import frame_manifest
 from ...core.geometry.affine import Affine
 from ..data import surface_space
-from ..data.scene import Surface
 from ..data.strands import (
     attributes,
     curves,
@@ -24,8 +23,8 @@ from ..data.strands import (
     simulated_guides,
     stored_roots,
 )
-from ..data.surfaces import cage_of
-from . import bindings, pipeline, staleness
+from ..data.surfaces import Surface, cage_of
+from . import bindings, pipeline, seen_shapes, staleness
 
 _CLOSE = 1e-5  # parts of the surface's size
 _ROUNDING = 1e-6  # parts of coordinates: they may be far from the origin
@@ -84,6 +83,8 @@ def note(strands: list[Curves], surface: Surface, change: Affine) -> None:
             before, now = (frame_manifest.digest(cage_of(key)) for key in (one.vellus.topology, surface.topology))
             surface_space.note_same(one, before, now)
             one.vellus.topology = surface.topology
+            if one.vellus.cage_topology == surface.cage.turned_topology:
+                one.vellus.cage_topology = surface.cage.topology
         surface_space.note_applied(one, change, rest_before, vertices)
 
 
@@ -122,7 +123,30 @@ def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgra
     bindings.invalidate(strands)
     stored = stored_roots.points(strands, surface)
     if stored is not None:
-        curves.write_roots(strands, surface, stored)  # whose normals are in local coordinates
+        firsts = curves.first_points(strands)
+        curves.write_roots(strands, surface, stored, firsts=firsts)  # whose normals are in local coordinates
+    _note_moved(strands, baked_as, followed)
+
+
+def keep_seen(strands: Curves, surface: Surface, change: Affine) -> None:
+    """Keep strands as they are seen where they turn with their surface by other angles now; when all have followed."""
+    stay = seen_shapes.kept_by(strands, surface, change)
+    if stay is None:
+        return
+    baked_as, followed, firsts = _baked_as(strands), staleness.guides_digest(strands), curves.first_points(strands)
+    shown = simulated_guides.point_cache.get(strands.session_uid)
+    kept_shapes.move(strands, stay)
+    if shown is not None:
+        moved = stay(shown.reshape(-1, 3)).reshape(shown.shape)
+        simulated_guides.show(strands, rooted_as(moved, shown, firsts, curves.first_points(strands)))
+    _note_moved(strands, baked_as, followed)
+
+
+def _note_moved(strands, baked_as, followed):
+    """Note that strands have moved with what was made of them.
+
+    baked_as: `_baked_as` before; followed: their `guides_digest` before.
+    """
     for before, now in zip(baked_as, _baked_as(strands), strict=True):
         surface_space.note_same(strands, before, now)
     for hair in curves.followers(strands):

@@ -97,6 +97,8 @@ def _carry(guide_curves, surface, change, depsgraph):
     surface = scene.read_surface(guide_curves.surface, depsgraph)
     for target in targets:
         applied_transforms.follow(target, surface, change, depsgraph)
+    for target in targets:
+        applied_transforms.keep_seen(target, surface, change)
     surface_space.keep_surface(guide_curves, surface)
 
 
@@ -116,5 +118,6 @@ def follow_alone(
                 applied_transforms.note([hair], surface, change)
                 surface = scene.read_surface(surface_object, depsgraph)
                 applied_transforms.follow(hair, surface, change, depsgraph)
+                applied_transforms.keep_seen(hair, surface, change)
         except HairError as error:
             hair.vellus.status = str(error)

@@ -76,6 +76,13 @@ class Affine:
         return bool(np.isfinite(self.matrix).all()) and abs(np.linalg.det(self.axes)) >= 1e-30
 
     @property
+    def is_even(self) -> bool:
+        """Whether it keeps angles, beyond rounding: it scales all axes alike."""
+        squares = self.axes.T @ self.axes
+        even = np.eye(3) * np.trace(squares) / 3.0
+        return np.allclose(squares, even, rtol=0.0, atol=1e-5 * np.trace(squares))
+
+    @property
     def is_identity(self) -> bool:
         """Whether it changes nothing beyond rounding."""
         return np.allclose(self.matrix, np.eye(4), rtol=0.0, atol=_ROUNDING)
