@@ -5,9 +5,9 @@
 #include "include/packed_strand.glsl"
 #include "include/surface_turn.glsl"
 
-// Texels of a strand in `roots`: the vertices around it, its barycentric coordinates, and its place at rest; of a vertex
-// in `vertices`, which turn_vertices.comp has written: where it is now and whether it has moved, and where its turn takes
-// the x and the y axis.
+// Texels of a strand in `roots`: the vertices around it, its barycentric coordinates, and where it begins at rest with
+// whether that is apart from its place there; of a vertex in `vertices`, which turn_vertices.comp has written: where it
+// is now and whether it has moved, and where its turn takes the x and the y axis. is_posed: 0 where all is at rest.
 const int ROOT_TEXELS = 3;
 const int VERTEX_TEXELS = 3;
 
@@ -21,7 +21,7 @@ void main()
   ivec2 root = strand_texel(strand, 0, ROOT_TEXELS, textureSize(roots, 0).x / ROOT_TEXELS);
   vec3 corners = texelFetch(roots, root, 0).xyz;
   vec3 barycentric = texelFetch(roots, root + ivec2(1, 0), 0).xyz;
-  vec3 from = texelFetch(roots, root + ivec2(2, 0), 0).xyz;
+  vec4 from = texelFetch(roots, root + ivec2(2, 0), 0);
   vec3 to = vec3(0.0);
   vec3 x_axis = vec3(0.0);
   vec3 y_axis = vec3(0.0);
@@ -39,10 +39,10 @@ void main()
   ivec2 here = packed_first(strand, 0, point_count, row_strands);
   vec4 head = packed_head(rest, here);
   vec4 carried = head;
-  bool is_carried = change > 0.0;  // undeformed parts do not change, bit for bit
+  bool is_carried = change > 0.0 || (is_posed == 1 && from.w > 0.0);  // undeformed parts do not change, bit for bit
   if (is_carried) {
     // A turn leaves every offset within the diagonal of what it was within.
-    carried = vec4(to + turn * (head.xyz - from), 1.7321 * head.w);
+    carried = vec4(to + turn * (head.xyz - from.xyz), 1.7321 * head.w);
   }
   imageStore(strands, here, vec4(carried.xy, 0.0, 0.0));
   imageStore(strands, here + ivec2(1, 0), vec4(carried.zw, 0.0, 0.0));

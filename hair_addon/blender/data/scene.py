@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Surfaces and cameras: Blender's data → arrays."""
 
-from dataclasses import dataclass
-
 import bmesh
 import bpy
 import numpy as np
@@ -15,15 +13,16 @@ from ...core.geometry.texture import Texture
 from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn, name_of
-from . import subdivided_surfaces, surface_space
-from .surfaces import Surface, cage_of, transformed
+from . import subdivided_surfaces, surface_readings, surface_space
+from .surface_readings import Reading
+from .surfaces import cage_of, transformed
 
 _MOST_CORNERS = 100_000  # of a face: the time to triangulate one grows faster than its corners
 
 # session_uid of a mesh object → (`Faces`, (C,) edges of its corners) that were read last.
 faces_cache = Cache(capacity=64)
 
-# session_uid of a surface → (`_Reading`, `Surface`, (F, 3) corners of its triangles) that were read last.
+# session_uid of a surface → (`Reading`, `Surface`, (F, 3) corners of its triangles) that were read last.
 surface_cache = Cache(capacity=16)
 
 
@@ -47,8 +46,10 @@ def read_surface(surface_object, depsgraph):
         faces = faces_read_again(surface_object, mesh)
         uv_map, loop_uvs = _loop_uvs(mesh)
         is_turned = surface_space.is_turned(surface_object)
-        read = _Reading(
-            name_of(surface_object), rest, faces, uv_map, loop_uvs, to_world_axes, rest is not posed, is_turned
+        is_divided = rest is not posed and subdivided_surfaces.is_divided(surface_object)
+        read = Reading(
+            *(name_of(surface_object), rest, faces, uv_map, loop_uvs, to_world_axes),
+            *(rest is not posed, is_turned, is_divided),
         )
         undivided = subdivided_surfaces.undivided_corners(surface_object, depsgraph, faces)
         if known is None or not known[0].is_same(read) or known[1].undivided_corners != undivided:
@@ -59,7 +60,7 @@ def read_surface(surface_object, depsgraph):
                 mesh.vertices.foreach_set("co", rest.ravel())
             corners = triangle_corners(mesh, faces, read.name)
             if is_turned:
-                corners = _turned_back(corners, faces, undivided)
+                corners = surface_readings.turned_back(corners, faces, undivided)
             known = None
     finally:
         evaluated.to_mesh_clear()
@@ -70,86 +71,10 @@ def read_surface(surface_object, depsgraph):
         return known[1].posed_at(posed if read.has_rest else known[1].rest)
     if known is not None:
         corners = known[2]
-    surface = _surface_of(read, posed, corners, cage_corners, undivided)
+    own = _own_mesh(surface_object, uv_map) if is_divided else None
+    surface = surface_readings.surface_of(read, posed, corners, cage_corners, undivided, own)
     surface_cache.keep(surface_object.session_uid, (read, surface, corners))
     return surface
-
-
-@dataclass(frozen=True)
-class _Reading:
-    """What a `Surface` follows from, but for its pose: arrays as of `Surface`."""
-
-    name: str
-    rest: np.ndarray
-    faces: Faces
-    uv_map: str
-    loop_uvs: np.ndarray | None  # (C, 2) float32
-    to_world_axes: np.ndarray
-    has_rest: bool  # whether Blender stores where vertices are at rest
-    is_turned: bool
-
-    def is_same(self, other):
-        named = [(read.name, read.uv_map, read.has_rest, read.is_turned) for read in (self, other)]
-        if named[0] != named[1] or (self.loop_uvs is None) != (other.loop_uvs is None):
-            return False
-        mine, its = (
-            (
-                r.rest,
-                r.faces.corner_vertices,
-                r.faces.starts,
-                r.to_world_axes,
-                np.float32(0) if r.loop_uvs is None else r.loop_uvs,
-            )
-            for r in (self, other)
-        )
-        return all(a is b or np.array_equal(a, b) for a, b in zip(mine, its, strict=True))
-
-
-def _turned_back(corners, faces, undivided):
-    """(T, 3) corners of triangles in the order that they had before faces, or those of their cage, were turned."""
-    turned = geometry.turned_faces.turned_cage(faces, undivided) if undivided else None
-    if turned is None:
-        return corners[_turned_order(faces)]
-    quads = turned.corners.reshape(-1, 4)
-    is_cut_otherwise = (corners[::2, 2] % 4 == 3)[quads[:, 0] // 4]  # as Blender cuts quads that are not convex
-    cuts = np.where(is_cut_otherwise[:, None], (0, 3, 1, 1, 3, 2), (0, 2, 1, 0, 3, 2))
-    return np.take_along_axis(quads, cuts, axis=1).reshape(-1, 3).astype(corners.dtype)
-
-
-def _turned_order(faces):
-    """(T,) int: the triangles of each face from its last one on, as a turned face has them in the order of before."""
-    counts = np.diff(faces.starts) - 2
-    firsts = np.repeat(np.cumsum(counts) - counts, counts)
-    return 2 * firsts + np.repeat(counts, counts) - 1 - np.arange(len(firsts))
-
-
-def _surface_of(read, posed, corners, cage_corners, undivided):
-    """The `Surface` of a `_Reading` whose triangles have (F, 3) corners."""
-    smooth_rest = subdivided_surfaces.smooth_positions(read.rest, read.faces, cage_corners)
-    triangles = read.faces.corner_vertices[corners]
-    corner_uvs = None if read.loop_uvs is None else read.loop_uvs[corners]
-    is_mirrored = bool(np.linalg.det(read.to_world_axes) < 0.0)
-    if is_mirrored:
-        triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
-        corner_uvs = None if corner_uvs is None else corner_uvs[:, [0, 2, 1]]
-    with np.errstate(invalid="ignore"):  # non-finite values are rejected by the check of the mesh
-        smooth = None if smooth_rest is read.rest else transformed(smooth_rest, read.to_world_axes)
-        mesh = TriMesh(transformed(read.rest, read.to_world_axes), triangles, smooth)
-    return Surface(
-        read.name,
-        mesh,
-        read.faces,
-        read.rest,
-        posed,
-        corner_uvs,
-        read.uv_map,
-        read.to_world_axes,
-        is_mirrored,
-        cage_corners,
-        smooth_rest,
-        undivided,
-        read.is_turned,
-    )
 
 
 def _loop_uvs(mesh):
@@ -162,12 +87,34 @@ def _loop_uvs(mesh):
     return name_of(layer), uvs
 
 
+def _own_mesh(surface_object, uv_map):
+    """(`Faces`, (C, 2) float32 of the UV map or None) of a mesh before its modifiers; None for no faces."""
+    mesh = surface_object.data
+    if not len(mesh.polygons):
+        return None
+    layer = None if subdivided_surfaces.moves_uvs(surface_object) else mesh.uv_layers.get(uv_map)
+    if layer is None or not len(layer.uv):
+        return faces_of(mesh), None
+    uvs = np.empty((len(mesh.loops), 2), np.float32)
+    layer.uv.foreach_get("vector", uvs.ravel())
+    return faces_of(mesh), uvs
+
+
 def read_own_mesh(surface_object, to_world_axes):
     """The `TriMesh` of a mesh object before its modifiers, in the axes and scale of a `Surface`."""
     mesh = surface_object.data
     faces = faces_of(mesh)
     triangles = faces.corner_vertices[triangle_corners(mesh, faces, name_of(surface_object))]
     return TriMesh(transformed(vertex_positions(mesh), to_world_axes), triangles)
+
+
+def shown_surface(surface_object, surface):
+    """The `Surface` of an object as it was read last, where the one given has the faces of its cage; else that one.
+
+    On it roots are stored that were placed on the cage.
+    """
+    known = None if surface_object is None else surface_cache.get(surface_object.session_uid)
+    return known[1] if known is not None and known[1].cage.topology == surface.topology else surface
 
 
 def present_depsgraph():
@@ -277,11 +224,13 @@ def read_vertex_group(surface_object, depsgraph, name):
 
 
 def read_weights(surface_object, surface, depsgraph, name):
-    """`read_vertex_group` on a `Surface` of an object, which may have been read at another level of subdivision."""
+    """`read_vertex_group` on a `Surface` of an object: its cage, or as it was read at another level of subdivision."""
     weights = read_vertex_group(surface_object, depsgraph, name)
     if weights is None or len(weights) == len(surface.rest):
         return weights
     present = read_surface(surface_object, depsgraph)
+    if present.cage.topology == surface.topology:
+        return present.of_cage(weights)
     if cage_of(present.topology) != cage_of(surface.topology):
         return weights
     nearest = geometry.closest_point.SurfaceQuery(present.local_mesh).nearest(surface.rest)
@@ -292,6 +241,18 @@ def read_cage_weights(surface_object, depsgraph, name):
     """`read_vertex_group` at the vertices of a `Surface.of_cage`, the same at every level of subdivision."""
     weights = read_vertex_group(surface_object, depsgraph, name)
     return None if weights is None else read_surface(surface_object, depsgraph).of_cage(weights)
+
+
+def on_surface(surface_object, surface, depsgraph, values, domain):
+    """Values of an evaluated mesh, of its POINT, FACE or CORNER: those of a `Surface` of it, which may be its cage."""
+    present = read_surface(surface_object, depsgraph)
+    if present.topology == surface.topology or present.cage.topology != surface.topology:
+        return values
+    if domain == "POINT":
+        return present.of_cage(values)
+    if domain == "FACE":
+        return values[present.divided_of[1]]
+    return values[present.faces.corner_vertices < present.cage_size]
 
 
 def weights_in_group(mesh, index):

@@ -31,6 +31,16 @@ def undivided_corners(surface_object, depsgraph, faces):
     return _corners_before(filter(_is_dividing, surface_object.modifiers), depsgraph, faces)
 
 
+def is_divided(surface_object):
+    """Whether an object's modifiers subdivide its mesh, at this level or at another one."""
+    return any(map(_is_dividing, surface_object.modifiers))
+
+
+def moves_uvs(surface_object):
+    """Whether modifiers may change UV coordinates in other ways than to subdivide them."""
+    return any(modifier.type in {"NODES", "UV_PROJECT", "UV_WARP"} for modifier in surface_object.modifiers)
+
+
 def _corners_before(modifiers, depsgraph, faces):
     levels = sum(_levels(modifier, depsgraph) for modifier in modifiers)
     # The first level makes a quad of each corner, the others make four of each.

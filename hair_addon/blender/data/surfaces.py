@@ -15,6 +15,8 @@ from ...core.kernels.checks import require_indices
 # What does not follow from where vertices are posed, and is kept in another pose.
 _AT_REST = ("to_local_axes", "local_mesh", "shape", "extent", "topology", "turned", "turned_topology", "cage_vertices")
 
+_RESIZED = 1.3  # times as large, and more than smoothing a cage may be
+
 _MOST_TURNINGS = 8  # of a surface: of the hair and the guides on it
 
 
@@ -42,6 +44,9 @@ class Surface:
     is_turned: bool = (
         False  # whether Blender has turned its faces since hair grew: triangles are in the order of before
     )
+    # The `Surface` of its faces before modifiers subdivide them, and one of the present faces (F,) in each of these.
+    is_cage: bool = False  # whether it is the cage of another one
+    divided_of: "tuple[Surface, np.ndarray] | None" = None
 
     @cached_property
     def to_local_axes(self):
@@ -72,6 +77,37 @@ class Surface:
     def posed_mesh(self):
         """The deformed `TriMesh`, with modifiers and shape keys, whose size the artist sees."""
         return TriMesh(self.from_local(self.posed), self.mesh.triangles) if self.is_deformed else self.mesh
+
+    @property
+    def drawn_on(self):
+        """(V, 3) float32 vertices that lines are drawn near to; None where they are those of `mesh`.
+
+        Of a cage they are: lines are drawn on what it is subdivided to (`drawn_lines.at_rest`).
+        """
+        return self.from_local(self.posed) if self.is_deformed and not self.is_cage else None
+
+    @property
+    def cage(self):
+        """The `Surface` at rest before modifiers subdivide it: the same at every level, to the last bit.
+
+        It is itself where nothing subdivides it, or where the faces of before are not known. Hair grows on it.
+        """
+        return self if self.divided_of is None else self.divided_of[0]
+
+    @cached_property
+    def sized_cage(self):
+        """The `cage`, which is as large as this is posed where more than subdivision has changed that."""
+        if self.divided_of is None or not self.is_deformed:
+            return self.cage
+        smooth = (
+            self.mesh if self.mesh.smooth_vertices is None else TriMesh(self.mesh.smooth_vertices, self.mesh.triangles)
+        )
+        with np.errstate(invalid="ignore", over="ignore"):
+            areas = [float(mesh.areas.sum()) for mesh in (self.posed_mesh, smooth)]
+        if not (np.isfinite(areas).all() and min(areas) > 0.0):
+            return self.cage
+        factor = np.float32(np.sqrt(areas[0] / areas[1]))
+        return self.cage if 1.0 / _RESIZED < factor < _RESIZED else self.cage.posed_at(factor * self.cage.rest)
 
     def posed_at(self, posed):
         """The same surface with its vertices at (V, 3) float32 local positions."""
@@ -215,7 +251,7 @@ class Surface:
     def turned_topology(self):
         """`topology` with each face turned, as Blender turns them where it applies a scale that mirrors."""
         faces = Faces(self.turned.before(self.faces.corner_vertices), self.faces.starts)
-        of_cage = geometry.turned_faces.cage_vertices(faces, self.undivided_corners)
+        of_cage = geometry.cages.cage_vertices(faces, self.undivided_corners)
         return _half_key(of_cage) + _half_key(faces.corner_vertices, faces.starts)
 
     @cached_property
@@ -230,7 +266,7 @@ class Surface:
     @cached_property
     def cage_vertices(self):
         """(C,) int32: the vertices at the corners of faces before modifiers subdivide them, face after face."""
-        return geometry.turned_faces.cage_vertices(self.faces, self.undivided_corners)
+        return geometry.cages.cage_vertices(self.faces, self.undivided_corners)
 
     @property
     def cage_size(self):

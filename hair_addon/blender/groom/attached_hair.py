@@ -10,8 +10,8 @@ from ...core.errors import HairError
 from ...core.geometry.affine import Affine
 from ...core.geometry.mesh import positions
 from ..data import scene, surface_space, usable_surfaces
-from ..data.scene import Surface
 from ..data.strands import attributes, curves, curves_objects, kept_shapes, posed_strands, stored_roots
+from ..data.surfaces import Surface
 from ..host.notices import name_of
 from . import bindings, staleness
 
@@ -53,7 +53,8 @@ def attach(
             bindings.invalidate(part)
         if part in kept and surface is not None:
             carried[part].write(surface)
-        part.vellus.is_stale = part not in kept
+        if part in changes:
+            part.vellus.is_stale = part not in kept
         if part in kept and part in followed and curves.is_hand_made(part):
             part.vellus.followed = staleness.guides_digest(part.vellus.guide_curves)
         part.update_tag()
@@ -117,7 +118,9 @@ class _Carried:
     def _seen(self, points):
         """(N, 3) points where they are seen, in the new surface's coordinates."""
         if self._motion_before is not None:
-            points = posed_strands.carried(points, *self._motion_before, self._counts)
+            motion, (*places, slides) = self._motion_before
+            points = points + np.repeat(slides, self._counts, axis=0)
+            points = posed_strands.carried(points, motion, places, self._counts)
         return self._change.points(points)
 
     def _to_rest(self, points, counts):
@@ -132,13 +135,16 @@ class _Carried:
 
 
 def _motion_of(part, depsgraph):
-    """(`SurfaceMotion` of the surface that strands are on, their places there); None at rest, and where it is gone."""
+    """(`SurfaceMotion` of the surface that strands are on, their places and slides there as of `Pose.rooted`).
+
+    None at rest, and where the surface is gone.
+    """
     surface_object = _surface_before(part)
     if surface_object is None:
         return None
     pose = posed_strands.read_pose(surface_object, depsgraph)
     if pose.surface is None or not pose.is_deformed:
         return None
-    stored = stored_roots.places(part, len(pose.surface.rest))
-    places = pose.rooted(part.vellus.topology, stored, curves.first_points(part))
-    return pose.motion_at(places[0]), places
+    firsts = curves.first_points(part)
+    vertices, weights, *slides = pose.rooted(part.vellus.topology, stored_roots.slid_places(part), firsts)
+    return pose.motion_at(vertices), (vertices, weights, slides[0] if slides else np.zeros_like(firsts))

@@ -20,8 +20,7 @@ from ...core.grooming import following, groom
 from ...core.grooming.groom import HairSettings
 from ...core.interpolation.hair_binding import HairBinding
 from ..data import scene
-from ..data.scene import Surface
-from ..data.surfaces import cage_of
+from ..data.surfaces import Surface, cage_of
 from ..host.caches import Cache
 from ..settings import style_items
 from . import styled_hair
@@ -249,7 +248,7 @@ def can_read_masks(bound: BoundHair, target: Curves, depsgraph: Depsgraph) -> bo
         return False
     if not any(any(style_items.masks_of(item)) for item in target.vellus.styles):
         return True
-    present, known = scene.read_surface(target.surface, depsgraph).topology, bound.surface.topology
+    present, known = scene.read_surface(target.surface, depsgraph).cage.topology, bound.surface.topology
     return present == known or cage_of(present) != cage_of(known)
 
 

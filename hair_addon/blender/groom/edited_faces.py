@@ -13,9 +13,8 @@ from bpy.types import Curves, Depsgraph
 from ...core import geometry
 from ...core.geometry.mesh import SurfacePoints, TriMesh, check_mesh, require_finite
 from ..data import surface_space
-from ..data.scene import Surface
 from ..data.strands import attributes, curves, kept_shapes, posed_strands, stored_roots
-from ..data.surfaces import cage_of, faces_of
+from ..data.surfaces import Surface, cage_of, faces_of
 from ..host.caches import Cache
 from . import bindings, staleness
 
@@ -62,10 +61,16 @@ def follow_moved(strands: Curves, surface: Surface, before: np.ndarray) -> None:
     """
     root_on_present_level(strands, surface, before)
     for target in (strands, *filter(_is_edited, _between(strands))):
+        on_cage = None if surface.divided_of is None else stored_roots.cage_points(target, surface.cage)
+        if on_cage is not None:  # so that it does not matter how the cage is subdivided now
+            cage = surface.cage
+            _carry(target, cage, before[: len(cage.rest)], cage.places(on_cage), on_cage)
+            curves.write_roots(target, cage, on_cage)
+            continue
         places, roots = stored_roots.places(target, len(surface.rest)), stored_roots.points(target, surface)
         if places is not None and roots is not None and faces_of(target.vellus.topology) == faces_of(surface.topology):
             _carry(target, surface, before, places, roots)
-            curves.write_roots(target, surface, roots)
+            curves.write_roots(target, surface, roots, firsts=curves.first_points(target))
 
 
 def _between(strands):
@@ -95,7 +100,7 @@ def change_level(strands: Curves, surface: Surface) -> None:
         roots = curves.nearest_roots(surface, _firsts(strands, surface))
     else:
         roots = surface.swap_winding(SurfacePoints(*known))
-    curves.write_roots(strands, surface, roots)
+    curves.write_roots(strands, surface, roots, firsts=curves.first_points(strands))
     surface_space.keep_surface(strands, surface)
     for hair in _between(strands):
         curves.write_smoothness(hair, surface)
@@ -110,8 +115,8 @@ def root_on_present_level(strands: Curves, surface: Surface, before: np.ndarray)
         topology = hair.vellus.topology
         if topology != surface.topology and cage_of(topology) == cage_of(surface.topology):
             mesh = TriMesh(surface.from_local(before), surface.mesh.triangles)
-            firsts = _firsts(hair, surface)
-            curves.write_roots(hair, surface, geometry.closest_point.SurfaceQuery(mesh).nearest(firsts))
+            roots = geometry.closest_point.SurfaceQuery(mesh).nearest(_firsts(hair, surface))
+            curves.write_roots(hair, surface, roots, firsts=curves.first_points(hair))
 
 
 def _firsts(strands, surface):

@@ -11,7 +11,7 @@ import bpy
 from bpy.types import Curves, Depsgraph, Object
 
 from ..data import surface_space
-from ..data.scene import Surface
+from ..data.surfaces import Surface
 from ..host import scene_time
 from ..host.caches import Cache
 

@@ -13,7 +13,7 @@ from ...core.geometry.texture import Texture
 from ...core.grooming import cost, groom, groom_defaults
 from ...core.grooming.groom import GuideSettings
 from ...core.long_work import Progress, part_of
-from ..data.scene import Surface
+from ..data.surfaces import Surface
 from ..settings import preferences
 from ..settings.translations import error_text
 
@@ -67,7 +67,7 @@ def grow(
         shape=surface.shape,
         roots=roots,
         flow=flow,
-        drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
+        drawn_on=surface.drawn_on,
         device=device,
         progress=part_of(progress, 0.0, _GROWN) if settings.drape else progress,
     )

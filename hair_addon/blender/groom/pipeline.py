@@ -17,13 +17,12 @@ from ...core.interpolation import hair_binding
 from ...core.long_work import Work, part_of, run_now
 from ...core.styling.base import StyleSettings
 from ..data import masks, scene, surface_space, whole_changes
-from ..data.scene import Surface
-from ..data.strands import curves, drawn_lines, partings, stored_roots
-from ..data.surfaces import cage_of
+from ..data.strands import curves, drawn_lines, partings
+from ..data.surfaces import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items
-from . import bindings, grown_guides, hair_memory, read_surfaces, size_fitting, styled_hair, writing
+from . import bindings, grown_guides, hair_memory, kept_roots, read_surfaces, size_fitting, styled_hair, writing
 from .bindings import BoundHair
 from .styled_hair import ReadStyles, StyledHair
 
@@ -58,10 +57,16 @@ def distributing_guides(
     sized = size_fitting.of_guides(settings, surface, mask, target if keeps_roots else None, may_drape)
     settings, key = sized.settings, sized.root_key
     hair_memory.require_guides(settings, len(surface.mesh.triangles))
-    roots = _kept_roots(target, surface, key, settings.guide_count) if keeps_roots else None
+    roots = kept_roots.of(target, surface, key, settings.guide_count) if keeps_roots else None
     flow = drawn_lines.read(surface_object, surface, settings.flow_lines, depsgraph)
-    place, target = Remembered(surface_object), Remembered(target)
-    grown = yield lambda progress: grown_guides.grow(surface, settings, mask, flow, progress, roots)
+    place, target, device = Remembered(surface_object), Remembered(target), preferences.device()
+    shown = scene.shown_surface(surface_object, surface)
+
+    def compute(progress):
+        laid_flow = drawn_lines.at_rest(flow, shown, surface, device)
+        return grown_guides.grow(surface, settings, mask, laid_flow, progress, roots)
+
+    grown = yield compute
     flow_key = drawn_lines.key(flow)
     return writing.write_guides(target.find(), place.find(), surface, grown, settings, key, flow_key, sized.fits)
 
@@ -116,10 +121,10 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     styles = new_styles if target is None else style_items.styles_of(target.vellus)
     read = styled_hair.read_styles(styles, guide_curves.surface, surface, guide_curves, depsgraph, target)
     known = _known_binding(target, settings, key, parting.key, guides, surface)
-    roots = _kept_roots(target, surface, key, settings.strand_count) if known is None else None
+    roots = kept_roots.of(target, surface, key, settings.strand_count) if known is None else None
     device, guide_uid = preferences.device(), guide_curves.session_uid
 
-    ground = _ground(surface, mask, parting, device)
+    ground = _ground(surface, scene.shown_surface(guide_curves.surface, surface), mask, parting, device)
     if target is not None:
         made_on = surface_space.made_on(target, surface.rest)
         ground["shape"] = surface.shape_made_on(made_on, surface_space.applied(target))
@@ -156,7 +161,7 @@ def complete(
 ) -> tuple[GuideSettings, HairSettings]:
     """`GuideSettings` and `HairSettings` with open settings computed from a mesh object. Raises `HairError`."""
     read_surfaces.require_mesh(surface_object)
-    surface = scene.read_surface(surface_object, depsgraph)
+    surface = scene.read_surface(surface_object, depsgraph).sized_cage
     sized, _masks = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
     return sized[0].settings, sized[1].settings
 
@@ -196,13 +201,15 @@ def adding_hair(
     flow = drawn_lines.read(surface_object, surface, guide_settings.flow_lines, depsgraph)
     styling = styled_hair.read_styles(styles, surface_object, surface, None, depsgraph)
     device, place = preferences.device(), Remembered(surface_object)
+    shown = scene.shown_surface(surface_object, surface)
 
     def compute(progress):
         groom.load_kernels(device, progress)
-        grown = grown_guides.grow(surface, guide_settings, mask, flow, part_of(progress, 0.0, 0.5))
+        ground = _ground(surface, shown, hair_mask, parting, device)
+        laid_flow = drawn_lines.at_rest(flow, shown, surface, device)
+        grown = grown_guides.grow(surface, guide_settings, mask, laid_flow, part_of(progress, 0.0, 0.5))
         guides = _as_written(grown.strands, surface, device)
         progress = part_of(progress, 0.5, 1.0)
-        ground = _ground(surface, hair_mask, parting, device)
         binding = _bind(surface, guides, hair_settings, ground, None, progress)
         styled = _styled(styling, binding, guides, hair_settings, surface, ground)
         known = binding, hair_settings, of_hair.root_key, parting.key, guides, None, surface, styled
@@ -220,18 +227,23 @@ def hair_between(
 ) -> Callable[..., BoundHair]:
     """A function of (guides, progress, density) that computes the `BoundHair` between `Strands` in no Curves yet.
 
-    density: (V,) where strands grow, None for the vertex group that settings name.
+    surface: as it is subdivided now; density: (V,) of it, where strands grow, None for the vertex group that settings
+    name.
     """
     hair_memory.require_strands(settings)
+    shown, surface = surface, surface.sized_cage
     painted, texture = masks.own(settings).read(surface_object, surface, depsgraph)
     parting = partings.read(surface_object, surface, None, settings, depsgraph)
     device = preferences.device()
 
     def compute(guides, progress, density=None):
-        density = painted if density is None else density
+        density = painted if density is None else shown.of_cage(density)
         mask = density, texture
         sized = size_fitting.of_hair(settings, surface, mask, len(guides))
-        completed, ground = sized.settings, _ground(surface, mask, parting, device)
+        completed, ground = sized.settings, _ground(surface, shown, mask, parting, device)
+        if surface is not shown:
+            roots = curves.nearest_roots(surface, guides.numpy()[:, 0])
+            guides = strands.from_numpy(guides.numpy(), roots, device)
         binding = _bind(surface, guides, completed, ground, None, progress)
         styles = _styled(ReadStyles(), binding, guides, completed, surface, ground)
         known = binding, completed, sized.root_key, parting.key, guides, None, surface, styles
@@ -252,24 +264,22 @@ def _as_written(guides, surface, device):
     return strands.from_numpy(surface.from_local(points), guides.roots, device)
 
 
-def _ground(surface, mask, parting, device):
-    """What strands and clump sites stand on: arguments of `groom.bind_hair`. mask: (density, texture)."""
+def _ground(surface, shown, mask, parting, device):
+    """What strands and clump sites stand on: arguments of `groom.bind_hair`. mask: (density, texture).
+
+    shown: the surface as modifiers subdivide it now, on which lines are drawn.
+    """
     density, texture = mask
     return {
         "density": density,
         "texture": texture,
         "regions": parting.regions,
-        "lines": parting.lines,
-        "drawn_on": _drawn_on(surface),
+        "lines": drawn_lines.at_rest(parting.lines, shown, surface, device),
+        "drawn_on": surface.drawn_on,
         "shape": surface.shape,
         "is_mirrored": surface.names_otherwise,
         "device": device,
     }
-
-
-def _drawn_on(surface):
-    """(V, 3) vertices that lines are drawn on, where these are not the surface's own."""
-    return surface.from_local(surface.posed) if surface.is_deformed else None
 
 
 def _bind(surface, guides, settings, ground, roots, progress):
@@ -299,21 +309,6 @@ def _known_by(bound, progress):
     progress("Growing strands", 0.8)
     _ = bound.binding.leaders, bound.binding.identities  # now, and not while other threads need the CPU
     return bound
-
-
-def _kept_roots(target, surface, key, count):
-    """The `SurfacePoints` that Curves store, if they were placed by this `root_key` on these faces; else None.
-
-    Those nearest to where strands begin, if these faces were subdivided otherwise. count: how many are wanted. Somebody
-    may have deleted some, or all.
-    """
-    if target is None or target.vellus.root_key != key or len(target.curves) != count:
-        return None
-    if cage_of(target.vellus.topology) != cage_of(surface.topology):
-        return None
-    if target.vellus.topology != surface.topology:
-        return curves.nearest_roots(surface, surface.from_local(curves.first_points(target)))
-    return stored_roots.points(target, surface, is_complete=True)
 
 
 @memory_as_sentence()

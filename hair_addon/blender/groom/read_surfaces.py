@@ -5,15 +5,15 @@ from bpy.types import Curves, Depsgraph, Object
 
 from ...core.errors import HairError
 from ..data import scene
-from ..data.scene import Surface
 from ..data.strands import curves, curves_objects, partings
+from ..data.surfaces import Surface
 from ..settings import style_items
 from . import bindings
 from .bindings import BoundHair
 
 
 def read(surface_object: Object | None, depsgraph: Depsgraph, target: Curves | None = None) -> Surface:
-    """The `Surface` of a mesh object that may be changed.
+    """The `Surface` that guides and hair are made on: the `sized_cage` of a mesh object that may be changed.
 
     The surface that `target` is bound to, if that is the same: of which normals and areas are known. That of hair
     that follows a library only carries it. Raises `HairError`.
@@ -21,7 +21,7 @@ def read(surface_object: Object | None, depsgraph: Depsgraph, target: Curves | N
     if target is None or not curves.follows_library(target):
         require_mesh(surface_object)
         curves_objects.keep_rest(surface_object)
-    surface, bound = scene.read_surface(surface_object, depsgraph), target and bindings.of(target)
+    surface, bound = scene.read_surface(surface_object, depsgraph).sized_cage, target and bindings.of(target)
     if bound is not None and (bound.surface.is_same(surface) or _is_as_bound(bound, surface, target)):
         surface = bound.surface
     return surface

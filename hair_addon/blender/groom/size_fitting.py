@@ -13,7 +13,7 @@ from ...core.geometry.texture import Texture
 from ...core.grooming import groom_defaults
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import Settings
-from ..data.scene import Surface
+from ..data.surfaces import Surface
 from ..settings import fitted_sizes, setting_properties
 from . import grown_guides, staleness
 

@@ -78,7 +78,7 @@ def has_other_parting(target: Curves, depsgraph: Depsgraph) -> bool:
     if not partings.is_wanted(target.vellus.hair) or target.surface is None:
         return False
     settings = setting_properties.to_settings(target.vellus.hair, groom.HairSettings)
-    surface = scene.read_surface(target.surface, depsgraph)
+    surface = scene.read_surface(target.surface, depsgraph).cage
     parting = partings.read(target.surface, surface, target.vellus.guide_curves, settings, depsgraph)
     return parting.key != target.vellus.parting_key
 

@@ -19,8 +19,8 @@ from ...core.styling.base import StyleSettings, has_effect
 from ...core.styling.clump_trees import ClumpTrees
 from ...core.styling.style_inputs import Inputs
 from ..data import surface_space
-from ..data.scene import Surface
 from ..data.strands import style_inputs
+from ..data.surfaces import Surface
 from ..settings import setting_properties
 
 if TYPE_CHECKING:

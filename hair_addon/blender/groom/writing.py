@@ -11,10 +11,9 @@ from ...core.errors import HairError, memory_as_sentence
 from ...core.geometry.strands import Strands, lengths
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
-from ..data import guide_map_readers, surface_space
-from ..data.scene import Surface
+from ..data import guide_map_readers, scene, surface_space
 from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots
-from ..data.surfaces import cage_of
+from ..data.surfaces import Surface, cage_of
 from ..host.notices import name_of
 from ..materials import looks
 from ..settings import animated, setting_properties, style_items
@@ -52,9 +51,9 @@ def write_guides(
     radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * (settings.length or 0.0) / surface.scale, np.float32)
     points = Future()
     points.set_result(surface.to_local(guides.numpy()))
-    curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
+    rooted_on = curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
     curves.write_points(target, points)
-    surface_space.keep_surface(target, surface)
+    surface_space.keep_surface(target, rooted_on)
     return target
 
 
@@ -169,12 +168,16 @@ def _store_roots(guide_curves, bound):
     if guide_curves is None or attributes.is_from_library(guide_curves) or guide_curves.session_uid != bound.guide_uid:
         return
     roots, surface = bound.guides.roots, bound.surface
-    present = guide_curves.vellus.topology
-    if present != surface.topology and cage_of(present) == cage_of(surface.topology):
-        return  # they are rooted on the surface as it is subdivided now
-    stored = stored_roots.places(guide_curves, len(surface.rest))
-    if stored is None or not all(map(np.array_equal, stored, surface.places(roots))):
-        curves.write_roots(guide_curves, surface, roots)
+    present, firsts, stored = guide_curves.vellus.topology, None, stored_roots.cage_points(guide_curves, surface)
+    if stored is None and present != surface.topology and cage_of(present) == cage_of(surface.topology):
+        # They are rooted on the surface as it is subdivided now, and were not placed on its cage.
+        surface = scene.shown_surface(guide_curves.surface, surface)
+        if present != surface.topology:
+            return
+        firsts, stored = curves.first_points(guide_curves), stored_roots.points(guide_curves, surface, is_complete=True)
+        roots = curves.read_roots(guide_curves, surface, surface.from_local(firsts))
+    if stored is None or not stored.is_same(roots):
+        curves.write_roots(guide_curves, surface, roots, firsts=firsts)
 
 
 def _keep_settings(target, kind, group, settings):

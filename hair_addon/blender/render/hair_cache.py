@@ -264,7 +264,7 @@ def _is_same(datablock, kept, bound):
         and np.array_equal(kept.randoms, curves.read_randoms(datablock))
         and made_strands.are_equal(kept.wetness, curves.read_wetness(datablock))
         and kept.rooted_on == _rooted_on(datablock, datablock.vellus.topology)
-        and (bound is not None or _are_places(kept.places, stored_roots.places(datablock, np.inf)))
+        and (bound is not None or _are_places(kept.places, stored_roots.slid_places(datablock)))
     )
 
 
@@ -297,7 +297,7 @@ def _read(datablock, bound, shown):
     """
     if bound is None:
         read = _shown_strands(datablock)
-        places = None if datablock.surface is None else stored_roots.places(datablock, np.inf)
+        places = None if datablock.surface is None else stored_roots.slid_places(datablock)
         if places is not None and read.is_sound is not None:
             places = tuple(values[read.is_sound] for values in places)
         rooted = places, _rooted_on(datablock, datablock.vellus.topology), stored_roots.may_float(datablock)

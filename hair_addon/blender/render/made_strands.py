@@ -136,16 +136,15 @@ class Making:
             return False
         if surface is None or not self.may_carry or (is_behind and self.due is None and _is_deformed(kept.pose)):
             return False
-        places = pose.rooted(kept.rooted_on[1], kept.places, kept.points[:, 0], kept.may_float)
-        if len(places) > 2:  # rooted at another level of subdivision
-            return False
+        vertices, weights, *slides = pose.rooted(kept.rooted_on[1], kept.places, kept.points[:, 0], kept.may_float)
         drawn = kept.on_gpu
         if _is_deformed(kept.pose):
             rest = strand_textures.packed_texture(kept.points, drawn.row_strands)
         else:
             rest, kept.on_gpu = drawn.texture, replace(drawn, texture=strand_textures.like(drawn.texture))
         self.carrier = strand_carrier.new_carrier(
-            rest, drawn.point_count, places, surface.rest, surface.turning(places[0])
+            *(rest, drawn.point_count, (vertices, weights), surface.rest, surface.turning(vertices)),
+            slides[0] if slides else None,
         )
         self._triangles = surface.mesh.triangles
         return True

@@ -258,6 +258,9 @@ class VellusCurves(bpy.types.PropertyGroup):
     is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_dynamics_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     topology: bpy.props.StringProperty(description="Triangulation that the stored roots refer to", options={"HIDDEN"})
+    cage_topology: bpy.props.StringProperty(
+        description="Faces before subdivision that the stored roots refer to", options={"HIDDEN"}
+    )
     root_key: bpy.props.StringProperty(description="Settings and inputs that placed the roots", options={"HIDDEN"})
     fit_key: bpy.props.StringProperty(description="Inputs that sizes were fitted to", options={"HIDDEN"})
     parting_key: bpy.props.StringProperty(description="Settings and inputs that parted the hair", options={"HIDDEN"})

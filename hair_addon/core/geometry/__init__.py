@@ -10,6 +10,7 @@ if TYPE_CHECKING:
         affine,
         bezier_segments,
         bspline,
+        cages,
         closest_point,
         clusters,
         connected_components,

@@ -29,7 +29,7 @@ def on_triangles(
     of its polygon.
     """
     sizes = np.diff(faces.starts)[polygons]
-    corners = _corners_of(faces, polygons, vertices)
+    corners = corners_of(faces, polygons, vertices)
     are_none = (corners < 0).any(axis=1)
     at_corners = np.where((sizes > 4)[:, None, None], mesh.vertices[vertices], _SQUARE[np.minimum(corners, 4)])
     places = (weights[..., None] * at_corners).sum(axis=1)
@@ -39,7 +39,7 @@ def on_triangles(
     for step in range(int(sizes.max(initial=3)) - 2):
         rows = np.flatnonzero((step < sizes - 2) & ~are_none)
         there = mesh.triangles[first[rows] + step]
-        own_corners = _corners_of(faces, polygons[rows], there)
+        own_corners = corners_of(faces, polygons[rows], there)
         is_large = (sizes[rows] > 4)[:, None, None]
         found = _barycentric(
             np.where(is_large, mesh.vertices[there], _SQUARE[np.minimum(own_corners, 4)]), places[rows]
@@ -119,7 +119,7 @@ def _same_places(before, after):
     return found
 
 
-def _corners_of(faces, polygons, vertices):
+def corners_of(faces, polygons, vertices):
     """(N, K) int32: which corner of its polygon each of the vertices (N, K) is, -1 for none."""
     sizes, starts = np.diff(faces.starts)[polygons], faces.starts[polygons]
     found = np.full(vertices.shape, -1, np.int32)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .cages import cage_starts, cage_vertices
 from .mesh import Faces
 
 _SIDES = np.array([(0, 1), (1, 2), (2, 3), (3, 0)])
@@ -31,21 +32,6 @@ class TurnedFaces:
         return there if self.vertices is None else self.vertices[there]
 
 
-def cage_vertices(faces: Faces, corner_count: int) -> np.ndarray:
-    """(N,) int32: vertices at the corners of a cage, face after face; all of `faces` where it is not subdivided.
-
-    corner_count: of the cage, 0 where nothing is subdivided. A subdivided mesh has the vertices of its cage first, and
-    each corner of the cage is one of its own, in order.
-    """
-    vertices = faces.corner_vertices
-    if corner_count:
-        up_to = np.cumsum(np.bincount(vertices))
-        last = int(np.searchsorted(up_to, corner_count))
-        if last < len(up_to) and up_to[last] == corner_count:
-            return vertices[vertices <= last]
-    return vertices
-
-
 def turned(faces: Faces) -> TurnedFaces:
     """The `TurnedFaces` of faces that nothing subdivides."""
     starts, sizes = faces.starts[:-1], np.diff(faces.starts)
@@ -59,28 +45,16 @@ def turned_cage(faces: Faces, corner_count: int) -> TurnedFaces | None:
 
     corner_count: as of `cage_vertices`.
     """
-    of_cage = cage_vertices(faces, corner_count)
-    if of_cage is faces.corner_vertices or (np.diff(faces.starts) != 4).any():
+    starts = cage_starts(faces, corner_count)
+    if starts is None:
         return None
-    quads = faces.corner_vertices.reshape(-1, 4)
-    per_corner, rest = divmod(len(quads), corner_count)
-    if not per_corner or rest:
-        return None
-    per_corner, rest = divmod(len(quads), corner_count)
-    if not per_corner or rest:
-        return None
+    of_cage, quads = cage_vertices(faces, corner_count), faces.corner_vertices.reshape(-1, 4)
     cage_size = int(of_cage.max()) + 1
-    # The vertices inside the faces of the cage come last, face after face, and each quad has one of them.
-    inside = quads.max(axis=1)
-    is_first = np.append(True, np.maximum.accumulate(inside)[:-1] < np.minimum.accumulate(inside[::-1])[::-1][1:])
-    starts = np.flatnonzero(is_first & (np.arange(len(quads)) % per_corner == 0))
-    counts = np.diff(starts, append=len(quads))
-    if (counts < 3 * per_corner).any():
-        return None
+    counts = np.diff(starts)
     corners = np.arange(len(faces.corner_vertices))
     vertices = np.arange(int(quads.max()) + 1, dtype=np.int32)
     for count in np.unique(counts):
-        firsts = starts[counts == count]
+        firsts = starts[:-1][counts == count]
         image = _image(quads[firsts[0] : firsts[0] + count], cage_size)
         if image is None:
             return None

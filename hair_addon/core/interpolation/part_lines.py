@@ -56,10 +56,7 @@ def lay(
         raise HairError("The part lines have no segments: draw a line of at least two points.")
     if not np.isfinite(segments).all():
         raise HairError("Some points of the part lines have non-finite coordinates: delete those lines.")
-    surface = mesh if drawn_on is None else TriMesh(drawn_on, mesh.triangles)
-    step = np.ptp(mesh.vertices.astype(np.float64), axis=0).max() / PIECES
-    query = closest_point.SurfaceQuery(surface, device=device)
-    lines = [positions(mesh, query.nearest(divided(line, step))).astype(np.float64) for line in chained(segments)]
+    lines, step = _on_mesh(mesh, segments, drawn_on, device)
     borders = _border_segments(mesh)
     laid, kinds = [], []
     for number, line in enumerate(lines):
@@ -83,6 +80,23 @@ def lay(
         wp.array(starts, dtype=int, device=device),
         wp.array(kinds, dtype=int, device=device),
     )
+
+
+def at_rest(mesh: TriMesh, segments: np.ndarray, drawn_on: np.ndarray, device: wp.DeviceLike = "cpu") -> np.ndarray:
+    """(M, 2, 3) float64 segments [m] on a checked mesh that `lay` finds for those near to vertices drawn_on (V, 3)."""
+    if not np.isfinite(segments).all():
+        return segments  # which `lay` refuses
+    lines, _step = _on_mesh(mesh, segments, drawn_on, device)
+    return np.concatenate([_pairs(line) for line in lines])
+
+
+def _on_mesh(mesh, segments, drawn_on, device):
+    """[(N, 3) float64]: polylines on a mesh of those near to it, or to `drawn_on`, and how far apart points are [m]."""
+    surface = mesh if drawn_on is None else TriMesh(drawn_on, mesh.triangles)
+    step = np.ptp(mesh.vertices.astype(np.float64), axis=0).max() / PIECES
+    query = closest_point.SurfaceQuery(surface, device=device)
+    lines = [positions(mesh, query.nearest(divided(line, step))).astype(np.float64) for line in chained(segments)]
+    return lines, step
 
 
 def in_order(edges: ArrayLike) -> np.ndarray:

@@ -127,7 +127,10 @@ def make_third(group):
     start = next(link.to_node for link in group.links if link.from_node == floats)
     nearest, used = start.inputs["True"].links[0].from_socket, start.outputs[0].links[0].to_socket
     group.links.new(nearest, used)
-    for node in (floats, start):
+    slide = next(n for n in nodes if "Name" in n.inputs and n.inputs["Name"].default_value == "root_slide")
+    slid = next(link.to_node for link in group.links if link.from_node == slide)
+    group.links.new(slid.inputs[0].links[0].from_socket, slid.outputs[0].links[0].to_socket)
+    for node in (floats, start, slide, slid):
         nodes.remove(node)
     group.interface.remove(group.interface.items_tree["Paused"])
     group["vellus_version"] = 3

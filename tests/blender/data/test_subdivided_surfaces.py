@@ -10,7 +10,8 @@ from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import follow_nodes
 from hair_addon.blender.live import older_files
 from hair_addon.core.geometry import closest_point
-from hair_addon.core.geometry.mesh import TriMesh, positions
+from hair_addon.core.geometry.mesh import positions
+from tests.support import render_probe
 from tests.support.dynamics.following import assert_follows, drawn_points, grow, update
 from tests.support.reading import evaluated_points, points, vertex_positions, write_points
 
@@ -156,56 +157,11 @@ def set_eye(surface, levels):
     surface.modifiers[0].show_viewport = levels > 0
 
 
-class Probe(bpy.types.RenderEngine):
-    """Keeps what a render shows."""
-
-    bl_idname, bl_label = "VELLUS_PROBE", "Probe"
-    seen = {}
-
-    def render(self, depsgraph):
-        Probe.seen.clear()
-        for shown in depsgraph.objects:
-            if shown.type == "CURVES":
-                Probe.seen[shown.name] = read_points(shown.data)
-            elif shown.type == "MESH":
-                Probe.seen[shown.name] = read_mesh(shown.data)
-
-
-def read_points(curves):
-    found = np.empty((len(curves.points), 3), np.float32)
-    curves.attributes["position"].data.foreach_get("vector", found.ravel())
-    return found.reshape(len(curves.curves), -1, 3)
-
-
-def read_mesh(mesh):
-    vertices = np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.vertices.foreach_get("co", vertices.ravel())
-    mesh.calc_loop_triangles()
-    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    return TriMesh(vertices, triangles)
-
-
 @pytest.fixture
 def rendered(cube):
     """A function that renders, and returns the strands and the largest distance of a root from the surface."""
-    scene_now = bpy.context.scene
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene_now.collection.objects.link(camera)
-    scene_now.camera = camera
-    scene_now.render.resolution_x = scene_now.render.resolution_y = 4
-    bpy.utils.register_class(Probe)
-
-    def render():
-        scene_now.render.engine = Probe.bl_idname
-        bpy.ops.render.render()
-        scene_now.render.engine = "CYCLES"
-        strands, mesh = Probe.seen["Hair"], Probe.seen[cube.name]
-        nearest = closest_point.SurfaceQuery(mesh).nearest(strands[:, 0])
-        return strands, np.linalg.norm(positions(mesh, nearest) - strands[:, 0], axis=1).max()
-
-    yield render
-    bpy.utils.unregister_class(Probe)
+    with render_probe.probing() as render:
+        yield lambda: render("Hair", cube.name)
 
 
 def bulge(cube):
@@ -264,7 +220,7 @@ def test_renders_do_not_depend_on_the_levels_of_viewports(cube, rendered, kind):
 
 def evaluated_mesh(surface):
     evaluated = surface.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    found = read_mesh(evaluated.to_mesh())
+    found = render_probe.read_mesh(evaluated.to_mesh())
     evaluated.to_mesh_clear()
     return found
 

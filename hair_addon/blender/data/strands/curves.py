@@ -14,6 +14,7 @@ from ....core.geometry import mesh as mesh_math
 from ....core.geometry import strands
 from ....core.grooming import groom
 from ...host.notices import name_of
+from .. import scene
 from ..surfaces import cage_of
 from . import attributes, follow_nodes, simulated_guides, stored_roots
 
@@ -44,7 +45,7 @@ def make_strands(curves, surface, roots, radii, identities, *, leaders=None, nor
     roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; identities: as `Surface.identities` gives them;
     leaders: (S,) int32, the strand that stands for the guide of each, or None where strands are guides themselves;
     normals: (S, 3) float32 of the surface at the roots, if they are known; written_radii: (P,) that the curves have, if
-    they are known.
+    they are known. Returns the `Surface` that the roots are stored on, as `write_roots`.
     """
     if len(roots) == 0:
         raise ValueError("no strands: an empty list of curves would crash Blender")
@@ -56,7 +57,7 @@ def make_strands(curves, surface, roots, radii, identities, *, leaders=None, nor
         attributes.write(curves, "guide_curve_index", "INT", "CURVE", leaders)
     for name, data_type, values in zip(("id", "strand_random"), ("INT", "FLOAT"), identities, strict=True):
         attributes.write(curves, name, data_type, "CURVE", values)
-    write_roots(curves, surface, roots, normals)
+    return write_roots(curves, surface, roots, normals)
 
 
 def write_guide_map(curves, guide_map):
@@ -94,10 +95,27 @@ def _write_or_remove(curves, name, data_type, values):
         curves.attributes.remove(curves.attributes[name])
 
 
-def write_roots(curves, surface, roots, normals=None):
-    """Store the roots of strands: for Vellus, for the nodes that deform them, and for Blender's tools."""
-    stored = surface.swap_winding(roots)
+def write_roots(curves, surface, roots, normals=None, firsts=None):
+    """Store the roots of strands: for Vellus, for the nodes that deform them, and for Blender's tools.
+
+    Those on a cage are stored at the nearest places of the surface as it is subdivided now, too: returns the `Surface`
+    that they are stored on. firsts: (S, 3) where strands begin, which were placed on a cage or were not, None where
+    they begin at their roots.
+    """
     normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots) if normals is None else normals)
+    cage, shown = surface.cage, scene.shown_surface(curves.surface, surface)
+    on_cage = None if firsts is None else stored_roots.cage_points(curves, cage)
+    if shown.topology != surface.topology:
+        on_cage, firsts = roots, mesh_math.interpolate(surface.rest, surface.mesh, roots)
+        surface, roots = shown, geometry.closest_point.SurfaceQuery(shown.local_mesh).nearest(firsts)
+    is_on_cage = surface.topology == cage.topology
+    has_slides = on_cage is not None or stored_roots.slides(curves) is not None
+    if firsts is None or is_on_cage or not has_slides or stored_roots.may_float(curves):
+        stored_roots.write_slides(curves, None)
+    else:
+        stored_roots.write_slides(curves, mesh_math.interpolate(surface.rest, surface.mesh, roots) - firsts)
+    stored_roots.write_cage(curves, cage, None if is_on_cage else on_cage)
+    stored = surface.swap_winding(roots)
     attributes.write(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
     attributes.write(curves, "surface_normal", "FLOAT_VECTOR", "CURVE", normals)
     attributes.write(curves, "root_triangle", "INT", "CURVE", stored.triangle)
@@ -111,6 +129,7 @@ def write_roots(curves, surface, roots, normals=None):
             is_combed = curves.vellus.kind == "GUIDES" and surface.corner_uvs is not None
             follow_nodes.set_surface(user, curves.surface, len(surface.rest), is_combed, surface.cage_corners)
     curves.update_tag()
+    return surface
 
 
 def write_smoothness(curves, surface):
@@ -254,10 +273,13 @@ def read_roots(curves, surface, first_points):
     Roots of curves that were added or slid in sculpt mode are outdated, and all roots if the triangles changed.
     """
     mesh_math.check_mesh(surface.mesh)
-    stored = stored_roots.points(curves, surface) if curves.vellus.topology == surface.topology else None
+    is_here = curves.vellus.topology == surface.topology
+    stored = stored_roots.points(curves, surface) if is_here else stored_roots.cage_points(curves, surface)
     if stored is None:
         return nearest_roots(surface, first_points)
-    distance = np.linalg.norm(mesh_math.positions(surface.mesh, stored) - first_points, axis=1)
+    places, slides = mesh_math.positions(surface.mesh, stored), stored_roots.slides(curves) if is_here else None
+    places = places if slides is None else places - surface.from_local(slides)
+    distance = np.linalg.norm(places - first_points, axis=1)
     apart = attributes.read(curves, "root_distance", "FLOAT", "CURVE")
     if apart is not None:
         distance = abs(distance - apart * surface.scale)

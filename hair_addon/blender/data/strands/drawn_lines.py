@@ -39,6 +39,16 @@ def read(surface_object, surface, name, depsgraph):
     return (local @ surface.to_world_axes.T)[interpolation.part_lines.in_order(edges)]
 
 
+def at_rest(lines, shown, surface, device):
+    """Lines that are drawn on a `Surface` as it is shown: moved to where it is at rest, if `surface` is its cage.
+
+    Both are the same one where nothing subdivides it.
+    """
+    if lines is None or not surface.is_cage or shown.drawn_on is None:
+        return lines
+    return interpolation.part_lines.at_rest(shown.mesh, lines, shown.drawn_on, device)
+
+
 def key(lines):
     """A key that changes with lines; empty for None."""
     return "" if lines is None else hashlib.blake2b(lines.tobytes(), digest_size=16).hexdigest()

@@ -18,12 +18,13 @@ _NAME = "Vellus Follow Surface"
 # Of the nodes below. Groups of other versions, from older files, are not changed: on surfaces without subdivision they
 # do the same. Hair takes a new one where strands would turn from the faces of a cage, as they do in groups before
 # `_SMOOTH_SINCE`, and where `_ADDED` nodes are all that a group lacks.
-_VERSION = 5
+_VERSION = 6
 _SMOOTH_SINCE = 3
 # Nodes that versions added: a group that lacks no others is taken for a new one.
 _ADDED = {
     4: ("GeometryNodeIsViewport", "FunctionNodeBooleanMath", "GeometryNodeSwitch"),
     5: ("GeometryNodeInputNamedAttribute", "GeometryNodeSwitch"),
+    6: ("GeometryNodeInputNamedAttribute", "ShaderNodeVectorMath"),
 }
 # Of the group: identifiers, which stay when an artist renames inputs, and types.
 _INPUTS = {
@@ -300,6 +301,8 @@ class _Tree:
                 {"Mesh": at_rest.outputs[0], "Value": value, "Sample Position": root},
                 data_type="FLOAT_VECTOR",
             ).outputs[0]
+            if is_start:  # where strands that were placed on a cage begin
+                known = self._vector("SUBTRACT", known, self._named(stored_roots.SLIDE, "FLOAT_VECTOR"))
             if is_start:  # faces at another level of subdivision do not lie in those of a bent cage
                 nearest = self._switch(floats.outputs["Exists"], root, nearest)
             return self._switch(is_other, known, nearest)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....core import geometry
 from ....core.errors import HairError
 from ....core.interpolation.regions import Regions
 from ...host.notices import name_of, text_of
@@ -41,7 +42,7 @@ def is_wanted(settings):
 def read(surface_object, surface, guide_curves, settings, depsgraph):
     """The `Partings` that `HairSettings` name, on a `Surface`; guide_curves: None if there are none yet."""
     regions = []
-    weights = scene.read_vertex_group(surface_object, depsgraph, settings.region_group)
+    weights = scene.read_weights(surface_object, surface, depsgraph, settings.region_group)
     if weights is not None:
         regions.append(Regions((weights > 0.5).astype(np.int32)[surface.mesh.triangles]))
     if settings.region_attribute:
@@ -51,22 +52,21 @@ def read(surface_object, surface, guide_curves, settings, depsgraph):
 
 
 def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):
-    corners = guides = None
+    numbers = corners = guides = None
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
         attribute = mesh.attributes.get(name)
         if attribute is not None:
-            numbers = _whole_numbers(attribute, name_of(surface_object), ("POINT", "FACE"))
-            if attribute.domain == "POINT":
-                corners = numbers[surface.mesh.triangles]
-            else:
-                mesh.calc_loop_triangles()
-                faces = np.empty(len(mesh.loop_triangles), np.int32)
-                mesh.loop_triangles.foreach_get("polygon_index", faces)
-                corners = np.repeat(numbers[faces][:, None], 3, axis=1)
+            domain, numbers = attribute.domain, _whole_numbers(attribute, name_of(surface_object), ("POINT", "FACE"))
     finally:
         evaluated.to_mesh_clear()
+    if numbers is not None:
+        numbers = scene.on_surface(surface_object, surface, depsgraph, numbers, domain)
+        if domain == "POINT":
+            corners = numbers[surface.mesh.triangles]
+        else:
+            corners = np.repeat(numbers[geometry.face_places.owners(surface.faces)][:, None], 3, axis=1)
     attribute = None if guide_curves is None else guide_curves.attributes.get(name)
     if attribute is not None:
         guides = _whole_numbers(attribute, name_of(guide_curves), ("CURVE",))

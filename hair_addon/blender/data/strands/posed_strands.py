@@ -13,8 +13,7 @@ import numpy as np
 from ....core import geometry
 from ....core.geometry.mesh import require_finite
 from .. import scene
-from ..scene import Surface
-from ..surfaces import cage_of
+from ..surfaces import Surface, cage_of
 
 
 @dataclass(frozen=True)
@@ -71,21 +70,25 @@ class Pose:
     def rooted(self, topology, places, firsts, may_float=False):
         """Root places on this surface, as `carry_rooted` takes them; firsts: (S, 3) local first points.
 
-        A third array where strands were rooted at another level of subdivision: (S, 3) from where they begin to their
-        places at rest. Faces at another level do not lie in those of a bent cage.
+        A third array where strands were rooted on the cage, or at another level of subdivision: (S, 3) from where they
+        begin to their places at rest. Faces at another level do not lie in those of a bent cage.
         """
         surface = self.surface
         if not self.is_deformed:
             return places
         if places is None or topology != surface.topology or len(places[0]) != len(firsts):
             places = np.zeros((len(firsts), 3), np.int32), np.zeros((len(firsts), 3), np.float32)
-        vertices, barycentric = places
+        vertices, barycentric, *slides = places
         lost = np.flatnonzero(~barycentric.any(axis=1) | (vertices >= len(surface.rest)).any(axis=1))
         if not len(lost):
             return places
         vertices, barycentric = vertices.copy(), barycentric.copy()
         vertices[lost], barycentric[lost] = surface.nearest_places(firsts[lost])
-        if may_float or topology == surface.topology or cage_of(topology) != cage_of(surface.topology):
+        if topology == surface.topology:
+            for slide in slides:
+                slide[lost] = 0.0
+            return vertices, barycentric, *slides
+        if may_float or cage_of(topology) != cage_of(surface.topology):
             return vertices, barycentric
         at_rest = sum(barycentric[:, corner, None] * surface.rest[vertices[:, corner]] for corner in range(3))
         return vertices, barycentric, at_rest - firsts

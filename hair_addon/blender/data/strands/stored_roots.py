@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Roots as Curves store them: a triangle, its vertices, and barycentric coordinates.
 
-The vertices tell the place in a face, whichever triangles this is cut into now.
+The vertices tell the place in a face, whichever triangles this is cut into now. Where modifiers subdivide the surface,
+roots that were placed on its cage are stored there too, to the bit, and strands begin there: how far that is from their
+place on the surface as it is subdivided is their slide.
 """
 
 import numpy as np
@@ -11,6 +13,8 @@ from ....core.geometry.mesh import SurfacePoints
 from . import attributes
 
 VERTICES = ("root_vertex_0", "root_vertex_1", "root_vertex_2")
+SLIDE = "root_slide"
+_CAGE = ("cage_triangle", "cage_barycentric")
 
 
 def points(curves, surface, is_complete=False):
@@ -44,6 +48,57 @@ def points(curves, surface, is_complete=False):
     return found
 
 
+def write_cage(curves, surface, roots):
+    """Store `SurfacePoints` on the `Surface.cage`; None: forget those that are stored."""
+    curves.vellus.cage_topology = "" if roots is None else surface.topology
+    if roots is None:
+        _remove(curves, *_CAGE)
+        return
+    stored = surface.swap_winding(roots)
+    attributes.write(curves, _CAGE[0], "INT", "CURVE", stored.triangle)
+    attributes.write(curves, _CAGE[1], "FLOAT_VECTOR", "CURVE", stored.barycentric)
+
+
+def cage_points(curves, surface):
+    """`SurfacePoints` on a `Surface.cage` as they were placed, None where any is not stored."""
+    if curves.vellus.topology == surface.topology:
+        return points(curves, surface, is_complete=True)
+    if not curves.vellus.cage_topology or curves.vellus.cage_topology != surface.topology:
+        return None
+    triangle = attributes.read(curves, _CAGE[0], "INT", "CURVE")
+    barycentric = attributes.read(curves, _CAGE[1], "FLOAT_VECTOR", "CURVE")
+    if triangle is None or barycentric is None or not are_barycentric(barycentric).all():
+        return None
+    if ((triangle < 0) | (triangle >= len(surface.mesh.triangles))).any():
+        return None
+    return surface.swap_winding(SurfacePoints(triangle, barycentric))
+
+
+def write_slides(curves, slides):
+    """Store (S, 3) from where strands begin to their places on the surface at rest; None: they begin there."""
+    if slides is None or not slides.any():
+        _remove(curves, SLIDE)
+    else:
+        attributes.write(curves, SLIDE, "FLOAT_VECTOR", "CURVE", slides)
+
+
+def slides(curves):
+    """(S, 3) float32 as `write_slides` stored them; None without."""
+    return attributes.read(curves, SLIDE, "FLOAT_VECTOR", "CURVE")
+
+
+def slid_places(curves):
+    """`places` on a mesh of any size, and the slides where strands have any: as `Pose.rooted` takes them."""
+    found, stored = places(curves, np.inf), slides(curves)
+    return found if found is None or stored is None else (*found, stored)
+
+
+def _remove(curves, *names):
+    for name in names:
+        if name in curves.attributes:
+            curves.attributes.remove(curves.attributes[name])
+
+
 def raw(curves):
     """(S,) int32 triangles and (S, 3) float32 barycentric coordinates as they are stored, each None if it is not."""
     triangle = attributes.read(curves, "root_triangle", "INT", "CURVE")
@@ -75,6 +130,9 @@ def turn(curves, turned):
         are_vertices = (vertices >= 0) & (vertices < len(turned.vertices))
         vertices[are_vertices] = turned.vertices[vertices[are_vertices]]
     attributes.write(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE", barycentric[:, [0, 2, 1]])
+    on_cage = attributes.read(curves, _CAGE[1], "FLOAT_VECTOR", "CURVE")
+    if on_cage is not None:
+        attributes.write(curves, _CAGE[1], "FLOAT_VECTOR", "CURVE", on_cage[:, [0, 2, 1]])
     for name, column in zip(VERTICES, (0, 2, 1), strict=True):
         attributes.write(curves, name, "INT", "CURVE", vertices[:, column])
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
+from ....core import geometry
 from ....core.errors import HairError
 from ....core.styling import lean, trim
 from ....core.styling.base import StyleSettings, has_effect
@@ -64,7 +65,7 @@ def read_mask(surface_object, surface, guide_curves, key, depsgraph):
     if not name:
         return Mask(None, texture, None, is_inverted)
     if surface_object.vertex_groups.get(name) is not None:
-        weights = scene.read_vertex_group(surface_object, depsgraph, name)
+        weights = scene.read_weights(surface_object, surface, depsgraph, name)
         _require_same(len(weights) == len(surface.rest), surface_object)
         return Mask(weights[surface.mesh.triangles], texture, None, is_inverted)
     corners = _read_surface_attribute(surface_object, surface, name, depsgraph)
@@ -83,20 +84,19 @@ def _read_surface_attribute(surface_object, surface, name, depsgraph):
         attribute = mesh.attributes.get(name)
         if attribute is None:
             return None
-        _require_same(len(mesh.vertices) == len(surface.rest), surface_object)
-        values = _numbers(attribute, name_of(surface_object))
-        if attribute.domain == "POINT":
-            return values[surface.mesh.triangles]
-        mesh.calc_loop_triangles()
-        kind, shape = ("loops", 3) if attribute.domain == "CORNER" else ("polygon_index", 1)
-        places = np.empty((len(mesh.loop_triangles), shape), np.int32)
-        mesh.loop_triangles.foreach_get(kind, places.ravel())
-        _require_same(len(places) == len(surface.mesh.triangles), surface_object)
+        domain, values = attribute.domain, _numbers(attribute, name_of(surface_object))
     finally:
         evaluated.to_mesh_clear()
-    if surface.is_mirrored and shape == 3:
-        places = places[:, [0, 2, 1]]
-    return np.broadcast_to(values[places], (len(places), 3)).copy()
+    values = scene.on_surface(surface_object, surface, depsgraph, values, domain)
+    faces, triangles = surface.faces, surface.mesh.triangles
+    sizes = {"POINT": len(surface.rest), "CORNER": len(faces.corner_vertices), "FACE": len(faces.starts) - 1}
+    _require_same(len(values) == sizes[domain], surface_object)
+    if domain == "POINT":
+        return values[triangles]
+    owners = geometry.face_places.owners(faces)
+    if domain == "FACE":
+        return np.repeat(values[owners][:, None], 3, axis=1)
+    return values[faces.starts[owners][:, None] + geometry.face_places.corners_of(faces, owners, triangles)]
 
 
 def _require_same(is_same, surface_object):

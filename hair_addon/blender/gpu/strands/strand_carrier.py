@@ -56,6 +56,7 @@ class StrandCarrier:
             ("strand_count", strands.strand_count),
             ("point_count", strands.point_count),
             ("row_strands", strands.row_strands),
+            ("is_posed", int(posed is not None)),
         ):
             program.uniform_int(name, value)
         run_for_each(program, strands.strand_count, _GROUP_SIZE)
@@ -69,12 +70,14 @@ def new_carrier(
     places: tuple[np.ndarray, np.ndarray],
     vertices: np.ndarray,
     turning: "Turning",
+    slides: np.ndarray | None = None,
 ) -> StrandCarrier:
     """The `StrandCarrier` of S strands.
 
     rest: their texture; places: (S, 3) int32 vertices around each root and (S, 3) float32 barycentric coordinates;
-    vertices: (V, 3) float32 of the surface at rest; turning: of the vertices around roots. Raises `HairError` where
-    counts or indices do not match, or the driver lacks something.
+    vertices: (V, 3) float32 of the surface at rest; turning: of the vertices around roots; slides: (S, 3) from where
+    strands begin to these places at rest, None where they begin there. Raises `HairError` where counts or indices do
+    not match, or the driver lacks something.
     """
     corners, barycentric = places
     require_count("barycentric coordinates", len(barycentric), len(corners))
@@ -87,6 +90,10 @@ def new_carrier(
     rows = np.zeros((len(corners), 3, 4), np.float32)
     rows[:, 0, :3], rows[:, 1, :3] = found, barycentric  # indices are exact in single precision up to 16 million
     rows[:, 2, :3] = (barycentric[:, :, None] * vertices[corners]).sum(axis=1)
+    if slides is not None:
+        require_count("slides", len(slides), len(corners))
+        rows[:, 2, :3] -= slides
+        rows[:, 2, 3] = slides.any(axis=1)
     roots, _row = rows_texture(rows.reshape(len(rows), -1), 4)
     return StrandCarrier(rest, roots, vertices, turner, new_changes(len(corners), point_count))
 
@@ -99,6 +106,6 @@ def _carry_program():
     for slot, name in enumerate(("rest", "roots", "vertices")):
         info.sampler(slot, "FLOAT_2D", name)
     declare_put(info, first_slot=0)
-    for name in ("strand_count", "point_count", "row_strands"):
+    for name in ("strand_count", "point_count", "row_strands", "is_posed"):
         info.push_constant("INT", name)
     return shaders.compile_compute(info, "carry_strands.comp")

@@ -23,8 +23,8 @@ from ....core.grooming.rooted_curves import RootedCurves, reversal
 from ....core.long_work import Work, part_of, run_now
 from ....core.params import Param, plain_value
 from ...data import masks, scene, surface_space, usable_surfaces, vertex_groups, whole_changes
-from ...data.scene import Surface
 from ...data.strands import attributes, curves, curves_objects, follow_nodes, posed_strands
+from ...data.surfaces import Surface
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...settings import preferences
@@ -165,7 +165,7 @@ def using_as_guides(
         usable_surfaces.require_paintable(its_surface.find())
     datablock = write(place.find(), its_surface.find(), surface, guides, seen, applies_modifiers)
     if bound is not None and is_unmasked:
-        _bind_to_group(bound, datablock.surface, guides.rooted.roots)
+        _bind_to_group(bound, datablock.surface, surface, guides.rooted.roots)
     hair = None if bound is None else pipeline.write_between(datablock, bound)
     return HandMade(datablock, hair, guides.rooted)
 
@@ -224,9 +224,9 @@ def _area(surface_object, surface, roots):
     return _coverage(own_mesh, positions(surface.mesh, roots))
 
 
-def _bind_to_group(bound, surface_object, roots):
+def _bind_to_group(bound, surface_object, surface, roots):
     """Set the vertex group of the area with guides as the mask of their hair."""
-    name = paint_area(surface_object, bound.surface, roots)
+    name = paint_area(surface_object, surface, roots)
     if not name:
         return
     bound.settings = replace(bound.settings, density_group=name)

@@ -18,8 +18,8 @@ from ....core.geometry.strands import Strands
 from ....core.grooming import following, groom
 from ....core.interpolation.hair_binding import HairBinding
 from ...data import scene
-from ...data.scene import Surface
 from ...data.strands import attributes, curves, kept_shapes, partings, simulated_guides
+from ...data.surfaces import Surface
 from ...host.notices import name_of
 from ...settings import setting_properties
 from .. import bindings, staleness
@@ -156,7 +156,7 @@ def _bind(hair, present, depsgraph, followed):
         settings,
         regions=parting.regions,
         lines=parting.lines,
-        drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
+        drawn_on=surface.drawn_on,
         roots=roots,
         is_mirrored=surface.names_otherwise,
     )

@@ -23,8 +23,8 @@ from ....core.grooming.rooted_curves import RootedCurves
 from ....core.long_work import Work, part_of
 from ....core.params import Param, declared, plain_value
 from ...data import scene, surface_space, thin_hair, whole_changes
-from ...data.scene import Surface
 from ...data.strands import attributes, curves, curves_objects, exported_curves, kept_shapes
+from ...data.surfaces import Surface
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...materials import looks

@@ -101,7 +101,7 @@ def _between(guides, count, mask, depsgraph):
         settings,
         regions=parting.regions,
         lines=parting.lines,
-        drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
+        drawn_on=surface.drawn_on,
         is_mirrored=surface.names_otherwise,
         device=device,
     )

@@ -20,7 +20,7 @@ def regions_of(guides: Curves, depsgraph: Depsgraph) -> np.ndarray | None:
     device = preferences.device()
     surface = scene.read_surface(guides.surface, depsgraph)
     roots = curves.read_guides(guides, surface, device).roots
-    drawn_on = surface.from_local(surface.posed) if surface.is_deformed else None
+    drawn_on = surface.drawn_on
     labels = []
     for hair in parted:
         settings = setting_properties.to_settings(hair.vellus.hair, groom.HairSettings)

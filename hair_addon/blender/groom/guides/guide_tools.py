@@ -27,8 +27,8 @@ from ....core.grooming.guide_tool_settings import (
     TrimSettings,
 )
 from ...data import scene
-from ...data.scene import Surface
 from ...data.strands import attributes, curves, cutters, guide_curves, posed_strands
+from ...data.surfaces import Surface
 from ...host.notices import name_of
 
 _FARTHEST = 1e14  # [m] from the surface's origin: squares of such lengths are still floats

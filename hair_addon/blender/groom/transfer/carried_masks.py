@@ -9,8 +9,8 @@ from ....core.geometry.landmark_warp import Warp
 from ....core.geometry.mesh import interpolate
 from ....core.grooming.groom_transfer import Ground
 from ...data import scene, usable_surfaces, vertex_groups
-from ...data.scene import Surface
 from ...data.strands import curves
+from ...data.surfaces import Surface
 from ...host.notices import text_of
 from ...settings import style_items
 

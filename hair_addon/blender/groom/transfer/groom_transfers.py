@@ -21,8 +21,8 @@ from ....core.grooming.groom_transfer import Ground, Places
 from ....core.grooming.transfer_settings import TransferSettings
 from ....core.long_work import Work
 from ...data import landmarks, scene, surface_space, usable_surfaces, whole_changes
-from ...data.scene import Surface
 from ...data.strands import attributes, curves, curves_objects, guide_curves, kept_shapes
+from ...data.surfaces import Surface
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...materials import looks

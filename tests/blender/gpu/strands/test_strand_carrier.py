@@ -76,6 +76,24 @@ def test_strands_are_where_warp_carries_them(blender, rooted):
         np.testing.assert_allclose(strands.bounds, [corners.min(axis=0), corners.max(axis=0)], rtol=0.0, atol=CLOSE)
 
 
+def test_strands_that_begin_apart_from_their_places_are_carried_to_these(blender, rooted):
+    """As on a cage; of strands at rest nothing changes."""
+    vertices, faces, places, points = rooted
+    slides = np.random.default_rng(3).normal(scale=0.02, size=(len(points), 3)).astype(np.float32)
+    slides[::3] = 0.0
+    turning = vertex_turns.turning(vertices, faces, places[0])
+    given = uploaded(points).texture, POINTS, places, vertices, turning
+    carrier, motion = (
+        strand_carrier.new_carrier(*given, slides),
+        surface_deform.motion(vertices, bent(vertices, 3.0), faces),
+    )
+    strands = carrier.carry(uploaded(points), motion.after)
+    wanted = surface_deform.carry(points + slides[:, None], motion, *places)
+    np.testing.assert_allclose(drawn_strands.places(strands), wanted, rtol=0.0, atol=CLOSE)
+    strands = carrier.carry(strands, None)
+    np.testing.assert_array_equal(drawn_strands.places(strands), drawn_strands.places(uploaded(points)))
+
+
 def test_at_rest_strands_are_the_same_bits(blender, rooted):
     vertices, _faces, _places, points = rooted
     carrier = carrier_of(rooted)
