@@ -2,16 +2,16 @@
 """Places in the polygons of a mesh, whichever triangles these are cut into.
 
 A place is three corners of a polygon and their weights. Where the polygon is cut otherwise, such as a quad that bends
-the other way now, the place is found in the triangles that it has: of a quad as if it were a square, which keeps
-neighboring places apart however it bends, and of polygons with more corners the nearest.
+the other way now, the place is found in the triangles that it has: of a quad straight above or below, as seen across
+both diagonals, which keeps neighboring places apart however it bends; nearest where it is not convex from there, and of
+polygons with more corners.
 """
 
 import numpy as np
 
 from .mesh import Faces, SurfacePoints, TriMesh
 
-# The corners of a square, of which a triangle has three; the last stands for those of polygons that have more.
-_SQUARE = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)], np.float64)
+_LEAST_TURN = 1e-3  # sine of the turn at a corner of a quad that is convex, where its sides are as long
 
 
 def owners(faces: Faces) -> np.ndarray:
@@ -31,23 +31,22 @@ def on_triangles(
     sizes = np.diff(faces.starts)[polygons]
     corners = corners_of(faces, polygons, vertices)
     are_none = (corners < 0).any(axis=1)
-    at_corners = np.where((sizes > 4)[:, None, None], mesh.vertices[vertices], _SQUARE[np.minimum(corners, 4)])
+    flat = _flat_quads(mesh.vertices, faces, polygons)
+    at_corners = np.where((sizes > 4)[:, None, None], mesh.vertices[vertices], _of_each(flat, corners))
     places = (weights[..., None] * at_corners).sum(axis=1)
     first = faces.starts[polygons] - 2 * polygons
     triangle, barycentric = first.astype(np.int32), np.zeros((len(polygons), 3), np.float32)
-    best = np.full(len(polygons), -np.inf)
+    best = np.full(len(polygons), np.inf)
     for step in range(int(sizes.max(initial=3)) - 2):
         rows = np.flatnonzero((step < sizes - 2) & ~are_none)
         there = mesh.triangles[first[rows] + step]
         own_corners = corners_of(faces, polygons[rows], there)
         is_large = (sizes[rows] > 4)[:, None, None]
-        found = _barycentric(
-            np.where(is_large, mesh.vertices[there], _SQUARE[np.minimum(own_corners, 4)]), places[rows]
-        )
-        least = found.min(axis=1)
-        is_better = least > best[rows]
+        at = np.where(is_large, mesh.vertices[there], _of_each(flat[rows], own_corners))
+        found, apart = _nearest(at, places[rows])
+        is_better = apart < best[rows]
         better = rows[is_better]
-        best[better], triangle[better] = least[is_better], first[better] + step
+        best[better], triangle[better] = apart[is_better], first[better] + step
         barycentric[better] = found[is_better]
     barycentric = np.maximum(barycentric, 0.0)
     barycentric[are_none] = (1.0, 0.0, 0.0)
@@ -119,7 +118,7 @@ def _same_places(before, after):
     return found
 
 
-def corners_of(faces, polygons, vertices):
+def corners_of(faces: Faces, polygons: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """(N, K) int32: which corner of its polygon each of the vertices (N, K) is, -1 for none."""
     sizes, starts = np.diff(faces.starts)[polygons], faces.starts[polygons]
     found = np.full(vertices.shape, -1, np.int32)
@@ -128,6 +127,51 @@ def corners_of(faces, polygons, vertices):
         is_it = faces.corner_vertices[starts[rows] + corner][:, None] == vertices[rows]
         found[rows] = np.where(is_it, corner, found[rows])
     return found
+
+
+def _flat_quads(vertices, faces, polygons):
+    """(N, 4, 3) float64: corners of quads among polygons (N,) as seen across diagonals, in place if not convex."""
+    flat = np.zeros((len(polygons), 4, 3))
+    quads = np.flatnonzero(np.diff(faces.starts)[polygons] == 4)
+    at = vertices[faces.corner_vertices[faces.starts[polygons[quads]][:, None] + np.arange(4)]].astype(np.float64)
+    seen = at - at[:, :1]
+    normals = np.cross(at[:, 2] - at[:, 0], at[:, 3] - at[:, 1])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    seen -= np.einsum("qcx,qx->qc", seen, normals)[..., None] * normals[:, None]
+    sides = np.roll(seen, -1, axis=1) - seen
+    turns = np.einsum("qcx,qx->qc", np.cross(np.roll(sides, 1, axis=1), sides), normals)
+    longest = np.einsum("qcx,qcx->qc", sides, sides).max(axis=1, keepdims=True)
+    is_convex = (turns > _LEAST_TURN * longest).all(axis=1)
+    flat[quads] = np.where(is_convex[:, None, None], seen, at)
+    return flat
+
+
+def _of_each(flat, corners):
+    """(N, 3, 3): places of corners (N, 3), of which others than the first four stand for those of larger polygons."""
+    return np.take_along_axis(flat, np.where((corners < 0) | (corners > 3), 0, corners)[..., None], axis=1)
+
+
+def _nearest(triangles, places):
+    """(N, 3) barycentric coordinates of the points of triangles (N, 3, 3) nearest to places (N, 3), (N,) how far²."""
+    inside = _barycentric(triangles, places)
+    best, least = inside, np.where((inside >= 0.0).all(axis=1), _apart(triangles, inside, places), np.inf)
+    for corner in range(3):
+        following = (corner + 1) % 3
+        along = triangles[:, following] - triangles[:, corner]
+        square = np.einsum("ni,ni->n", along, along)
+        part = np.einsum("ni,ni->n", places - triangles[:, corner], along) / np.where(square > 0.0, square, np.inf)
+        on_side = np.zeros_like(inside)
+        on_side[:, following] = np.clip(part, 0.0, 1.0)
+        on_side[:, corner] = 1.0 - on_side[:, following]
+        apart = _apart(triangles, on_side, places)
+        is_nearer = apart < least
+        best, least = np.where(is_nearer[:, None], on_side, best), np.where(is_nearer, apart, least)
+    return best, least
+
+
+def _apart(triangles, barycentric, places):
+    between = np.einsum("nc,ncx->nx", barycentric, triangles) - places
+    return np.einsum("ni,ni->n", between, between)
 
 
 def _barycentric(triangles, places):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.geometry import face_places
+from hair_addon.core.geometry.closest_point import SurfaceQuery
 from hair_addon.core.geometry.mesh import Faces, TriMesh, positions
 
 # A square and a pentagon beside it, flat, so that no way to cut them moves a place.
@@ -53,6 +54,34 @@ def test_a_place_in_a_flat_face_stays_when_that_is_cut_otherwise(rng):
         mesh(0), FACES, polygons, mesh(1).triangles[points.triangle], points.barycentric
     )
     np.testing.assert_allclose(positions(mesh(0), back), there, atol=1e-5)
+
+
+QUAD = Faces(np.array([0, 1, 2, 3], np.int32), np.array([0, 4], np.int32))
+
+
+def moved_in_quad(rng, corners, count=300):
+    """Places in one cut of a quad, and where they are in the other: (N, 3) each, and the `TriMesh` of that."""
+    corners = np.array(corners, np.float32)
+    cuts = [TriMesh(corners, np.array(cut[:2], np.int32)) for cut in CUTS]
+    vertices, weights = cuts[0].triangles[rng.integers(0, 2, count)], rng.dirichlet((1, 1, 1), count)
+    found, are_none = face_places.on_triangles(cuts[1], QUAD, np.zeros(count, np.int32), vertices, weights)
+    assert not are_none.any()
+    return (weights[..., None] * corners[vertices]).sum(axis=1), positions(cuts[1], found), cuts[1]
+
+
+def test_a_place_in_a_bent_quad_moves_straight_up_or_down(rng):
+    """So neighbors stay apart, and none moves further than the diagonals are apart, whatever the shape."""
+    before, after, _mesh = moved_in_quad(rng, [(0, 0, 0), (1.2, 0.1, 0.3), (1.4, 1.2, 0), (0.1, 0.5, 0.3)])
+    np.testing.assert_allclose(after[:, :2], before[:, :2], atol=1e-6)
+    assert 0.05 < abs(after - before).max() <= 0.3
+
+
+def test_a_place_in_a_folded_quad_moves_to_the_nearest_point(rng):
+    before, after, other = moved_in_quad(rng, [(0, 0, 0), (1, 0, 0), (0.2, 0.2, 0.1), (0, 1, 0)])
+    nearest = positions(other, SurfaceQuery(other).nearest(before.astype(np.float32)))
+    apart = [np.linalg.norm(there - before, axis=1) for there in (after, nearest)]
+    np.testing.assert_allclose(*apart, atol=1e-5)
+    assert apart[0].max() > 0.02
 
 
 def test_a_vertex_that_is_no_corner_of_its_polygon_has_no_place():
