@@ -140,6 +140,6 @@ def _copied(guides, surface_object, surface):
     surface_space.forget_applied(own)
     curves_objects.link_object(name_of(guides), own, surface_object, is_rendered=False)
     roots = curves.read_roots(own, surface, surface.from_local(curves.first_points(own)))
-    curves.write_roots(own, surface, roots)
+    curves.write_roots(own, surface, roots, firsts=curves.first_points(own))
     surface_space.keep_surface(own, surface)
     return own

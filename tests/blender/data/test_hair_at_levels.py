@@ -9,9 +9,11 @@ from mathutils import Vector
 
 from hair_addon import api
 from hair_addon.blender.data import scene as scene_data
+from hair_addon.blender.data.simulation import guide_poses
 from tests.support import render_probe
 from tests.support.dynamics.following import drawn_points, update
-from tests.support.reading import attribute, evaluated_points, points, vertex_positions
+from tests.support.exchange.imported import select
+from tests.support.reading import attribute, evaluated_points, points, vertex_positions, write_points
 
 RENDERED = (1, 2, 3)
 
@@ -151,3 +153,23 @@ def test_cages_are_the_same_at_every_level(scene):
             np.testing.assert_array_equal(cage.mesh.triangles, cages[0].mesh.triangles)
             if not mirrors:
                 np.testing.assert_array_equal(cage.corner_uvs, cages[0].corner_uvs)
+
+
+def test_guides_begin_on_the_surface_wherever_they_are_simulated_or_attached(scene):
+    """On it as it is subdivided now, and not on the cage that they were placed on, whose faces are bent."""
+    make_hair(2)
+    guides, surface = bpy.data.objects["Guides"], bpy.data.objects["Cube"]
+    pose = guide_poses.read(guides.data, bpy.context.evaluated_depsgraph_get(), 1.0)
+    world = pose.to_world(points(guides))
+    assert np.linalg.norm(pose.slides, axis=1).max() > 1e-3
+    np.testing.assert_allclose(world[:, 0], pose.root_positions, atol=1e-6)
+    np.testing.assert_allclose(pose.to_rest(world), points(guides), atol=1e-5)
+    write_points(guides, points(guides) * np.float32([1.0, 1.0, 1.0 + 1e-6]))  # combed: it is to stay
+    seen = evaluated_points(guides)
+    mesh = bpy.data.meshes.new_from_object(surface.evaluated_get(bpy.context.evaluated_depsgraph_get()))
+    other = bpy.data.objects.new("Other", mesh)
+    bpy.context.scene.collection.objects.link(other)
+    select(other, guides)
+    assert bpy.ops.vellus.attach_to_surface() == {"FINISHED"}
+    update()
+    np.testing.assert_allclose(evaluated_points(guides), seen, atol=2e-5)

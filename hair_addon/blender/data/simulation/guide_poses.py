@@ -21,12 +21,14 @@ from ..strands.posed_strands import Pose
 class GuidePose:
     """A surface in one frame, and the roots of guides on it.
 
-    places: root vertices and barycentric coordinates; matrix: (3, 4) float64, local coordinates → the world's [m].
+    places: root vertices and barycentric coordinates; matrix: (3, 4) float64, local coordinates → the world's [m];
+    slides: (G, 3) from where guides begin at rest to their places, None where they begin there.
     """
 
     pose: Pose
     places: tuple[np.ndarray, np.ndarray]
     matrix: np.ndarray
+    slides: np.ndarray | None = None
 
     @property
     def triangles(self) -> np.ndarray:
@@ -72,11 +74,14 @@ class GuidePose:
     def to_rest(self, points: np.ndarray) -> np.ndarray:
         """Points (G, P, 3) [m] in the world → (G, P, 3) float32, local coordinates at rest."""
         local = (points - self.matrix[:, 3]) @ np.linalg.inv(self.matrix[:, :3]).T
-        return self._carried(local.astype(np.float32), is_back=True)
+        return self._slid(self._carried(local.astype(np.float32), is_back=True), -1.0)
 
     def to_world(self, points: np.ndarray) -> np.ndarray:
         """The inverse of `to_rest`, float64 [m]."""
-        return self._to_world(self._carried(np.ascontiguousarray(points, np.float32)))
+        return self._to_world(self._carried(self._slid(np.ascontiguousarray(points, np.float32), 1.0)))
+
+    def _slid(self, points, sign):
+        return points if self.slides is None else points + np.float32(sign) * self.slides[:, None]
 
     @property
     def _rest(self):
@@ -120,7 +125,7 @@ def read(guides, depsgraph, metres):
     matrix = np.array(surface_object.evaluated_get(depsgraph).matrix_world, np.float64)[:3]
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:, :3])) < 1e-30:
         raise HairError('"{name}" has a scale of zero: change its scale.', name=surface_object.name)
-    return GuidePose(pose, places, metres * matrix)
+    return GuidePose(pose, places, metres * matrix, stored_roots.slides(guides))
 
 
 def _polar(matrix):

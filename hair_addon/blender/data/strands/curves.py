@@ -105,6 +105,8 @@ def write_roots(curves, surface, roots, normals=None, firsts=None):
     normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots) if normals is None else normals)
     cage, shown = surface.cage, scene.shown_surface(curves.surface, surface)
     on_cage = None if firsts is None else stored_roots.cage_points(curves, cage)
+    if on_cage is None and firsts is not None and stored_roots.are_on_cage(curves, cage):
+        on_cage = read_roots(curves, cage, cage.from_local(firsts))  # some were added
     if shown.topology != surface.topology:
         on_cage, firsts = roots, mesh_math.interpolate(surface.rest, surface.mesh, roots)
         surface, roots = shown, geometry.closest_point.SurfaceQuery(shown.local_mesh).nearest(firsts)
@@ -274,7 +276,11 @@ def read_roots(curves, surface, first_points):
     """
     mesh_math.check_mesh(surface.mesh)
     is_here = curves.vellus.topology == surface.topology
-    stored = stored_roots.points(curves, surface) if is_here else stored_roots.cage_points(curves, surface)
+    stored = (
+        stored_roots.points(curves, surface)
+        if is_here
+        else stored_roots.cage_points(curves, surface, is_complete=False)
+    )
     if stored is None:
         return nearest_roots(surface, first_points)
     places, slides = mesh_math.positions(surface.mesh, stored), stored_roots.slides(curves) if is_here else None

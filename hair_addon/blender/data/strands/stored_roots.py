@@ -59,18 +59,25 @@ def write_cage(curves, surface, roots):
     attributes.write(curves, _CAGE[1], "FLOAT_VECTOR", "CURVE", stored.barycentric)
 
 
-def cage_points(curves, surface):
-    """`SurfacePoints` on a `Surface.cage` as they were placed, None where any is not stored."""
+def are_on_cage(curves, surface):
+    """Whether roots were placed on a `Surface.cage` beside which they are stored."""
+    return curves.vellus.cage_topology != "" and curves.vellus.cage_topology == surface.topology
+
+
+def cage_points(curves, surface, is_complete=True):
+    """`SurfacePoints` on a `Surface.cage` as they were placed, None if none is; impossible ones as of `points`."""
     if curves.vellus.topology == surface.topology:
-        return points(curves, surface, is_complete=True)
-    if not curves.vellus.cage_topology or curves.vellus.cage_topology != surface.topology:
+        return points(curves, surface, is_complete)
+    if not are_on_cage(curves, surface):
         return None
     triangle = attributes.read(curves, _CAGE[0], "INT", "CURVE")
     barycentric = attributes.read(curves, _CAGE[1], "FLOAT_VECTOR", "CURVE")
-    if triangle is None or barycentric is None or not are_barycentric(barycentric).all():
+    if triangle is None or barycentric is None:
         return None
-    if ((triangle < 0) | (triangle >= len(surface.mesh.triangles))).any():
+    known = are_barycentric(barycentric) & (triangle >= 0) & (triangle < len(surface.mesh.triangles))
+    if is_complete and not known.all():
         return None
+    triangle[~known], barycentric[~known] = 0, (1.0, 0.0, 0.0)
     return surface.swap_winding(SurfacePoints(triangle, barycentric))
 
 

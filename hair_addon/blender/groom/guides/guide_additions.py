@@ -73,7 +73,8 @@ def write(guides: CombedGuides, additions: list[Additions], removed: np.ndarray)
             guide_curves.write_tail(datablock, "strand_random", "FLOAT", randoms)
             guide_curves.write_tail(datablock, "root_distance", "FLOAT", apart / surface.scale)
     guide_curves.remove(datablock, removed)
-    curves.write_roots(datablock, surface, roots[np.setdiff1d(np.arange(len(roots)), removed)])
+    left = np.setdiff1d(np.arange(len(roots)), removed)
+    curves.write_roots(datablock, surface, roots[left], firsts=curves.first_points(datablock))
     datablock.update_tag()
 
 
