@@ -99,8 +99,8 @@ def write_roots(curves, surface, roots, normals=None, firsts=None):
     """Store the roots of strands: for Vellus, for the nodes that deform them, and for Blender's tools.
 
     Those on a cage are stored at the nearest places of the surface as it is subdivided now, too: returns the `Surface`
-    that they are stored on. firsts: (S, 3) where strands begin, which were placed on a cage or were not, None where
-    they begin at their roots.
+    that they are stored on. firsts: (S, 3) where strands begin that were rooted before, and keep their places on the
+    cage if they have any; None for new ones, which begin at their roots.
     """
     normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots) if normals is None else normals)
     cage, shown = surface.cage, scene.shown_surface(curves.surface, surface)
