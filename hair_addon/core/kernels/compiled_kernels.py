@@ -29,7 +29,7 @@ def load(module: "wp.Module", device: "wp.Device") -> bool:
         return False
     processor, modules = _fitting(FOLDER)
     module_hash, digests = modules.get(short_name(module), ("", {}))
-    if module_hash != module.get_module_hash(1).hex():
+    if not digests or module_hash != module.get_module_hash(1).hex():
         return False
     binary, meta = (FOLDER / path for path in file_names(short_name(module), processor))
     if digests.get(processor, "") != digest(binary, meta):
