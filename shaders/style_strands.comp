@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A program of styles on strands where they are drawn: core/styling/steps.cpp on any GPU, one strand a thread.
 //
-// HAS_CURL and the like: the kinds of its steps. Other kinds are not compiled.
+// all.strand holds the kinds of its steps, and HAS_TRIM and the like say which these are.
 
-#include "include/bend.glsl"
-#include "include/clump.glsl"
-#include "include/curl.glsl"
-#include "include/frizz.glsl"
 #include "include/put_packed_strand.glsl"
-#include "include/smooth.glsl"
 #include "include/strand.glsl"
-#include "include/styled_strand.glsl"
-#include "include/trim.glsl"
-#include "include/weave.glsl"
+#include "include/strand_language.glsl"
+#include "all.strand"
 
 // Numbers of a strand in `known`: its normal, its identity in two parts, its clump centre of each level, its masks.
 const int KNOWN_LEVELS = 5;
@@ -32,31 +26,33 @@ void read_strand(ivec2 first)
 {
   half_now = 0;
   total = 0.0;
-  vec3 direction = strand_normal;
+  vec3 direction = normal;
   vec3 before = imageLoad(plain_strands, first).xyz;
-  strand_root = before;
+  root = before;
   for (int i = 1; i < styling.point_count; i++) {
     vec3 here = imageLoad(plain_strands, first + ivec2(i, 0)).xyz;
     vec3 along = here - before;
     float size = length(along);
     direction = (size > 1e-12) ? along / size : direction;
-    put_segment(i, direction, size);
+    set_direction(i, direction);
+    set_length(i, size);
     total += size;
     before = here;
   }
 }
 
 // The clump centre that a step counts the strand to.
-void take_centre(ivec2 first, Step row)
+void take_centre(ivec2 first)
 {
-  centre = row.first_centre;
-  centre_normal = strand_normal;
-  lock = strand_identity;
+  centre = row_now.first_centre;
+  centre_normal = normal;
+  lock = identity;
   in_lock = 0.0;
-  int member = int(known_number(first, KNOWN_LEVELS + row.level));
+  has_centre_points = row_now.level >= 0 && centre < styling.centre_count;
+  int member = int(known_number(first, KNOWN_LEVELS + row_now.level));
   if (member < 0) {
-    if (row.kind == KIND_CLUMP || row.kind == KIND_WEAVE) {
-      base_amount = 0.0;
+    if (((NEEDING_CENTRE >> kind) & 1) != 0) {
+      base = 0.0;
     }
     return;
   }
@@ -68,49 +64,21 @@ void take_centre(ivec2 first, Step row)
   lock = whole(its.w, texelFetch(locks, texel + ivec2(1, 0), 0).x);
 }
 
-void apply(Step row)
+void take_profile()
 {
-#ifdef HAS_TRIM
-  if (row.kind == KIND_TRIM) {
-    trim(row);
-  }
-#endif
-#ifdef HAS_CLUMP
-  if (row.kind == KIND_CLUMP) {
-    clump(row);
-  }
-#endif
-#ifdef HAS_CURL
-  if (row.kind == KIND_CURL) {
-    curl(row);
-  }
-#endif
-#ifdef HAS_FRIZZ
-  if (row.kind == KIND_FRIZZ) {
-    frizz(row);
-  }
-#endif
-#ifdef HAS_BEND
-  if (row.kind == KIND_BEND) {
-    bend(row);
-  }
-#endif
-#ifdef HAS_SMOOTH
-  if (row.kind == KIND_SMOOTH) {
-    smooth_strand(row);
-  }
-#endif
-#ifdef HAS_WEAVE
-  if (row.kind == KIND_WEAVE) {
-    weave(row);
-  }
-#endif
+  at_root = number_at(AT_ROOT_NUMBER);
+  at_tip = number_at(AT_TIP_NUMBER);
+  exponent = number_at(EXPONENT_NUMBER);
+  is_flipped = number_at(IS_FLIPPED_NUMBER) != 0.0;
+  from = number_at(FROM_NUMBER);
+  least = 0.5 / float(POINTS - 1);
+  slope = 1.0 / power(least, 1.0 - exponent);
 }
 
 // A point from the root on, in the coordinates that are drawn. A strand that no style has touched keeps its points.
 vec3 drawn_offset(ivec2 first, int i, vec3 from_root, bool is_touched)
 {
-  vec3 offset = is_touched ? from_root : imageLoad(plain_strands, first + ivec2(i, 0)).xyz - strand_root;
+  vec3 offset = is_touched ? from_root : imageLoad(plain_strands, first + ivec2(i, 0)).xyz - root;
   return (styling.to_drawn * vec4(offset, 0.0)).xyz;
 }
 
@@ -119,17 +87,15 @@ void write_strand(int strand, ivec2 first, bool is_touched)
   vec3 from_root = vec3(0.0);
   float range = 0.0;
   for (int i = 1; i < styling.point_count; i++) {
-    vec4 along = segment_at(i);
-    from_root += along.xyz * along.w;
+    from_root += direction_at(i) * length_at(i);
     vec3 extent = abs(drawn_offset(first, i, from_root, is_touched));
     range = max(range, max(extent.x, max(extent.y, extent.z)));
   }
-  vec3 root = (styling.to_drawn * vec4(strand_root, 0.0)).xyz;
+  vec3 root = (styling.to_drawn * vec4(root, 0.0)).xyz;
   begin_strand(strand, root, range, POINTS, styling.row_packed);
   from_root = vec3(0.0);
   for (int i = 1; i < styling.point_count; i++) {
-    vec4 along = segment_at(i);
-    from_root += along.xyz * along.w;
+    from_root += direction_at(i) * length_at(i);
     put_point(i, drawn_offset(first, i, from_root, is_touched));
   }
   end_strand(strand);
@@ -143,11 +109,10 @@ void write_centre(ivec2 first, bool is_touched)
   for (int i = 0; i < styling.point_count; i++) {
     vec4 texel = imageLoad(plain_strands, first + ivec2(i, 0));
     if (i > 0) {
-      vec4 along = segment_at(i);
-      from_root += along.xyz * along.w;
-      arc += along.w;
+      from_root += direction_at(i) * length_at(i);
+      arc += length_at(i);
     }
-    vec3 here = is_touched ? strand_root + from_root : texel.xyz;
+    vec3 here = is_touched ? root + from_root : texel.xyz;
     imageStore(plain_strands, first + ivec2(i, 0), vec4(here, arc));
   }
 }
@@ -159,27 +124,32 @@ void main()
   if (place >= some_count) {
     return;
   }
+  point_count = styling.point_count;
+  hand = styling.hand;
   int strand = first_strand + place;
   ivec2 known_first = strand_texel(strand, 0, styling.known_texels, styling.row_known);
   vec4 head = texelFetch(known, known_first, 0);
-  strand_normal = head.xyz;
-  strand_identity = whole(head.w, known_number(known_first, 4));
+  normal = head.xyz;
+  identity = whole(head.w, known_number(known_first, 4));
   ivec2 first = strand_texel(styling.first_strand + place, 0, POINTS, styling.row_strands);
   read_strand(first);
   bool is_touched = false;
   for (int index = 0; index < styling.step_count; index++) {
-    Step row = styling.steps[index];
+    row_now = styling.steps[index];
+    kind = row_now.kind;
+    seed = row_now.seed;
+    keep_length = number_at(KEEP_LENGTH_NUMBER);
     // A_si = base · profile(x_i).
-    base_amount = row.numbers[0].x * (1.0 - row.numbers[0].y * random_of(row.seed, RANDOM_VARY));
-    if (row.mask >= 0) {
-      base_amount *= known_number(known_first, KNOWN_LEVELS + styling.level_count + row.mask);
+    base = number_at(AMOUNT_NUMBER) * (1.0 - number_at(VARY_NUMBER) * random(VARY));
+    if (row_now.mask >= 0) {
+      base *= known_number(known_first, KNOWN_LEVELS + styling.level_count + row_now.mask);
     }
-    take_centre(known_first, row);
-    if (base_amount > 0.0) {
+    take_centre(known_first);
+    if (base > 0.0) {
       is_touched = true;
-      course = course_of(row.numbers[0].zw, row.numbers[1].xyz, POINTS);
+      take_profile();
       per_total = 1.0 / max(total, 1e-20);
-      apply(row);
+      apply_step();
     }
   }
   if (styling.are_centres != 0) {

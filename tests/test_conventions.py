@@ -13,7 +13,7 @@ from tests.support.each_file import ROOT, each_file
 
 ADDON = ROOT / "hair_addon"
 MODULES = sorted(ADDON.rglob("*.py"))
-NATIVE = sorted(path for path in ADDON.rglob("*") if path.suffix in {".cpp", ".cu", ".h"})
+NATIVE = sorted(path for path in ADDON.rglob("*") if path.suffix in {".cpp", ".cu", ".h", ".strand"})
 SHADERS = sorted(path for path in (ROOT / "shaders").rglob("*") if path.suffix in {".glsl", ".frag", ".vert", ".comp"})
 SCRIPTS = [path for name in ("tests", "tools", "blend_samples") for path in sorted((ROOT / name).rglob("*.py"))]
 SCRIPTS += [ROOT / "__init__.py", ROOT / "tools" / "bootstrap.sh", ROOT / ".ci" / "run"]

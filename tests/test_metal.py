@@ -8,7 +8,8 @@ import re
 from pathlib import Path
 
 SHADERS = Path(__file__).resolve().parents[1] / "shaders"
-SOURCES = sorted([*SHADERS.glob("*.*"), *SHADERS.glob("include/*.glsl")])
+STYLES = SHADERS.parent / "hair_addon" / "core" / "styling"
+SOURCES = sorted([*SHADERS.glob("*.*"), *SHADERS.glob("include/*.glsl"), *STYLES.glob("*.strand")])
 GLSL = [path for path in SOURCES if path.suffix != ".md"]
 
 # Keywords of C++ and of the language that GLSL lets be names, and what Blender's backend defines as macros.
@@ -32,7 +33,7 @@ powr radians reflect refract rint rotate round rsqrt sign sin sinh smoothstep sq
 """
 RESERVED = set(f"{_CPP} {_METAL} {_MACROS}".split())
 
-_TYPE = r"(?:void|bool|int|uint|float|[biu]?vec[234]|mat[234]|sampler\w+|[A-Z]\w*)"
+_TYPE = r"(?:void|bool|int|uint|float|[biu]?vec[234]|mat[234]|sampler\w+|lanes|ints|uints|flags|vector|[A-Z]\w*)"
 _DECLARED = re.compile(rf"\b{_TYPE}\s+(\w+)\s*(?=[;,=()\[{{])")
 _FUNCTION = re.compile(rf"^{_TYPE}\s+(\w+)\s*\([^;{{]*\)\s*([;{{])", re.MULTILINE)
 _STRUCT = re.compile(r"\bstruct\s+(\w+)")
@@ -48,7 +49,7 @@ STRUCTS = {name for path in GLSL for name in _STRUCT.findall(code(path))}
 
 def where(found):
     """{file: what was found in its code} where that is anything."""
-    every = {path.relative_to(SHADERS).as_posix(): found(code(path)) for path in GLSL}
+    every = {path.name: found(code(path)) for path in GLSL}
     return {name: bad for name, bad in every.items() if bad}
 
 

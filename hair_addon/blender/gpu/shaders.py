@@ -9,30 +9,30 @@ from pathlib import Path
 
 import gpu
 
+from ...core import styling
 from ...core.errors import HairError
 from ..host.caches import Cache
 
 FOLDER = Path(__file__).resolve().parents[3] / "shaders"
+STYLES = Path(styling.__file__).parent  # .strand files, which C++ reads too
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 
 
-def expand(name, replaced=None):
+def expand(name, replaced=None, texts=None):
     """(text, lines): the file with every #include put in its place once.
 
-    replaced: {file: the one that is included in its place, or None}; lines: each line's (file, number).
+    replaced: {file: the one that is included in its place, or None}; texts: {file: its text} of files that are none;
+    lines: each line's (file, number).
     """
-    text, lines, seen, replaced = [], [], set(), replaced or {}
+    text, lines, seen, replaced, texts = [], [], set(), replaced or {}, texts or {}
 
     def add(file):
         file = replaced.get(file, file)
         if file is None or file in seen:
             return
         seen.add(file)
-        path = FOLDER / file
-        if not path.is_file():
-            raise HairError(f"The shader file {file} is missing: reinstall Vellus.")
-        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+        for number, line in enumerate((texts.get(file) or _read(file)).splitlines(), start=1):
             include = _INCLUDE.match(line)
             if include:
                 add(include.group(1))
@@ -42,6 +42,13 @@ def expand(name, replaced=None):
 
     add(name)
     return "\n".join(text) + "\n", lines
+
+
+def _read(file):
+    path = (STYLES if file.endswith(".strand") else FOLDER) / file
+    if not path.is_file():
+        raise HairError(f"The shader file {file} is missing: reinstall Vellus.")
+    return path.read_text(encoding="utf-8")
 
 
 program_cache = Cache()  # (function decorated by `kept`, its arguments) → program
@@ -84,9 +91,9 @@ def compile_drawing(info, vertex, fragment, targets=COLOR, replaced=None):
     return _create(info, (vertex, fragment), vertex_lines, fragment_lines)
 
 
-def compile_compute(info, file, replaced=None):
+def compile_compute(info, file, replaced=None, texts=None):
     """The compute program of a file, some of its includes replaced as `expand` says. Raises `HairError`."""
-    text, lines = expand(file, replaced)
+    text, lines = expand(file, replaced, texts)
     info.compute_source(text)
     return _create(info, (file,), [], lines)
 

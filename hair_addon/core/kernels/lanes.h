@@ -15,6 +15,7 @@
   using lanes = float;
   using ints = int;
   using uints = unsigned;
+  #define ALWAYS_INLINE
   const auto get_lane = [](auto vector, int) { return vector; };
   const auto set_lane = [](auto& vector, int, auto value) { vector = value; };
   const auto floor_of = [](lanes value) { return floorf(value); };
@@ -26,6 +27,7 @@
   const auto exact_quotient_of = [](lanes a, lanes b) { return __fdiv_rn(a, b); };
   const auto fused = [](lanes a, lanes b, lanes c) { return __fmaf_rn(a, b, c); };
   const auto to_ints = [](lanes value) { return static_cast<int>(value); };
+  const auto to_uints = [](ints value) { return static_cast<unsigned>(value); };
   const auto to_lanes = [](auto value) { return static_cast<float>(value); };
   const auto lanes_of_bits = [](ints bits) { return __int_as_float(bits); };
   const auto bits_of_lanes = [](lanes value) { return __float_as_int(value); };
@@ -35,6 +37,7 @@
   typedef float lanes __attribute__((ext_vector_type(WIDTH)));
   typedef int ints __attribute__((ext_vector_type(WIDTH)));
   typedef unsigned uints __attribute__((ext_vector_type(WIDTH)));
+  #define ALWAYS_INLINE __attribute__((always_inline))
   const auto get_lane = [](auto vector, int lane) { return vector[lane]; };
   const auto set_lane = [](auto& vector, int lane, auto value) { vector[lane] = value; };
   const auto floor_of = [](lanes value) { return __builtin_elementwise_floor(value); };
@@ -72,8 +75,11 @@
   };
 #endif
   const auto to_ints = [](lanes value) { return __builtin_convertvector(value, ints); };
+  const auto to_uints = [](ints value) { return __builtin_convertvector(value, uints); };
   const auto to_lanes = [](auto value) { return __builtin_convertvector(value, lanes); };
   const auto lanes_of_bits = [](ints bits) { return __builtin_bit_cast(lanes, bits); };
   const auto bits_of_lanes = [](lanes value) { return __builtin_bit_cast(ints, value); };
   const auto any_of = [](ints condition) { return __builtin_reduce_or(condition) != 0; };
 #endif
+using uint = unsigned;
+using flags = decltype(lanes() > lanes());  // a condition of each lane

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         steps,
         strand_wetness,
         style_inputs,
+        style_text,
         trim,
         wet,
     )

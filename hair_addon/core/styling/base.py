@@ -12,7 +12,9 @@ a straight line: it would begin vertically, and points would jump where its begi
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -73,6 +75,47 @@ class Profile:
 EVERYWHERE = Profile()
 
 
+@dataclass(frozen=True)
+class TreeSettings:
+    """What the clump sites of a style follow from.
+
+    sizes: distance between the sites of each level [m], the largest first; crossover: part of the strands that belongs
+    to the second nearest site.
+    """
+
+    sizes: tuple[float, ...]
+    seed: int
+    crossover: float
+
+
+@dataclass(frozen=True)
+class Cutter:
+    """A plane that trims strands: they keep what lies on the side that the unit normal (3,) points away from.
+
+    point: (3,) [m] of the plane, in the coordinates of strands.
+    """
+
+    point: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True)
+class Step:
+    """A row of a program: what one text, a .strand file, does to strands.
+
+    kind: of `kinds.STEPS`; numbers: the values of that file's own numbers, by the names in `NUMBERS` of its module;
+    level: of the clump centres that it needs, counted from the style's first; None for those of a style above it.
+    """
+
+    kind: str
+    settings: StyleSettings
+    amount: float
+    profile: Profile
+    numbers: Mapping[str, Any]  # floats, and tuples of them where a name has a size
+    level: int | None = None
+    keep_length: float = 1.0
+
+
 def evaluated(profile: Profile, x: np.ndarray) -> np.ndarray:
     """The profile at x (…, P), parts of the length of strands of P points, from 0 to 1."""
     y = np.clip((x - profile.start) / (1.0 - profile.start), 0.0, 1.0)
@@ -95,6 +138,11 @@ def profile_of(settings: StyleSettings) -> Profile:
     shape = settings.shape
     exponent = -math.log2(1.0 - min(shape, 1.0 - shape))
     return Profile(settings.root, settings.tip, exponent, shape > 0.5, settings.start)
+
+
+def step_of(settings: StyleSettings, kind: str, numbers: Mapping[str, Any], **changes: Any) -> Step:
+    """The `Step` of a kind with the amount and the profile of its style; changes: other fields of it."""
+    return replace(Step(kind, settings, settings.amount, profile_of(settings), numbers), **changes)
 
 
 def has_effect(settings: StyleSettings) -> bool:

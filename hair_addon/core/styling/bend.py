@@ -7,13 +7,16 @@
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..params import param
-from .base import ProfiledSettings
+from .base import Cutter, ProfiledSettings, Step, step_of
 
 LABEL = "Bend"
 DESCRIPTION = "Bend strands, or roll up their tips"
+STEP = "BEND"
+NUMBERS = ("angle", "direction", "random_turn")  # of bend.strand: both angles in turns
 
 
 @dataclass(frozen=True)
@@ -43,3 +46,9 @@ class Settings(ProfiledSettings):
 
 
 ROLL = {"start": 0.75, "angle": 6.0 * math.pi}  # as added from the menu under the name Roll
+
+
+def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
+    """The steps that bend strands."""
+    angle, direction = settings.angle / (2.0 * math.pi), settings.turn / (2.0 * math.pi)
+    return [step_of(settings, STEP, {"angle": angle, "direction": direction, "random_turn": settings.random_turn})]

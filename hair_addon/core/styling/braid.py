@@ -12,13 +12,17 @@ so no point slides along its tress when the hair swings; where strands gather th
 Centre lines of three tresses stay 0.90 R apart for a pitch of 6 R, so a tress may have half of that as its radius.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..params import param, param_of
-from .base import ProfiledSettings
+from .base import Cutter, ProfiledSettings, Step, TreeSettings, step_of
 
 LABEL = "Braid"
 DESCRIPTION = "Braid or twist the strands of a lock"
+STEP = "WEAVE"
+NEEDS_CENTRE = True
+NUMBERS = ("radius", "pitch", "flat_part", "tress_count", "thickness")  # of weave.strand
 
 PATTERNS = (
     ("BRAID", "Braid", "Three tresses, each over the next in turn"),
@@ -71,3 +75,15 @@ class Settings(ProfiledSettings):
     )
     start: float = param_of(ProfiledSettings, "start", 0.1)
     shape: float = param_of(ProfiledSettings, "shape", 0.1)
+
+
+def tree(settings: Settings) -> TreeSettings:
+    """What the places of the braids follow from."""
+    return TreeSettings((settings.size,), settings.seed, 0.0)
+
+
+def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
+    """The steps that weave strands."""
+    numbers = {name: getattr(settings, name) for name in ("radius", "pitch", "thickness")}
+    numbers |= {"flat_part": 1.0 - settings.flatness, "tress_count": 3.0 if settings.pattern == "BRAID" else 2.0}
+    return [step_of(settings, STEP, numbers, level=0)]

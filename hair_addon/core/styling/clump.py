@@ -6,21 +6,25 @@ At the arc length s_i of a point p_i, with C the centre strand of level k after 
     q_i = c + (1 - B_ki (1 - thickness)) Rot(t_c, 2π twist · profile(x_i)) (p_i - c)
 
 The strand follows the curve of these points as far as its own length goes, so that what is drawn onto the centre lies
-on it (gather.h). Roots stay: the pull that the profile has at the root grows over twice the distance to the centre. The
-part `stray` of strands joins no lock; a tenth more joins in part, so the part may be animated. clump_trees.py has sites
-and levels.
+on it (clump.strand). Roots stay: the pull that the profile has at the root grows over twice the distance to the centre.
+The part `stray` of strands joins no lock; a tenth more joins in part, so the part may be animated. clump_trees.py has
+sites and levels.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..params import param, param_of
-from .base import ProfiledSettings
+from .base import Cutter, ProfiledSettings, Step, TreeSettings, step_of
 
 LABEL = "Clump"
 DESCRIPTION = "Gather strands into locks, and locks into larger ones"
 
 MOST_LEVELS = 4
+STEP = "CLUMP"
+NEEDS_CENTRE = True
+NUMBERS = ("thickness", "twist", "stray")  # of clump.strand
 
 
 @dataclass(frozen=True)
@@ -106,3 +110,14 @@ def packed_thickness(strand_density: float, radius: float) -> float:
     Discs are packed to 0.9 of an area at most.
     """
     return min(math.sqrt(strand_density * math.pi * radius**2 / 0.9), 1.0)
+
+
+def tree(settings: Settings) -> TreeSettings:
+    """What the clump sites follow from."""
+    return TreeSettings(tuple(sizes(settings)), settings.seed, settings.crossover)
+
+
+def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
+    """The steps that gather strands, one for each level."""
+    own = {"thickness": settings.thickness, "twist": settings.twist / settings.levels, "stray": settings.stray}
+    return [step_of(settings, STEP, own, amount=amount, level=level) for level, amount in enumerate(amounts(settings))]

@@ -18,7 +18,7 @@ from ..geometry.mesh import SurfacePoints
 from ..interpolation.hair_binding import HairBinding
 from ..interpolation.root_binder import RootBinder
 from ..kernels.checks import require_indices
-from .program import TreeSettings
+from .base import TreeSettings
 from .random_numbers import CROSSOVER, random_numbers
 
 MOST_SITES = 20_000  # of the finest level: they take a second to place, and 50,000 on two levels seven

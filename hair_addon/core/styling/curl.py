@@ -10,7 +10,7 @@ With the arc of a turn ℓ = sqrt((2πR)² + h²), κ = keep_length and y the st
 
 The second line leads the phase back to a turn for each pitch of y. Below a Clump, y is counted along the centre of the
 strand's lock, and ρ is in the centre's frames: strands that are rooted at different places along the lock wind as one
-(beside.h). Without one, y is the strand's own.
+(beside.strand). Without one, y is the strand's own.
 
 A straight strand of length L reaches L pitch / ℓ. It is the curve of curvature R / (R² + (h/2π)²) and torsion
 (h/2π) / (R² + (h/2π)²), the helix that natural curvature gives a fibre [Bertails06]. A twentieth of the locks winds
@@ -20,13 +20,16 @@ changes sign.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..params import param, param_of
-from .base import ProfiledSettings
+from .base import Cutter, ProfiledSettings, Step, step_of
 
 LABEL = "Curl"
 DESCRIPTION = "Wind strands into coils or waves"
+STEP = "CURL"
+NUMBERS = ("radius", "pitch", "roundness", "coherence", "stretch", "left_handed", "switchback")  # of curl.strand
 
 POINTS_A_TURN = 8  # below, coils look angular
 
@@ -103,3 +106,10 @@ def turn_length(settings: Settings) -> float:
 def points_wanted(settings: Settings, length: float) -> int:
     """Points a strand of a length [m] needs for smooth coils."""
     return math.ceil(POINTS_A_TURN * length / turn_length(settings)) + 1
+
+
+def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
+    """The steps that wind strands."""
+    numbers = {name: getattr(settings, name) for name in NUMBERS if name != "roundness"}
+    numbers["roundness"] = 1.0 - settings.flatness
+    return [step_of(settings, STEP, numbers, keep_length=settings.keep_length)]

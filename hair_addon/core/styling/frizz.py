@@ -9,16 +9,32 @@ X_s is the root at rest in the surface's axes and |k_m| about 2π / spread. c_m 
 cannot carry.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..params import param
-from .base import ProfiledSettings
+from .base import Cutter, ProfiledSettings, Step, step_of
 
 LABEL = "Frizz"
 DESCRIPTION = "Ruffle strands by smooth noise"
 
 WAVES_AN_OCTAVE = 6
 MOST_OCTAVES = 4
+STEP = "FRIZZ"
+# Of frizz.strand.
+NUMBERS = (
+    "amplitude",
+    "wavelength",
+    "octave_count",
+    "gain",
+    "coherence",
+    "per_spread",
+    "stray",
+    "stray_gain",
+    f"frequencies[{WAVES_AN_OCTAVE}]",
+)
 
 
 @dataclass(frozen=True)
@@ -73,3 +89,23 @@ class Settings(ProfiledSettings):
         high=1.0,
         subtype="FACTOR",
     )
+
+
+def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
+    """The steps that ruffle strands."""
+    gains = settings.gain ** np.arange(settings.octaves)
+    # Each coordinate of ρ has the amplitude as its root mean square: the square of a wave is one half.
+    per_size = (0.5 * WAVES_AN_OCTAVE * np.sum(gains**2)) ** -0.5
+    wave = np.arange(WAVES_AN_OCTAVE)
+    numbers = {
+        "amplitude": settings.amplitude * per_size,
+        "wavelength": settings.wavelength,
+        "octave_count": float(settings.octaves),
+        "gain": settings.gain,
+        "coherence": settings.coherence,
+        "per_spread": 1.0 / settings.spread,
+        "stray": settings.stray,
+        "stray_gain": settings.stray_gain,
+        "frequencies": tuple(2.0 ** ((wave + 0.5) / WAVES_AN_OCTAVE - 0.5)),
+    }
+    return [step_of(settings, STEP, numbers, keep_length=settings.keep_length)]

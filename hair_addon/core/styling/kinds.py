@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The kinds of styles by their names in files and in Blender, and what the menu offers."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import HairError
 from ..params import described
 from . import bend, braid, clump, curl, frizz, lean, smooth, trim, wet
-from .base import StyleSettings
+from .base import Cutter, Step, StyleSettings
 
-_MODULES = {
+_MODULES: dict[str, Any] = {
     "TRIM": trim,
     "CLUMP": clump,
     "CURL": curl,
@@ -20,6 +21,10 @@ _MODULES = {
     "BRAID": braid,
     "WET": wet,
 }
+
+# The kinds of steps, and the numbers that kernels know them by. A step's text is a file of its name: bend.strand.
+STEPS: dict[str, Any] = {module.STEP: module for module in _MODULES.values() if hasattr(module, "STEP")}
+STEP_KINDS = {step: number for number, step in enumerate(STEPS, start=1)}
 
 KINDS: dict[str, type[StyleSettings]] = {kind: module.Settings for kind, module in _MODULES.items()}
 LABELS = {kind: module.LABEL for kind, module in _MODULES.items()}
@@ -66,3 +71,22 @@ def kind_of(settings: StyleSettings) -> str:
         if type(settings) is settings_class:
             return kind
     raise HairError(f"A style must be the settings of a style, not {described(settings)}.")
+
+
+def module_of(settings: StyleSettings) -> Any:
+    """The file of a style's settings. Raises `HairError` for anything else."""
+    return _MODULES[kind_of(settings)]
+
+
+def needs_centre(step: str) -> bool:
+    """Whether a kind of step acts on strands with a clump centre alone."""
+    return hasattr(STEPS[step], "NEEDS_CENTRE")
+
+
+def steps_of(settings: StyleSettings, cutters: Mapping[str, Cutter]) -> list[Step]:
+    """The steps of one style on strands, none of one that acts on guides; a level counts from the first of its own.
+
+    cutters: planes by the names that Trim styles know them by.
+    """
+    module = module_of(settings)
+    return module.steps(settings, cutters) if hasattr(module, "steps") else []

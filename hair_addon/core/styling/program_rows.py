@@ -6,15 +6,17 @@ from typing import Any
 
 import numpy as np
 
-TRIM, CLUMP, CURL, FRIZZ, BEND, SMOOTH, WEAVE = range(1, 8)  # the kinds of steps
-
-CHOICES = 5  # kind, seed, row of masks or -1, row of members or -1, first of the centres that members count from
-NUMBERS = 24  # amount, vary; root, tip, exponent, whether flipped and start of the profile; keep_length; 16 of the step
+# The whole numbers of a step: its kind, of `kinds.STEP_KINDS`; its seed; its row of masks or -1; its row of members or
+# -1; the first of the centres that members count from.
+CHOICES = ("kind", "seed", "mask", "level", "first_centre")
+# The numbers that all steps have, and how many they have with their own, which follow.
+SHARED = ("amount", "vary", "at_root", "at_tip", "exponent", "is_flipped", "from", "keep_length")
+NUMBERS = 24
 
 
 @dataclass(frozen=True)
 class Program:
-    """Steps as a kernel reads them: (N, CHOICES) int32 and (N, NUMBERS) float32, which are not changed any more."""
+    """Steps as a kernel reads them: (N, 5) int32 `CHOICES` and (N, NUMBERS) float32, which are not changed any more."""
 
     choices: np.ndarray
     numbers: np.ndarray

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random numbers of strands and clumps, from an identity, the style's seed and a purpose; style_numbers.h has a twin.
+"""Random numbers of strands and clumps, from an identity, the style's seed and a purpose, as style_numbers.strand has.
 
 They follow from roots alone: neither the order of strands nor their number matters, nor a style's place in the stack.
 The mixing function is lowbias32 [Wellons18].

@@ -4,13 +4,16 @@
 What is left of a wave is sinc²(length / wavelength): 0.41 of one twice as long, nothing of one that is as long.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..params import param, param_of
-from .base import ProfiledSettings
+from .base import Cutter, ProfiledSettings, Step, step_of
 
 LABEL = "Smooth"
 DESCRIPTION = "Smooth or straighten strands"
+STEP = "SMOOTH"
+NUMBERS = ("chord",)  # of smooth.strand: the length that is averaged [m]
 
 
 @dataclass(frozen=True)
@@ -30,3 +33,8 @@ class Settings(ProfiledSettings):
 
 
 STRAIGHTEN = {"length": 10.0}  # as added from the menu under the name Straighten
+
+
+def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
+    """The steps that smooth strands."""
+    return [step_of(settings, STEP, {"chord": settings.length})]

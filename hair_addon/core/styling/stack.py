@@ -18,13 +18,13 @@ from ..geometry.strands import Strands
 from ..interpolation.hair_binding import HairBinding
 from ..kernels import kernel_cache
 from ..kernels.checks import require_count, require_indices
+from . import kinds, steps, strand_wetness
 from . import program as programs
-from . import steps, strand_wetness
-from .base import StyleSettings
+from .base import StyleSettings, TreeSettings
 from .clump_trees import HAIR, ClumpTrees, Owner
 from .guide_styles import FollowedGuides, leans
-from .program import TreeSettings, mask_key
-from .program_rows import CLUMP, WEAVE, Program
+from .program import mask_key
+from .program_rows import Program
 from .steps import StrandData
 from .style_inputs import Inputs
 
@@ -290,8 +290,8 @@ def _side(guides, normals):
 
 def _steps_before(program, made, level):
     """The steps above the one that gathers strands around the centres of a level."""
-    row = next(row for row, step in enumerate(made) if step.kind in {CLUMP, WEAVE} and step.level == level)
-    return program.before(row)
+    rows = (row for row, step in enumerate(made) if step.level == level and kinds.needs_centre(step.kind))
+    return program.before(next(rows))
 
 
 def _joined(parts, kind, device):

@@ -19,7 +19,7 @@
 //   array_t<float> numbers              (N, NUMBERS) of steps.py
 //   mat44 axes                          from the coordinates of points to the surface's own, without scale
 //
-// Constants: WIDTH, MOST points a strand, CHOICES, NUMBERS; the kinds and purposes of steps.py.
+// Constants: WIDTH, MOST points a strand, CHOICES, NUMBERS, and those of style_text.py.
 //
 // A strand is held as its root, unit directions t_i and lengths d_i of its segments, i = 1 … P - 1. So a style that
 // turns segments keeps roots and lengths.
@@ -28,9 +28,8 @@
 #include "lanes.h"
 #include "lane_rows.h"
 #include "vectors.h"
-#include "style_numbers.h"
+#include "style_numbers.strand"
 
-using marks = int[LANES];  // a place along the strand of each lane
 const int point_count = points.shape[1];
 const int first = block * LANES;
 const int left = points.shape[0] - first;
@@ -47,8 +46,7 @@ lanes lengths[2][MOST];
 vector directions[2][MOST];
 lanes *length = lengths[0], *next_length = lengths[1];
 vector *t = directions[0], *next = directions[1];
-// Points from the root on, which round less than places do, and their arc lengths, for styles that ask for them by
-// `put_points`.
+// Points from the root on, and their arc lengths, for styles that ask for them by `put_points`.
 vector place[MOST];
 lanes along[MOST];
 constexpr int MOST_KEPT = LANES == 1 ? 1 : MOST;
@@ -62,16 +60,6 @@ const auto swap = [](auto*& a, auto*& b) {
 };
 // Number `lane` of an entry of such an array.
 const auto lane_of = [](const lanes& values, int lane) { return reinterpret_cast<const float*>(&values)[lane]; };
-const auto gathered = [&](const vector* from, const marks& index, int ahead) {
-  vector found;
-  for (int lane = 0; lane < LANES; ++lane) {
-    const vector& entry = from[index[lane] + ahead];
-    set_lane(found.x, lane, lane_of(entry.x, lane));
-    set_lane(found.y, lane, lane_of(entry.y, lane));
-    set_lane(found.z, lane, lane_of(entry.z, lane));
-  }
-  return found;
-};
 
 int strand[LANES];
 float* rows[LANES];
@@ -103,30 +91,18 @@ read_points(rows, [&](int i, const vector& point) {
   }
   point_before = point;
 });
-const auto put_points = [&]() {
-  place[0] = {};
-  along[0] = 0.0f;
-  for (int i = 1; i < point_count; ++i) {
-    place[i] = plus(place[i - 1], t[i], length[i]);
-    along[i] = along[i - 1] + length[i];
-  }
-};
-// To be called where lengths have changed.
-const auto put_total = [&]() {
-  total = 0.0f;
-  for (int i = 1; i < point_count; ++i) total += length[i];
-};
 ints is_touched = 0;
 
 for (int step = 0; step < numbers.shape[0]; ++step) {
   const int* choice = choices.data + size_t(step) * CHOICES;
   const float* number = numbers.data + size_t(step) * NUMBERS;
   const int kind = choice[0], seed = choice[1], mask = choice[2], level = choice[3], first_centre = choice[4];
-  const auto random = [&](int purpose) { return random_number(identity, seed, ints(purpose)); };
+  const float keep_length = number[KEEP_LENGTH_NUMBER];
 
   // A_si = base · profile(x_i).
-  lanes base = number[0];
-  if (number[1] != 0.0f) base *= 1.0f - number[1] * random(VARY);
+  lanes base = number[AMOUNT_NUMBER];
+  const float vary = number[VARY_NUMBER];
+  if (vary != 0.0f) base *= 1.0f - vary * random_number(identity, seed, ints(VARY));
   if (mask >= 0) {
     for (int lane = 0; lane < LANES; ++lane) {
       set_lane(base, lane, get_lane(base, lane) * masks.data[size_t(mask) * masks.shape[1] + strand[lane]]);
@@ -143,7 +119,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
       const int member = members.data[size_t(level) * members.shape[1] + strand[lane]];
       centre[lane] = first_centre + (member < 0 ? 0 : member);
       if (member < 0) {
-        if (kind == CLUMP || kind == WEAVE) set_lane(base, lane, 0.0f);
+        if ((NEEDING_CENTRE >> kind) & 1) set_lane(base, lane, 0.0f);
         continue;
       }
       set_lane(in_lock, lane, 1.0f);
@@ -164,53 +140,16 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
       kept_length[i] = length[i];
     }
   }
-  const float at_root = number[2], at_tip = number[3], exponent = number[4], from = number[6];
-  const bool is_even = at_root == at_tip, is_linear = exponent == 1.0f, is_flipped = number[5] != 0.0f;
-  // Within half a segment of its beginning it rises straight: a power would begin vertically, and points jump.
+  const float at_root = number[AT_ROOT_NUMBER], at_tip = number[AT_TIP_NUMBER];
+  const float exponent = number[EXPONENT_NUMBER], from = number[FROM_NUMBER];
+  const bool is_flipped = number[IS_FLIPPED_NUMBER] != 0.0f;
   const lanes least = 0.5f / (point_count - 1), slope = 1.0f / power(least, lanes(1.0f - exponent));
-  const auto profile = [&](lanes x) {
-    if (is_even) return lanes(at_root);
-    // x of the tip is 1 but for rounding, which steep profiles are sensitive to.
-    lanes part = 1.000001f * x - from;
-    if (from != 0.0f) part = exact_quotient_of(part, lanes(1.0f - from));
-    lanes y = clamped(part, lanes(0.0f), lanes(1.0f));
-    if (is_flipped || !is_linear) {
-      const lanes raised = power(is_flipped ? 1.0f - y : y, lanes(exponent));
-      y = is_flipped ? 1.0f - raised : (y < least ? y * slope : raised);
-    }
-    return lanes(at_root + (at_tip - at_root) * y);
-  };
   const lanes per_total = exact_quotient_of(lanes(1.0f), higher_of(total, lanes(1.0e-20f)));
 
-#include "frames.h"
-#include "across.h"
-#include "centre_course.h"
-#include "gather.h"
+#include "strand_language.h"
+#include "all.strand"
 
-  switch (kind) {
-    case TRIM: {
-#include "trim.h"
-    } break;
-    case CLUMP: {
-#include "clump.h"
-    } break;
-    case CURL: {
-#include "beside.h"
-#include "curl.h"
-    } break;
-    case FRIZZ: {
-#include "frizz.h"
-    } break;
-    case BEND: {
-#include "bend.h"
-    } break;
-    case SMOOTH: {
-#include "smooth.h"
-    } break;
-    case WEAVE: {
-#include "weave.h"
-    } break;
-  }
+  apply_step();
   if (is_partial) {
     const auto is_styled = base > 0.0f;
     for (int i = 1; i < point_count; ++i) {

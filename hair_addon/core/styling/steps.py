@@ -14,9 +14,8 @@ import warp as wp
 from ..errors import HairError
 from ..kernels import native_code, parallel
 from ..kernels.checks import require_count, require_indices
-from . import frizz
-from .program_rows import BEND, CHOICES, CLUMP, CURL, FRIZZ, NUMBERS, SMOOTH, TRIM, WEAVE, Program
-from .random_numbers import PURPOSES
+from . import kinds, style_text
+from .program_rows import CHOICES, NUMBERS, Program
 
 # Nothing differentiates these kernels. A GPU's approximate divisions and roots move hair by less than 2e-6 of its size;
 # where more would follow from them, steps.cpp asks for exact ones.
@@ -28,6 +27,14 @@ WIDTH = 16  # strands that a thread of the processor styles at once: 8 take a fi
 MOST_POINTS = 257  # of a strand
 SHORT_POINTS = 64  # of a strand that takes less memory of a GPU
 POINTS_AT_ONCE = 5  # of a strand in the shared memory of a GPU: more take cache from directions and lengths
+
+
+_TEXTS = style_text.texts(kinds.STEPS)
+_CONSTANTS = style_text.constants() | {
+    "CHOICES": len(CHOICES),
+    "NUMBERS": NUMBERS,
+    "POINTS_AT_ONCE": POINTS_AT_ONCE,
+}
 
 
 @dataclass(frozen=True)
@@ -66,7 +73,7 @@ def variant(width: int, most_points: int, module: wp.Module | None = None) -> Va
     if module is not None:
         module.options.update(_OPTIONS)
 
-    @wp.func_native(native_code.body(__file__, "steps.cpp", WIDTH=width, MOST=most_points, **_CONSTANTS))
+    @wp.func_native(native_code.body(__file__, "steps.cpp", _TEXTS, WIDTH=width, MOST=most_points, **_CONSTANTS))
     def _apply_steps(
         block: int,
         points: wp.array2d[wp.vec3],
@@ -119,21 +126,6 @@ def variant(width: int, most_points: int, module: wp.Module | None = None) -> Va
     return Variant(_style_blocks, width, most_points)
 
 
-_CONSTANTS = {
-    "CHOICES": CHOICES,
-    "NUMBERS": NUMBERS,
-    "TRIM": TRIM,
-    "CLUMP": CLUMP,
-    "CURL": CURL,
-    "FRIZZ": FRIZZ,
-    "BEND": BEND,
-    "SMOOTH": SMOOTH,
-    "WEAVE": WEAVE,
-    "WAVES": frizz.WAVES_AN_OCTAVE,
-    "MOST_OCTAVES": frizz.MOST_OCTAVES,
-    "POINTS_AT_ONCE": POINTS_AT_ONCE,
-    **PURPOSES,
-}
 _ANY = variant(WIDTH, MOST_POINTS)
 # A thread of a GPU reserves memory for the most points that there may be.
 _SHORT = variant(WIDTH, SHORT_POINTS, wp.get_module(f"{__name__}_short"))
@@ -198,11 +190,11 @@ def _check(points, program, data, chosen, most_points):
     for name, array in (("masks", data.masks), ("clump members", data.members)):
         if len(array):
             require_count(name, array.shape[1], strand_count)
-    require_count("choices of a step", program.choices.shape[1], CHOICES)
+    require_count("choices of a step", program.choices.shape[1], len(CHOICES))
     require_count("numbers of a step", program.numbers.shape[1], NUMBERS)
     require_count("steps", len(program.numbers), len(program))
-    kinds, _seeds, masks, levels, first_centres = program.choices.T
-    require_indices("kinds of steps", kinds, WEAVE + 1)
+    step_kinds, _seeds, masks, levels, first_centres = program.choices.T
+    require_indices("kinds of steps", step_kinds - 1, len(kinds.STEPS))
     require_indices("masks", masks[masks >= 0], len(data.masks))
     require_indices("clump levels", levels[levels >= 0], len(data.members))
     least, greatest = data.member_limits
@@ -211,7 +203,7 @@ def _check(points, program, data, chosen, most_points):
     has_centres = levels >= 0
     has_centres[has_centres] = greatest[levels[has_centres]] >= 0
     require_indices("clump centres", last_centres[has_centres], centre_count)
-    needs_points = (kinds == CLUMP) | (kinds == WEAVE)
+    needs_points = (_CONSTANTS["NEEDING_CENTRE"] >> step_kinds) & 1 == 1
     require_indices("clump levels", levels[needs_points], len(data.members))
     if needs_points.any():
         # The last centres may be guides, which have no points here.

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .base import Cutter
 from .masks import Mask
-from .program import Cutter
 
 
 @dataclass(frozen=True)

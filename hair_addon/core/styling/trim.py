@@ -7,13 +7,33 @@ A strand takes L + amount (L' - L): a mask of lengths is the mask of the style. 
 the undercoat and the others, so that its part may be animated.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..params import param
-from .base import StyleSettings
+from .base import Cutter, Step, StyleSettings, step_of
 
 LABEL = "Trim"
 DESCRIPTION = "Cut or scale strands to a length"
+STEP = "TRIM"
+CHANGES_LENGTHS = True
+# Of trim.strand.
+NUMBERS = (
+    "factor",
+    "random_part",
+    "to_length",
+    "undercoat",
+    "undercoat_length",
+    "is_cut",
+    "has_plane",
+    "axis_x",
+    "axis_y",
+    "axis_z",
+    "plane_distance",
+)
+NO_LIMIT = 1e30  # [m], of a length
 
 METHODS = (
     ("CUT", "Cut", "Cut strands off; the rest keeps its place"),
@@ -52,3 +72,21 @@ class Settings(StyleSettings):
     )
     method: str = param("CUT", "How strands become shorter", choices=METHODS)
     cutter: str = param("", "Empty object that cuts off what lies on the side of its Z axis")
+
+
+def steps(settings: Settings, cutters: Mapping[str, Cutter]) -> list[Step]:
+    """The steps that trim strands; cutters: planes by the names that settings know them by."""
+    cutter = cutters.get(settings.cutter)
+    axis = (0.0, 0.0, 0.0) if cutter is None else cutter.normal
+    numbers = {
+        "factor": settings.factor,
+        "random_part": settings.random,
+        "to_length": settings.to_length or NO_LIMIT,
+        "undercoat": settings.undercoat,
+        "undercoat_length": settings.undercoat_length,
+        "is_cut": float(settings.method == "CUT"),
+        "has_plane": float(cutter is not None),
+        **{f"axis_{name}": float(value) for name, value in zip("xyz", axis, strict=True)},
+        "plane_distance": 0.0 if cutter is None else float(np.dot(cutter.normal, cutter.point)),
+    }
+    return [step_of(settings, STEP, numbers)]

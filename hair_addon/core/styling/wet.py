@@ -7,15 +7,23 @@ a root begins vertically). Shading takes the same w as its wetness, that of each
 makes them differ (strand_wetness.py), and so do simulated guides.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 from ..params import param
-from .base import StyleSettings
+from . import clump, smooth
+from .base import EVERYWHERE, Cutter, Profile, Step, StyleSettings, TreeSettings, profile_of, step_of
 
 LABEL = "Wet"
 DESCRIPTION = "Soak hair: it clings, joins into locks and darkens"
 
 CLEARANCE = 0.15  # of wet guides from the surface, by the size of locks
+
+_RATIO = 0.32  # of the small wet locks to the large ones
+_THICKNESS = 0.10
+_SMOOTHING = 2.0  # lengths of locks that water smooths over
+_CLUMP = 0.92
+_START = 0.01  # below, small locks join evenly: by the square root they would begin at once
 
 
 @dataclass(frozen=True)
@@ -36,3 +44,20 @@ class Settings(StyleSettings):
     cling: float = param(0.35, "How far wet hair leans down at its roots", low=0.0, high=1.0, subtype="FACTOR")
     relax: float = param(0.8, "How far water straightens curls and waves", low=0.0, high=1.0, subtype="FACTOR")
     swelling: float = param(0.15, "Increase of the radius of a soaked strand", low=0.0, high=1.0, subtype="FACTOR")
+
+
+def tree(settings: Settings) -> TreeSettings:
+    """What the sites of wet locks follow from."""
+    return TreeSettings((settings.lock, settings.lock * _RATIO), settings.seed, 0.0)
+
+
+def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
+    """The steps that straighten strands and gather them, in large locks and then in small ones."""
+    wetness = settings.amount
+    along = Profile(0.0, 1.0, profile_of(clump.Settings()).exponent)
+    chord = {"chord": settings.lock * _SMOOTHING}
+    smoothing = step_of(settings, smooth.STEP, chord, amount=settings.relax * wetness, profile=EVERYWHERE)
+    own = {"thickness": _THICKNESS, "twist": 0.0, "stray": 0.0}
+    large = step_of(settings, clump.STEP, own, amount=_CLUMP * wetness**1.5, profile=along, level=0)
+    small_amount = _CLUMP * wetness / max(wetness, _START) ** 0.5
+    return [smoothing, large, replace(large, amount=small_amount, level=1)]

@@ -10,7 +10,7 @@ import warp as wp
 
 from hair_addon.core.geometry.strands import from_numpy, segment_lengths
 from hair_addon.core.grooming import hair_styles
-from hair_addon.core.styling import bend, clump, curl, frizz, kinds, lean, program, smooth, steps, trim, wet
+from hair_addon.core.styling import base, bend, clump, curl, frizz, kinds, lean, program, smooth, steps, trim, wet
 from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.style_inputs import Inputs
 from tests.support.devices import DEVICE
@@ -199,7 +199,7 @@ def test_turned_moved_scaled_and_mirrored_before_or_after(rng, name, is_mirrored
     after = scale * (after @ turn.T) + shift
     before = stepped(
         (scale * (strands @ turn.T) + shift).astype(np.float32),
-        program.base.scaled(style, scale),
+        base.scaled(style, scale),
         normals=normals @ turn.T,
         members=members,
         centre_normals=normals[::8] @ turn.T,

@@ -6,7 +6,7 @@ import pytest
 
 from hair_addon.core.geometry.strands import segment_lengths
 from hair_addon.core.styling import trim
-from hair_addon.core.styling.program import Cutter
+from hair_addon.core.styling.base import Cutter
 from tests.support.dynamics.stepped import curved_strands, stepped, straight_strands
 
 

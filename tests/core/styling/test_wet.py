@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hair_addon.core.styling import curl, frizz, program, program_rows, wet
+from hair_addon.core.styling import clump, curl, frizz, program, wet
 from tests.support.strands.styled import head
 
 LOCK = wet.Settings(lock=0.03)
@@ -44,7 +44,7 @@ def test_the_wetter_the_thinner_the_locks(hair):
 def test_small_locks_form_first(hair):
     """At a tenth of the wetness the small ones have gathered by a third or more, the large ones hardly."""
     made = program.strand_steps([replace(LOCK, amount=0.1)], {})
-    large, small = (step.amount for step in made if step.level is not None and step.kind == program_rows.CLUMP)
+    large, small = (step.amount for step in made if step.level is not None and step.kind == clump.STEP)
     assert large < 0.05 and small > 0.25
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from ....core import geometry
 from ....core.errors import HairError
 from ....core.styling import lean, trim
-from ....core.styling.base import StyleSettings, has_effect
+from ....core.styling.base import Cutter, StyleSettings, has_effect
 from ....core.styling.masks import Mask
-from ....core.styling.program import Cutter, mask_keys
+from ....core.styling.program import mask_keys
 from ....core.styling.style_inputs import Inputs
 from ...host.notices import name_of
 from .. import scene

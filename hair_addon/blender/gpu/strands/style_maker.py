@@ -3,7 +3,7 @@
 
 The program of a stack is the one that core/styling runs, as the same rows of numbers: a slider uploads these alone.
 Centre strands of clumps are made and styled first, level by level, in a texture of their own.
-shaders/style_strands.comp is the twin of core/styling/steps.cpp.
+The texts of steps are those of core/styling.
 """
 
 from dataclasses import dataclass, replace
@@ -14,9 +14,8 @@ import numpy as np
 
 from ....core.interpolation.hair_binding import HairBinding
 from ....core.kernels.checks import require_count
-from ....core.styling import frizz, program_rows
-from ....core.styling.program_rows import Program
-from ....core.styling.random_numbers import PURPOSES
+from ....core.styling import kinds, style_text
+from ....core.styling.program_rows import CHOICES, NUMBERS, Program
 from .. import shaders, uniforms
 from ..strand_textures import TEXTURE_WIDTH, StrandsOnGPU, row_strands_of, run_for_each
 from . import strand_changes, strand_maker
@@ -33,7 +32,6 @@ MOST_POINTS = 128  # of a strand: what a thread keeps of it is 32 or 48 bytes a 
 MOST_AT_ONCE = 1 << 16
 
 _GROUP_SIZE = 64
-_KINDS = {name: getattr(program_rows, name) for name in ("TRIM", "CLUMP", "CURL", "FRIZZ", "BEND", "SMOOTH", "WEAVE")}
 
 
 def can_style(styling: "Styling") -> bool:
@@ -240,16 +238,16 @@ def _new_pass(record, data, program, axes, point_count):
 
 def _put_steps(record, program):
     rows = record["steps"][: len(program)]
-    for column, name in enumerate(("kind", "seed", "mask", "level", "first_centre")):
+    for column, name in enumerate(CHOICES):
         rows[name] = program.choices[:, column]
-    rows["numbers"] = program.numbers.reshape(len(program), program_rows.NUMBERS // 4, 4)
+    rows["numbers"] = program.numbers.reshape(len(program), NUMBERS // 4, 4)
     record["step_count"] = len(program)
 
 
 def _kinds_of(program):
     """The kinds of a program's steps, as a program is compiled for them."""
     present = set(program.choices[:, 0].tolist())
-    return tuple(name for name, kind in _KINDS.items() if kind in present)
+    return tuple(name for name, kind in kinds.STEP_KINDS.items() if kind in present)
 
 
 def _known(data: "StrandData"):
@@ -295,7 +293,7 @@ def _are_alike(styling, other):
 
 
 @shaders.kept
-def _styles_program(point_count, kinds):
+def _styles_program(point_count, step_kinds):
     """The compute program that applies steps of some kinds to strands of so many points."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_GROUP_SIZE)
@@ -309,11 +307,7 @@ def _styles_program(point_count, kinds):
     strand_changes.declare_put(info, first_slot=2)
     for name in ("first_strand", "some_count"):
         info.push_constant("INT", name)
-    numbers = {"POINTS": point_count, "WAVES": frizz.WAVES_AN_OCTAVE, "MOST_OCTAVES": frizz.MOST_OCTAVES}
-    numbers |= {f"KIND_{name}": kind for name, kind in _KINDS.items()}
-    numbers |= {f"RANDOM_{name}": purpose for name, purpose in PURPOSES.items()}
-    numbers |= {f"HAS_{name}": 1 for name in kinds}
-    for name, value in numbers.items():
+    constants = {"POINTS": point_count, **style_text.constants(), **{f"HAS_{name}": 1 for name in step_kinds}}
+    for name, value in constants.items():
         info.define(name, str(value))
-    left_out = {f"include/{name.lower()}.glsl": None for name in _KINDS if name not in kinds}
-    return shaders.compile_compute(info, "style_strands.comp", left_out)
+    return shaders.compile_compute(info, "style_strands.comp", texts=style_text.texts(step_kinds))

@@ -10,9 +10,9 @@ import pytest
 from hair_addon.blender.gpu import shaders, strand_textures, uniforms
 from hair_addon.blender.gpu.strands import style_maker
 from hair_addon.core.geometry.strands import from_numpy
-from hair_addon.core.styling import bend, braid, clump, curl, frizz, lean, program_rows, smooth, trim, wet
+from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
+from hair_addon.core.styling.base import Cutter
 from hair_addon.core.styling.masks import Mask
-from hair_addon.core.styling.program import Cutter
 from hair_addon.core.styling.style_inputs import Inputs
 from tests.support import drawn_strands
 from tests.support.strands.styled import head
@@ -52,7 +52,7 @@ def hair(blender):
 @pytest.fixture
 def one_program(monkeypatch):
     """One program for all stacks: compiling takes longer than all else."""
-    monkeypatch.setattr(style_maker, "_kinds_of", lambda _program: tuple(style_maker._KINDS))
+    monkeypatch.setattr(style_maker, "_kinds_of", lambda _program: tuple(kinds.STEPS))
 
 
 def uploaded(strands):
@@ -196,10 +196,3 @@ def test_some_stacks_are_left_to_warp(hair, monkeypatch):
     assert not style_maker.can_style(hair.bound(curl.Settings(), point_count=style_maker.MOST_POINTS + 1))
     assert style_maker.can_style(hair.bound(curl.Settings(), frizz.Settings()))
     assert not style_maker.can_style(hair.bound(*[bend.Settings()] * (uniforms.MOST_STEPS + 1)))
-
-
-def test_every_kind_of_step_has_a_shader(hair):
-    kinds = {
-        value for name, value in vars(program_rows).items() if name.isupper() and name not in {"CHOICES", "NUMBERS"}
-    }
-    assert set(style_maker._KINDS.values()) == kinds

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What .strand files are compiled with, alike in C++, CUDA and GLSL: constants, and texts that follow from the kinds.
+
+`#include "bend.numbers"` declares the numbers of a step by their names in `NUMBERS` of its module, and `#include
+"all.strand"` includes the file of each kind of step and chooses among them.
+"""
+
+import re
+from collections.abc import Iterable
+
+from . import frizz, kinds, program_rows
+from .base import Step
+from .random_numbers import PURPOSES
+
+_ARRAY = re.compile(r"(\w+)\[(\d+)\]")
+
+
+def constants() -> dict[str, int]:
+    """{name: value} of what all .strand files know: kinds, places of numbers, purposes of random numbers."""
+
+    def bits(attribute):
+        return sum(1 << kinds.STEP_KINDS[step] for step, module in kinds.STEPS.items() if hasattr(module, attribute))
+
+    return {
+        **kinds.STEP_KINDS,
+        **{f"{name.upper()}_NUMBER": place for place, name in enumerate(program_rows.SHARED)},
+        **PURPOSES,
+        "WAVES": frizz.WAVES_AN_OCTAVE,
+        "MOST_OCTAVES": frizz.MOST_OCTAVES,
+        "NEEDING_CENTRE": bits("NEEDS_CENTRE"),  # of each kind a bit
+        "CHANGING_LENGTHS": bits("CHANGES_LENGTHS"),
+    }
+
+
+def texts(steps: Iterable[str]) -> dict[str, str]:
+    """{file: text} of the files that follow from the kinds of steps that a program has, of `kinds.STEPS`."""
+    present = [step for step in kinds.STEPS if step in set(steps)]
+    includes = [f'#include "{step.lower()}.strand"' for step in present]
+    choices = [f"  if (kind == {step}) {{\n    {step.lower()}_strand();\n  }}" for step in present]
+    chosen = "\n".join([*includes, "", "void apply_step()", "{", *choices, "}", ""])
+    return {"all.strand": chosen} | {f"{step.lower()}.numbers": _declarations(step) for step in present}
+
+
+def ordered(step: Step) -> list[float]:
+    """The own numbers of a step in the order in which kernels read them."""
+    values = dict(step.numbers)
+    found: list[float] = []
+    for name in kinds.STEPS[step.kind].NUMBERS:
+        array = _ARRAY.fullmatch(name)
+        found += values.pop(array[1])[: int(array[2])] if array else [values.pop(name)]
+    assert not values, f"{step.kind} does not know {', '.join(values)}"
+    return found
+
+
+def _declarations(step):
+    place = len(program_rows.SHARED)
+    lines = []
+    for name in kinds.STEPS[step].NUMBERS:
+        array = _ARRAY.fullmatch(name)
+        if array is None:
+            lines.append(f"float {name} = number_at({place});")
+        else:
+            lines.append(f"float {name};")
+            lines += [f"{array[1]}[{k}] = number_at({place + k});" for k in range(int(array[2]))]
+        place += int(array[2]) if array else 1
+    return "\n".join(lines) + "\n"
