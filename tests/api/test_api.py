@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The functions for scripts: their documented examples run, README's too, and what they cannot do is one sentence."""
+"""The functions for scripts: documented examples run, also those of docs/scripts.md; errors are one sentence."""
 
 import doctest
 import math
@@ -59,9 +59,10 @@ def examples_of(module):
     return sorted((test for test in found if test.examples), key=lambda test: test.lineno)
 
 
-def readme(language):
-    """The blocks of code of a language in README.md."""
-    return re.findall(rf"```{language}\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+def shown_code():
+    """The blocks of Python code in docs/scripts.md."""
+    text = (ROOT / "docs" / "scripts.md").read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 
 
 @pytest.fixture
@@ -103,9 +104,9 @@ def test_the_example_of_plain_arrays_runs_without_blender(tmp_path):
     run_python(WITHOUT_BLENDER + program, tmp_path)
 
 
-def test_examples_of_the_readme_run(tmp_path):
+def test_examples_of_the_documentation_run(tmp_path):
     """As they stand: the add-on registers itself in a checkout."""
-    in_blender, plain = readme("python")
+    in_blender, plain = shown_code()
     assert "import bpy" in in_blender and "bpy" not in plain
     run_python(in_blender, tmp_path)
     run_python(WITHOUT_BLENDER + plain, tmp_path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands that README and the manual show: they are understood, and those of README work."""
+"""Commands that the documentation shows: they are understood, and those of docs/command_line.md work."""
 
 import re
 import shlex
@@ -10,14 +10,16 @@ import pytest
 from hair_addon import command_line
 from tests.support.commands import HEAD, ROOT, run_here
 
+PAGE = ROOT / "docs" / "command_line.md"
 
-def test_readme_shows_commands_that_work(lit, tmp_path, monkeypatch):
-    """Those of its section, with less to do, one after the other in a folder that holds what they name."""
+
+def test_the_page_shows_commands_that_work(lit, tmp_path, monkeypatch):
+    """With less to do, one after the other in a folder that holds what they name."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "head.obj").write_bytes(HEAD.read_bytes())
     bpy.context.scene.render.resolution_percentage, bpy.context.scene.vellus.sample_count = 3, 1
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
     commands = re.findall(r"^python -m hair_addon (.*)$", text, re.MULTILINE)
     assert len(commands) >= 7
     for command in commands:
@@ -40,7 +42,7 @@ def commands_of(page):
 
 
 def test_pages_show_commands_that_are_understood(capfd):
-    pages = [ROOT / "README.md", ROOT / "docs" / "farm" / "README.md", *(ROOT / "docs" / "manual").glob("*.md")]
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     shown = [words for page in pages for words in commands_of(page)]
     assert len({words[0] for words in shown}) >= 8
     for words in shown:

@@ -30,6 +30,7 @@ def test_the_interface_has_us_spelling():
 ROOT = spoken.ADDON.parent
 PAGES = [
     *sorted(manual_pages.SOURCE.glob("*.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
     *(ROOT / name for name in ("README.md", "CHANGELOG.md", "docs/farm/README.md", "blend_samples/README.md")),
 ]
 

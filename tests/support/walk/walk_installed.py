@@ -20,7 +20,7 @@ import gpu
 import numpy as np
 
 MODULE = "bl_ext.user_default.vellus"
-README = Path(__file__).resolve().parents[3] / "README.md"
+SCRIPTS = Path(__file__).resolve().parents[3] / "docs" / "scripts.md"
 # In the order of `tests/api/test_api.py`: later examples use what earlier ones made.
 API_FILES = (
     "api_dynamics",
@@ -91,7 +91,7 @@ def _positions(curves):
 
 
 def scripts(_zip_path, folder):
-    """The code of README and of the docstrings, with the import that README gives for the extension."""
+    """The code of docs/scripts.md and of the docstrings, with the import that is given there for the extension."""
     bpy.ops.preferences.addon_enable(module=MODULE)
     api = importlib.import_module(f"{MODULE}.hair_addon.api")
     import warp  # there since the extension was enabled
@@ -99,7 +99,7 @@ def scripts(_zip_path, folder):
     warp.config.log_level = warp.LOG_WARNING  # what it says of loaded kernels is no part of an example
     os.chdir(folder)
     ran = 0
-    for block in re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL):
+    for block in re.findall(r"```python\n(.*?)```", SCRIPTS.read_text(encoding="utf-8"), re.DOTALL):
         bpy.ops.wm.read_homefile(use_empty=True)
         exec(block.replace("from hair_addon import api", f"from {MODULE}.hair_addon import api"), {})
         ran += 1
