@@ -5,7 +5,7 @@ import os
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from .api_blender import blender
 from .core.errors import HairError
@@ -14,13 +14,13 @@ from .core.geometry.mesh import TriMesh
 from .core.long_work import Progress
 from .core.params import Settings, declared, described, require_class
 
+S = TypeVar("S", bound=Settings)
+
 # Settings that refer to data in a .blend file.
 _OF_BLENDER = ("density_group", "density_image", "region_group", "region_attribute", "part_lines", "flow_lines")
 
 
-def changed[S: Settings](
-    settings_class: type[S], settings: S | None, changes: dict[str, Any], skip: Collection[str] = ()
-) -> S:
+def changed(settings_class: type[S], settings: S | None, changes: dict[str, Any], skip: Collection[str] = ()) -> S:
     """Return `Settings` with some fields changed, based on the defaults if None. Raises `HairError`.
 
     skip: names of fields that do not apply.

@@ -2,12 +2,14 @@
 """The Blender integration as functions of the Python interface use it: registered, or one sentence about why not."""
 
 import importlib.util
+from pathlib import Path
 from typing import Any
 
 from .core import lazy
 from .core.errors import HairError
 
 NO_BLENDER = "This needs Blender: run it in Blender's Python, or install the module bpy."
+ARRAYS_ONLY = "This installation of Vellus works on arrays alone: use the extension in Blender, or a checkout."
 
 
 class RegisteredBlender(lazy.Package):
@@ -21,7 +23,9 @@ class RegisteredBlender(lazy.Package):
 
 
 def require_blender() -> None:
-    """Raise `HairError` where Python has no Blender."""
+    """Raise `HairError` where Python has no Blender, or the package no integration."""
+    if not (Path(__file__).parent / "blender").is_dir():
+        raise HairError(ARRAYS_ONLY)
     try:
         is_there = importlib.util.find_spec("bpy") is not None
     except ValueError:  # a module that was made without one

@@ -9,13 +9,14 @@ window is drawn meanwhile.
 import threading
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from .errors import memory_as_sentence
 
 Progress = Callable[[str, float], None]  # told a step and the part of the work that is done
 Compute = Callable[[Progress], Any]
-type Work[T] = Generator[Compute, Any, T]
+T = TypeVar("T")
+Work = Generator[Compute, Any, T]
 
 
 class Stopped(Exception):
@@ -42,7 +43,7 @@ def part_of(progress: Progress, first: float, last: float) -> Progress:
     return lambda step, part: progress(step, first + (last - first) * part)
 
 
-def run_now[T](work: Work[T], progress: Progress = no_progress) -> T:
+def run_now(work: Work[T], progress: Progress = no_progress) -> T:
     """Run such a generator to its end; returns its result. progress: callback for each computation.
 
     After an error, of a computation or of progress, it is closed: what it had begun is undone by then.

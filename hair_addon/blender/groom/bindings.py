@@ -8,7 +8,7 @@ be dropped at any time: the next change of a guide then searches again.
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from bpy.types import Curves, Depsgraph
@@ -29,6 +29,8 @@ from .styled_hair import StyledHair
 
 if TYPE_CHECKING:
     from ...core.interpolation.guide_weights import Reach
+
+T = TypeVar("T")
 
 
 @dataclass
@@ -202,7 +204,7 @@ class BoundHair:
         self.shares[moved] = shares
 
 
-def _grown[T](value: T | None) -> T:
+def _grown(value: T | None) -> T:
     """What strands have once they grow: `pipeline` sees to that before it hands on a `BoundHair`."""
     if value is None:
         raise ValueError("These strands have not begun to grow.")

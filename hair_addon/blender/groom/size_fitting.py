@@ -5,6 +5,7 @@ Nothing else fits them again, so that hair is as thick in each frame of a surfac
 """
 
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 from bpy.types import Curves
@@ -17,7 +18,9 @@ from ..data.surfaces import Surface
 from ..settings import fitted_sizes, setting_properties
 from . import grown_guides, staleness
 
-type Mask = tuple[np.ndarray | None, Texture | None]
+S = TypeVar("S", bound=Settings)
+
+Mask = tuple[np.ndarray | None, Texture | None]
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class Fits:
 
 
 @dataclass(frozen=True)
-class Sized[S: Settings]:
+class Sized(Generic[S]):
     """Settings that are complete, the `staleness.root_key` of them, and their `Fits`."""
 
     settings: S

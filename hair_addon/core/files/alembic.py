@@ -13,7 +13,7 @@ Headers are bits that say which type a property has and how many samples; `_prop
 """
 
 import struct
-from collections.abc import Buffer, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
@@ -37,7 +37,7 @@ _LAYOUT_VERSION = 0
 _LIBRARY_VERSION = 10700  # whose files these are like: 1.7.0
 _MOST_INDEXED = 254  # entries of the table of metadata; others are written in full
 
-type Metadata = Mapping[str, str]
+Metadata = Mapping[str, str]
 
 
 @dataclass
@@ -112,7 +112,7 @@ class AlembicWriter:
         self.add_sample(made, [_encoded(texts)], len(texts))
         return made
 
-    def add_sample(self, target: Property, parts: Iterable[Buffer], count: int | None = None) -> None:
+    def add_sample(self, target: Property, parts: Iterable[ogawa.Data], count: int | None = None) -> None:
         """Write the next sample of a property: the bytes of its elements, in parts; count: of strings."""
         address, size, digest = self._container.sample(_bytes(parts))
         target.addresses.append(address)
@@ -225,7 +225,7 @@ def _encoded(texts):
     return b"".join(text.encode() + b"\0" for text in texts)
 
 
-def _bytes(parts: Iterable[Buffer]) -> Iterator[memoryview]:
+def _bytes(parts: Iterable[ogawa.Data]) -> Iterator[memoryview]:
     for part in parts:
         view = memoryview(np.ascontiguousarray(part) if isinstance(part, np.ndarray) else part)
         if view.nbytes:  # an empty view cannot be cast

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Transforms and curves as AbcGeom of [Alembic26] has them: objects of its schemas, and geometry parameters."""
 
-from collections.abc import Buffer, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import ogawa
 from .alembic import TYPES, AlembicWriter, Object, Property, serialized
 
 # How many values a parameter has: one, one for each curve, one for each point.
@@ -109,7 +110,7 @@ class CurvesWriter:
         return made
 
 
-def _measured(parts, bounds) -> Iterator[Buffer]:
+def _measured(parts, bounds) -> Iterator[ogawa.Data]:
     """Points in parts as the file has them; bounds: (2, 3) float64 that grow around them."""
     for part in parts:
         points = np.ascontiguousarray(part, np.float32)

@@ -17,7 +17,7 @@ from ..errors import HairError
 from . import plain_file
 
 # Name → (type of NumPy, shape).
-type Layout = Mapping[str, tuple[str, tuple[int, ...]]]
+Layout = Mapping[str, tuple[str, tuple[int, ...]]]
 
 TYPES = ("<f4", "<f8", "<i4", "<i8", "|u1")
 MOST_BYTES = 2**32 - 2**16  # of a file: longer ones would take another format

@@ -20,7 +20,7 @@ MOST_POINTS_OF_GROUP = 2**24 - 1
 MOST_CURVES_OF_GROUP = 2**22 - 1
 
 # Values at the points of some curves, one curve after another: those of a slice of all.
-type Rows = Callable[[slice], np.ndarray]
+Rows = Callable[[slice], np.ndarray]
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,12 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 from ..params import Settings, declared
 from .settings_file import GroomSettings
+
+S = TypeVar("S", bound=Settings)
 
 # Settings that name an object or an image of the scene, by their section; those of styles are looked up in each style.
 _NAMES_OF_OTHERS = {"guides": ("density_image", "flow_lines"), "hair": ("density_image", "part_lines")}
@@ -21,7 +24,7 @@ def scaled(settings: GroomSettings, factor: float) -> GroomSettings:
     return replace(settings, **sections, styles=tuple(_scaled(style, factor) for style in settings.styles))
 
 
-def _scaled[S: Settings](settings: S, factor: float) -> S:
+def _scaled(settings: S, factor: float) -> S:
     lengths = {
         name: min(max(value * factor, details.low), details.high)
         for name, details, value in ((n, d, getattr(settings, n)) for n, _default, d in declared(type(settings)))

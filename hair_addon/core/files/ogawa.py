@@ -12,8 +12,12 @@ All other numbers are little-endian and have 64 bits.
 
 import hashlib
 import struct
-from collections.abc import Buffer, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import BinaryIO
+
+import numpy as np
+
+Data = bytes | bytearray | memoryview | np.ndarray  # what a file is written from
 
 EMPTY_GROUP = 0
 EMPTY_DATA = 1 << 63
@@ -24,7 +28,7 @@ _HEADER = struct.Struct("<5sB2sQ")
 _NUMBER = struct.Struct("<Q")
 
 
-def digest_of(*parts: Buffer) -> bytes:
+def digest_of(*parts: Data) -> bytes:
     """Return the digest of the bytes of all parts: any good hash will do, as readers only compare them."""
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
     for part in parts:
@@ -49,7 +53,7 @@ class OgawaWriter:
         self._append(_NUMBER.pack(len(content)), content)
         return address
 
-    def sample(self, parts: Iterable[Buffer]) -> tuple[int, int, bytes]:
+    def sample(self, parts: Iterable[Data]) -> tuple[int, int, bytes]:
         """Write a sample, its digest and then its content in parts; returns its (address, bytes of content, digest).
 
         One that the file has is not kept again, and one without content has no place.

@@ -7,8 +7,11 @@ import stat
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from ..errors import HairError, cause_of
+
+T = TypeVar("T")
 
 # A program that looks at a file, such as a virus scanner, keeps others from it on Windows for a moment.
 _PAUSES = (0.05, 0.2)  # [s] between the tries
@@ -41,7 +44,7 @@ def read(path: Path, most: int) -> bytes:
     return data
 
 
-def tried[T](action: Callable[[], T]) -> T:
+def tried(action: Callable[[], T]) -> T:
     """Return what an action on a file returns, which is repeated twice while another program holds the file."""
     for pause in _PAUSES:
         try:

@@ -10,7 +10,7 @@ import json
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, TypeVar, get_type_hints
 
 from ..dynamics.rod.settings import DynamicsSettings
 from ..errors import HairError
@@ -21,6 +21,8 @@ from ..shading.tables import lookup_tables
 from ..styling.base import StyleSettings
 from ..styling.kinds import KINDS, LABELS, MOST_STYLES, kind_of
 from .whole_file import whole_file
+
+S = TypeVar("S", bound=Settings)
 
 FORMAT = "Vellus groom settings"
 VERSION = 3
@@ -181,7 +183,7 @@ def _style(values, path, place):
     return name, to_settings(values, KINDS[kind], path, f"{place}.")
 
 
-def to_settings[S: Settings](
+def to_settings(
     values: dict[str, Any],
     settings_class: type[S],
     path: str | Path,

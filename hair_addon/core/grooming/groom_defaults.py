@@ -10,6 +10,7 @@ brows are seen: as thick as in proportion to the mean distance of their roots. D
 """
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from ..errors import HairError
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, interpolate
 from ..geometry.texture import Texture
 from ..params import Settings, from_surface
+
+S = TypeVar("S", bound=Settings)
 
 # Fractions of the square root of the area: on closed and flat surfaces, and on a dome. A human scalp has 0.055 m².
 FUR_LENGTH, DOME_LENGTH = 0.06, 0.52
@@ -83,7 +86,7 @@ def grown_area(mesh: TriMesh, density: np.ndarray | None = None, texture: Textur
     return float(_mean_weights(mesh, density, texture) @ mesh.areas)
 
 
-def complete[S: Settings](
+def complete(
     settings: S,
     mesh: TriMesh,
     density: np.ndarray | None = None,

@@ -14,7 +14,11 @@ a straight line: it would begin vertically, and points would jump where its begi
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+<<<<<<< HEAD
 from typing import Any
+=======
+from typing import TypeVar
+>>>>>>> 4ce45a87 (A wheel of the half that works on arrays, for Python 3.11 and later, with types; a picture of the data flow by a script)
 
 import numpy as np
 
@@ -151,7 +155,10 @@ def has_effect(settings: StyleSettings) -> bool:
     return settings.is_on and settings.amount > 0.0 and not is_profile_zero
 
 
-def scaled[S: StyleSettings](settings: S, factor: float) -> S:
+S = TypeVar("S", bound=StyleSettings)
+
+
+def scaled(settings: S, factor: float) -> S:
     """Style settings with all lengths multiplied by a factor, within their ranges."""
     changes = {}
     for field in fields(settings):

@@ -3,17 +3,19 @@
 
 from collections.abc import Collection
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, TypeVar
 
 from ..params import Param
 from . import base, braid, clump, wet
 from .base import StyleSettings
 
+S = TypeVar("S", bound=StyleSettings)
+
 _FEWEST_SPACINGS = 4.0  # smaller locks have too few strands
 _LOCKS: dict[type[StyleSettings], str] = {clump.Settings: "size", braid.Settings: "size", wet.Settings: "lock"}
 
 
-def fitted[S: StyleSettings](settings: S, factor: float, strand_spacing: float = 0.0, kept: Collection[str] = ()) -> S:
+def fitted(settings: S, factor: float, strand_spacing: float = 0.0, kept: Collection[str] = ()) -> S:
     """A style with its lengths multiplied by a factor; locks have a size of 4 strand spacings [m] at least.
 
     kept: names of settings that stay as they are.
