@@ -70,10 +70,17 @@ def is_under_way() -> bool:
     return bool(_under_way)
 
 
+def processor_count() -> int:
+    """Number of CPUs that this process may use, at least one."""
+    if hasattr(os, "process_cpu_count"):  # since Python 3.13
+        return os.process_cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def _thread_count(most):
     """Number of threads to start: as many as CPUs, minus those already loading; at least one."""
     others = sum(loading.thread_count for loading in tuple(_under_way))
-    return max(1, min(most, (os.process_cpu_count() or 1) - others))
+    return max(1, min(most, processor_count() - others))
 
 
 class _Loading:

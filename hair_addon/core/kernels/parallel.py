@@ -7,7 +7,6 @@ sums over rows. On a GPU either is one launch.
 """
 
 import itertools
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from . import kernel_cache
+from . import kernel_cache, kernel_setup
 from .checks import require_count
 
 PARTS_PER_CORE = 2  # for load balancing, as one core may have other work
@@ -97,7 +96,7 @@ def launch_shares(
 
 def _core_count(device):
     """How many launches run at once on a device."""
-    return (os.process_cpu_count() or 1) if device.is_cpu else 1
+    return kernel_setup.processor_count() if device.is_cpu else 1
 
 
 def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=None):
