@@ -10,7 +10,7 @@ import functools
 import inspect
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import bpy
 from bpy.types import ID, Curves, Mesh, Object, Scene
@@ -19,13 +19,16 @@ from ...core.long_work import Work
 from ..host.notices import name_of
 from . import thin_hair
 
+P = ParamSpec("P")
+T = TypeVar("T")
+
 # Of Blender's windows, and of files that are linked: not the scene's. And all together.
 _NOT_OURS = {"all_ids", "libraries", "screens", "window_managers", "workspaces"}
 
 _open: list["_Change"] = []  # changes that are under way, the outermost first; none between calls
 
 
-def whole[**P, T](work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
+def whole(work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
     """Work in steps that leaves nothing behind where it fails or is stopped.
 
     What its arguments name is what it changes: objects, Curves, and their surfaces.
@@ -54,7 +57,7 @@ def whole[**P, T](work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
     return working
 
 
-def whole_if_new[**P, T](work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
+def whole_if_new(work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
     """`whole` of work that makes something, as its argument `target` is None; other work is done at each update."""
     guarded, signature = whole(work), inspect.signature(work)
 

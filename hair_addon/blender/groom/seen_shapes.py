@@ -15,7 +15,7 @@ from ...core.geometry.affine import Affine
 from ..data.strands import curves, posed_strands, stored_roots
 from ..data.surfaces import Surface
 
-type Points = Callable[[np.ndarray], np.ndarray]
+Points = Callable[[np.ndarray], np.ndarray]
 
 
 def kept_by(strands: Curves, surface: Surface, change: Affine) -> Points | None:

@@ -160,7 +160,7 @@ def nurbs(
     own, along, controls, places = (np.concatenate(group) for group in kept)
     sorted_rows = np.lexsort((along, own))
     controls, places = controls[sorted_rows], places[sorted_rows]
-    segments = np.bincount(own, minlength=len(counts))
+    segments = np.bincount(own.astype(np.intp), minlength=len(counts))
     if not is_rational:
         return Segments(controls, segments, places)
     return Segments(controls[..., :-1] / controls[..., -1:], segments, places, controls[..., -1])

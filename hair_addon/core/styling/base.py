@@ -14,11 +14,7 @@ a straight line: it would begin vertically, and points would jump where its begi
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-<<<<<<< HEAD
-from typing import Any
-=======
-from typing import TypeVar
->>>>>>> 4ce45a87 (A wheel of the half that works on arrays, for Python 3.11 and later, with types; a picture of the data flow by a script)
+from typing import Any, TypeVar
 
 import numpy as np
 
