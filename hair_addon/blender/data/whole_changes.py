@@ -91,6 +91,11 @@ def keep_copy(curves_object: Object) -> None:
         _open[0].keep_copy(curves_object)
 
 
+def kept_copies() -> set[int]:
+    """Session UIDs of the copies that `keep_copy` has made of objects and their data, which nobody is to use."""
+    return {uid for change in _open for uid in change.copies()}
+
+
 def _next(steps, answer):
     """(The next step, None), or (None, the result)."""
     try:

@@ -11,7 +11,7 @@ import bpy
 from bpy.types import Curves, Depsgraph, Object
 
 from ...core.errors import HairError
-from ..data import scene, surface_space
+from ..data import scene, surface_space, whole_changes
 from ..data.strands import curves, curves_objects
 from ..host.caches import Cache
 from ..host.notices import name_of
@@ -52,13 +52,16 @@ def follow() -> None:
 
 
 def _ours() -> list[Curves]:
-    return [one for one in bpy.data.hair_curves if one.vellus.kind != "NONE" and one.library is None]
+    kept = whole_changes.kept_copies()
+    ours = (one for one in bpy.data.hair_curves if one.vellus.kind != "NONE" and one.library is None)
+    return [one for one in ours if one.session_uid not in kept]
 
 
 def _users() -> dict[Curves, list[Object]]:
     found: dict[Curves, list[Object]] = {}
+    kept = whole_changes.kept_copies()
     for user in bpy.data.objects:
-        if user.type == "CURVES":
+        if user.type == "CURVES" and user.session_uid not in kept:
             found.setdefault(user.data, []).append(user)
     return found
 

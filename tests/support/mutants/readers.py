@@ -299,7 +299,7 @@ def readers():
         "catalogs": Reader(
             "blender/io/asset_catalogs.py",
             catalogs,
-            lambda path: asset_catalogs.identifier(path.parent, "Hair/Short"),
+            lambda path: asset_catalogs.read(path.parent, "Hair/Short").identifier,
             _is_uuid,
             path=asset_catalogs.FILE,
             is_text=True,
