@@ -15,6 +15,9 @@ LAUNCHING = "core/kernels"
 # A container of values is no place, as a dictionary is none.
 CONTAINER = "blender/host/caches.py"
 
+# What does nothing but turn an error into a sentence is no place either, as a try statement is none.
+SENTENCES = {"core/errors.py", "blender/gpu/driver_textures.py"}
+
 
 class Way:
     """Files in order of their first call, in all threads, while it is entered as a context; it may be so again.
@@ -70,6 +73,6 @@ def _place(frame):
     if not path.is_relative_to(ADDON) or frame.f_code.co_name == "<module>":
         return None
     name = path.relative_to(ADDON).as_posix()
-    if name == CONTAINER:
+    if name == CONTAINER or name in SENTENCES:
         return None
     return LAUNCHING if name.startswith(f"{LAUNCHING}/") else name
