@@ -41,6 +41,11 @@ def pytest_collection():
         gc.freeze()
 
 
+def pytest_unconfigure():
+    """Let go what was frozen: a Blender in which tests ran would say at its end that it was not freed."""
+    gc.unfreeze()
+
+
 def pytest_collection_modifyitems(items):
     """Begin with the files that take longest."""
     items.sort(key=lambda item: item.path.name not in LONG_FILES)
