@@ -34,9 +34,8 @@ OTHERS = {
     "integers on points": ("INT", "POINT"),
     "text": ("STRING", "CURVE"),
 }
-# Numbers that can be drawn: strands with larger ones are left out of pictures, and are refused where all are so.
 INTEGERS = {"negative": -1, "far out of range": 2**31 - 1, "just out of range": 642}
-FLOATS = {"not a number": np.nan, "infinite": np.inf, "negative": -1.0, "huge": 1e12}
+FLOATS = {"not a number": np.nan, "infinite": np.inf, "negative": -1.0, "huge": 1e30}
 
 
 def retype(datablock, name, kind):

@@ -24,23 +24,17 @@ SIZED = {"attract_guides": ["clearance"]}  # values in metres, fitted to the sur
 @pytest.fixture(scope="module")
 def placed_files(blender, tmp_path_factory):
     """A function of one of `PLACES`: the file of a surface there, with a plane to trim by."""
-    folder, files = tmp_path_factory.mktemp("placed"), {}
+    return placed_hair.files_in(tmp_path_factory.mktemp("placed"), _add_cutter)
 
-    def file_of(place):
-        if place not in files:
-            bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-            body = placed_hair.grow(place)
-            size, middle = placed_hair.world_scale(body), seen().vertices.mean(axis=0)
-            bpy.ops.mesh.primitive_plane_add(location=middle, rotation=(0.4, 0.2, 0.0))
-            bpy.context.object.name = "Cutter"
-            bpy.context.object.scale = (size, size, size)
-            group = body.vertex_groups.new(name="top")
-            group.add(range(0, len(body.data.vertices), 3), 1.0, "REPLACE")
-            files[place] = str(folder / f"{len(files)}.blend")
-            bpy.ops.wm.save_as_mainfile(filepath=files[place], copy=True)
-        return files[place]
 
-    return file_of
+def _add_cutter(body):
+    """A plane to trim by, and a vertex group."""
+    size, middle = placed_hair.world_scale(body), seen().vertices.mean(axis=0)
+    bpy.ops.mesh.primitive_plane_add(location=middle, rotation=(0.4, 0.2, 0.0))
+    bpy.context.object.name = "Cutter"
+    bpy.context.object.scale = (size, size, size)
+    group = body.vertex_groups.new(name="top")
+    group.add(range(0, len(body.data.vertices), 3), 1.0, "REPLACE")
 
 
 def after_tool(path, tool, values, is_applied):

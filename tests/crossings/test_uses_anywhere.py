@@ -30,17 +30,7 @@ FROM_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # ax
 @pytest.fixture(scope="module")
 def placed_files(blender, tmp_path_factory):
     """A function of one of `PLACES`: the file of a surface there, made once."""
-    folder, files = tmp_path_factory.mktemp("placed"), {}
-
-    def file_of(place):
-        if place not in files:
-            bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-            placed_hair.grow(place)
-            files[place] = str(folder / f"{len(files)}.blend")
-            bpy.ops.wm.save_as_mainfile(filepath=files[place], copy=True)
-        return files[place]
-
-    return file_of
+    return placed_hair.files_in(tmp_path_factory.mktemp("placed"))
 
 
 def opened(path, is_applied=False):

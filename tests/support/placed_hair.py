@@ -14,6 +14,25 @@ from tests.support.exchange.imported import curves_object, select
 GUIDES, STRANDS = 8, 24
 
 
+def files_in(folder, add=lambda _body: None):
+    """A function of one of `PLACES`: the path of a file of hair on a surface there, made once in a folder.
+
+    add: adds to the scene what else the file is to hold.
+    """
+    files = {}
+
+    def file_of(place):
+        if place not in files:
+            bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+            bpy.context.preferences.edit.use_global_undo = True
+            add(grow(place))
+            files[place] = str(folder / f"{len(files)}.blend")
+            bpy.ops.wm.save_as_mainfile(filepath=files[place], copy=True)
+        return files[place]
+
+    return file_of
+
+
 def add_body():
     """A mesh of 1 m without any symmetry, off its origin."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=0.5)

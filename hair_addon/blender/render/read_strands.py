@@ -43,7 +43,7 @@ def read(datablock: Any) -> ReadStrands:
         raise HairError('"{name}" has no strands to draw.', name=name_of(datablock))
     points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
     wetness, is_smooth, note = curves.read_wetness(datablock), attributes.are_smooth(datablock), None
-    is_sound = _are_sound(points, radii, counts)
+    is_sound = _are_sound(points, counts)
     if is_sound is not None:
         note = _left_out(datablock, is_sound)
         of_point = np.repeat(is_sound, counts)
@@ -62,16 +62,16 @@ def read(datablock: Any) -> ReadStrands:
     return ReadStrands(points, radii, randoms, wetness, is_sound, note)
 
 
-def _are_sound(points, radii, counts):
+def _are_sound(points, counts):
     """(N,) bool: whether all of a curve can be drawn; None where all curves can be. points: (M, 3), curve by curve."""
     flat = points.ravel()
     # The sum of squares tells it in a tenth of the time, where it is not that large itself.
     with np.errstate(over="ignore", invalid="ignore"):
         is_small = flat @ flat <= notices.LARGEST
-    if is_small and radii.max(initial=0.0) <= notices.LARGEST:
+    if is_small:
         return None
     with np.errstate(invalid="ignore"):
-        is_point_sound = (np.abs(points) <= notices.LARGEST).all(axis=1) & (radii <= notices.LARGEST)
+        is_point_sound = (np.abs(points) <= notices.LARGEST).all(axis=1)
     if is_point_sound.all():
         return None
     broken = np.repeat(np.arange(len(counts)), counts)[~is_point_sound]

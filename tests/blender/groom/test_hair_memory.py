@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands that take much of the free memory: refused, asked for or said, and none is lost where there is not enough."""
 
+import ctypes
 import gc
 from pathlib import Path
 from types import SimpleNamespace
@@ -44,15 +45,16 @@ def resident(name):
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="the system does not tell what was used at most")
 @pytest.mark.parametrize(("strands", "point_count"), [(60_000, 41), (10_000, 257)])
 def test_strands_take_what_is_estimated(guides, strands, point_count):
-    """While they are made, without what styles and viewports add: never more. Less where memory of before is taken."""
+    """While they are made, without what styles and viewports add: at least half of it, and never more."""
     api.interpolate_hair(guides.data, strand_count=100, point_count=point_count)  # loads what is to be loaded
     gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)  # what tests before have freed would be taken again, and not be seen
     Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
     before = resident("VmRSS")
     hair = api.interpolate_hair(guides.data, strand_count=strands, point_count=point_count)
     taken = resident("VmHWM") - before
     estimate = cost.strand_bytes(strands, point_count, hair.vellus.hair.neighbour_limit)
-    assert 0.25 * estimate < taken < 1.05 * estimate, (taken / estimate, taken)
+    assert 0.5 * estimate < taken < 1.05 * estimate, (taken / estimate, taken)
 
 
 def test_more_than_there_is_is_refused_before_anything_is_made(hair, free):

@@ -4,6 +4,7 @@
 import numpy as np
 
 from ....core import geometry, kernels
+from ...host import notices
 
 # Data types that can be read as arrays: (name of the value property, components, dtype).
 LAYOUTS = {
@@ -115,8 +116,8 @@ def repeats(values, row):
 
 
 def valid_radii(radii):
-    """Radii as they are, Blender's own default in place of negative and non-finite ones."""
-    return np.where((radii >= 0.0) & (radii < np.inf), radii, np.float32(RADIUS))
+    """Radii as they are, Blender's own default in place of negative ones and of those too large to compute with."""
+    return np.where((radii >= 0.0) & (radii <= notices.LARGEST), radii, np.float32(RADIUS))
 
 
 def curve_types(curves):

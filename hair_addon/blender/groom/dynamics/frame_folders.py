@@ -237,11 +237,6 @@ def have_changed(guides: Curves) -> None:
 
 
 def has_frames(guides: Curves) -> bool:
-    """Whether some guides have baked frames: panels ask with every redraw, so files are read the first time alone.
-
-    As where the add-on was enabled while the file is open: nothing else has looked for them then.
-    """
-    if folder_cache.get(guides.session_uid) is None:
-        frames_of(guides)
+    """Whether frames of some guides are known: panels ask with every redraw, so no file is read."""
     _folder, baked = folder_cache.get(guides.session_uid) or (None, None)
     return baked is not None and baked.manifest is not None
