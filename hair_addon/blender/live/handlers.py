@@ -323,14 +323,12 @@ def _hide_drawn_hair():
 
 
 def _take_over():
-    """Draw what Blender drew while the add-on was disabled, and know which frames are baked."""
+    """Draw what Blender drew while the add-on was disabled."""
     older_files.renew()
     file_changes.follow(bpy.data.scenes)
     _hide_drawn_hair()
     composite.follow_all()
     looks.follow_guides(bpy.context.view_layer)
-    for guides in frame_folders.simulating():
-        frame_folders.frames_of(guides)
 
 
 @persistent

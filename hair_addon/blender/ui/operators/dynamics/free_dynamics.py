@@ -20,7 +20,9 @@ class VELLUS_OT_free_dynamics(HairOperator, bpy.types.Operator):
     def applies(cls, context):
         cls.poll_message_set("Select guides whose frames have been baked.")
         guides = guides_of(context.object)
-        return guides is not None and frame_folders.has_frames(guides)
+        # Read once and kept: nothing else has looked where the add-on was enabled while the file is open.
+        baked = None if guides is None else frame_folders.frames_of(guides)
+        return baked is not None and baked.manifest is not None
 
     def invoke(self, context, event):
         """Ask first."""
