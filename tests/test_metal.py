@@ -9,7 +9,7 @@ from pathlib import Path
 
 SHADERS = Path(__file__).resolve().parents[1] / "shaders"
 STYLES = SHADERS.parent / "hair_addon" / "core" / "styling"
-SOURCES = sorted([*SHADERS.glob("*.*"), *SHADERS.glob("include/*.glsl"), *STYLES.glob("*.strand")])
+SOURCES = sorted([*SHADERS.rglob("*.*"), *STYLES.glob("*.strand")])
 GLSL = [path for path in SOURCES if path.suffix != ".md"]
 
 # Keywords of C++ and of the language that GLSL lets be names, and what Blender's backend defines as macros.

@@ -74,13 +74,13 @@ def beside_sidebar(walk, name):
 
 def test_it_comes_to_its_end(walk):
     walk.assert_done()
-    assert [line for line in walk.complaints() if "display.frag" not in line] == []
+    assert [line for line in walk.complaints() if "picture/display.frag" not in line] == []
 
 
 def test_a_broken_shader_is_told_once_and_the_viewport_goes_on(walk):
-    told = [line for line in walk.complaints() if "display.frag" in line]
+    told = [line for line in walk.complaints() if "picture/display.frag" in line]
     assert len(told) == 1
-    assert re.search(r"include/display_place\.glsl:8: .*nonsense", told[0])
+    assert re.search(r"picture/display_transform\.glsl:8: .*nonsense", told[0])
     view = walk.facts["steps"]["mended"]["view"]
     names = ("broken", "broken_again", "mended_bare")
     broken, again, bare = (part(beside_sidebar(walk, name), view) for name in names)

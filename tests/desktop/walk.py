@@ -328,7 +328,7 @@ def twins():
 def break_shader():
     """A driver that refuses the shader that lays hair over the viewport: twice, and mended again."""
     shaders = addon().gpu.shaders
-    file = shaders.FOLDER / "include" / "display_place.glsl"
+    file = shaders.FOLDER / "picture" / "display_transform.glsl"
     text = file.read_text()
     file.write_text(text.replace("return log2", "return nonsense + log2"))
     shaders.program_cache.invalidate((addon().gpu.scene_programs.display_program.__wrapped__, ()))

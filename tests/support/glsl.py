@@ -12,16 +12,16 @@ _COMPONENTS = {"float": 1, "vec2": 2, "vec3": 3, "vec4": 4}
 
 # The parts of a shading model that are no function of their arguments.
 _MAIN = (
-    "include/shade_strand.glsl",
-    "include/arrival.glsl",
-    "include/arrival_on_strand.glsl",
-    "include/light_grid.glsl",
-    "include/shadow.glsl",
-    "include/strand_samples.glsl",
-    "include/world.glsl",
-    "include/hair_return.glsl",
-    "include/this_place.glsl",
-    "include/segment.glsl",
+    "fibre/shade_strand.glsl",
+    "light/irradiance.glsl",
+    "light/strand_irradiance.glsl",
+    "light/light_grid.glsl",
+    "shadows/shadow.glsl",
+    "visibility/strand_samples.glsl",
+    "light/world.glsl",
+    "fibre/ambient_response.glsl",
+    "visibility/strand_hit.glsl",
+    "visibility/segment.glsl",
 )
 
 
@@ -40,7 +40,7 @@ def source(*names):
 def evaluate(text, returns, expression, *, textures=None, volumes=(), structs="", blocks=None, **inputs):
     """Values of a GLSL expression, (N,) or (N, components) float32.
 
-    text: GLSL before the expression, such as `source("include/fibre.glsl")`; returns: the expression's type;
+    text: GLSL before the expression, such as `source("fibre/fibre.glsl")`; returns: the expression's type;
     inputs: (N,) or (N, 2..4) arrays that the expression knows by their names, integers as int and the rest as float or
     vec; textures: {sampler: GPUTexture}; volumes: samplers that are three-dimensional; structs: the text that declares
     the types of blocks; blocks: uniform blocks, {instance: (type, record)}.
@@ -78,7 +78,7 @@ def _program(text, returns, expression, inputs, textures, volumes, structs, bloc
         info.sampler(slot, "FLOAT_3D" if name in volumes else "FLOAT_2D", name)
     reads = "".join(_read(name, values) for name, values in inputs.items())
     zeros = ", 0.0" * (4 - _COMPONENTS[returns])
-    info.vertex_source(shaders.expand("cover.vert")[0])
+    info.vertex_source(shaders.expand("picture/cover.vert")[0])
     info.fragment_source(f"{text}\nvoid main()\n{{\n{reads}  color = vec4({expression}{zeros});\n}}\n")
     info.fragment_out(0, "VEC4", "color")
     return gpu.shader.create_from_info(info)

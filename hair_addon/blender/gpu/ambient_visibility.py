@@ -139,8 +139,7 @@ def _view_of_surface(surface):
 class _Target:
     """Textures that visibility is added up in, a texel for each place.
 
-    is_in_bytes: whether all lights are added at once, and what strands see is kept as shaders/include/seen_bytes.glsl
-    has it.
+    is_in_bytes: whether all lights are added at once and stored in bytes: see shaders/light/visibility_bytes.glsl.
     """
 
     def __init__(self, place, is_in_bytes=False):

@@ -170,7 +170,7 @@ def runs_of_strand(record):
 
 
 # Which of the strands are walked along, and how many in how many: WALK_ALL and the like of
-# shaders/include/walk_segment.glsl.
+# shaders/visibility/rasterize_segment.glsl.
 WALK_ALL, WALK_FIRST, WALK_OTHERS = range(3)
 _FIRST_SHARE = 8
 
@@ -234,7 +234,7 @@ def resolve(picture, samples_per_side):
 
 
 def cover(program):
-    """Run a bound program whose vertex shader is cover.vert over the whole framebuffer."""
+    """Run a bound program whose vertex shader is picture/cover.vert over the whole framebuffer."""
     _cover_vertices().draw(program)
 
 

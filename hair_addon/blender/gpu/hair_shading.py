@@ -15,10 +15,10 @@ from . import scene_programs, uniforms
 
 # What the two modes of the Marschner model read; in the energy-conserving one M is evaluated.
 _TABLES = {
-    "classic": ("marschner.comp", ("m", "n", "n_trt")),
-    "energy": ("energy_conserving.comp", ("n", "n_trt", "n_res")),
+    "classic": ("fibre/marschner.comp", ("m", "n", "n_trt")),
+    "energy": ("fibre/energy_conserving.comp", ("n", "n_trt", "n_res")),
 }
-_VARIED = {"classic": "marschner_varied.comp", "energy": "energy_conserving_varied.comp"}
+_VARIED = {"classic": "fibre/marschner_varied.comp", "energy": "fibre/energy_conserving_varied.comp"}
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Shading:
 
 @dataclass(frozen=True)
 class Mix:
-    """Which share of a strand's light a `Shading` has: constants of shaders/include/mixed_samples.glsl."""
+    """Which share of a strand's light a `Shading` has: constants of shaders/fibre/mixed_looks.glsl."""
 
     wetness_range: tuple  # of the driest look and of the wettest
     is_wet: bool  # the share of the wettest, or of the driest
@@ -96,14 +96,14 @@ def _opacity(forward):
 def kajiya_kay_shading(settings):
     """The Kajiya-Kay model, ready to draw. The cylinder is opaque: half of its scattering is forward."""
     forward = 0.5 * kajiya_kay.mean_albedo(settings)
-    return _shading("kajiya_kay.comp", {"settings": settings}, {}, forward)
+    return _shading("fibre/kajiya_kay.comp", {"settings": settings}, {}, forward)
 
 
 def kajiya_kay_strand_shading(settings, variation):
     """The same for varied strands: `kajiya_kay.StrandSettings` and `strand_variation.Settings`."""
     forward = 0.5 * kajiya_kay.mean_albedo_of_strands(settings, strand_variation.sample_sigma_a(variation))
     blocks = {"settings": settings, "variation": variation}
-    return _shading("kajiya_kay_varied.comp", blocks, {}, forward, is_varied=True)
+    return _shading("fibre/kajiya_kay_varied.comp", blocks, {}, forward, is_varied=True)
 
 
 def marschner_shading(tables):
@@ -128,7 +128,7 @@ def marschner_strand_shading(tables):
         arrays |= {"n_g_slices": slices.n_g, "dual_table": tables.dual}
     file = _VARIED[tables.settings.mode]
     if slices.n_trt is not None:
-        file, arrays["n_trt_slices"] = "marschner_elliptic.comp", slices.n_trt
+        file, arrays["n_trt_slices"] = "fibre/marschner_elliptic.comp", slices.n_trt
     deep = _deep(tables.settings, tables.forward, tables.backward)
     shading = _shading(file, blocks, arrays, *deep, is_varied=True)
     return replace(shading, fibre=_fibre(tables.settings, tables.variation))

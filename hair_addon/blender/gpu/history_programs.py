@@ -5,18 +5,18 @@ import gpu
 
 from . import shaders, uniforms
 
-BLOCK_SIDE = 8  # pixels: BLOCK_SIDE of shaders/include/history_blocks.glsl
+BLOCK_SIDE = 8  # pixels: BLOCK_SIDE of shaders/picture/history_blocks.glsl
 
 
 @shaders.kept
 def blocks_program():
-    """The program of the mean and deviation of each block of a picture's pixels: see history_blocks.frag."""
-    return _filter("history_blocks.frag", ("picture",), (("mean", "VEC4"), ("deviation", "VEC4")), ("weight",))
+    """The program of the mean and deviation of each block of a picture's pixels: see picture/history_blocks.frag."""
+    return _filter("picture/history_blocks.frag", ("picture",), (("mean", "VEC4"), ("deviation", "VEC4")), ("weight",))
 
 
 @shaders.kept
 def carry_program():
-    """The program that moves the previous picture to where its contents are now: see history_carry.frag."""
+    """The program that moves the previous picture to where its contents are now: see picture/history_carry.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.HISTORY.source)
     info.uniform_buf(0, "History", "history")
@@ -26,14 +26,14 @@ def carry_program():
     of_light = ("light_before", "light_now")
     for slot, name in enumerate(("before", "before_passes", *of_blocks, "motion", *of_light), start=2):
         info.sampler(slot, "FLOAT_2D", name)
-    return shaders.compile_drawing(info, "history_carry.vert", "history_carry.frag", _PICTURE)
+    return shaders.compile_drawing(info, "picture/history_carry.vert", "picture/history_carry.frag", _PICTURE)
 
 
 @shaders.kept
 def mix_program():
-    """The program that blends carried pixels with the passes so far: see history_mix.frag."""
+    """The program that blends carried pixels with the passes so far: see picture/history_mix.frag."""
     samplers = ("sums", "carried", "carried_passes")
-    return _filter("history_mix.frag", samplers, _PICTURE, ("weight", "pass_count", "part_left"))
+    return _filter("picture/history_mix.frag", samplers, _PICTURE, ("weight", "pass_count", "part_left"))
 
 
 _PICTURE = (("color", "VEC4"), ("passes", "FLOAT"))
@@ -45,4 +45,4 @@ def _filter(fragment, samplers, targets, constants):
         info.push_constant("FLOAT", name)
     for slot, name in enumerate(samplers):
         info.sampler(slot, "FLOAT_2D", name)
-    return shaders.compile_drawing(info, "cover.vert", fragment, targets)
+    return shaders.compile_drawing(info, "picture/cover.vert", fragment, targets)

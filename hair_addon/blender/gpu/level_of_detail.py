@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Level of detail in viewports: with distance, fewer strands, thicker in proportion, with fewer points.
 
-Consecutive indices are a uniform subset of all strands (drawn_strand.glsl) [Cook07]; their number changes one by one
-with the distance, without popping. Each pass of a picture uses another subset: at rest all strands contribute.
+Consecutive indices are a uniform subset of all strands (shaders/strands/level_of_detail.glsl) [Cook07]; their number
+changes one by one with the distance, without popping. Each pass of a picture uses another subset: at rest all strands
+contribute.
 """
 
 import numpy as np

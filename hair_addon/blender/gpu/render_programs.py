@@ -10,15 +10,15 @@ FILM_FORMAT = "RGBA32F"  # of sums of samples
 
 @shaders.kept
 def film_program():
-    """The compute program that adds the samples of `picture` to a film: see film.comp."""
-    return _film("film.comp", (("picture", "FLOAT_2D"),))
+    """The compute program that adds the samples of `picture` to a film: see picture/film.comp."""
+    return _film("picture/film.comp", (("picture", "FLOAT_2D"),))
 
 
 @shaders.kept
 def film_depth_program():
-    """The same for data passes: see film_depth.comp."""
+    """The same for data passes: see picture/film_depth.comp."""
     samplers = (("segments", "UINT_2D"), ("depths", "UINT_2D"))
-    return _film("film_depth.comp", samplers, (("VEC4", "view_to_clip"),))
+    return _film("picture/film_depth.comp", samplers, (("VEC4", "view_to_clip"),))
 
 
 def _film(file, samplers, constants=()):
@@ -34,8 +34,8 @@ def _film(file, samplers, constants=()):
 
 @shaders.kept
 def strand_arrival_program():
-    """The compute program of light visibility from strands: see strand_arrival.comp."""
-    return shaders.compile_compute(scene_programs.strand_samples_info(), "strand_arrival.comp")
+    """The compute program of light visibility from strands: see light/strand_irradiance.comp."""
+    return shaders.compile_compute(scene_programs.strand_samples_info(), "light/strand_irradiance.comp")
 
 
 MOTION_FORMAT = "RGBA32F"  # of how far things move
@@ -43,17 +43,17 @@ MOTION_FORMAT = "RGBA32F"  # of how far things move
 
 @shaders.kept
 def strand_motion_program():
-    """The compute program of motion vectors of strands: see strand_motion.comp."""
+    """The compute program of motion vectors of strands: see picture/strand_motion.comp."""
     names = ("strands_before", "strands_after", "moved_rows", "moved_points")
     samplers = tuple((name, "FLOAT_2D") for name in names)
     info = scene_programs.strand_samples_info(uniforms.MOTION.source, samplers, MOTION_FORMAT)
     info.uniform_buf(2, "Motion", "motion")
-    return shaders.compile_compute(info, "strand_motion.comp")
+    return shaders.compile_compute(info, "picture/strand_motion.comp")
 
 
 @shaders.kept
 def surface_motion_program():
-    """The same for surfaces: see surface_motion.vert."""
+    """The same for surfaces: see picture/surface_motion.vert."""
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.VIEW.source + uniforms.MOTION.source)
     info.uniform_buf(0, "View", "view")
@@ -64,14 +64,14 @@ def surface_motion_program():
     for name in ("place_now", "place_before", "place_after"):
         varying.smooth("VEC4", name)
     info.vertex_out(varying)
-    return shaders.compile_drawing(info, "surface_motion.vert", "surface_motion.frag")
+    return shaders.compile_drawing(info, "picture/surface_motion.vert", "picture/surface_motion.frag")
 
 
 @shaders.kept
 def film_view_program():
-    """The program that shows the mean of a film: see film_view.frag."""
+    """The program that shows the mean of a film: see picture/film_view.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("VEC2", "origin")  # [pixels] of the film in the framebuffer
     info.push_constant("FLOAT", "weight_sum")
     info.sampler(0, "FLOAT_2D", "sums")
-    return shaders.compile_drawing(info, "cover.vert", "film_view.frag")
+    return shaders.compile_drawing(info, "picture/cover.vert", "picture/film_view.frag")

@@ -7,7 +7,7 @@ from . import uniforms
 from .shaders import COLOR, compile_compute, compile_drawing, kept
 
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
-# See shaders/world_visibility.comp.
+# See shaders/light/world_visibility.comp.
 VISIBILITY_SAMPLERS = (
     "visibility_x_y",
     "visibility_z",
@@ -15,7 +15,7 @@ VISIBILITY_SAMPLERS = (
     "visibility_channels",
     "visibility_color",
 )
-STRAND_SAMPLERS = ("strands", "strand_radii")  # see shaders/include/segment.glsl
+STRAND_SAMPLERS = ("strands", "strand_radii")  # see shaders/visibility/segment.glsl
 
 
 def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):
@@ -37,7 +37,7 @@ def declare_clipped_scene(info, shadow_samplers, is_clipped):
     if not is_clipped:
         return {}
     info.uniform_buf(2, "Clipping", "clipping")
-    return {"include/unclipped.glsl": "include/clipped.glsl"}
+    return {"visibility/unclipped.glsl": "visibility/clipped.glsl"}
 
 
 def has_image_atomics():
@@ -49,23 +49,23 @@ def has_image_atomics():
 def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=(), is_clipped=False):
     """The program that draws strips of strands: a .frag, the shadow maps that it reads, (output, type), ... of it.
 
-    samplers: of other textures that it reads; is_clipped: whether planes cut something off, as guides.frag knows.
+    samplers: of other textures that it reads; is_clipped: whether clipping planes apply, as in strands/guides.frag.
     """
     info = gpu.types.GPUShaderCreateInfo()
     replaced = _strip(info, shadow_samplers, is_clipped)
     for slot, name in enumerate(samplers, start=len(SHADOW_SAMPLERS) + len(STRAND_SAMPLERS)):
         info.sampler(slot, "FLOAT_2D", name)
-    return compile_drawing(info, "strand.vert", fragment, targets, replaced)
+    return compile_drawing(info, "strands/strip.vert", fragment, targets, replaced)
 
 
 @kept
 def strip_segments_program(is_clipped):
-    """The program that draws strips of strands as samples of a picture: see strand_segments.frag."""
+    """The program that draws strips of strands as samples of a picture: see visibility/strand_segments.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     replaced = _strip(info, (), is_clipped)
     info.depth_write("ANY")
     targets = (("segment", "UINT"), ("depth", "UINT"))
-    return compile_drawing(info, "strand.vert", "strand_segments.frag", targets, replaced)
+    return compile_drawing(info, "strands/strip.vert", "visibility/strand_segments.frag", targets, replaced)
 
 
 def _strip(info, shadow_samplers, is_clipped):
@@ -85,23 +85,25 @@ def _strip(info, shadow_samplers, is_clipped):
 
 
 RUN_GROUP_SIZE = 64  # runs of segments that one work group of a program that walks along strands takes
-RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/include/walk_segment.glsl
+RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/visibility/rasterize_segment.glsl
 
 
 @kept
 def segments_program(is_depth, is_round, is_clipped=False):
-    """The compute program that draws strands as samples of a picture: see strand_segments.comp."""
+    """The compute program that draws strands as samples of a picture: see visibility/strand_segments.comp."""
     images, constants = ("depths", "segments", "seen_runs"), ("first_run", "are_tiles_known")
     defined, samplers = {"IS_DEPTH": is_depth, "IS_ROUND": is_round}, (("farthest_depths", "UINT_2D"),)
-    return _walk("strand_segments.comp", images, defined, constants, samplers=samplers, is_clipped=is_clipped)
+    return _walk(
+        "visibility/strand_segments.comp", images, defined, constants, samplers=samplers, is_clipped=is_clipped
+    )
 
 
 @kept
 def strand_shadow_program(is_front):
-    """The compute program that draws strands into a deep opacity map: see strand_shadow.comp."""
+    """The compute program that draws strands into a deep opacity map: see shadows/strand_shadow.comp."""
     images, samplers = ("fronts", "backs", "counts"), (("hidden_depth", "FLOAT_2D"),)
     defined = {"IS_FRONT": is_front, "IS_ROUND": False}
-    return _walk("strand_shadow.comp", images, defined, shadow_samplers=("hair_front",), samplers=samplers)
+    return _walk("shadows/strand_shadow.comp", images, defined, shadow_samplers=("hair_front",), samplers=samplers)
 
 
 def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), is_clipped=False):
@@ -122,7 +124,7 @@ def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), 
 
 PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
 PICTURE_GROUP_SIZE = 8  # threads along each side of a work group of a picture's programs
-SAMPLES_OF_THREAD = 8  # of shaders/include/strand_samples.glsl
+SAMPLES_OF_THREAD = 8  # of shaders/visibility/strand_samples.glsl
 
 
 @kept
@@ -130,8 +132,8 @@ def shading_program(file, blocks=(), tables=(), in_parts=False, is_mixed=False):
     """The compute program that shades strands: a model's .comp, its blocks and its samplers of tables.
 
     blocks: (instance, class of settings), ...; tables: (sampler, type), ...; in_parts: whether just a part of the light
-    is drawn, by the constants of include/drawn_light.glsl; is_mixed: whether strands take just their share of it, by
-    the constants of include/mixed_samples.glsl.
+    is drawn, by the constants of fibre/drawn_lobes.glsl; is_mixed: whether strands take just their share of it, by
+    the constants of fibre/mixed_looks.glsl.
     """
     structs = [uniforms.settings_block(settings_class, instance) for instance, settings_class in blocks]
     structs_source = "".join(block.source for block in structs)
@@ -142,18 +144,18 @@ def shading_program(file, blocks=(), tables=(), in_parts=False, is_mixed=False):
         info.uniform_buf(slot, block.type_name, instance)
     replaced = {}
     if in_parts:
-        replaced["include/drawn_light.glsl"] = None
+        replaced["fibre/drawn_lobes.glsl"] = None
         info.push_constant("VEC4", "drawn_lobes")
         info.push_constant("FLOAT", "drawn_world")
     if is_mixed:
-        replaced["include/whole_samples.glsl"] = "include/mixed_samples.glsl"
+        replaced["fibre/single_look.glsl"] = "fibre/mixed_looks.glsl"
         info.push_constant("VEC2", "wetness_range")
         info.push_constant("INT", "is_wet")
     return compile_compute(info, file, replaced)
 
 
 def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, is_mixed=False):
-    """Info of a program that includes strand_samples.glsl.
+    """Info of a program that includes visibility/strand_samples.glsl.
 
     samplers: (name, type), ... beside the scene's; texture_format: of what it fills; is_mixed: whether it reads that
     too.
@@ -179,7 +181,7 @@ def environment_program(fragment):
     info.typedef_source(uniforms.ENVIRONMENT.source)
     info.uniform_buf(0, "Environment", "environment")
     info.sampler(0, "FLOAT_2D", "surroundings")
-    return compile_drawing(info, "cover.vert", fragment)
+    return compile_drawing(info, "picture/cover.vert", fragment)
 
 
 @kept
@@ -188,12 +190,12 @@ def resolve_program():
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("INT", "samples_per_side")
     info.sampler(0, "FLOAT_2D", "picture")
-    return compile_drawing(info, "cover.vert", "resolve.frag")
+    return compile_drawing(info, "picture/cover.vert", "picture/resolve.frag")
 
 
 @kept
 def accumulate_program():
-    """The program that adds a pass to the picture of a viewport: see accumulate.frag."""
+    """The program that adds a pass to the picture of a viewport: see picture/accumulate.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("INT", "samples_per_side")
     info.push_constant("IVEC2", "first_place")  # [samples] of the textures in the picture
@@ -202,12 +204,12 @@ def accumulate_program():
     info.sampler(1, "UINT_2D", "depths")
     info.sampler(2, "FLOAT_2D", "surface_depth")
     info.depth_write("ANY")
-    return compile_drawing(info, "cover.vert", "accumulate.frag")
+    return compile_drawing(info, "picture/cover.vert", "picture/accumulate.frag")
 
 
 @kept
 def display_program():
-    """The program that shows hair over a viewport: see display.frag."""
+    """The program that shows hair over a viewport: see picture/display.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("VEC2", "origin")  # [pixels] of the picture in the framebuffer
     info.push_constant("FLOAT", "exposure")
@@ -217,4 +219,4 @@ def display_program():
     info.sampler(1, "FLOAT_2D", "depths")
     info.sampler(2, "FLOAT_3D", "display_table")
     info.depth_write("ANY")
-    return compile_drawing(info, "cover.vert", "display.frag")
+    return compile_drawing(info, "picture/cover.vert", "picture/display.frag")

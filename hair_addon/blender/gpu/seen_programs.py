@@ -18,7 +18,7 @@ IMAGES = (
 BYTES = "RGBA8"  # of textures that strands' visibility is kept in
 SUMS = "RGBA16F"  # and of those in which sums are added up
 
-_PUT = {"include/put_seen_sums.glsl": "include/put_seen_bytes.glsl"}
+_PUT = {"light/write_visibility_sums.glsl": "light/write_visibility_bytes.glsl"}
 
 
 @shaders.kept
@@ -32,9 +32,9 @@ def visibility_program(texture_format):
     for slot, name in enumerate(("places", "strand_radii"), start=len(scene_programs.SHADOW_SAMPLERS)):
         info.sampler(slot, "FLOAT_2D", name)
     if texture_format != SUMS:
-        return shaders.compile_compute(info, "world_visibility.comp", _PUT)
+        return shaders.compile_compute(info, "light/world_visibility.comp", _PUT)
     info.push_constant("INT", "is_first")
-    return shaders.compile_compute(info, "world_visibility.comp")
+    return shaders.compile_compute(info, "light/world_visibility.comp")
 
 
 @shaders.kept
@@ -43,7 +43,7 @@ def bytes_program():
     info = _program(BYTES)
     for slot, name in enumerate(scene_programs.VISIBILITY_SAMPLERS):
         info.sampler(slot, "FLOAT_2D", name)
-    return shaders.compile_compute(info, "visibility_bytes.comp")
+    return shaders.compile_compute(info, "light/visibility_bytes.comp")
 
 
 def _program(texture_format):

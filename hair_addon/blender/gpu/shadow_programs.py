@@ -14,34 +14,36 @@ _READ_WRITE = {"READ", "WRITE"}
 @shaders.kept
 def rows_program():
     """The program that finds the ends of each texel's row in `fronts` and `backs`, a deep opacity map's first pass."""
-    return _filter("shadow_rows.comp", "RG32F", {"fronts": "UINT_2D", "backs": "UINT_2D"})
+    return _filter("shadows/shadow_rows.comp", "RG32F", {"fronts": "UINT_2D", "backs": "UINT_2D"})
 
 
 @shaders.kept
 def fill_program():
     """The program that fills gaps of `fronts` and `backs` from the result of `rows_program`, into a layer."""
     samplers = {"fronts": "UINT_2D", "backs": "UINT_2D", "row_ends": "FLOAT_2D"}
-    return _filter("shadow_fill.comp", "RG32F", samplers, in_layer=True)
+    return _filter("shadows/shadow_fill.comp", "RG32F", samplers, in_layer=True)
 
 
 @shaders.kept
 def counts_program():
     """The program that makes layers of `counts`, a deep opacity map's second pass, and leaves all its images empty."""
     images = {"counts": _READ_WRITE, "fronts": _READ_WRITE, "backs": _READ_WRITE}
-    return _filter("shadow_counts.comp", "RGBA16F", {}, in_layer=True, images=images)
+    return _filter("shadows/shadow_counts.comp", "RGBA16F", {}, in_layer=True, images=images)
 
 
 @shaders.kept
 def hidden_program():
     """The program that finds the depth behind which strands are hidden by the surfaces of `surface_depth`."""
-    return _filter("shadow_hidden.comp", "R32F", {"surface_depth": "FLOAT_2D_ARRAY"})
+    return _filter("shadows/shadow_hidden.comp", "R32F", {"surface_depth": "FLOAT_2D_ARRAY"})
 
 
 @shaders.kept
 def moments_program():
     """The program that blurs `surface_depth` along an axis: depths if is_depth, else its first result."""
     constants = (("IVEC2", "along"), ("INT", "taps"), ("INT", "is_depth"), ("FLOAT", "deviation"))
-    return _filter("shadow_moments.comp", "RGBA32F", {"surface_depth": "FLOAT_2D_ARRAY"}, constants, in_layer=True)
+    return _filter(
+        "shadows/shadow_moments.comp", "RGBA32F", {"surface_depth": "FLOAT_2D_ARRAY"}, constants, in_layer=True
+    )
 
 
 def _filter(file, texture_format, samplers, constants=(), in_layer=False, images=None):

@@ -8,11 +8,11 @@ import numpy as np
 
 from . import drawing, scene_programs, shadow_programs, surface_textures, uniforms
 
-SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
+SUN = 0  # LIGHT_SUN of shaders/light/lights.glsl
 
 _NEAREST = 0.01  # minimum distance of a light, as a part of the hair's diameter
 _WIDEST = np.radians(80.0)  # between the axis of a map and its border
-_FAR = 2.0  # FAR of shaders/include/opacity.glsl
+_FAR = 2.0  # FAR of shaders/shadows/opacity.glsl
 _NO_SURFACE = (_FAR, -1.0, 0.0, 0.0)  # its depth, and a color that there is none of
 _NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it; of a back that is nowhere, 0
 
@@ -192,8 +192,10 @@ class ShadowMaps:
     def _draw_strips(self, layer, placed, lights, hidden):
         """Draw the same map with triangle strips."""
         self._clear_ends()
-        end = scene_programs.strip_program("shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden))
-        layers = scene_programs.strip_program("shadow_layers.frag", ("hair_front",), samplers=tuple(hidden))
+        end = scene_programs.strip_program(
+            "shadows/shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden)
+        )
+        layers = scene_programs.strip_program("shadows/shadow_layers.frag", ("hair_front",), samplers=tuple(hidden))
         for texture, depth, test in ((self._fronts, 1.0, "LESS_EQUAL"), (self._backs, 0.0, "GREATER_EQUAL")):
             target = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=self._depth)
             with target.bind(), drawing.gpu_state(test, depth_writes=True):

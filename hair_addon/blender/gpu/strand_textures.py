@@ -249,7 +249,7 @@ def like(texture):
 
 
 def seen_points(point_count):
-    """Texels of a strand in the visibility textures: SEEN_STEP of shaders/include/strand.glsl, and the tip."""
+    """Texels of a strand in the visibility textures: SEEN_STEP of shaders/strands/strip.glsl, and the tip."""
     return -(-(point_count - 1) // 4) + 1
 
 
@@ -333,7 +333,7 @@ def _move_program():
     info.image(1, "R32F", "FLOAT_2D", "moved_rows", qualifiers={"WRITE"})
     for name in ("moved_count", "moved_row_strands", "texel_count", "row_strands"):
         info.push_constant("INT", name)
-    return shaders.compile_compute(info, "move_strands.comp")
+    return shaders.compile_compute(info, "strands/write_strands.comp")
 
 
 @shaders.kept
@@ -346,7 +346,7 @@ def _keep_program():
     info.image(0, "RG32F", "FLOAT_2D", "kept_strands", qualifiers={"WRITE"})
     for name in ("kept_count", "row_kept", "is_list", "texel_count", "row_strands"):
         info.push_constant("INT", name)
-    return shaders.compile_compute(info, "keep_strands.comp")
+    return shaders.compile_compute(info, "strands/previous_strands.comp")
 
 
 def vertex_count(strand_count, drawn_points):

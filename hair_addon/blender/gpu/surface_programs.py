@@ -14,7 +14,7 @@ _MATERIAL_SAMPLERS = (*SURFACE_IMAGES, "surface_albedo")
 
 @kept
 def number_program():
-    """The program that draws a surface as samples of a picture: see surface_number.vert."""
+    """The program that draws a surface as samples of a picture: see visibility/triangle_index.vert."""
     info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("number_varying")
     scene_programs.declare_scene(info, shadow_samplers=(), is_lit=False)
     for slot, name in enumerate(CORNER_SAMPLERS):
@@ -22,15 +22,17 @@ def number_program():
     info.push_constant("INT", "first_triangle")
     varying.flat("INT", "triangle")
     info.vertex_out(varying)
-    return compile_drawing(info, "surface_number.vert", "surface_number.frag", (("segment", "UINT"),))
+    return compile_drawing(
+        info, "visibility/triangle_index.vert", "visibility/triangle_index.frag", (("segment", "UINT"),)
+    )
 
 
-SIDE = 4  # samples along each side of what a thread takes: of shaders/surface.comp
+SIDE = 4  # samples along each side of what a thread takes: of shaders/surfaces/surface.comp
 
 
 @kept
 def shading_program():
-    """The compute program that shades a surface in the samples where it is nearest: see surface.comp."""
+    """The compute program that shades a surface in the samples where it is nearest: see surfaces/surface.comp."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     for slot, name in enumerate(("segments", "depths"), start=_declare_material(info)):
@@ -39,16 +41,16 @@ def shading_program():
     numbers = "first_triangle", "part_triangle", "triangle_count", "window_left", "window_bottom"
     for name in (*numbers, "row_stride", "is_coarse", "has_over"):
         info.push_constant("INT", name)
-    return compile_compute(info, "surface.comp")
+    return compile_compute(info, "surfaces/surface.comp")
 
 
 @kept
 def clear_program():
-    """The program that draws a clear surface: see clear_surface.frag."""
+    """The program that draws a clear surface: see surfaces/clear_surface.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     _declare_material(info)
     info.vertex_out(_lit_varying())
-    return compile_drawing(info, "lit_surface.vert", "clear_surface.frag")
+    return compile_drawing(info, "surfaces/lit_surface.vert", "surfaces/clear_surface.frag")
 
 
 @kept
@@ -57,21 +59,21 @@ def arrival_program(fragment):
     info = gpu.types.GPUShaderCreateInfo()
     _declare_lit(info)
     info.vertex_out(_lit_varying())
-    return compile_drawing(info, "lit_surface.vert", fragment)
+    return compile_drawing(info, "surfaces/lit_surface.vert", fragment)
 
 
 @kept
-def depth_program(fragment="shadow_surface.frag", is_clipped=False):
+def depth_program(fragment="shadows/shadow_surface.frag", is_clipped=False):
     """The program that draws a surface into a shadow map, or one that only hides.
 
-    is_clipped: whether planes cut something off, as surface_hides.frag knows.
+    is_clipped: whether planes cut something off, as surfaces/occluding_surface.frag knows.
     """
     info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
     replaced = scene_programs.declare_clipped_scene(info, (), is_clipped)
     info.sampler(0, "FLOAT_2D", "places")
     varying.smooth("VEC3", "drawn_position")
     info.vertex_out(varying)
-    return compile_drawing(info, "surface_place.vert", fragment, replaced=replaced)
+    return compile_drawing(info, "surfaces/surface_depth.vert", fragment, replaced=replaced)
 
 
 def _declare_material(info):

@@ -55,7 +55,7 @@ class _Corners:
 
     @cached_property
     def texture(self):
-        """Each corner's vertex, in two numbers of sixteen bits, and its uv: see shaders/include/surface_corner.glsl."""
+        """Each corner's vertex, in two numbers of sixteen bits, and its UV: shaders/surfaces/surface_corner.glsl."""
         count = len(self.vertices)
         width = min(count, _ROW_CORNERS)
         texels = np.zeros((beside_powers(-(-count // width)) * width, 4), np.float32)
@@ -186,11 +186,11 @@ def _texture_of(vectors, known):
     return texture
 
 
-_COLORED = "shadow_surface.frag"  # the only one that a material's color matters to
+_COLORED = "shadows/shadow_surface.frag"  # the only one that a material's color matters to
 
 
 def draw_depth(surface, view, lights, fragment=_COLORED, clip_planes=None):
-    """Draw a `SurfaceOnGPU` into a shadow map's first pass, or where it only hides: surface_hides.frag.
+    """Draw a `SurfaceOnGPU` into a shadow map's first pass, or where it only hides: surfaces/occluding_surface.frag.
 
     clip_planes: (6, 4) that cut off what only hides, None for none.
     """

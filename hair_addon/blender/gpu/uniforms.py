@@ -163,7 +163,7 @@ MAKING = Block(
     {
         "axes": "mat4",  # from the coordinates of roots and guides to those of the strands
         "axes_scale": "float",  # the greatest by which they lengthen anything
-        "limits": "vec4",  # as `limited_part` of shaders/include/guide_sum.glsl
+        "limits": "vec4",  # as `limited_part` of shaders/strands/guide_interpolation.glsl
         "keep_length": "float",
         "strand_count": "int",
         "guide_count": "int",

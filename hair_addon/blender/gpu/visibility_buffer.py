@@ -350,7 +350,7 @@ class VisibilityBuffer:
     def _shade(self, placed, picture, parts=None):
         """Fill the samples in which a strand of a hair is nearest with its light, or with parts of it.
 
-        parts: constants of include/drawn_light.glsl.
+        parts: constants of fibre/drawn_lobes.glsl.
         """
         for shading, mix in placed.shading.layers:
             has_options = parts is not None or mix is not None

@@ -40,7 +40,7 @@ def may_be_wide(strands, record, size, half_width):
     clip = _corners_in_clip(strands.bounds, to_clip)
     if clip is None:
         return True
-    # As `width_stretch` of shaders/include/segment.glsl has it, at the picture's corner farthest from its axis.
+    # As `width_stretch` of shaders/visibility/segment.glsl has it, at the picture's corner farthest from its axis.
     stretch = 1.0
     if record["is_perspective"]:
         axis = to_clip @ np.append(to_clip[3, :3], 0.0)

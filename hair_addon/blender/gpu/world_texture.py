@@ -65,7 +65,7 @@ def draw_background(world, view, width, height):
     record = _record(world, width, height)
     record["clip_to_world"] = np.linalg.inv(view["world_to_clip"].astype(np.float64))
     with drawing.gpu_state("NONE", depth_writes=False):
-        _draw("background.frag", world, record)
+        _draw("light/background.frag", world, record)
 
 
 def _unrolled(world):
@@ -76,7 +76,7 @@ def _unrolled(world):
     target = gpu.types.GPUTexture((width, height), format="RGBA32F")
     framebuffer = gpu.types.GPUFrameBuffer(color_slots=target)
     with framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
-        _draw("environment.frag", world, record)
+        _draw("light/environment.frag", world, record)
         pixels = framebuffer.read_color(0, 0, width, height, 4, 0, "FLOAT")
     return np.nan_to_num(np.array(pixels, np.float32).reshape(height, width, 4)[..., :3], posinf=0.0)
 

@@ -20,7 +20,7 @@ def draw_hiding(drawn, view, clip_planes=None):
     """
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for surface, _parts in drawn.surfaces:
-            surface_textures.draw_depth(surface, view, drawn.lights, "surface_hides.frag", clip_planes)
+            surface_textures.draw_depth(surface, view, drawn.lights, "surfaces/occluding_surface.frag", clip_planes)
 
 
 def draw(drawn, view, buffer, is_transparent):
@@ -121,7 +121,7 @@ def _shade_behind_hair(drawn, view, buffer, picture, is_transparent):
 def draw_arrival(drawn, view, buffer):
     """Return a texture of light visibility for the content of a `VisibilityBuffer`, to which hair was added last."""
     with buffer.surfaces_of_part(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_by_lights(drawn, view, "surface_arrival.frag", are_holdouts_left_out=True)
+        _draw_by_lights(drawn, view, "light/surface_irradiance.frag", are_holdouts_left_out=True)
     return buffer.part_by(render_programs.strand_arrival_program())
 
 
@@ -129,14 +129,14 @@ def draw_hair_shadow(drawn, view, buffer):
     """Return a texture of the part of the light on surfaces that hair lets through; 1 where there is no surface."""
     white = (1.0, 1.0, 1.0, 1.0)
     with buffer.surfaces_of_part(background=white), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_by_lights(drawn, view, "hair_shadow.frag")
+        _draw_by_lights(drawn, view, "shadows/hair_shadow.frag")
     return buffer.part(background=white)
 
 
 def draw_viewport_shadow(drawn, view):
     """As `draw_hiding`, and as black over what Blender draws, whose alpha is the part of the light that hair stops."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_by_lights(drawn, view, "hair_shadow_view.frag")
+        _draw_by_lights(drawn, view, "shadows/hair_shadow_view.frag")
 
 
 def _draw_by_lights(drawn, view, fragment, are_holdouts_left_out=False):
@@ -145,7 +145,7 @@ def _draw_by_lights(drawn, view, fragment, are_holdouts_left_out=False):
     program = surface_programs.arrival_program(fragment)
     for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
         if parts is None and are_holdouts_left_out:
-            surface_textures.draw_depth(surface, view, lights, "surface_hides.frag")
+            surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag")
             continue
         surface_textures.draw_lit(surface, program, view, lights, samplers)
 
@@ -197,7 +197,7 @@ def _draw_over_surfaces(drawn, view):
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for (surface, parts), lights in zip(drawn.surfaces, _light_of(drawn, solid=True)[0], strict=True):
             if parts is None:
-                surface_textures.draw_depth(surface, view, lights, "surface_hides.frag")
+                surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag")
     with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA_PREMULT"):
         for (surface, parts), lights, samplers in zip(drawn.clear, *_light_of(drawn, solid=False), strict=True):
             surface_shading.draw_clear(surface, parts, view, lights, samplers)

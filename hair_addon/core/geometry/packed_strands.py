@@ -5,7 +5,7 @@ A strand of P points is P + 1 texels of two floats: (root x, root y), (root z, r
 An offset has 20 bits along each axis, so that each coordinate is within 2^-20 of the strand's greatest, beside the
 rounding of places: a strand that fills a picture of 4,000 pixels is drawn within 0.004 of them. The 60 bits are in two
 floats that are normal numbers whatever their values are: textures of floats keep the bits of these alone.
-shaders/include/packed_strand.glsl is the twin.
+shaders/strands/packed_strand.glsl is the twin.
 """
 
 import numpy as np

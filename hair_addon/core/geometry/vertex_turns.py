@@ -3,7 +3,7 @@
 
 A face's gradient takes two of its edges and its unit normal from where they are at rest to where they are now. Of this
 only the second depends on the pose: what is at rest is found once, for those vertices that anything grows around.
-shaders/turn_vertices.comp is the same in single precision.
+shaders/strands/vertex_rotations.comp is the same in single precision.
 """
 
 from dataclasses import dataclass

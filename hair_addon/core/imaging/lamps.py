@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lamps by importance: those that are drawn one by one, and an ambient cube of the light of all others.
 
-A lamp is a record with the fields of `Light` in shaders/include/lights.glsl.
+A lamp is a record with the fields of `Light` in shaders/light/lights.glsl.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ def directions_to(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def irradiance(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """(N, P, 3) irradiance [W/m²] of a small ball at places (P, 3) by lamps (N,): light_irradiance of lights.glsl."""
+    """(N, P, 3) irradiance [W/m²] of a small ball at points (P, 3) from lamps (N,): as in light/lights.glsl."""
     kind = lamps["kind"][:, None]
     offsets = places - lamps["position"][:, None, :3].astype(float)
     squared = np.maximum(np.sum(np.square(offsets), axis=-1), 1e-8)
@@ -39,7 +39,7 @@ def irradiance(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _disk_irradiance(height, beside, radius):
-    """Of a small ball by a Lambertian disk that sends 1 W/sr along its axis: disk_irradiance of lights.glsl."""
+    """Of a small ball by a Lambertian disk that sends 1 W/sr along its axis: disk_irradiance of light/lights.glsl."""
     outside = height**2 + beside**2 - radius**2
     root = np.maximum(np.sqrt(outside**2 + 4.0 * height**2 * radius**2), 1e-12)
     far = 2.0 * height**2 / (root * np.maximum(root + outside, 1e-12))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The language of .strand files in C++, for LANES strands at once; shaders/include/strand_language.glsl has it in GLSL.
+// The language of .strand files in C++, for LANES strands at once; shaders/strands/strand_language.glsl has it in GLSL.
 //
 // Types: lanes, ints and flags are a number, a whole number and a condition of each strand, vector is three numbers.
 // float, int and bool are the same for all strands. Every function of a .strand file is inlined, as a lambda.

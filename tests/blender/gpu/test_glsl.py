@@ -11,7 +11,7 @@ from hair_addon.core.shading.fibre.principled import variance_from_roughness
 from hair_addon.core.shading.tables import dual_scattering, lookup_tables
 from tests.support import drawn_strands, glsl
 
-AXES = ["ANGLES", "COSINES"]  # in the order of AXES_ANGLES and AXES_COSINES in marschner.glsl
+AXES = ["ANGLES", "COSINES"]  # in the order of AXES_ANGLES and AXES_COSINES in fibre/marschner.glsl
 
 # Dot products that rounding has carried past one, and grazing ones.
 EDGE_COSINES = np.array([-1.0000001, -1.0, -0.9999999, -0.9999, -1e-7, 0.0, 1e-7, 0.9999, 0.9999999, 1.0, 1.0000001])
@@ -57,14 +57,14 @@ def assert_twins(shader, python, atol):
 
 def test_sine_from_cosine(sines):
     x = np.concatenate([sines[0], 1.0 - np.geomspace(1e-7, 1.0, 500)]).astype(np.float32)
-    shader = glsl.evaluate(glsl.source("include/fibre.glsl"), "float", "sin_from_cos(x)", x=x)
+    shader = glsl.evaluate(glsl.source("fibre/fibre.glsl"), "float", "sin_from_cos(x)", x=x)
     # To the last digits near one too, where 1 - cos² has lost them.
     np.testing.assert_allclose(shader, angles.sin_from_cos(x.astype(np.float64)), rtol=1e-6)
 
 
 def test_cosine_of_the_difference_angle(sines):
     sin_i, sin_o = sines
-    shader = glsl.evaluate(glsl.source("include/fibre.glsl"), "float", "cos_theta_d(i, o)", i=sin_i, o=sin_o)
+    shader = glsl.evaluate(glsl.source("fibre/fibre.glsl"), "float", "cos_theta_d(i, o)", i=sin_i, o=sin_o)
     python = angles.cos_theta_d(sin_i.astype(np.float64), sin_o.astype(np.float64))
     # Where it is near zero a root has lost half of the digits; its square is what counts.
     assert_twins(shader**2, python**2, 1e-6)
@@ -72,7 +72,7 @@ def test_cosine_of_the_difference_angle(sines):
 
 
 def test_relative_azimuth(fibres):
-    shader = glsl.evaluate(glsl.source("include/fibre.glsl"), "float", "relative_azimuth(T, L, V)", **fibres)
+    shader = glsl.evaluate(glsl.source("fibre/fibre.glsl"), "float", "relative_azimuth(T, L, V)", **fibres)
     T, L, V = doubles(fibres)
     # The azimuth of a direction is as uncertain as the direction's part across the fibre is short.
     across = np.minimum(angles.sin_from_cos(np.sum(T * L, axis=-1)), angles.sin_from_cos(np.sum(T * V, axis=-1)))
@@ -85,7 +85,7 @@ def test_relative_azimuth(fibres):
 
 
 def test_kajiya_kay_diffuse(fibres):
-    shader = glsl.evaluate(glsl.source("include/kajiya_kay.glsl"), "float", "kajiya_kay_diffuse(T, L)", **fibres)
+    shader = glsl.evaluate(glsl.source("fibre/kajiya_kay.glsl"), "float", "kajiya_kay_diffuse(T, L)", **fibres)
     T, L, _V = doubles(fibres)
     # Along the fibre sin(T, L) is the root of what rounding left of 1 - cos².
     assert_twins(shader**2, kajiya_kay.kajiya_kay_diffuse(T, L) ** 2, 1e-6)
@@ -94,14 +94,14 @@ def test_kajiya_kay_diffuse(fibres):
 @pytest.mark.parametrize("exponent", [1.0, 60.0, 500.0])
 def test_kajiya_kay_specular(fibres, exponent):
     expression = f"kajiya_kay_specular(T, L, V, {exponent})"
-    shader = glsl.evaluate(glsl.source("include/kajiya_kay.glsl"), "float", expression, **fibres)
+    shader = glsl.evaluate(glsl.source("fibre/kajiya_kay.glsl"), "float", expression, **fibres)
     # A cosine that is off by a rounding error is off by `exponent` of them after the power.
     assert_twins(shader, kajiya_kay.kajiya_kay_specular(*doubles(fibres), exponent), 1e-5 + 5e-7 * exponent)
 
 
 def test_kajiya_kay_reflection(fibres):
     settings = kajiya_kay.Settings(diffuse_color=(0.9, 0.4, 0.1), specular_color=(0.3, 0.2, 0.7), exponent=30.0)
-    shader = shading_model("kajiya_kay.comp", settings, "hair_bsdf(T, L, V, 0.0)", **fibres)
+    shader = shading_model("fibre/kajiya_kay.comp", settings, "hair_bsdf(T, L, V, 0.0)", **fibres)
     T, L, V = doubles(fibres)
     regular = angles.sin_from_cos(np.sum(T * L, axis=-1)) > 1e-2  # its diffuse part is a root, see above
     assert_twins(shader[regular], kajiya_kay.kajiya_kay(T, L, V, settings)[regular], 1e-5)
@@ -116,7 +116,7 @@ def test_kajiya_kay_albedo_is_the_mean_answer_to_a_uniform_surrounding(exponent,
     directions = [np.stack([np.cos(t), np.zeros_like(t), np.sin(t)], axis=-1) for t in (theta_i, theta_o)]
     T = np.broadcast_to([0.0, 0.0, 1.0], directions[0].shape)
     reflected = shading_model(
-        "kajiya_kay.comp", settings, "hair_bsdf(T, L, V, 0.0)", T=T, L=directions[0], V=directions[1]
+        "fibre/kajiya_kay.comp", settings, "hair_bsdf(T, L, V, 0.0)", T=T, L=directions[0], V=directions[1]
     )
     # It does not depend on the azimuth, which is 2 pi of the solid angle 2 pi cos(theta) d(theta).
     over_lights = 2.0 * np.pi * (reflected * np.cos(theta_i)[:, None]).reshape(180, 180, 3).sum(axis=1) * np.pi / 180
@@ -125,7 +125,7 @@ def test_kajiya_kay_albedo_is_the_mean_answer_to_a_uniform_surrounding(exponent,
         "vec3 returned(float sin_theta_o)\n{\n  vec3 all, towards, zonal_1, zonal_2;\n"
         "  hair_return(sin_theta_o, all, towards, zonal_1, zonal_2);\n  return all;\n}\n"
     )
-    albedo = shading_model("kajiya_kay.comp", settings, "returned(T.x)", more=returned, T=T[:1])[0]
+    albedo = shading_model("fibre/kajiya_kay.comp", settings, "returned(T.x)", more=returned, T=T[:1])[0]
     np.testing.assert_allclose(albedo, mean, rtol=tolerance)
 
 
@@ -138,11 +138,11 @@ def shading_model(fragment, settings, expression, textures=None, more="", **inpu
     return glsl.evaluate(text, "vec3", expression, structs=structs, blocks=blocks, textures=textures, **inputs)
 
 
-@pytest.mark.parametrize("model", ["kajiya_kay.comp", "energy_conserving.comp"])
+@pytest.mark.parametrize("model", ["fibre/kajiya_kay.comp", "fibre/energy_conserving.comp"])
 @pytest.mark.parametrize("width", [0.1, 0.5])
 def test_a_wide_light_is_as_many_narrow_ones(rng, model, width):
     """Light from a stripe of inclinations [rad], one direction after the other and all at once."""
-    if model == "kajiya_kay.comp":
+    if model == "fibre/kajiya_kay.comp":
         settings, textures = kajiya_kay.Settings(diffuse_color=(0.0, 0.0, 0.0), exponent=60.0), {}
     else:
         settings = lookup_tables.Settings(mode="energy", size=64, roughness=0.3)
@@ -171,7 +171,7 @@ def test_a_wide_light_is_as_many_narrow_ones(rng, model, width):
 @pytest.mark.parametrize("axes", AXES)
 def test_coordinates_of_the_tables(sines, axes):
     first, second = sines
-    text = glsl.source("include/marschner.glsl")
+    text = glsl.source("fibre/marschner.glsl")
     shader = glsl.evaluate(text, "vec2", f"m_coordinates(i, o, {AXES.index(axes)})", i=first, o=second)
     python = lookup_tables.m_coordinates(first.astype(np.float64), second.astype(np.float64), axes)
     assert_twins(shader, np.stack(python, axis=-1), 1e-5)
@@ -185,7 +185,7 @@ def test_lobes_are_put_together(rng):
     m, n, n_trt = rng.random((2000, 3)), rng.random((2000, 4)), rng.random((2000, 3))
     cosine = np.concatenate([[0.0, 1e-9, 1e-4, 1e-3, 1.0], rng.random(1995)])
     expression = "marschner_scattering(m, n, n_trt, cosine)"
-    text = glsl.source("include/marschner.glsl")
+    text = glsl.source("fibre/marschner.glsl")
     shader = glsl.evaluate(text, "vec3", expression, m=m, n=n, n_trt=n_trt, cosine=cosine)
     np.testing.assert_allclose(shader, marschner.marschner_scattering(m, n, n_trt, cosine), rtol=1e-5)
 
@@ -195,7 +195,9 @@ def test_marschner_reflection_is_read_from_the_tables(fibres, axes):
     """The whole of hair_bsdf() on real textures equals the tables' own sampling times cos(theta_i)."""
     tables = lookup_tables.bake(lookup_tables.Settings(size=64, axes=axes))
     textures = hair_shading.marschner_shading(tables).samplers
-    shader = shading_model("marschner.comp", tables.settings, "hair_bsdf(T, L, V, 0.0)", textures=textures, **fibres)
+    shader = shading_model(
+        "fibre/marschner.comp", tables.settings, "hair_bsdf(T, L, V, 0.0)", textures=textures, **fibres
+    )
     halves = lookup_tables.Tables(*(texels(table) for table in (tables.m, tables.n, tables.n_trt)), tables.settings)
     at = angles.fibre_angles(*doubles(fibres))
     python = lookup_tables.sample_scattering(halves, at) * np.cos(at.theta_i)[:, None]
@@ -211,14 +213,14 @@ def test_marschner_reflection_is_read_from_the_tables(fibres, axes):
 
 def test_bessel_function_without_its_overflow():
     x = np.concatenate([[0.0, 3.75, 3.7500002], np.geomspace(1e-6, 1e6, 2000)]).astype(np.float32)
-    shader = glsl.evaluate(glsl.source("include/longitudinal.glsl"), "float", "i0e(x)", x=x)
+    shader = glsl.evaluate(glsl.source("fibre/longitudinal.glsl"), "float", "i0e(x)", x=x)
     np.testing.assert_allclose(shader, longitudinal.i0e(x.astype(np.float64)), rtol=3e-6)
 
 
 @pytest.mark.parametrize("roughness", [0.1, 0.3, 1.0])
 def test_longitudinal_lobes(sines, roughness):
     sin_i, sin_o = (np.clip(values, -1.0, 1.0) for values in sines)
-    text, expression = glsl.source("include/longitudinal.glsl"), f"m_lobes(i, o, 0.1, 4.0, {roughness}, 0.4, 0.0)"
+    text, expression = glsl.source("fibre/longitudinal.glsl"), f"m_lobes(i, o, 0.1, 4.0, {roughness}, 0.4, 0.0)"
     shader = glsl.evaluate(text, "vec4", expression, i=sin_i, o=sin_o)
     settings = lookup_tables.Settings(mode="energy", tilt=0.1, roughness=roughness, coat=0.4)
     python = energy_conserving.m_lobes(*(np.arcsin(values.astype(np.float64)) for values in (sin_i, sin_o)), settings)
@@ -231,7 +233,9 @@ def test_energy_conserving_reflection_is_read_from_the_tables(fibres, axes):
     settings = lookup_tables.Settings(mode="energy", size=64, axes=axes, roughness=0.4, coat=0.5)
     tables = lookup_tables.bake(settings)
     textures = hair_shading.marschner_shading(tables).samplers
-    shader = shading_model("energy_conserving.comp", settings, "hair_bsdf(T, L, V, 0.0)", textures=textures, **fibres)
+    shader = shading_model(
+        "fibre/energy_conserving.comp", settings, "hair_bsdf(T, L, V, 0.0)", textures=textures, **fibres
+    )
     arrays = (tables.m, tables.n, tables.n_trt, tables.n_res)
     m, n, n_trt, n_res = (texels(table) for table in arrays)
     halves = lookup_tables.Tables(m, n, n_trt, settings, n_res)
@@ -249,7 +253,7 @@ def test_dual_scattering_is_read_from_the_tables(fibres, rng):
     front, behind = rng.uniform(0.0, 6.0, (2, len(fibres["T"]))).astype(np.float32)
     expression = "hair_radiance(T, L, V, front, behind, 0.0)"
     numbers = {"front": front, "behind": behind}
-    shader = shading_model("energy_conserving.comp", settings, expression, textures=textures, **numbers, **fibres)
+    shader = shading_model("fibre/energy_conserving.comp", settings, expression, textures=textures, **numbers, **fibres)
     halves = lookup_tables.Tables(*map(texels, (tables.m, tables.n, tables.n_trt)), settings, texels(tables.n_res))
     at = angles.fibre_angles(*doubles(fibres))
     python = dual_scattering.sample_radiance(
@@ -271,7 +275,7 @@ def texels(table):
 @pytest.fixture(scope="module")
 def strip():
     """The strip of 5 strands of 7 points: (V, 3) integers strand, point, side."""
-    text = glsl.source("include/strand.glsl") + (
+    text = glsl.source("strands/strip.glsl") + (
         "vec3 strip(int vertex) { int s, p; float side; strip_vertex(vertex, 7, s, p, side); "
         "return vec3(float(s), float(p), side); }\n"
     )
@@ -310,7 +314,7 @@ def test_strand_texture_holds_the_points_where_the_shader_looks(rng, strand_coun
     uploaded = strand_textures.upload_strands(points, radii)
     strand, point = (grid.ravel() for grid in np.indices((strand_count, point_count)))
     found = glsl.evaluate(
-        glsl.source("include/packed_strand.glsl") + STRAND_PLACE,
+        glsl.source("strands/packed_strand.glsl") + STRAND_PLACE,
         "vec3",
         f"place_of(strand, point, {point_count}, {uploaded.row_strands})",
         textures={"strands": uploaded.texture},
@@ -325,7 +329,7 @@ def test_strand_texture_holds_the_points_where_the_shader_looks(rng, strand_coun
 
 def test_strip_side_is_a_unit_vector_across_the_strand_that_faces_the_viewer(fibres):
     T, V = fibres["T"], fibres["V"]
-    side = glsl.evaluate(glsl.source("include/strand.glsl"), "vec3", "strip_side(T, V)", T=T, V=V)
+    side = glsl.evaluate(glsl.source("strands/strip.glsl"), "vec3", "strip_side(T, V)", T=T, V=V)
     np.testing.assert_allclose(np.linalg.norm(side, axis=1), 1.0, atol=1e-5)
     across = np.linalg.norm(np.cross(T, V), axis=1)
     np.testing.assert_allclose(np.sum(side * T, axis=1) * np.maximum(across, 1e-3), 0.0, atol=1e-6)
@@ -338,6 +342,6 @@ def test_strip_side_is_a_unit_vector_across_the_strand_that_faces_the_viewer(fib
 @pytest.mark.parametrize("least, most", [(0.0, 1.0), (0.25, 0.75), (0.0, 0.8)])
 def test_share_of_the_wet_look(rng, least, most):
     wetness = np.concatenate([rng.random(500), np.linspace(0.0, 1.0, 11), [0.2501, 0.7499]]).astype(np.float32)
-    text, expression = glsl.source("include/wet_share.glsl"), f"wet_share(wetness, {least}, {most})"
+    text, expression = glsl.source("fibre/wet_share.glsl"), f"wet_share(wetness, {least}, {most})"
     shader = glsl.evaluate(text, "float", expression, wetness=wetness)
     assert_twins(shader, appearance.wet_share(wetness, least, most), 1e-6)

@@ -55,7 +55,7 @@ def drawn_strands(strand_count, steps):
         steps,
     )
     found = glsl.evaluate(
-        glsl.source("include/drawn_strand.glsl"),
+        glsl.source("strands/level_of_detail.glsl"),
         "float",
         "float(drawn_strand(turn))",
         structs=uniforms.VIEW.source,

@@ -76,7 +76,7 @@ def shader_irradiance(lights):
     """(SIZE², 3) irradiance of the wall by the shaders' functions, from a `uniforms.LIGHTS` record."""
     middles = (np.arange(SIZE) + 0.5) / SIZE * WALL - 0.5 * WALL
     x, y = (grid.ravel() for grid in np.meshgrid(middles, middles))
-    text = glsl.source("include/lights.glsl") + (
+    text = glsl.source("light/lights.glsl") + (
         "vec3 irradiance(Light light, vec3 at)\n"
         "{\n"
         "  vec3 facing = light_irradiance(light.kind, light.position.xyz, light.axis.xyz, light.power.rgb,\n"
@@ -153,7 +153,7 @@ def test_a_disk_lights_by_its_solid_angle(radius):
     x, y = out * np.cos(turn), out * np.sin(turn)
     received = [np.mean(h / (h**2 + (x - b) ** 2 + y**2) ** 1.5) for h, b in zip(height, beside, strict=True)]
     found = glsl.evaluate(
-        glsl.source("include/lights.glsl"),
+        glsl.source("light/lights.glsl"),
         "float",
         f"disk_irradiance(height, beside, {radius})",
         structs=uniforms.LIGHT.source,
@@ -180,7 +180,7 @@ def test_python_has_the_irradiance_of_the_shaders(rng):
     given = {name: some[name][:, :3] if some[name].ndim == 2 else some[name] for name in some.dtype.names}
     names = ("kind", "position", "axis", "power", "cos_cone", "blend", "radius")
     shown = glsl.evaluate(
-        glsl.source("include/lights.glsl"),
+        glsl.source("light/lights.glsl"),
         "vec3",
         f"light_irradiance({', '.join(names)}, place)",
         structs=uniforms.LIGHT.source,

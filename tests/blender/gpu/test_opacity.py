@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Counts of strands in deep opacity maps, and the light that they leave: include/opacity.glsl."""
+"""Counts of strands in deep opacity maps, and the light that they leave: shadows/opacity.glsl."""
 
 import numpy as np
 import pytest
 
 from tests.support import glsl
 
-LAYER_ENDS = np.array([0.007, 0.058, 0.205, 0.5])  # as in opacity.glsl, which the next test holds them to
+LAYER_ENDS = np.array([0.007, 0.058, 0.205, 0.5])  # as in shadows/opacity.glsl, which the next test holds them to
 
 
 def opacity(expression, returns="float", **inputs):
-    return glsl.evaluate(glsl.source("include/opacity.glsl"), returns, expression, **inputs)
+    return glsl.evaluate(glsl.source("shadows/opacity.glsl"), returns, expression, **inputs)
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What strands see of the world, in a byte for each number: shaders/include/seen_bytes.glsl."""
+"""What strands see of the world, in a byte for each number: shaders/light/visibility_bytes.glsl."""
 
 import bpy
 import numpy as np
@@ -40,7 +40,7 @@ vec4 kept(vec4 x_y, vec4 z, vec4 surface, vec4 channels, vec4 color, int which)
 
 
 def sums(rng):
-    """Five (N, 4) sums over directions as world_visibility.comp makes them, of dark and of open places."""
+    """Five (N, 4) sums over directions as light/world_visibility.comp makes them, of dark and of open places."""
     axes, weights = ambient_cube.DIRECTIONS, 6.0 * ambient_cube.WEIGHTS
 
     def parts(*more):
@@ -66,7 +66,7 @@ def test_bytes_keep_what_strands_see(scene, rng):
     """Every sum to half a step of its root, ratios too, the direction of surfaces to a third of a degree."""
     given = sums(rng)
     names = dict(zip(("x_y", "z", "surface", "channels", "tint"), given, strict=True))
-    text = shaders.expand("include/seen_bytes.glsl")[0] + _ROUND_TRIP
+    text = shaders.expand("light/visibility_bytes.glsl")[0] + _ROUND_TRIP
     found = [glsl.evaluate(text, "vec4", f"kept(x_y, z, surface, channels, tint, {i})", **names) for i in range(5)]
     np.testing.assert_allclose(np.sqrt(found[0]), np.sqrt(given[0]), rtol=0.0, atol=STEP)
     np.testing.assert_allclose(np.sqrt(found[1][:, :2]), np.sqrt(given[1][:, :2]), rtol=0.0, atol=STEP)

@@ -11,7 +11,7 @@ from tests.support import glsl
 def test_a_disk_is_mirrored_with_the_light_that_it_sends(half_radius, alpha):
     """Over all normals the integral is one, as of a small lamp; a smooth surface shows an even disk with a border."""
     angle = np.linspace(0.0, 1.2, 40_001)
-    text = glsl.source("include/surface_reflection.glsl")
+    text = glsl.source("surfaces/surface_reflection.glsl")
     values = glsl.evaluate(
         text, "float", f"D_ggx_of_disk(n_dot_h, {half_radius}, {alpha})", n_dot_h=np.cos(angle).astype(np.float32)
     )

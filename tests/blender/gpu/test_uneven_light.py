@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light that is not the same all around a fibre, by the functions of shaders/include/uneven_light.glsl."""
+"""Light that is not the same all around a fibre, by the functions of shaders/fibre/zonal_light.glsl."""
 
 import numpy as np
 
 from tests.support import glsl
 
-TEXT = "include/uneven_light.glsl"
+TEXT = "fibre/zonal_light.glsl"
 COUNT = 500
 
 

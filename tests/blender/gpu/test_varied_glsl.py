@@ -58,7 +58,7 @@ def test_absorption_along_strands(look, strands):
     source, record = block("variation", variation)
     gradient = "tip_gradient(variation.gradient_start, variation.gradient_end, position)"
     shader = glsl.evaluate(
-        glsl.source("include/strand_variation.glsl"),
+        glsl.source("strands/strand_variation.glsl"),
         "vec3",
         f"sigma_a_along(variation, random, {gradient})",
         structs=source,
@@ -73,7 +73,7 @@ def test_absorption_along_strands(look, strands):
 
 def test_roughness_of_strands(rng):
     roughness, amount, random = rng.random((3, COUNT)).astype(np.float32)
-    text = glsl.source("include/principled.glsl")
+    text = glsl.source("surfaces/principled.glsl")
     expression = "varied_roughness(roughness, amount, random)"
     shader = glsl.evaluate(text, "float", expression, roughness=roughness, amount=amount, random=random)
     np.testing.assert_allclose(shader, varied_roughness(roughness, amount, random), atol=1e-6)
@@ -83,7 +83,7 @@ def test_roughness_of_strands(rng):
 def test_place_among_slices(rng, low, high):
     """The slice itself may differ by one where a value lies on it; what is between them may not."""
     sigma_a = np.concatenate([[0.0, 99.0], np.square(rng.uniform(0.0, 3.0, COUNT))]).astype(np.float32)
-    text = glsl.source("include/absorption_slices.glsl")
+    text = glsl.source("fibre/absorption_slices.glsl")
     shader = glsl.evaluate(text, "vec2", f"slice_of(x, {low}, {high}, 16)", x=sigma_a).sum(axis=1)
     python = np.sum(absorption_slices.slice_of(sigma_a.astype(float), low, high, 16), axis=0)
     if low < high:
@@ -94,7 +94,7 @@ def test_place_among_slices(rng, low, high):
 def test_geometric_mix(rng):
     a, b = (np.where(rng.random((COUNT, 4)) < 0.1, 0.0, rng.random((COUNT, 4)) ** 4) for _ in range(2))
     fraction = rng.random(COUNT)
-    text = glsl.source("include/absorption_slices.glsl")
+    text = glsl.source("fibre/absorption_slices.glsl")
     shader = glsl.evaluate(text, "vec4", "geometric_mix(a, b, fraction)", a=a, b=b, fraction=fraction)
     np.testing.assert_allclose(shader, absorption_slices.geometric_mix(a, b, fraction[:, None]), atol=1e-5)
 
@@ -102,7 +102,7 @@ def test_geometric_mix(rng):
 def test_gaussian_lobes(rng):
     theta_h, roughness = rng.uniform(-1.5, 1.5, COUNT), rng.random(COUNT)
     expression = "gaussian_lobes(theta_h, 0.1, 1.5, beta_r_of(roughness), 0.0)"
-    text = glsl.source("include/marschner.glsl")
+    text = glsl.source("fibre/marschner.glsl")
     shader = glsl.evaluate(text, "vec3", expression, theta_h=theta_h, roughness=roughness)
     settings = marschner.Settings(tilt=0.1, shifts="PUBLISHED")
     python = marschner.gaussian_lobes(theta_h, settings, marschner.beta_r_of(roughness))
@@ -111,7 +111,7 @@ def test_gaussian_lobes(rng):
 
 def test_color_and_highlight_of_strands(rng):
     sigma_a, roughness = rng.random((COUNT, 3)) * 5.0, rng.random(COUNT)
-    text = glsl.source("include/kajiya_kay.glsl")
+    text = glsl.source("fibre/kajiya_kay.glsl")
     shader = glsl.evaluate(text, "vec3", "color_from_falloff(sigma_a, 5.5)", sigma_a=sigma_a)
     np.testing.assert_allclose(shader, pigment.color_from_falloff(sigma_a, 5.5), atol=1e-6)
     shader = glsl.evaluate(text, "float", "highlight_exponent(roughness)", roughness=roughness)
@@ -181,7 +181,9 @@ def settings_of(tables):
 def test_marschner_models_read_the_slices(rng, tables, strands):
     """hair_bsdf() of both modes: absorption and roughness of each strand by itself."""
     shading = hair_shading.marschner_strand_shading(tables)
-    fragment = "energy_conserving_varied.comp" if tables.settings.mode == "energy" else "marschner_varied.comp"
+    fragment = (
+        "fibre/energy_conserving_varied.comp" if tables.settings.mode == "energy" else "fibre/marschner_varied.comp"
+    )
     inputs = directions(rng)
     shader = model(fragment, "hair_bsdf(T, L, V, 0.0)", settings_of(tables), shading.samplers, strands, **inputs)
     at = angles.fibre_angles(*doubles(inputs))
@@ -205,7 +207,12 @@ def test_inner_reflection_of_elliptic_fibres(rng, strands):
     shading = hair_shading.marschner_strand_shading(tables)
     inputs = directions(rng)
     shader = model(
-        "marschner_elliptic.comp", "hair_bsdf(T, L, V, 0.0)", settings_of(tables), shading.samplers, strands, **inputs
+        "fibre/marschner_elliptic.comp",
+        "hair_bsdf(T, L, V, 0.0)",
+        settings_of(tables),
+        shading.samplers,
+        strands,
+        **inputs,
     )
     random, position = (values.astype(float) for values in strands)
     tangent, to_light, to_view = doubles(inputs)
@@ -224,7 +231,7 @@ def test_inner_reflection_of_elliptic_fibres(rng, strands):
 
 
 def test_elliptic_section(rng, strands):
-    text = glsl.source("include/elliptic_section.glsl")
+    text = glsl.source("fibre/elliptic_section.glsl")
     inputs = directions(rng)
     tangent, to_light, to_view = doubles(inputs)
     axis = elliptic_section.major_axis(tangent, strands[0].astype(float))
@@ -245,7 +252,7 @@ def test_dual_scattering_among_strands_that_differ(rng, strands):
     front, behind = rng.uniform(0.0, 6.0, (2, COUNT)).astype(np.float32)
     inputs = directions(rng)
     shader = model(
-        "energy_conserving_varied.comp",
+        "fibre/energy_conserving_varied.comp",
         "hair_radiance(T, L, V, front, behind, 0.0)",
         settings_of(tables),
         shading.samplers,
@@ -265,7 +272,9 @@ def test_dual_scattering_among_strands_that_differ(rng, strands):
 @pytest.mark.parametrize("row", range(4))
 def test_even_light_takes_the_colour_of_the_place(rng, tables, strands, row):
     shading = hair_shading.marschner_strand_shading(tables)
-    fragment = "energy_conserving_varied.comp" if tables.settings.mode == "energy" else "marschner_varied.comp"
+    fragment = (
+        "fibre/energy_conserving_varied.comp" if tables.settings.mode == "energy" else "fibre/marschner_varied.comp"
+    )
     theta_o = rng.uniform(-1.5, 1.5, COUNT)
     expression = f"hair_return_part(sine, {row})"
     shader = model(
@@ -282,7 +291,7 @@ def test_kajiya_kay_of_strands_that_differ(rng, look, strands):
         "variation": appearance.strand_settings(look),
     }
     inputs = directions(rng)
-    shader = model("kajiya_kay_varied.comp", "hair_bsdf(T, L, V, 0.0)", settings, {}, strands, **inputs)
+    shader = model("fibre/kajiya_kay_varied.comp", "hair_bsdf(T, L, V, 0.0)", settings, {}, strands, **inputs)
     random, position = (values.astype(float) for values in strands)
     sigma_a = strand_variation.strand_sigma_a(settings["variation"], random, position)
     roughness = varied_roughness(look.roughness, look.random_roughness, random)

@@ -46,7 +46,7 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL, 
             corners = np.array([[-9, -9, -hiding_at], [0, -9, -hiding_at], [0, 9, -hiding_at]] * 2, np.float32)
             corners[3:, :2] = [[-9, -9], [0, 9], [-9, 9]]
             surface = surface_textures.upload_surface(corners, np.arange(6, dtype=np.int32))
-            surface_textures.draw_depth(surface, view, lights, "surface_hides.frag", clip_planes)
+            surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag", clip_planes)
     hair = [
         (strand_textures.upload_strands(points, radii), shading, to_world, none, steps)
         for points, radii, to_world in placed

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light of the world on strands, channel by channel, by the functions of shaders/include/world.glsl."""
+"""Light of the world on strands, channel by channel, by the functions of shaders/light/world.glsl."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def sides_of(seen, opacity, forward, channels):
     """(N, 6, 3) radiance that arrives from the sides of a white world."""
     lights = uniforms.LIGHTS.record()
     lights["world"] = 1.0
-    text = shaders.expand("include/world.glsl")[0]
+    text = shaders.expand("light/world.glsl")[0]
     text += """
 vec3 one_side(int side, vec4 x_y, vec2 z, float opacity, vec3 forward, vec3 channels)
 {

@@ -166,7 +166,7 @@ def test_no_light_comes_through_a_plane_to_hair_behind_it(scene):
 def test_part_of_the_cone_below_a_plane(rng):
     T, V, N = rng.normal(size=(3, 2000, 3))
     T, V, N = (one / np.linalg.norm(one, axis=1)[:, None] for one in (T, V, N))
-    found = glsl.evaluate(glsl.source("include/fibre.glsl"), "vec2", "light_from_below(T, V, N)", T=T, V=V, N=N)
+    found = glsl.evaluate(glsl.source("fibre/fibre.glsl"), "vec2", "light_from_below(T, V, N)", T=T, V=V, N=N)
     first = np.cross(T, N)
     first /= np.linalg.norm(first, axis=1)[:, None]
     turn = 2.0 * np.pi * (np.arange(720) + 0.5) / 720

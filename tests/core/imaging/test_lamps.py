@@ -58,7 +58,7 @@ def test_ambient_light_of_lamps_keeps_the_mean_irradiance(rng):
     arriving = lamps.irradiance(some, place)[:, 0]
     cosines = np.maximum(lamps.directions_to(some, place)[:, 0] @ normals.T, 0.0)
     expected = np.einsum("nc,nd->c", arriving, cosines) / len(normals)
-    # As shaders/include/world.glsl lights a surface.
+    # As shaders/light/world.glsl lights a surface.
     planes = np.pi * ambient_cube.side_shares(normals) @ lamps.ambient_sides(some, place)
     np.testing.assert_allclose(planes.mean(axis=0), expected, rtol=0.01)
 

@@ -71,4 +71,4 @@ def _join_program():
     info.image(0, "RGBA32F", "FLOAT_2D", "joined", qualifiers={"WRITE"})
     for name in ("box_count", "joined_count", "share"):
         info.push_constant("INT", name)
-    return shaders.compile_compute(info, "join_boxes.comp")
+    return shaders.compile_compute(info, "strands/strand_bounds.comp")

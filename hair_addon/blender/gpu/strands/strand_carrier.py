@@ -28,7 +28,7 @@ class StrandCarrier:
     """Strands at rest and where they are rooted; made by `new_carrier`."""
 
     rest: gpu.types.GPUTexture  # as `StrandsOnGPU.texture`
-    roots: gpu.types.GPUTexture  # shaders/carry_strands.comp
+    roots: gpu.types.GPUTexture  # shaders/strands/carry_strands.comp
     vertices: np.ndarray  # (V, 3) of the surface at rest
     turner: vertex_turner.VertexTurner  # of the vertices around roots
     changes: StrandChanges
@@ -108,4 +108,4 @@ def _carry_program():
     declare_put(info, first_slot=0)
     for name in ("strand_count", "point_count", "row_strands", "is_posed"):
         info.push_constant("INT", name)
-    return shaders.compile_compute(info, "carry_strands.comp")
+    return shaders.compile_compute(info, "strands/carry_strands.comp")

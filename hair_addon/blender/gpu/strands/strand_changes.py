@@ -63,7 +63,7 @@ def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -
 
 
 def declare_put(info: gpu.types.GPUShaderCreateInfo, first_slot: int) -> None:
-    """Declare what shaders/include/put_packed_strand.glsl writes, from an image slot on."""
+    """Declare what shaders/strands/write_packed_strand.glsl writes, from an image slot on."""
     for slot, (name, texture_format) in enumerate((("strands", "RG32F"), ("boxes", "RGBA32F")), start=first_slot):
         info.image(slot, texture_format, "FLOAT_2D", name, qualifiers={"WRITE"})
 

@@ -2,7 +2,7 @@
 """Strands made of their guides by compute programs, in the texture that they are drawn from.
 
 What a strand follows is uploaded once. An edit of guides uploads these alone, and nothing is read back.
-core/interpolation has the mathematics; shaders/interpolate_strands.comp is its twin.
+core/interpolation has the mathematics; shaders/strands/interpolate_strands.comp is its twin.
 """
 
 from dataclasses import dataclass, replace
@@ -162,7 +162,7 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain:
 
 
 def _binding_rows(bound):
-    """(S, 4 T) float32, T texels of each strand: see shaders/interpolate_strands.comp."""
+    """(S, 4 T) float32, T texels of each strand: see shaders/strands/interpolate_strands.comp."""
     strand_count, slot_count = bound.indices.shape
     require_count("strands", len(bound.roots), strand_count)
     require_count("normals", len(bound.normals), strand_count)
@@ -192,7 +192,7 @@ def _segments_program():
     """The compute program that brings guides into the frames of their roots."""
     info = _declared(("guide_points", "guide_normals"))
     info.image(0, "RGBA32F", "FLOAT_2D", "segments", qualifiers={"WRITE"})
-    return shaders.compile_compute(info, "guide_segments.comp")
+    return shaders.compile_compute(info, "strands/guide_segments.comp")
 
 
 @shaders.kept
@@ -204,7 +204,7 @@ def _strands_program(slot_count, is_plain):
         info.push_constant("INT", name)
     if not is_plain:
         declare_put(info, first_slot=0)
-        return shaders.compile_compute(info, "interpolate_strands.comp")
+        return shaders.compile_compute(info, "strands/interpolate_strands.comp")
     info.image(0, "RGBA32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
-    put = "include/put_packed_strand.glsl", "include/put_plain_strand.glsl"
-    return shaders.compile_compute(info, "interpolate_strands.comp", dict([put]))
+    put = "strands/write_packed_strand.glsl", "strands/write_plain_strand.glsl"
+    return shaders.compile_compute(info, "strands/interpolate_strands.comp", dict([put]))

@@ -251,7 +251,7 @@ def _kinds_of(program):
 
 
 def _known(data: "StrandData"):
-    """(texture, strands in a row of it, texels of a strand): see shaders/style_strands.comp."""
+    """(texture, strands in a row of it, texels of a strand): see shaders/strands/style_strands.comp."""
     columns = [data.normals.numpy(), _halves(data.identities.numpy()), data.members.numpy().T, data.masks.numpy().T]
     rows = np.concatenate(columns, axis=1, dtype=np.float32)
     rows = np.pad(rows, ((0, 0), (0, -rows.shape[1] % 4)))
@@ -310,4 +310,4 @@ def _styles_program(point_count, step_kinds):
     constants = {"POINTS": point_count, **style_text.constants(), **{f"HAS_{name}": 1 for name in step_kinds}}
     for name, value in constants.items():
         info.define(name, str(value))
-    return shaders.compile_compute(info, "style_strands.comp", texts=style_text.texts(step_kinds))
+    return shaders.compile_compute(info, "strands/style_strands.comp", texts=style_text.texts(step_kinds))

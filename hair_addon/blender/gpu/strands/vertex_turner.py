@@ -28,10 +28,10 @@ _LARGEST_INDEX = 1 << 24  # that is exact in single precision
 class VertexTurner:
     """A `Turning` on the GPU; made by `new_turner`."""
 
-    turned: gpu.types.GPUTexture  # of each vertex where it is, and its axes: shaders/carry_strands.comp
+    turned: gpu.types.GPUTexture  # of each vertex where it is, and its axes: shaders/strands/carry_strands.comp
     rings: gpu.types.GPUTexture  # of each vertex its place among those that are uploaded, and its faces in `around`
     around: gpu.types.GPUTexture  # indices of faces
-    faces: gpu.types.GPUTexture  # shaders/turn_vertices.comp
+    faces: gpu.types.GPUTexture  # shaders/strands/vertex_rotations.comp
     rest: gpu.types.GPUTexture  # places of vertices at rest
     smooth_rest: gpu.types.GPUTexture  # the same on the smooth surface that they turn from; `rest` where none is
     needed: np.ndarray | slice  # (N,) vertices whose places are uploaded
@@ -131,4 +131,4 @@ def _turn_program():
         info.sampler(slot, "FLOAT_2D", name)
     info.image(0, "RGBA32F", "FLOAT_2D", "turned", qualifiers={"WRITE"})
     info.push_constant("INT", "vertex_count")
-    return shaders.compile_compute(info, "turn_vertices.comp")
+    return shaders.compile_compute(info, "strands/vertex_rotations.comp")

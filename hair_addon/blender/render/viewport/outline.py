@@ -157,28 +157,28 @@ def _program(fragment, constants, samplers):
         info.push_constant(kind, name)
     for slot, (name, kind) in enumerate(samplers.items()):
         info.sampler(slot, kind, name)
-    return shaders.compile_drawing(info, "cover.vert", fragment)
+    return shaders.compile_drawing(info, "picture/cover.vert", fragment)
 
 
 @shaders.kept
 def _mask_program():
     constants = {"channel": "VEC4", "first_place": "IVEC2"}
     constants |= dict.fromkeys(("samples_per_side", "first_segment", "segment_count"), "INT")
-    return _program("outline_mask.frag", constants, {"segments": "UINT_2D"})
+    return _program("picture/outline_mask.frag", constants, {"segments": "UINT_2D"})
 
 
 @shaders.kept
 def _rows_program():
-    return _program("outline_rows.frag", {"reach": "INT", "pass_count": "INT"}, {"mask": "FLOAT_2D"})
+    return _program("picture/outline_rows.frag", {"reach": "INT", "pass_count": "INT"}, {"mask": "FLOAT_2D"})
 
 
 @shaders.kept
 def _distance_program():
-    return _program("outline_distance.frag", {"reach": "INT"}, {"mask": "FLOAT_2D", "rows": "FLOAT_2D"})
+    return _program("picture/outline_distance.frag", {"reach": "INT"}, {"mask": "FLOAT_2D", "rows": "FLOAT_2D"})
 
 
 @shaders.kept
 def _outline_program():
     constants = {"active_color": "VEC3", "selected_color": "VEC3", "origin": "VEC2"}
     constants |= dict.fromkeys(("gap", "half_width", "hidden_opacity"), "FLOAT")
-    return _program("outline.frag", constants, {"distances": "FLOAT_2D"})
+    return _program("picture/outline.frag", constants, {"distances": "FLOAT_2D"})

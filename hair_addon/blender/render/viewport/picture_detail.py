@@ -17,7 +17,7 @@ _MOST_PER_SIDE = 6  # samples along each side of a pixel: about as many as a fin
 _WANTED_SAMPLES = 48_000
 _LARGEST_PART = 1.0 / 4.0
 
-_MARGIN = 6  # pixels around the hair, where it may have been before: history_carry.frag looks that far
+_MARGIN = 6  # pixels around the hair, where it may have been before: picture/history_carry.frag looks that far
 _SIZE_STEP = 16  # pixels: textures are made anew when the size changes
 
 

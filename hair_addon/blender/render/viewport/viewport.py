@@ -265,7 +265,7 @@ def _draw_guide_object(guide_object, view, lights, clip_planes):
         hair_cache.refuse(guide_object.data, error)
         return
     if guides is not None:
-        program = scene_programs.strip_program("guides.frag", is_clipped=clip_planes is not None)
+        program = scene_programs.strip_program("strands/guides.frag", is_clipped=clip_planes is not None)
         place = np.array(guide_object.matrix_world, np.float64)
         with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
             drawing.draw_strands(guides, program, view, lights, place, clip_planes=clip_planes)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps as paths see them: shaders/include/lights.glsl, at a point of each lamp; and the world beside them."""
+"""Lamps as paths see them: shaders/light/lights.glsl, at a point of each lamp; and the world beside them."""
 
 import warp as wp
 

@@ -23,7 +23,7 @@ class Surroundings:
     """What lights hair beside itself: surfaces, lamps and the world.
 
     corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own;
-    albedo: (F, 3) base colors of them; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl;
+    albedo: (F, 3) base colors of them; lamps: (N,) records with the fields of `Light` in shaders/light/lights.glsl;
     importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance, a picture of longitude
     and latitude as core/imaging/environment.py takes it apart; gloss: (F, 3) of triangles, roughness, metallic, and
     reflectance at normal incidence, without it all are matt; is_seen: (F,) bool of triangles, whether they hide hair

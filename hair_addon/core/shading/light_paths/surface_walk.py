@@ -13,7 +13,7 @@ from .fibre_walk import PI, reflectance
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 _LEAST_COSINE = wp.constant(1e-3)
-_SMOOTHEST = wp.constant(0.03)  # roughness, as shaders/include/surface_material.glsl has it
+_SMOOTHEST = wp.constant(0.03)  # roughness, as shaders/surfaces/surface_material.glsl has it
 _GRAZING = wp.constant(50.0)  # one over the reflectance below which less is reflected at any angle
 
 

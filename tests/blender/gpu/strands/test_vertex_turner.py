@@ -25,7 +25,7 @@ def ball():
 def nearest_rotations(matrices):
     """(N, 3, 3) by the shader."""
     inputs = {f"c{column}": np.float32(matrices[:, :, column]) for column in range(3)}
-    text, call = glsl.source("include/nearest_rotation.glsl"), "nearest_rotation(mat3(c0, c1, c2))"
+    text, call = glsl.source("strands/nearest_rotation.glsl"), "nearest_rotation(mat3(c0, c1, c2))"
     return np.stack([glsl.evaluate(text, "vec3", f"{call}[{column}]", **inputs) for column in range(3)], axis=2)
 
 

@@ -82,7 +82,7 @@ def test_the_table_is_as_good_as_eight_bits(blender_scene, colors, settings):
 
 def test_places_in_the_table_are_twins_and_come_back():
     light = np.concatenate([[0.0, 512.0, 1e6], np.geomspace(1e-6, 500.0, 1000)]).astype(np.float32)
-    text = glsl.source("include/display_place.glsl")
+    text = glsl.source("picture/display_transform.glsl")
     shader = glsl.evaluate(text, "vec3", "display_place(vec3(light))", light=light)[:, 1]
     python = display_transform.display_place(light.astype(np.float64))
     np.testing.assert_allclose(shader, python, atol=1e-5)
@@ -122,7 +122,7 @@ def test_hair_is_laid_over_a_viewport_in_its_colours(lit):
 def sample_offsets(columns, middles, turn):
     """Offsets of the samples beside axes of strands; arguments of one shape, but for the pass."""
     columns, middles = np.broadcast_arrays(columns, middles)
-    text = glsl.source("include/coverage.glsl")
+    text = glsl.source("visibility/coverage.glsl")
     x, y = columns.ravel().astype(np.int32), middles.ravel()
     found = glsl.evaluate(text, "float", f"sample_offset(x, y, offset_turn({turn:.4f}))", x=x, y=y)
     return found.reshape(columns.shape)
@@ -293,15 +293,17 @@ def test_meshes_that_are_no_surface_in_the_viewport_hide_nothing(sphere):
 
 
 PROGRAMS = {
-    "guides.frag": lambda: scene_programs.strip_program.__wrapped__("guides.frag"),
-    "strand_segments.comp": lambda: scene_programs.segments_program.__wrapped__(is_depth=True, is_round=True),
+    "strands/guides.frag": lambda: scene_programs.strip_program.__wrapped__("strands/guides.frag"),
+    "visibility/strand_segments.comp": lambda: scene_programs.segments_program.__wrapped__(
+        is_depth=True, is_round=True
+    ),
 }
 
 
 @pytest.mark.parametrize("file", PROGRAMS)
 def test_a_shader_that_does_not_compile_is_reported_once_with_file_and_line(file, tmp_path, monkeypatch):
     shutil.copytree(shaders.FOLDER, tmp_path / "shaders")
-    broken = tmp_path / "shaders" / "include" / "strand.glsl"
+    broken = tmp_path / "shaders" / "strands" / "strip.glsl"
     text = broken.read_text()
     line = next(number for number, words in enumerate(text.splitlines(), 1) if "int row =" in words)
     broken.write_text(text.replace("int row =", "int row = nonsense; int other =", 1))
@@ -311,7 +313,7 @@ def test_a_shader_that_does_not_compile_is_reported_once_with_file_and_line(file
     real = gpu.shader.create_from_info
     monkeypatch.setattr(gpu.shader, "create_from_info", lambda info: (compilations.append(1), real(info))[1])
     for _ in range(3):
-        with pytest.raises(HairError, match=rf"{re.escape(file)} .*include/strand\.glsl:{line}: .*nonsense"):
+        with pytest.raises(HairError, match=rf"{re.escape(file)} .*strands/strip\.glsl:{line}: .*nonsense"):
             PROGRAMS[file]()
     assert len(compilations) == 2  # and once more, to hear where
 
@@ -321,8 +323,8 @@ def test_a_complaint_is_found_in_what_vulkan_writes():
         "00:02.605  gpu.shader       | ERROR pyGPU_Shader vertex: \n"
         "                            |       | python_shader.glsl:2: Error: 'x' : undeclared identifier\n"
     )
-    vertex, fragment = [("a.vert", 1), ("include/b.glsl", 7)], [("c.frag", 1), ("c.frag", 2)]
-    assert shaders.complaint(log, vertex, fragment) == "include/b.glsl:7: Error: 'x' : undeclared identifier"
+    vertex, fragment = [("a.vert", 1), ("strands/b.glsl", 7)], [("c.frag", 1), ("c.frag", 2)]
+    assert shaders.complaint(log, vertex, fragment) == "strands/b.glsl:7: Error: 'x' : undeclared identifier"
     assert shaders.complaint(log.replace("vertex", "fragment"), vertex, fragment).startswith("c.frag:2: ")
     assert shaders.complaint("something else", vertex, fragment) is None
 
@@ -339,4 +341,4 @@ def test_undrawable_hair_is_reported_once(monkeypatch, capsys):
     viewport.draw()
     assert capsys.readouterr().err == "Vellus: The shader x.frag does not compile.\n"
     invalidation.clear()
-    PROGRAMS["guides.frag"]()  # others compile as before
+    PROGRAMS["strands/guides.frag"]()  # others compile as before

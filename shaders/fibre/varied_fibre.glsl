@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// N of the absorption where this sample lies: needs the samplers n_slices and return_slices and the block slices.
+
+#include "fibre/absorption_slices.glsl"
+#include "fibre/fibre.glsl"
+#include "fibre/lobe_sum.glsl"
+#include "fibre/varied_strand.glsl"
+
+// N_TT, N_TRT, N of the residual and N_R of one channel's absorption.
+vec4 channel_lobes(vec2 at, float sigma_a)
+{
+  float slice_count = float(textureSize(n_slices, 0).z);
+  vec2 place = slice_of(sigma_a, slices.low, slices.high, int(slice_count));
+  vec4 below = textureLod(n_slices, vec3(at, (place.x + 0.5) / slice_count), 0.0);
+  vec4 above = textureLod(n_slices, vec3(at, (place.x + 1.5) / slice_count), 0.0);
+  return geometric_mix(below, above, place.y);
+}
+
+FibreLobes side_by_side(vec4 red, vec4 green, vec4 blue)
+{
+  FibreLobes lobes;
+  lobes.n = vec4(red.x, green.x, blue.x, red.w);
+  lobes.n_trt = vec3(red.y, green.y, blue.y);
+  lobes.n_res = vec3(red.z, green.z, blue.z);
+  return lobes;
+}
+
+FibreLobes fibre_lobes(vec2 at)
+{
+  vec3 sigma_a = this_sigma_a();
+  return side_by_side(channel_lobes(at, sigma_a.r), channel_lobes(at, sigma_a.g), channel_lobes(at, sigma_a.b));
+}
+
+// A value in [0, 1] as the coordinate of a table whose first and last texel are at its ends.
+float between_ends(float value, float texel_count)
+{
+  return (clamp(value, 0.0, 1.0) * (texel_count - 1.0) + 0.5) / texel_count;
+}
+
+// Response to uniform light towards theta_o for one channel's absorption: the integral over phi, and the
+// same weighted with the cosine of phi, then those to P1 and P2 of sin(theta_i). As `albedo.fibre_moments`.
+vec4 channel_return(float u, float sigma_a)
+{
+  float along = (sqrt(sigma_a) - slices.low) / max(slices.high - slices.low, 1e-6);
+  return textureLod(return_slices, vec2(u, between_ends(along, float(textureSize(return_slices, 0).y))), 0.0);
+}
+
+void fibre_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
+{
+  float u = atan(sin_theta_o, sin_from_cos(sin_theta_o)) / PI + 0.5;
+  vec3 sigma_a = this_sigma_a();
+  vec4 red = channel_return(u, sigma_a.r);
+  vec4 green = channel_return(u, sigma_a.g);
+  vec4 blue = channel_return(u, sigma_a.b);
+  returned = vec3(red.x, green.x, blue.x);
+  towards = vec3(red.y, green.y, blue.y);
+  zonal_1 = vec3(red.z, green.z, blue.z);
+  zonal_2 = vec3(red.w, green.w, blue.w);
+}

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Light of a lamp at the place on a strand that `find_place` found.
+
+#include "light/irradiance.glsl"
+#include "visibility/strand_hit.glsl"
+
+struct LampLight {
+  vec3 L;           // towards the lamp
+  vec3 irradiance;  // [W/m²] where nothing is between
+  float open;       // the part of it that passes surfaces
+  float front;      // mean number of strands between
+  float behind;     // mean number of strands beyond
+  bool is_in_map;   // whether the lamp's shadow maps reach the place
+  vec3 at;          // in these maps
+  float depth;
+};
+
+// root: `root_direction` of the strand.
+LampLight lamp_on_strand(Light light, vec3 root)
+{
+  LampLight lamp;
+  lamp.L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
+  lamp.irradiance = irradiance_of(light, drawn_position);
+  lamp.open = 1.0;
+  lamp.front = 0.0;
+  lamp.behind = 0.0;
+  lamp.is_in_map = shadow_place(light, drawn_position, lamp.at, lamp.depth);
+  if (lamp.is_in_map) {
+    lamp.open = lit_part(lamp.at, lamp.depth, strand_bias(root, lamp.L));
+    float own = own_count(light, drawn_position, drawn_radius);
+    lamp.front = crossed_strands(lamp.at, lamp.depth, own, lamp.behind);
+  }
+  return lamp;
+}

@@ -1,9 +1,0 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-// No strand and no triangle in any sample, where a picture starts.
-
-#include "include/no_segment.glsl"
-
-void main()
-{
-  segment = NO_SEGMENT;
-}

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Hair over a viewport, after the view transform: light through the scene's colour management.
+
+#include "picture/display_transform.glsl"
+
+// Depth of the hair in a pixel. What is carried from an earlier picture may have none there: it takes that of the nearest
+// hair around it, or else is in front, as our own surfaces have already hidden it.
+float depth_at(ivec2 pixel)
+{
+  float depth = texelFetch(depths, pixel, 0).r;
+  for (int turn = 0; turn < 9 && depth == 1.0; turn++) {
+    ivec2 beside = pixel + ivec2(turn % 3 - 1, turn / 3 - 1);
+    depth = texelFetch(depths, clamp(beside, ivec2(0), textureSize(depths, 0) - 1), 0).r;
+  }
+  return (depth < 1.0) ? depth : 0.0;
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy - origin);
+  vec4 light = max(texelFetch(passes, pixel, 0), vec4(0.0));
+  if (light.a == 0.0) {
+    discard;
+  }
+  float side = float(textureSize(display_table, 0).x);
+  vec3 at = display_place(exposure * light.rgb / light.a);
+  vec3 display = textureLod(display_table, (at * (side - 1.0) + 0.5) / side, 0.0).rgb;
+  // Blender interprets colours drawn over a viewport as display colours to the power of 2.2, for any display encoding.
+  color = vec4(pow(display, vec3(2.2)), 1.0) * (opacity * min(light.a / float(pass_count), 1.0));
+  gl_FragDepth = depth_at(pixel);
+}

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Mean and standard deviation of each block of pixels; of an even one that is zero.
+
+#include "picture/history_blocks.glsl"
+
+void main()
+{
+  ivec2 corner = ivec2(gl_FragCoord.xy) * BLOCK_SIDE;
+  ivec2 end = min(corner + BLOCK_SIDE, textureSize(picture, 0));
+  vec4 sum = vec4(0.0);
+  vec4 squares = vec4(0.0);
+  for (int y = corner.y; y < end.y; y++) {
+    for (int x = corner.x; x < end.x; x++) {
+      // A single glint is no change.
+      vec4 light = clamp(texelFetch(picture, ivec2(x, y), 0) / weight, -100.0, 100.0);
+      sum += light;
+      squares += light * light;
+    }
+  }
+  vec2 extent = vec2(end - corner);
+  float count = extent.x * extent.y;
+  mean = sum / count;
+  deviation = sqrt(max(squares / count - mean * mean, vec4(0.0)));
+  // Less is rounding, not noise.
+  deviation *= step(1e-3 * abs(mean) + 1e-6, deviation);
+}

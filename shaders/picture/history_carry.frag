@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The previous picture of a viewport, moved to where its contents are now [Karis14], and how many passes it is worth.
+// Clamping each pixel to its neighbours would remove thin strands, which are in few samples of a pass. Means of
+// blocks are compared instead: they may differ as far as noise allows.
+
+#include "picture/history_blocks.glsl"
+#include "visibility/sample_values.glsl"
+
+const float MOST_OF_BACKGROUND = 1.0;  // where no hair and no surface is near: it has no noise, and may have been hidden
+const float MOST_OF_LIT_SURFACE = 24.0;  // where only lights move: shadows on surfaces go with them, and leave a trail
+const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as strands hide each other in other ways
+
+// Standard errors by which the means of two blocks may differ.
+const float TOLERANCE = 2.0;
+const float MOST_GAIN = 8.0;  // of what is lit: more light comes to all strands alike, also to dark ones
+const float TOLERANCE_OF_LIGHT = 3.0;  // where nothing but lights has moved
+
+// Where the textures of samples begin in the picture. Beside them there is no hair.
+ivec2 first_place()
+{
+  return ivec2(history.first_column, history.first_row);
+}
+
+void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
+{
+  place = clamp(place, ivec2(0), textureSize(depths, 0) - 1);
+  float depth = uintBitsToFloat(texelFetch(depths, place, 0).r);
+  if (depth < nearest) {
+    nearest = depth;
+    nearest_place = place;
+  }
+}
+
+// Where in the previous picture the nearest of what is in a pixel or beside it was [pixels]: silhouettes move with what
+// they are of. is_background: there is nothing.
+vec2 place_before(ivec2 pixel, out bool is_background)
+{
+  int side = history.samples_per_side;
+  ivec2 corner = pixel * side - first_place();
+  ivec2 nearest_place = corner;
+  float nearest = 2.0;
+  for (int y = 0; y < side; y++) {
+    for (int x = 0; x < side; x++) {
+      look(corner + ivec2(x, y), nearest_place, nearest);
+    }
+  }
+  look(corner + ivec2(side, 0), nearest_place, nearest);
+  look(corner + ivec2(-1, 0), nearest_place, nearest);
+  look(corner + ivec2(0, side), nearest_place, nearest);
+  look(corner + ivec2(0, -1), nearest_place, nearest);
+  // A thin strand is in few samples: before the background, look for it a little further.
+  if (nearest == 1.0) {
+    for (int turn = 0; turn < 4; turn++) {
+      int sign = (turn & 2) - 1;
+      look(corner + ivec2(2 * sign * side, 2 * side * (2 * (turn & 1) - 1)), nearest_place, nearest);
+      look(corner + ((turn & 1) == 0 ? ivec2(4 * sign * side, 0) : ivec2(0, 4 * sign * side)), nearest_place, nearest);
+    }
+  }
+  is_background = nearest == 1.0;
+  vec2 at = vec2(pixel) + 0.5;
+  bool is_hair = texelFetch(segments, nearest_place, 0).r < NO_SEGMENT;
+  if (is_hair ? history.has_hair_motion != 0 : history.has_surface_motion != 0 && !is_background) {
+    return at + texelFetch(motion, nearest_place, 0).xy;
+  }
+  vec4 clip = history.now_to_before * vec4(2.0 * at / history.size.xy - 1.0, 2.0 * nearest - 1.0, 1.0);
+  return (clip.w > 0.0) ? (0.5 * clip.xy / clip.w + 0.5) * history.size.xy : vec2(-1.0);
+}
+
+// The previous picture at a place [pixels], by Catmull and Rom's cubics: bilinear filtering would blur it more in each
+// frame. Five bilinear samples; the corners' weights are small. Beside bright strands it may be below zero: that is cut
+// off where it is shown, as frame by frame it would add up to more light.
+vec4 previous_at(vec2 place)
+{
+  vec2 middle = floor(place - 0.5) + 0.5;
+  vec2 t = place - middle;
+  vec2 before_it = t * (-0.5 + t * (1.0 - 0.5 * t));
+  vec2 first = 1.0 + t * t * (-2.5 + 1.5 * t);
+  vec2 second = t * (0.5 + t * (2.0 - 1.5 * t));
+  vec2 after_it = t * t * (-0.5 + 0.5 * t);
+  vec2 inner = first + second;
+  vec2 texel = 1.0 / history.size.xy;
+  vec2 low = (middle - 1.0) * texel;
+  vec2 between = (middle + second / inner) * texel;
+  vec2 high = (middle + 2.0) * texel;
+  vec4 total = textureLod(before, between, 0.0) * (inner.x * inner.y);
+  total += textureLod(before, vec2(low.x, between.y), 0.0) * (before_it.x * inner.y);
+  total += textureLod(before, vec2(high.x, between.y), 0.0) * (after_it.x * inner.y);
+  total += textureLod(before, vec2(between.x, low.y), 0.0) * (inner.x * before_it.y);
+  total += textureLod(before, vec2(between.x, high.y), 0.0) * (inner.x * after_it.y);
+  float weight = inner.x * inner.y + (before_it.x + after_it.x) * inner.y + inner.x * (before_it.y + after_it.y);
+  return total / weight;
+}
+
+// Mean light of a picture and its coverage, of the samples around a place, before and now: of the same samples, so that
+// which strands they are on is no noise of the change [Schied18].
+void light_around(vec2 place, out vec4 earlier, out vec3 later)
+{
+  ivec2 blocks = textureSize(light_now, 0);
+  vec2 at = block_place(place * float(history.samples_per_side) - vec2(first_place()), blocks);
+  earlier = vec4(0.0);
+  later = vec3(0.0);
+  for (int turn = 0; turn < 4; turn++) {
+    vec2 beside = at + (vec2(turn & 1, turn >> 1) - 0.5) / vec2(blocks);
+    earlier += 0.25 * textureLod(light_before, beside, 0.0);
+    later += 0.25 * textureLod(light_now, beside, 0.0).rgb;
+  }
+}
+
+// Whether hair is in the samples of a pixel or around it, up to four pixels away: a thin strand is in few of them.
+bool is_near_hair(ivec2 pixel)
+{
+  int side = history.samples_per_side;
+  ivec2 last = textureSize(segments, 0) - 1;
+  bool is_found = false;
+  for (int turn = 0; turn < 25 && !is_found; turn++) {
+    ivec2 place = (pixel + 2 * ivec2(turn % 5, turn / 5) - 4) * side - first_place();
+    place = clamp(place, ivec2(0), last);
+    is_found = texelFetch(segments, place, 0).r < NO_SEGMENT;
+  }
+  return is_found;
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ivec2 blocks = textureSize(now_mean, 0);
+  vec2 here = block_place(vec2(pixel) + 0.5, blocks);
+  vec4 mean = textureLod(now_mean, here, 0.0);
+  color = vec4(0.0);
+  passes = 0.0;
+  bool is_still = history.is_still != 0;
+  bool is_background = false;
+  bool is_hair_alone = is_still && (history.has_lit_surfaces == 0 || is_near_hair(pixel));
+  vec2 place = is_still ? vec2(pixel) + 0.5 : place_before(pixel, is_background);
+  if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, history.size.xy))) {
+    return;
+  }
+  vec2 there = block_place(place, blocks);
+  vec4 mean_before = textureLod(before_mean, there, 0.0);
+  vec4 deviation = textureLod(now_deviation, here, 0.0);
+  if (!is_background) {  // where hair has gone, its own noise is no reason to keep some of it
+    deviation = max(deviation, textureLod(before_deviation, there, 0.0));
+  }
+  vec4 light = previous_at(place);
+  float tolerance = TOLERANCE;
+  if (is_still) {
+    vec4 earlier;
+    vec3 later;
+    light_around(place, earlier, later);
+    vec3 change = later / max(earlier.rgb, vec3(1e-6));
+    vec3 gain = min(change, vec3(MOST_GAIN));
+    vec3 more = max(later - gain * earlier.rgb, vec3(0.0)) / max(earlier.a, 1e-3);
+    light.rgb = gain * light.rgb + more * light.a;
+    mean_before.rgb = gain * mean_before.rgb + more * mean_before.a;
+  }
+  if (is_hair_alone) {
+    // How much of a block hair covers is noise, and only its light may have changed.
+    mean *= mean_before.a / max(mean.a, 0.25 * mean_before.a + 1e-4);
+    tolerance = TOLERANCE_OF_LIGHT;
+  }
+  // Half floats resolve a thousandth.
+  vec4 bound = (tolerance / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
+  vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
+  // In proportion: what is black beside a bright edge remains so.
+  vec4 factor = clamp(allowed / max(mean_before, vec4(1e-6)), vec4(0.0), vec4(2.0));
+  light *= is_hair_alone ? vec4(factor.rgb, 1.0) : factor;
+  vec4 excess = abs(mean_before - mean) / bound;
+  float most = max(max(excess.r, excess.g), max(excess.b, excess.a));
+  color = light;
+  passes = textureLod(before_passes, place / history.size.xy, 0.0).r;
+  float most_passes = (is_still && !is_hair_alone) ? MOST_OF_LIT_SURFACE : history.most_passes;
+  passes = min(passes, is_background ? MOST_OF_BACKGROUND : most_passes) / max(0.5 * most, 1.0);
+  passes /= max(distance(place, vec2(pixel) + 0.5) / SLOW, 1.0);
+}

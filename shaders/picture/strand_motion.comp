@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Motion vectors of strands.
+
+#include "picture/motion.glsl"
+#include "visibility/strand_hit.glsl"
+
+// Which of the combed strands this one is, counted from one; 0: it was not combed.
+int moved_row(int strand)
+{
+  ivec2 texel = ivec2(strand % view.row_strands, strand / view.row_strands);
+  return (motion.moved_row_strands > 0) ? int(texelFetch(moved_rows, texel, 0).r) : 0;
+}
+
+// A place between a point of a strand and the next.
+vec3 place_between(sampler2D texels, ivec2 first, int point, float t)
+{
+  vec4 head = packed_head(texels, first);
+  return mix(packed_place(texels, first, head, point), packed_place(texels, first, head, point + 1), t);
+}
+
+vec4 sample_value()
+{
+  float place = strand_position * float(view.point_count - 1);
+  int point = min(int(place), view.point_count - 2);
+  ivec2 first = strand_first(strand_index);
+  float t = place - float(point);
+  vec3 now = place_between(strands, first, point, t);
+  vec3 after = place_between(strands_after, first, point, t);
+  vec3 before;
+  int row = moved_row(strand_index);
+  if (row > 0) {
+    first = packed_first(row - 1, 1, view.point_count, motion.moved_row_strands);
+    before = place_between(moved_points, first, point, t);
+  }
+  else {
+    before = place_between(strands_before, first, point, t);
+  }
+  return moved(motion.now_to_clip * vec4(now, 1.0),
+               motion.before_to_clip * vec4(before, 1.0),
+               motion.after_to_clip * vec4(after, 1.0),
+               motion.size.xy);
+}
+
+#include "visibility/strand_samples.glsl"

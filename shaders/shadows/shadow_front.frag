@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// First pass of a deep opacity map drawn as strips: the depth of the strands that the light meets first, or last.
+
+#include "shadows/opacity.glsl"
+
+void main()
+{
+  Light light = lights.light[view.light_index];
+  float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, light.near, light.extent, drawn_position);
+  // What surfaces hide has no part in the layers' depths.
+  if (depth > texelFetch(hidden_depth, ivec2(gl_FragCoord.xy), 0).r) {
+    discard;
+  }
+  front = front_bits(depth);
+}

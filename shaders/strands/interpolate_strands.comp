@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Makes strands of their guides in the texture that they are drawn from, or that styles take them from:
+// core/interpolation/interpolation.py on any GPU.
+
+#include "strands/guide_interpolation.glsl"
+#include "strands/write_packed_strand.glsl"
+#include "strands/strip.glsl"
+
+// Texels of a strand in `bindings`: root, normal, and guides with their weights, two a texel.
+const int BINDING_TEXELS = 2 + (SLOTS + 1) / 2;
+
+void main()
+{
+  int group = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);
+  int made = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
+  if (made >= some_count) {
+    return;
+  }
+  int strand = first_strand + made;
+  ivec2 bound = strand_texel(strand, 0, BINDING_TEXELS, making.row_bindings);
+  vec3 root = texelFetch(bindings, bound, 0).xyz;
+  vec3 normal = texelFetch(bindings, bound + ivec2(1, 0), 0).xyz;
+  vec3 tangent;
+  vec3 bitangent;
+  root_frame(normal, tangent, bitangent);
+
+  ivec2 guide[SLOTS];
+  float share[SLOTS];
+  float log_length[SLOTS];
+  vec2 turn[SLOTS];
+  vec3 first_lower = vec3(0.0);
+  vec3 first_tip = vec3(0.0);
+  float first_length = 0.0;
+  float total = 0.0;
+  for (int slot = 0; slot < SLOTS; slot++) {
+    vec4 pair = texelFetch(bindings, bound + ivec2(2 + slot / 2, 0), 0);
+    vec2 weighed = (slot % 2 == 0) ? pair.xy : pair.zw;
+    int index = int(weighed.x);
+    guide[slot] = strand_texel(index, 0, making.point_count + 1, making.row_segments);
+    int row = index / making.row_normals;
+    vec3 guide_normal = texelFetch(guide_normals, ivec2(index - row * making.row_normals, row), 0).xyz;
+    turn[slot] = frame_turn(guide_normal, tangent, bitangent, normal);
+    vec4 shape = texelFetch(segments, guide[slot] + ivec2(making.point_count - 1, 0), 0);
+    vec3 lower = turned_by(turn[slot], shape.xyz);
+    vec3 tip = turned_by(turn[slot], texelFetch(segments, guide[slot] + ivec2(making.point_count, 0), 0).xyz);
+    share[slot] = weighed.y;
+    log_length[slot] = shape.w;
+    if (slot == 0) {
+      first_lower = lower;
+      first_tip = tip;
+      first_length = shape.w;
+    }
+    else {
+      float facing = min(dot(first_lower, lower), dot(first_tip, tip));
+      share[slot] *= limited_part(facing, abs(shape.w - first_length), making.limits);
+    }
+    total += share[slot];
+  }
+  // No strand is longer than its guides' mean, but for rounding.
+  float range = 0.0;
+  for (int slot = 0; slot < SLOTS; slot++) {
+    share[slot] /= total;
+    turn[slot] *= share[slot];
+    range += share[slot] * exp(log_length[slot]);
+  }
+  range *= 1.001 * making.axes_scale;
+
+  // From the surface's frame to the coordinates that are drawn.
+  tangent = (making.axes * vec4(tangent, 0.0)).xyz;
+  bitangent = (making.axes * vec4(bitangent, 0.0)).xyz;
+  normal = (making.axes * vec4(normal, 0.0)).xyz;
+  vec3 place = (making.axes * vec4(root, 0.0)).xyz;
+  begin_strand(made, place, range, making.point_count, making.row_strands);
+  vec3 offset = vec3(0.0);
+  for (int point = 1; point < making.point_count; point++) {
+    vec3 sum = vec3(0.0);
+    float mean_length = 0.0;
+    for (int slot = 0; slot < SLOTS; slot++) {
+      vec4 segment = texelFetch(segments, guide[slot] + ivec2(point - 1, 0), 0);
+      sum.xy += turn[slot] * segment.x + vec2(-turn[slot].y, turn[slot].x) * segment.y;
+      sum.z += share[slot] * segment.z;
+      mean_length += share[slot] * segment.w;
+    }
+    sum = stretched(sum, mean_length, making.keep_length);
+    offset += tangent * sum.x + bitangent * sum.y + normal * sum.z;
+    put_point(point, offset);
+  }
+  end_strand(made);
+}

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A program of styles on strands where they are drawn: core/styling/steps.cpp on any GPU, one strand a thread.
+//
+// all.strand holds the kinds of its steps, and HAS_TRIM and the like say which these are.
+
+#include "strands/write_packed_strand.glsl"
+#include "strands/strip.glsl"
+#include "strands/strand_language.glsl"
+#include "all.strand"
+
+// Numbers of a strand in `known`: its normal, its identity in two parts, its clump centre of each level, its masks.
+const int KNOWN_LEVELS = 5;
+
+float known_number(ivec2 first, int number)
+{
+  return texelFetch(known, first + ivec2(number / 4, 0), 0)[number % 4];
+}
+
+int whole(float high, float low)
+{
+  return int((uint(high) << 16u) | uint(low));
+}
+
+// Directions and lengths of the segments between points. A segment without length goes on as the one before.
+void read_strand(ivec2 first)
+{
+  half_now = 0;
+  total = 0.0;
+  vec3 direction = normal;
+  vec3 before = imageLoad(plain_strands, first).xyz;
+  root = before;
+  for (int i = 1; i < styling.point_count; i++) {
+    vec3 here = imageLoad(plain_strands, first + ivec2(i, 0)).xyz;
+    vec3 along = here - before;
+    float size = length(along);
+    direction = (size > 1e-12) ? along / size : direction;
+    set_direction(i, direction);
+    set_length(i, size);
+    total += size;
+    before = here;
+  }
+}
+
+// The clump centre that a step counts the strand to.
+void take_centre(ivec2 first)
+{
+  centre = row_now.first_centre;
+  centre_normal = normal;
+  lock = identity;
+  in_lock = 0.0;
+  has_centre_points = row_now.level >= 0 && centre < styling.centre_count;
+  int member = int(known_number(first, KNOWN_LEVELS + row_now.level));
+  if (member < 0) {
+    if (((NEEDING_CENTRE >> kind) & 1) != 0) {
+      base = 0.0;
+    }
+    return;
+  }
+  in_lock = 1.0;
+  centre += member;
+  ivec2 texel = strand_texel(centre, 0, 2, styling.row_locks);
+  vec4 its = texelFetch(locks, texel, 0);
+  centre_normal = its.xyz;
+  lock = whole(its.w, texelFetch(locks, texel + ivec2(1, 0), 0).x);
+}
+
+void take_profile()
+{
+  at_root = number_at(AT_ROOT_NUMBER);
+  at_tip = number_at(AT_TIP_NUMBER);
+  exponent = number_at(EXPONENT_NUMBER);
+  is_flipped = number_at(IS_FLIPPED_NUMBER) != 0.0;
+  from = number_at(FROM_NUMBER);
+  least = 0.5 / float(POINTS - 1);
+  slope = 1.0 / power(least, 1.0 - exponent);
+}
+
+// A point from the root on, in the coordinates that are drawn. A strand that no style has touched keeps its points.
+vec3 drawn_offset(ivec2 first, int i, vec3 from_root, bool is_touched)
+{
+  vec3 offset = is_touched ? from_root : imageLoad(plain_strands, first + ivec2(i, 0)).xyz - root;
+  return (styling.to_drawn * vec4(offset, 0.0)).xyz;
+}
+
+void write_strand(int strand, ivec2 first, bool is_touched)
+{
+  vec3 from_root = vec3(0.0);
+  float range = 0.0;
+  for (int i = 1; i < styling.point_count; i++) {
+    from_root += direction_at(i) * length_at(i);
+    vec3 extent = abs(drawn_offset(first, i, from_root, is_touched));
+    range = max(range, max(extent.x, max(extent.y, extent.z)));
+  }
+  vec3 root = (styling.to_drawn * vec4(root, 0.0)).xyz;
+  begin_strand(strand, root, range, POINTS, styling.row_packed);
+  from_root = vec3(0.0);
+  for (int i = 1; i < styling.point_count; i++) {
+    from_root += direction_at(i) * length_at(i);
+    put_point(i, drawn_offset(first, i, from_root, is_touched));
+  }
+  end_strand(strand);
+}
+
+// Points of a centre strand, with their arc lengths.
+void write_centre(ivec2 first, bool is_touched)
+{
+  vec3 from_root = vec3(0.0);
+  float arc = 0.0;
+  for (int i = 0; i < styling.point_count; i++) {
+    vec4 texel = imageLoad(plain_strands, first + ivec2(i, 0));
+    if (i > 0) {
+      from_root += direction_at(i) * length_at(i);
+      arc += length_at(i);
+    }
+    vec3 here = is_touched ? root + from_root : texel.xyz;
+    imageStore(plain_strands, first + ivec2(i, 0), vec4(here, arc));
+  }
+}
+
+void main()
+{
+  int group = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);
+  int place = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
+  if (place >= some_count) {
+    return;
+  }
+  point_count = styling.point_count;
+  hand = styling.hand;
+  int strand = first_strand + place;
+  ivec2 known_first = strand_texel(strand, 0, styling.known_texels, styling.row_known);
+  vec4 head = texelFetch(known, known_first, 0);
+  normal = head.xyz;
+  identity = whole(head.w, known_number(known_first, 4));
+  ivec2 first = strand_texel(styling.first_strand + place, 0, POINTS, styling.row_strands);
+  read_strand(first);
+  bool is_touched = false;
+  for (int index = 0; index < styling.step_count; index++) {
+    row_now = styling.steps[index];
+    kind = row_now.kind;
+    seed = row_now.seed;
+    keep_length = number_at(KEEP_LENGTH_NUMBER);
+    // A_si = base · profile(x_i).
+    base = number_at(AMOUNT_NUMBER) * (1.0 - number_at(VARY_NUMBER) * random(VARY));
+    if (row_now.mask >= 0) {
+      base *= known_number(known_first, KNOWN_LEVELS + styling.level_count + row_now.mask);
+    }
+    take_centre(known_first);
+    if (base > 0.0) {
+      is_touched = true;
+      take_profile();
+      per_total = 1.0 / max(total, 1e-20);
+      apply_step();
+    }
+  }
+  if (styling.are_centres != 0) {
+    write_centre(first, is_touched);
+  }
+  else {
+    write_strand(strand, first, is_touched);
+  }
+}

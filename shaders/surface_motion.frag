@@ -1,9 +1,0 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-// Motion vectors of a surface.
-
-#include "include/motion.glsl"
-
-void main()
-{
-  color = moved(place_now, place_before, place_after, motion.size.xy);
-}

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Light from a point of a surface, a Principled BSDF: diffuse below a rough dielectric, or metal.
+
+#include "shadows/surface_visibility.glsl"
+#include "light/world.glsl"
+#include "surfaces/surface_reflection.glsl"
+#include "surfaces/surface_material.glsl"
+#include "surfaces/surface_point.glsl"
+
+// Largest light that a picture's half-precision samples hold.
+const float BRIGHTEST = 6e4;
+
+// alpha of microfacets and of the normal's change within a sample, which would leave dots of light [Tokuyoshi19].
+float filtered_alpha(float roughness, float variance)
+{
+  float squared = roughness * roughness * roughness * roughness;
+  return sqrt(min(squared + min(2.0 * variance, 0.18), 1.0));
+}
+
+struct SurfaceLight {
+  vec3 below;  // through the coat
+  vec3 highlight;  // what the coat, or metal, reflects
+  float coat;  // the part of even light that it does
+  float alpha;  // of its microfacets
+  float noise;  // variance of its irradiance, by that squared
+};
+
+// turn: of `sample_turn`.
+SurfaceLight surface_light(SurfacePoint point, vec2 turn)
+{
+  vec3 N = point.N;
+  vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - point.position) : view.eye.xyz;
+  float n_dot_v = max(abs(dot(N, V)), 1e-4);
+  vec3 albedo = base_color(point.uv, point.uv_right, point.uv_up);
+  float roughness = base_roughness(point.uv, point.uv_right, point.uv_up);
+  float alpha = filtered_alpha(roughness, point.normal_variance);
+  vec4 share = directional_albedo(surface_albedo, n_dot_v, roughness);
+  // A surface that reflects nothing straight on does not at any angle.
+  float grazing = share.z * min(50.0 * surface.reflectance, 1.0);
+  float coat = surface.reflectance * (share.x - share.z) + grazing;
+  vec3 reflectance = mix(vec3(surface.reflectance), albedo, surface.metallic);
+  vec3 gain = multiple_reflections(share, reflectance);
+  vec3 reflected = gain * mix(vec3(coat), albedo * (share.x - share.y) + share.y, surface.metallic);
+
+  mat3 plus;
+  mat3 minus;
+  world_sides(point.seen_x_y, point.seen_z.xy, view.seen_opacity, view.hair_forward.rgb, plus, minus);
+  vec3 irradiance = surface_irradiance(plus, minus, N);
+  vec3 highlight = reflected * surface_irradiance(plus, minus, reflect(-V, N)) / PI;
+  float variance = 0.0;
+  for (int index = 0; index < lights.count; index++) {
+    Light light = lights.light[index];
+    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, point.position);
+    SurfaceVisibility seen = surface_visibility(light, point.position, N, view.hair_forward.rgb, turn);
+    if (any(greaterThan(seen.past_hair, vec3(0.0)))) {
+      vec3 facing = light_irradiance(light.kind,
+                                     light.position.xyz,
+                                     light.axis.xyz,
+                                     light.power.rgb,
+                                     light.cos_cone,
+                                     light.blend,
+                                     light.radius,
+                                     point.position);
+      // A plane receives less of a wide lobe of the world than a ball does, in the mean by its variance.
+      float blur = light_blur(light.kind, light.position.xyz, light.radius, point.position);
+      variance += seen.variance * squared_mean(facing);
+      vec3 arriving = facing * seen.past_hair * ((light.kind == LIGHT_SUN) ? 1.0 - blur : 1.0);
+      irradiance += arriving;
+      float n_dot_l = max(dot(N, L), 1e-3);
+      vec3 H = normalize(L + V);
+      float v_dot_h = clamp(dot(V, H), 0.0, 1.0);
+      // A light's size widens its highlight: half its angle, seen by the microfacets' normals.
+      float widened = min(sqrt(alpha * alpha + 0.5 * blur), 1.0);
+      vec3 dielectric = vec3(F_dielectric(v_dot_h, surface.reflectance));
+      vec3 fresnel = mix(dielectric, F_schlick(v_dot_h, albedo), surface.metallic);
+      float n_dot_h = clamp(dot(N, H), 0.0, 1.0);
+      float facets = D_ggx(n_dot_h, widened);
+      float mirrored = smoothstep(0.25, 1.0, 0.5 * blur / (alpha * alpha));
+      if (mirrored > 0.0) {
+        facets = mix(facets, D_ggx_of_disk(n_dot_h, sqrt(blur), alpha), mirrored);
+      }
+      facets *= V_smith(n_dot_l, n_dot_v, alpha);
+      highlight += arriving * gain * fresnel * facets;
+    }
+  }
+  SurfaceLight light_here;
+  light_here.below = (1.0 - surface.metallic) * max(1.0 - coat, 0.0) * albedo * irradiance / PI;
+  light_here.highlight = highlight;
+  light_here.coat = coat;
+  light_here.alpha = alpha;
+  light_here.noise = variance / max(squared_mean(irradiance), 1e-20);
+  return light_here;
+}
