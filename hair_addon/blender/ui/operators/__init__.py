@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All operators: a package a subject, one file per operator: read, compute, write."""
+"""All operators: one file a subject. An operator reads, computes and writes."""
 
 from . import conversion, dynamics, guide_tools, library, looks, output, pictures, styles, surface, systems
 
-PACKAGES = (systems, surface, conversion, guide_tools, styles, dynamics, looks, library, pictures, output)
-CLASSES = tuple(cls for package in PACKAGES for cls in package.CLASSES)
+SUBJECTS = (systems, surface, conversion, guide_tools, styles, dynamics, looks, library, pictures, output)
+CLASSES = tuple(cls for subject in SUBJECTS for cls in subject.CLASSES)

@@ -6,7 +6,7 @@ import bpy
 from ...groom.hair_systems import edited_system, guides_of_system, systems_of
 from ...groom.selection import object_of, surface_of
 from .. import setting_rows
-from ..operators.systems.comb_guides import is_combing
+from ..operators.systems import is_combing
 from .tab import HairTab, draw_combing
 
 _ROWS = 3  # of a list that holds less

@@ -5,7 +5,7 @@ import textwrap
 
 from ...host.notices import text_of
 from ...settings.translations import CONTEXT, interface_text, status_text
-from ..operators.systems.comb_guides import is_combing
+from ..operators.systems import is_combing
 
 _CHARACTER_WIDTH = 6.8  # pixels of Blender's interface font on average, at a scale of one
 _ICON_AND_MARGINS = 66.0

@@ -1,18 +1,61 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A groom of an asset library → guides and hair on the active mesh."""
+"""Operators that save grooms to asset libraries and apply them to meshes."""
 
 from pathlib import Path
 
 import bpy
 
-from .....core.errors import HairError
-from ....groom.selection import make_active, object_of, surface_of
-from ....groom.transfer import library_groom
-from ....host import paths
-from ....io import groom_library
-from ....settings import asset_libraries, properties
-from ....settings.translations import report_text
-from ..base.file_browser import BrowsedOperator
+from ....core.errors import HairError
+from ...groom.selection import hair_of, make_active, object_of, surface_of
+from ...groom.transfer import library_groom
+from ...host import paths
+from ...host.notices import name_of
+from ...io import groom_library
+from ...settings import asset_libraries, properties
+from ...settings.translations import report_text
+from .base.file_browser import BrowsedOperator
+from .base.hair_operator import needs_hair
+from .base.modal import LongOperator
+
+
+class VELLUS_OT_save_groom(LongOperator, bpy.types.Operator):
+    """Save the active hair with its guides, masks, styles and look as an asset, to apply it to other meshes"""
+
+    bl_idname = "vellus.save_groom"
+    bl_label = "Save Groom to Library"
+    bl_options = {"REGISTER"}
+    __annotations__ = {
+        "name": properties.text("Name", "Name of the groom. Leave empty to use the name of the hair"),
+        "library": asset_libraries.library_name("Library", "Asset library to save to"),
+        "catalog": properties.text("Catalog", "Catalog of the groom, such as Hair/Short. Leave empty for none", True),
+        "overwrites": properties.switch("Overwrite", "Replace a groom of the same name", False),
+    }
+    applies = needs_hair
+
+    def invoke(self, context, _event):
+        if not self.library:
+            self.library = asset_libraries.first_name()
+        if not self.name:
+            self.name = name_of(hair_of(context.object))
+        return context.window_manager.invoke_props_dialog(self)
+
+    def seconds(self, context):
+        return float("inf")  # graphics drivers differ a hundredfold
+
+    def work(self, context):
+        hair = hair_of(context.object)
+        folder = asset_libraries.folder_of(self.library or asset_libraries.first_name())
+        path = groom_library.path_of(folder, self.name or name_of(hair))
+        if path.exists() and not self.overwrites:
+            raise HairError("{path} exists: choose another name, or turn on Overwrite.", path=path)
+        return groom_library.saving(hair, path, self.name, self.catalog)
+
+    def message(self, made):
+        return "Groom saved to {path}", {"path": made}
+
+    def after(self, context, made):
+        asset_libraries.show_changes(self.library or asset_libraries.first_name())
+
 
 _METHODS = {"AUTO": "Automatic", "UV": "UV Map", "NEAREST": "Nearest Surface"}
 _TOOLTIPS = {
@@ -72,3 +115,9 @@ class VELLUS_OT_apply_groom(BrowsedOperator, bpy.types.Operator):
         make_active(object_of(made.made.hair, context.view_layer), context.view_layer)
         for sentence, values in made.notes():
             self.report({"WARNING"}, report_text(sentence, **values))
+
+
+CLASSES = (
+    VELLUS_OT_save_groom,
+    VELLUS_OT_apply_groom,
+)
