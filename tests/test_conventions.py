@@ -48,11 +48,11 @@ ROOTS = {"__init__", "__main__"}
 
 
 def package_of(path):
-    """The listed package that a file is in; api and api_arguments.py are one."""
+    """The listed package that a file is in."""
     name = name_of(path).removesuffix(".py")
     if name in ROOTS:
         return ""
-    return "api" if name.startswith("api") else name.rpartition("/")[0]
+    return name.rpartition("/")[0]
 
 
 def imports(path):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hair_addon.api_blender import ARRAYS_ONLY
+from hair_addon.api.blender_access import ARRAYS_ONLY
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -45,7 +45,7 @@ def wheel(tmp_path_factory):
 
 def test_a_wheel_holds_the_half_for_arrays_and_its_types(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
-    assert {"hair_addon/py.typed", "hair_addon/api.py", "hair_addon/core/styling/bend.py"} <= names
+    assert {"hair_addon/py.typed", "hair_addon/api/__init__.py", "hair_addon/core/styling/bend.py"} <= names
     assert not [name for name in names if name.startswith(("hair_addon/blender/", "tests/", "shaders/"))]
     sources = {path.relative_to(ROOT).as_posix() for path in (ROOT / "hair_addon" / "core").rglob("*.*")}
     assert {source for source in sources if "__pycache__" not in source} <= names

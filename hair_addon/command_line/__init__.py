@@ -7,7 +7,7 @@ Ctrl-C or SIGTERM.
 
 import sys
 
-from ..api_blender import NO_BLENDER
+from ..api.blender_access import NO_BLENDER
 from ..core.errors import HairError
 from ..core.long_work import Stopped
 from . import (

@@ -13,7 +13,8 @@ from fractions import Fraction
 import bpy
 import numpy as np
 
-from hair_addon import api, api_guide_tools
+from hair_addon import api
+from hair_addon.api import guide_tools
 from hair_addon.blender.live import live_hair
 from hair_addon.core.files import settings_file
 from hair_addon.core.imaging.pixel_sampling import DRAWING_FIELDS, FRAME_FIELDS, PictureSettings
@@ -135,8 +136,8 @@ def add_style(dice):
 
 
 def change_guides(dice):
-    tool = dice.choice([*api_guide_tools.TOOLS])
-    changed = changes(dice, api_guide_tools.TOOLS[tool], ())
+    tool = dice.choice([*guide_tools.TOOLS])
+    changed = changes(dice, guide_tools.TOOLS[tool], ())
     return api.change_guides(target(dice, "GUIDES"), anything(dice, tool), **changed)
 
 

@@ -14,19 +14,9 @@ import numpy as np
 import pytest
 import warp
 
-from hair_addon import (
-    api,
-    api_cards,
-    api_dynamics,
-    api_export,
-    api_guide_tools,
-    api_import,
-    api_library,
-    api_pictures,
-    api_styles,
-    api_tables,
-)
-from hair_addon.api_blender import NO_BLENDER
+from hair_addon import api
+from hair_addon.api import cards, dynamics, export, grooms, guide_tools, imports, library, pictures, styles, tables
+from hair_addon.api.blender_access import NO_BLENDER
 from hair_addon.core.kernels import compiled_kernels
 from hair_addon.core.placement import cvt
 from hair_addon.core.shading import appearance
@@ -34,18 +24,7 @@ from tests.support.dynamics.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULES = (
-    api,
-    api_dynamics,
-    api_guide_tools,
-    api_styles,
-    api_tables,
-    api_export,
-    api_library,
-    api_import,
-    api_pictures,
-    api_cards,
-)
+MODULES = (api, grooms, dynamics, guide_tools, styles, tables, export, library, imports, pictures, cards)
 WITHOUT_BLENDER = "import sys\nfor name in ('bpy', 'gpu', 'mathutils', 'imbuf'): sys.modules[name] = None\n"
 
 

@@ -23,15 +23,16 @@ MODULE = "bl_ext.user_default.vellus"
 SCRIPTS = Path(__file__).resolve().parents[3] / "docs" / "scripts.md"
 # In the order of `tests/api/test_api.py`: later examples use what earlier ones made.
 API_FILES = (
-    "api_dynamics",
-    "api_guide_tools",
-    "api_styles",
-    "api_tables",
-    "api_export",
-    "api_library",
-    "api_import",
-    "api_pictures",
-    "api_cards",
+    "grooms",
+    "dynamics",
+    "guide_tools",
+    "styles",
+    "tables",
+    "export",
+    "library",
+    "imports",
+    "pictures",
+    "cards",
 )
 
 
@@ -121,8 +122,8 @@ def scripts(_zip_path, folder):
 
 
 def _examples(api):
-    """The doctests of the functions of `api`, file by file as api.py imports them."""
-    modules = [api, *(importlib.import_module(f"{api.__package__}.{name}") for name in API_FILES)]
+    """The doctests of the functions of `api`, file by file."""
+    modules = [importlib.import_module(f"{api.__name__}.{name}") for name in API_FILES]
     for module in modules:
         found = doctest.DocTestFinder(exclude_empty=True).find(module, "api")
         yield from sorted(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python interface's functions of styles; api.py offers them."""
+"""Functions of styles."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,31 +7,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .api_arguments import changed, choice
-from .api_blender import blender
-from .core.errors import HairError
-from .core.files import style_presets
-from .core.files.settings_file import require_styles
-from .core.geometry.mesh import TriMesh
-from .core.geometry.strands import Strands
-from .core.grooming import following, groom, hair_styles
-from .core.grooming.groom import HairSettings
-from .core.long_work import Progress
-from .core.params import Param, array_of, declared, described, plain_value
-from .core.styling.base import StyleSettings
-from .core.styling.bend import Settings as Bend
-from .core.styling.braid import Settings as Braid
-from .core.styling.clump import Settings as Clump
-from .core.styling.curl import Settings as Curl
-from .core.styling.frizz import Settings as Frizz
-from .core.styling.kinds import OFFERS, kind_of
-from .core.styling.lean import Settings as Lean
-from .core.styling.masks import Mask
-from .core.styling.program import mask_keys
-from .core.styling.smooth import Settings as Smooth
-from .core.styling.style_inputs import Inputs
-from .core.styling.trim import Settings as Trim
-from .core.styling.wet import Settings as Wet
+from ..core.errors import HairError
+from ..core.files import style_presets
+from ..core.files.settings_file import require_styles
+from ..core.geometry.mesh import TriMesh
+from ..core.geometry.strands import Strands
+from ..core.grooming import following, groom, hair_styles
+from ..core.grooming.groom import HairSettings
+from ..core.long_work import Progress
+from ..core.params import Param, array_of, declared, described, plain_value
+from ..core.styling.base import StyleSettings
+from ..core.styling.bend import Settings as Bend
+from ..core.styling.braid import Settings as Braid
+from ..core.styling.clump import Settings as Clump
+from ..core.styling.curl import Settings as Curl
+from ..core.styling.frizz import Settings as Frizz
+from ..core.styling.kinds import OFFERS, kind_of
+from ..core.styling.lean import Settings as Lean
+from ..core.styling.masks import Mask
+from ..core.styling.program import mask_keys
+from ..core.styling.smooth import Settings as Smooth
+from ..core.styling.style_inputs import Inputs
+from ..core.styling.trim import Settings as Trim
+from ..core.styling.wet import Settings as Wet
+from .arguments import changed, choice
+from .blender_access import blender
 
 Curves = Any
 

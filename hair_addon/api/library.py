@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python interface's functions of grooms in asset libraries; api.py offers them."""
+"""Functions of grooms in asset libraries."""
 
 import os
 from pathlib import Path
@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .api_arguments import choice, heard, path_of
-from .api_blender import blender
-from .core import grooming
-from .core.errors import HairError
-from .core.long_work import Progress, no_progress, run_now
-from .core.params import array_of, described, is_text
+from ..core import grooming
+from ..core.errors import HairError
+from ..core.long_work import Progress, no_progress, run_now
+from ..core.params import array_of, described, is_text
+from .arguments import choice, heard, path_of
+from .blender_access import blender
 
 Curves = Any
 MeshObject = Any

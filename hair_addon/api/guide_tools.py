@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python interface's function of guide tools; api.py offers it."""
+"""Functions of guide tools."""
 
 from typing import Any
 
-from .api_arguments import changed, choice
-from .api_blender import blender
-from .core.grooming import guide_tool_settings
-from .core.grooming.guide_tool_settings import CopySettings, ToolSettings
-from .core.params import require_class
+from ..core.grooming import guide_tool_settings
+from ..core.grooming.guide_tool_settings import CopySettings, ToolSettings
+from ..core.params import require_class
+from .arguments import changed, choice
+from .blender_access import blender
 
 Curves = Any
 

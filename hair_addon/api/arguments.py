@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .api_blender import blender
-from .core.errors import HairError
-from .core.geometry import mesh as mesh_math
-from .core.geometry.mesh import TriMesh
-from .core.long_work import Progress
-from .core.params import Settings, declared, described, require_class
+from ..core.errors import HairError
+from ..core.geometry import mesh as mesh_math
+from ..core.geometry.mesh import TriMesh
+from ..core.long_work import Progress
+from ..core.params import Settings, declared, described, require_class
+from .blender_access import blender
 
 S = TypeVar("S", bound=Settings)
 

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python interface's function of exports; api.py offers it."""
+"""Functions of exports."""
 
 import os
 from collections.abc import Iterable
 from typing import Any
 
-from .api_arguments import changed, heard, path_of
-from .api_blender import blender
-from .core.errors import HairError
-from .core.files.export_settings import ExportSettings
-from .core.long_work import Progress, no_progress, run_now
+from ..core.errors import HairError
+from ..core.files.export_settings import ExportSettings
+from ..core.long_work import Progress, no_progress, run_now
+from .arguments import changed, heard, path_of
+from .blender_access import blender
 
 Curves = Any
 

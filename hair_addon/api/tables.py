@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python interface's functions of lookup tables; api.py offers them."""
+"""Functions of lookup tables."""
 
 import os
 from pathlib import Path
 from typing import Any
 
-from .api_arguments import changed, heard, path_of
-from .api_blender import blender
-from .core.files.settings_file import GroomSettings
-from .core.long_work import Progress, no_progress, run_now
-from .core.params import Param, plain_value, require_class
-from .core.shading import appearance
-from .core.shading.tables import lookup_tables
+from ..core.files.settings_file import GroomSettings
+from ..core.long_work import Progress, no_progress, run_now
+from ..core.params import Param, plain_value, require_class
+from ..core.shading import appearance
+from ..core.shading.tables import lookup_tables
+from .arguments import changed, heard, path_of
+from .blender_access import blender
 
 _ANY = Param("")
 

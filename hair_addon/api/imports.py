@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python interface's functions of hair that comes from elsewhere, or goes to another mesh; api.py offers them."""
+"""Functions of hair that comes from elsewhere, or goes to another mesh."""
 
 import os
 from collections.abc import Iterable
@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .api_arguments import are_arrays, changed, choice, curves_object_of, heard, mesh_of, path_of
-from .api_blender import blender
-from .core import geometry, grooming
-from .core.files.curve_file import TO_Z_UP, Convention, parsed_unit
-from .core.geometry.mesh import TriMesh
-from .core.geometry.strands import Strands, curve_offsets, from_numpy
-from .core.grooming import groom
-from .core.grooming.derived_guides import DerivationSettings
-from .core.grooming.transfer_settings import TransferSettings
-from .core.long_work import Progress, no_progress, run_now
+from ..core import geometry, grooming
+from ..core.files.curve_file import TO_Z_UP, Convention, parsed_unit
+from ..core.geometry.mesh import TriMesh
+from ..core.geometry.strands import Strands, curve_offsets, from_numpy
+from ..core.grooming import groom
+from ..core.grooming.derived_guides import DerivationSettings
+from ..core.grooming.transfer_settings import TransferSettings
+from ..core.long_work import Progress, no_progress, run_now
+from .arguments import are_arrays, changed, choice, curves_object_of, heard, mesh_of, path_of
+from .blender_access import blender
 
 if TYPE_CHECKING:
-    from .blender.groom.foreign.kept_hair import KeptHair
-    from .blender.groom.transfer.groom_transfers import TransferredGroom
-    from .blender.io.curve_files import Found
+    from ..blender.groom.foreign.kept_hair import KeptHair
+    from ..blender.groom.transfer.groom_transfers import TransferredGroom
+    from ..blender.io.curve_files import Found
 
 
 Curves = Any

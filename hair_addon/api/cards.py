@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python interface's functions of hair for games; api.py offers them."""
+"""Functions of hair for games."""
 
 import os
 from typing import Any
 
-from .api_arguments import changed, heard, path_of
-from .api_blender import blender
-from .core.cards.card_settings import CardSettings, TubeSettings
-from .core.long_work import Progress, no_progress, run_now
+from ..core.cards.card_settings import CardSettings, TubeSettings
+from ..core.long_work import Progress, no_progress, run_now
+from .arguments import changed, heard, path_of
+from .blender_access import blender
 
 Curves = Any
 MeshObject = Any

@@ -1,26 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Python interface of Vellus: the panel's operations as functions of Blender objects or plain arrays.
-
-Plain arrays need no Blender:
-
->>> import numpy as np
->>> from hair_addon import api
->>> vertices = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]], np.float32)  # metres
->>> triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
->>> guides = api.distribute_guides((vertices, triangles), guide_count=20, length=0.03)
->>> hair = api.interpolate_hair(guides, mesh=(vertices, triangles), strand_count=500, seed=2)
->>> api.points(hair).shape
-(500, 41, 3)
-
-A path that begins with // is relative to the open .blend file, as everywhere in Blender.
-
-In Blender a surface is a mesh object, and guides and hair are Curves datablocks; functions also accept their objects.
-Settings are keyword arguments, which override those of a `Settings` object, or the defaults. Errors that the user can
-fix raise `HairError`, a message of one sentence, before anything in the scene is changed.
-
-In the installed extension this is bl_ext.user_default.vellus.hair_addon.api. In a checkout the add-on is registered
-when a function first needs Blender; a script that reads `vellus` properties before calls `hair_addon.register()`.
-"""
+"""Guides and hair: distributed, interpolated, shaded; settings of a groom."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -30,121 +9,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .api_arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
-from .api_blender import blender
-from .api_cards import CardSettings, TubeSettings, make_hair_cards, make_hair_tubes
-from .api_dynamics import (
-    DynamicsSettings,
-    bake_dynamics,
-    deliver_dynamics,
-    dynamics_of,
-    remove_delivery,
-    set_dynamics,
-    simulate,
-)
-from .api_export import ExportSettings, export_groom
-from .api_guide_tools import change_guides
-from .api_import import (
-    DerivationSettings,
-    TransferSettings,
-    import_curves,
-    transfer_groom,
-    use_as_guides,
-    use_as_hair,
-)
-from .api_library import apply_groom, groom_names, save_groom
-from .api_pictures import draw, render
-from .api_styles import (
-    Bend,
-    Braid,
-    Clump,
-    Curl,
-    Frizz,
-    Lean,
-    Smooth,
-    Trim,
-    Wet,
-    add_style,
-    apply_style_preset,
-    set_styles,
+from ..core import dynamics
+from ..core.errors import HairError
+from ..core.files import settings_file
+from ..core.files.settings_file import GroomSettings, require_styles
+from ..core.geometry.mesh import TriMesh
+from ..core.geometry.strands import Strands, check_strands
+from ..core.grooming.groom import GuideSettings, HairSettings
+from ..core.long_work import Progress, no_progress, run_now
+from ..core.params import require_class
+from ..core.shading import presets
+from ..core.shading.appearance import Appearance, shown_changes
+from ..core.styling.base import StyleSettings
+from .arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
+from .blender_access import blender
+from .styles import (
     styled_strands,
-    styles_of,
 )
-from .api_tables import bake_tables, table_settings
-from .core import dynamics
-from .core.errors import HairError
-from .core.files import settings_file
-from .core.files.settings_file import GroomSettings, require_styles
-from .core.geometry.mesh import TriMesh
-from .core.geometry.strands import Strands, check_strands
-from .core.grooming.groom import GuideSettings, HairSettings
-from .core.long_work import Progress, no_progress, run_now
-from .core.params import require_class
-from .core.shading import presets
-from .core.shading.appearance import Appearance, shown_changes
-from .core.styling.base import StyleSettings
 
 # Blender has no types outside of Blender. Wherever Curves are taken their object is too.
 Curves = Any
 MeshObject = Any
 Arrays = TriMesh | tuple[ArrayLike, ArrayLike]  # vertices (V, 3) [m] and triangles (F, 3)
-
-__all__ = [
-    "Appearance",
-    "Bend",
-    "Braid",
-    "CardSettings",
-    "Clump",
-    "Curl",
-    "DerivationSettings",
-    "DynamicsSettings",
-    "ExportSettings",
-    "Frizz",
-    "GroomSettings",
-    "GuideSettings",
-    "HairError",
-    "HairSettings",
-    "Lean",
-    "Smooth",
-    "TransferSettings",
-    "Trim",
-    "TubeSettings",
-    "Wet",
-    "add_hair",
-    "add_style",
-    "apply_groom",
-    "apply_settings",
-    "apply_style_preset",
-    "bake_dynamics",
-    "bake_tables",
-    "change_guides",
-    "deliver_dynamics",
-    "distribute_guides",
-    "draw",
-    "dynamics_of",
-    "export_groom",
-    "groom_names",
-    "import_curves",
-    "interpolate_hair",
-    "load_settings",
-    "make_hair_cards",
-    "make_hair_tubes",
-    "points",
-    "remove_delivery",
-    "render",
-    "save_groom",
-    "save_settings",
-    "set_dynamics",
-    "set_styles",
-    "settings_of",
-    "shade",
-    "simulate",
-    "styles_of",
-    "table_settings",
-    "transfer_groom",
-    "use_as_guides",
-    "use_as_hair",
-]
 
 
 # Growing.

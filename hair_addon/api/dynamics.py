@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python interface's functions of dynamics; api.py offers them."""
+"""Functions of dynamics."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .api_arguments import changed, choice, heard, mesh_of
-from .api_blender import blender
-from .core import dynamics
-from .core.dynamics.rod.presets import PRESETS, applied
-from .core.dynamics.rod.settings import DynamicsSettings
-from .core.errors import HairError
-from .core.geometry.strands import Strands, check_strands
-from .core.long_work import Progress, no_progress, run_now
-from .core.params import Param, array_of, plain_value
+from ..core import dynamics
+from ..core.dynamics.rod.presets import PRESETS, applied
+from ..core.dynamics.rod.settings import DynamicsSettings
+from ..core.errors import HairError
+from ..core.geometry.strands import Strands, check_strands
+from ..core.long_work import Progress, no_progress, run_now
+from ..core.params import Param, array_of, plain_value
+from .arguments import changed, choice, heard, mesh_of
+from .blender_access import blender
 
 Curves = Any
 

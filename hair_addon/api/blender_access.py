@@ -5,8 +5,8 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-from .core import lazy
-from .core.errors import HairError
+from ..core import lazy
+from ..core.errors import HairError
 
 NO_BLENDER = "This needs Blender: run it in Blender's Python, or install the module bpy."
 ARRAYS_ONLY = "This installation of Vellus works on arrays alone: use the extension in Blender, or a checkout."
@@ -24,7 +24,7 @@ class RegisteredBlender(lazy.Package):
 
 def require_blender() -> None:
     """Raise `HairError` where Python has no Blender, or the package no integration."""
-    if not (Path(__file__).parent / "blender").is_dir():
+    if not (Path(__file__).parents[1] / "blender").is_dir():
         raise HairError(ARRAYS_ONLY)
     try:
         is_there = importlib.util.find_spec("bpy") is not None
@@ -34,4 +34,4 @@ def require_blender() -> None:
         raise HairError(NO_BLENDER)
 
 
-blender = RegisteredBlender(".blender", __package__)
+blender = RegisteredBlender("..blender", __package__)

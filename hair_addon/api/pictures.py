@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python interface's functions of pictures; api.py offers them."""
+"""Functions of pictures."""
 
 import os
 from pathlib import Path
@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from .api_arguments import changed, choice, heard, path_of
-from .api_blender import blender
-from .core import imaging
-from .core.long_work import Progress, no_progress, run_now
-from .core.params import Param, plain_value
+from ..core import imaging
+from ..core.long_work import Progress, no_progress, run_now
+from ..core.params import Param, plain_value
+from .arguments import changed, choice, heard, path_of
+from .blender_access import blender
 
 __all__ = ["draw", "render"]
 _IS_ALLOWED = Param("")

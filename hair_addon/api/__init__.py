@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Python interface of Vellus: the panel's operations as functions of Blender objects or plain arrays.
+
+Plain arrays need no Blender:
+
+>>> import numpy as np
+>>> from hair_addon import api
+>>> vertices = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]], np.float32)  # metres
+>>> triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+>>> guides = api.distribute_guides((vertices, triangles), guide_count=20, length=0.03)
+>>> hair = api.interpolate_hair(guides, mesh=(vertices, triangles), strand_count=500, seed=2)
+>>> api.points(hair).shape
+(500, 41, 3)
+
+A path that begins with // is relative to the open .blend file, as everywhere in Blender.
+
+In Blender a surface is a mesh object, and guides and hair are Curves datablocks; functions also accept their objects.
+Settings are keyword arguments, which override those of a `Settings` object, or the defaults. Errors that the user can
+fix raise `HairError`, a message of one sentence, before anything in the scene is changed.
+
+In the installed extension this is bl_ext.user_default.vellus.hair_addon.api. In a checkout the add-on is registered
+when a function first needs Blender; a script that reads `vellus` properties before calls `hair_addon.register()`.
+"""
+
+from ..core.errors import HairError
+from ..core.files.settings_file import GroomSettings
+from ..core.grooming.groom import GuideSettings, HairSettings
+from ..core.shading.appearance import Appearance
+from .cards import CardSettings, TubeSettings, make_hair_cards, make_hair_tubes
+from .dynamics import (
+    DynamicsSettings,
+    bake_dynamics,
+    deliver_dynamics,
+    dynamics_of,
+    remove_delivery,
+    set_dynamics,
+    simulate,
+)
+from .export import ExportSettings, export_groom
+from .grooms import (
+    add_hair,
+    apply_settings,
+    distribute_guides,
+    interpolate_hair,
+    load_settings,
+    points,
+    save_settings,
+    settings_of,
+    shade,
+)
+from .guide_tools import change_guides
+from .imports import DerivationSettings, TransferSettings, import_curves, transfer_groom, use_as_guides, use_as_hair
+from .library import apply_groom, groom_names, save_groom
+from .pictures import draw, render
+from .styles import (
+    Bend,
+    Braid,
+    Clump,
+    Curl,
+    Frizz,
+    Lean,
+    Smooth,
+    Trim,
+    Wet,
+    add_style,
+    apply_style_preset,
+    set_styles,
+    styles_of,
+)
+from .tables import bake_tables, table_settings
+
+__all__ = [
+    "Appearance",
+    "Bend",
+    "Braid",
+    "CardSettings",
+    "Clump",
+    "Curl",
+    "DerivationSettings",
+    "DynamicsSettings",
+    "ExportSettings",
+    "Frizz",
+    "GroomSettings",
+    "GuideSettings",
+    "HairError",
+    "HairSettings",
+    "Lean",
+    "Smooth",
+    "TransferSettings",
+    "Trim",
+    "TubeSettings",
+    "Wet",
+    "add_hair",
+    "add_style",
+    "apply_groom",
+    "apply_settings",
+    "apply_style_preset",
+    "bake_dynamics",
+    "bake_tables",
+    "change_guides",
+    "deliver_dynamics",
+    "distribute_guides",
+    "draw",
+    "dynamics_of",
+    "export_groom",
+    "groom_names",
+    "import_curves",
+    "interpolate_hair",
+    "load_settings",
+    "make_hair_cards",
+    "make_hair_tubes",
+    "points",
+    "remove_delivery",
+    "render",
+    "save_groom",
+    "save_settings",
+    "set_dynamics",
+    "set_styles",
+    "settings_of",
+    "shade",
+    "simulate",
+    "styles_of",
+    "table_settings",
+    "transfer_groom",
+    "use_as_guides",
+    "use_as_hair",
+]
