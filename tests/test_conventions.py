@@ -209,15 +209,18 @@ def test_native_code_fits_the_columns_of_python(path):
 OPERATORS = ADDON / "blender" / "ui" / "operators"
 
 
-@each_file(path for path in OPERATORS.rglob("__init__.py") if path.parent.name != "base")
-def test_folder_tuple_names_every_file(path):
-    """What grows without end is found by its folder's tuple, one line each; `base` is what the others are made of."""
-    files = {entry.stem for entry in path.parent.iterdir() if re.fullmatch(r"[a-z]\w*(\.py)?", entry.name)} - {"base"}
-    tree = syntax(path)
-    imported = [node for node in nodes(tree) if isinstance(node, ast.ImportFrom)]
-    file_of = {alias.asname or alias.name: node.module or alias.name for node in imported for alias in node.names}
-    tuples = [node for node in nodes(tree) if isinstance(node, ast.Tuple)]
-    assert files == {file_of[ast.unparse(element)] for node in tuples for element in node.elts}
+@each_file(OPERATORS.glob("*.py"))
+def test_tuples_name_every_operator_and_every_file_of_operators(path):
+    """Blender registers what these tuples name, and an operator that is missing in them has no effect."""
+    tuples = [
+        node for node in nodes(syntax(path)) if isinstance(node, ast.Assign) and isinstance(node.value, ast.Tuple)
+    ]
+    named = {ast.unparse(element) for node in tuples for element in node.value.elts}
+    if path.stem == "__init__":
+        assert named == {file.stem for file in path.parent.glob("[a-z]*.py")}
+    else:
+        operators = {node.name for node in nodes(syntax(path)) if isinstance(node, ast.ClassDef)}
+        assert {name for name in operators if name.startswith("VELLUS_OT_")} <= named
 
 
 # -------------------------------------------------------------------------------------------------------- types
