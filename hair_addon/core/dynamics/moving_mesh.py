@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 import warp as wp
+from numpy.typing import ArrayLike
 
 from ..errors import HairError
 from ..geometry import mesh as mesh_math
@@ -24,7 +25,7 @@ from .simulation import Obstacle, Simulation, World
 def simulated(
     mesh: TriMesh,
     guides: Strands,
-    poses: Iterable[np.ndarray],
+    poses: Iterable[ArrayLike],
     settings: DynamicsSettings,
     seconds: float,
     gravity: tuple[float, float, float],
