@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.mutants import native, run
+from tests.support.mutants import native, run, shares
 from tests.support.mutants.readers import readers
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -63,10 +63,16 @@ def test_every_reader_has_mutants():
 
 
 def test_a_few_mutants():
-    refused, found = run.faults(630, seed=1)
-    assert found == []
+    read, refused, found = run.faults(630, seed=1)
+    assert read == 630 and found == []
     # Those with a checksum refuse nearly all, but for mutants that are the whole file again.
     assert all(refused[name] >= 27 for name in ("settings", "frame", "arrays", "record of a sequence"))
+
+
+def test_shares_of_a_campaign_are_all_of_it():
+    whole = list(shares.numbers(1003, seed=4))
+    assert [number for place in range(16) for number in shares.numbers(1003, 4, (place, 16))] == whole
+    assert len(whole) == len(set(whole)) == 1003 and whole[0] == 4 * 10**9
 
 
 @pytest.mark.long

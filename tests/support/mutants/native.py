@@ -1,20 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Damaged files for readers in native code, which may end their process: USD, OpenEXR, Blender's importers.
 
-    python -m tests.support.mutants.native COUNT SEED [ending, or name of a reader]
+    python -m tests.support.mutants.native COUNT SEED [--only ending, or name of a reader] [--share K/N] [--seconds S]
+
+COUNT is that of each reader. Share K of N, from 0 on, is that of one of N processes, which together read all; its
+seconds are those of all its readers.
 
 Each reader has a process of its own, and a new one after its end. The command line gives some readers a process of
 their own too (`command_line/import_mesh.py`), which may end, or come to no end; no other may.
 """
 
+import math
 import os
 import random
 import selectors
 import subprocess
 import sys
 import tempfile
+import time
 from collections import Counter
 from pathlib import Path
+
+from tests.support.mutants.shares import given, numbers
 
 ROOT = Path(__file__).resolve().parents[3]
 PATIENCE = 60.0  # [s] without a word of a process
@@ -122,16 +129,18 @@ def _child(name, first, last):
             paths[place].write_bytes(wholes[place])
 
 
-def faults(name, count, seed):
+def faults(name, count, seed, share=(0, 1), seconds=math.inf):
     """(Counter of how mutants were read, [what went wrong]) of one reader."""
+    end = time.monotonic() + seconds
     may_end = name == CURVES or (name in MESHES and _ends_blender(name))
     told, found = Counter(), []
-    number, last = seed * 10**9, seed * 10**9 + count
-    while number < last:
+    asked = numbers(count, seed, share)
+    number, last = asked.start, asked.stop
+    while number < last and time.monotonic() < end:
         words = [sys.executable, "-m", "tests.support.mutants.native", "child", name, str(number), str(last)]
         process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         before = number
-        seen = _watch(process)
+        seen = _watch(process, end)
         for line in seen.lines:
             kind, _, rest = line.partition(" ")
             if kind == "at":
@@ -140,7 +149,7 @@ def faults(name, count, seed):
             told[line if line in ("read", "refused") else "wrong"] += 1
             if line not in ("read", "refused"):
                 found.append(f"{name} {number}: {line}")
-        if process.returncode == 0:
+        if process.returncode == 0 or seen.is_stopped:
             break
         ended = "no end" if seen.is_late else f"ended with {process.returncode}"
         told[ended] += 1
@@ -155,17 +164,18 @@ def faults(name, count, seed):
 
 class _Watched:
     def __init__(self):
-        self.lines, self.is_late = [], False
+        self.lines, self.is_late, self.is_stopped = [], False, False
 
 
-def _watch(process):
-    """What a process says until its end, which is brought about where it says nothing for long."""
+def _watch(process, end):
+    """What a process says until its end, which is brought about where it says nothing for long, or time is over."""
     seen, rest = _Watched(), b""
     with selectors.DefaultSelector() as selector:
         selector.register(process.stdout, selectors.EVENT_READ)
         while True:
-            if not selector.select(PATIENCE):
-                seen.is_late = True
+            seen.is_stopped = time.monotonic() > end
+            seen.is_late = not seen.is_stopped and not selector.select(PATIENCE)
+            if seen.is_stopped or seen.is_late:
                 process.kill()
                 break
             part = os.read(process.stdout.fileno(), 65_536)
@@ -183,13 +193,17 @@ def _ends_blender(ending):
     return mesh_files.ends_blender(f"a{ending}")
 
 
-def main(count, seed, only=""):
+def main(words=None):
     """Print how mutants of each reader were read, and what went wrong."""
-    wrong = 0
-    for name in [only] if only else NAMES:
-        told, found = faults(name, int(count), int(seed))
-        print(f"{name}: {dict(told)}", *found[:20], sep="\n  ", flush=True)
+    asked = given(words)
+    names = [asked.only] if asked.only else NAMES
+    wrong, end = 0, time.monotonic() + asked.seconds
+    for place, name in enumerate(names):
+        seconds = (end - time.monotonic()) / (len(names) - place)
+        told, found = faults(name, asked.count, asked.seed, asked.share, seconds)
+        print(f"{name}: {dict(told)}", *found, sep="\n  ", flush=True)
         wrong += len(found)
+    print(f"wrong: {wrong}")
     return 1 if wrong else 0
 
 
@@ -197,4 +211,4 @@ if __name__ == "__main__":
     if sys.argv[1] == "child":
         _child(sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))
     else:
-        sys.exit(main(*sys.argv[1:]))
+        sys.exit(main())

@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Damaged files by the thousand, read by every reader of `readers.py`.
 
-    python -m tests.support.mutants.run COUNT SEED [NAME of a reader]
+    python -m tests.support.mutants.run COUNT SEED [--only NAME of a reader] [--share K/N] [--seconds S]
 
-A mutant of a seed is the same each time: what goes wrong is printed with the number that makes it again.
+A mutant of a seed is the same each time: what goes wrong is printed with the number that makes it again. Share K of N,
+from 0 on, is that of one of N processes, which together read all; one whose seconds are over says how many it read.
 """
 
 import contextlib
+import math
 import random
 import signal
 import sys
 import tempfile
+import time
 from collections import Counter
 from pathlib import Path
 
 from hair_addon.core.errors import HairError
 from tests.support.mutants.changes import mutated
 from tests.support.mutants.readers import readers
+from tests.support.mutants.shares import given, numbers
 
 PATIENCE = 10.0  # [s] for a reader of a small file
 MEMORY = 4 * 2**30  # [bytes] beside what the process has
@@ -73,9 +77,10 @@ class Bench:
         return "", False
 
 
-def faults(count, seed, only=""):
-    """({name: how many were refused}, [what went wrong]) of mutants, each reader's in turn."""
-    refused, found = Counter(), []
+def faults(count, seed, only="", share=(0, 1), seconds=math.inf):
+    """(how many were read, {name: how many were refused}, [what went wrong]) of mutants, each reader's in turn."""
+    refused, found, read = Counter(), [], 0
+    end = time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as folder:
         benches = []
         for place, (name, reader) in enumerate(readers().items()):
@@ -83,30 +88,33 @@ def faults(count, seed, only=""):
                 own = Path(folder) / str(place)
                 own.mkdir()
                 benches.append(Bench(name, reader, own))
-        for number in range(count):
-            bench = benches[number % len(benches)]
-            fault, is_refused = bench.fault(seed * 10**9 + number)
+        for number in numbers(count, seed, share):
+            if time.monotonic() > end:
+                break
+            bench = benches[number % 10**9 % len(benches)]
+            fault, is_refused = bench.fault(number)
+            read += 1
             refused[bench.name] += is_refused
             if fault:
-                found.append(f"{bench.name} {seed * 10**9 + number}: {fault}")
-    return dict(refused), found
+                found.append(f"{bench.name} {number}: {fault}")
+    return read, dict(refused), found
 
 
-def main(count, seed, only=""):
+def main(words=None):
     """Print what goes wrong, each kind once, and how many mutants were refused."""
     import resource
 
     own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, own + MEMORY))
-    refused, found = faults(int(count), int(seed), only)
+    read, refused, found = faults(**vars(given(words)))
     kinds = {}
     for line in found:
         kinds.setdefault((line.split()[0], line.partition(": ")[2][:40]), []).append(line)
     for lines in kinds.values():
         print(f"{len(lines)} like {lines[0]}")
-    print(f"{count} mutants, refused: {refused}, wrong: {len(found)}")
+    print(f"{read} mutants, refused: {refused}, wrong: {len(found)}")
     return 1 if found else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    sys.exit(main())
