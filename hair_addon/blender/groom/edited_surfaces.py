@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guides on an edited mesh: transformed with the surface, and rooted again where faces have changed."""
 
+import enum
 from collections.abc import Callable
 
 import numpy as np
@@ -12,7 +13,7 @@ from ...core.geometry.mesh import require_finite
 from ..data import scene, surface_space
 from ..data.strands import attributes, curves, stored_roots
 from ..data.surfaces import cage_of, faces_of
-from . import applied_transforms, edited_faces, frame_faces
+from . import applied_transforms, bindings, edited_faces, frame_faces
 
 _ROOTED_AGAIN = {
     "GUIDES": '{guides} guides and {strands} strands lost their faces of "{name}": rooted at the nearest points.',
@@ -20,10 +21,21 @@ _ROOTED_AGAIN = {
 }
 
 
+class Followed(enum.Enum):
+    """What strands followed: nothing new, a transform that was applied, which moves nothing in the world, or an edit.
+
+    Where a transform was applied, the hair between guides has gone along, and stays as it is seen.
+    """
+
+    NOTHING = enum.auto()
+    APPLIED = enum.auto()
+    EDITED = enum.auto()
+
+
 def follow_surface(
     guide_curves: Curves, depsgraph: Depsgraph, to_world_before: Affine | None = None, follows_edits: bool = True
-) -> bool:
-    """Carry guides, combed or not, or hair that is kept as it came, with an edited surface; whether it was edited.
+) -> Followed:
+    """Carry guides, combed or not, or hair that is kept as it came, with an edited surface.
 
     to_world_before: where the surface's object was before the edit, None if unknown. Shape keys and modifiers are not
     edits: strands are stored on the surface at rest. Roots whose face is gone move to the nearest points.
@@ -31,41 +43,41 @@ def follow_surface(
     change.
     """
     if surface_space.has_other_surface(guide_curves):
-        return False  # to which they are about to be attached
+        return Followed.NOTHING  # to which they are about to be attached
     state = guide_curves.vellus
     surface = scene.read_surface(guide_curves.surface, depsgraph)
     if state.topology == surface.turned_topology:
         change = applied_transforms.find(guide_curves, surface, to_world_before)
         if change is not None and change.is_mirroring:
             _carry(guide_curves, surface, change, depsgraph)
-            return True
+            return Followed.APPLIED
     before, is_same = surface_space.rest_before(guide_curves), state.topology == surface.topology
     if not is_same and _is_divided_alone(guide_curves, surface, before):
         if follows_edits:
             edited_faces.change_level(guide_curves, surface)
-        return False
+        return Followed.NOTHING
     roots = stored_roots.places(guide_curves, len(surface.rest))
     stored = stored_roots.points(guide_curves, surface)
     if faces_of(state.topology) != faces_of(surface.topology) or roots is None or stored is None:
         if not follows_edits or frame_faces.came_with_the_frame(guide_curves, surface):
-            return False
+            return Followed.NOTHING
         curves.require_not_linked(guide_curves)
         lost, lost_between = edited_faces.root_again(guide_curves, surface, depsgraph)
         if lost or lost_between:
             strand_count = lost_between if state.kind == "GUIDES" else lost
             sentence = _ROOTED_AGAIN[state.kind]
             state.status = sentence.format(name=surface.name, guides=lost, strands=strand_count)
-        return True
+        return Followed.EDITED
     if before is not None and before.shape != surface.rest.shape:
         before = surface.rest
     if is_same and before is not None and np.array_equal(before, surface.rest):
-        return False
+        return Followed.NOTHING
     change = applied_transforms.find(guide_curves, surface, to_world_before)
     if change is not None:
         if before is not None:
             edited_faces.root_on_present_level(guide_curves, surface, before)
         _carry(guide_curves, surface, change, depsgraph)
-        return True
+        return Followed.APPLIED
     if before is not None and follows_edits:
         curves.require_not_linked(guide_curves)
         require_finite(surface.rest)
@@ -75,8 +87,8 @@ def follow_surface(
                 surface_space.note_applied(one, shift, before)
         edited_faces.follow_moved(guide_curves, surface, before)
         surface_space.keep_surface(guide_curves, surface)
-        return True
-    return False
+        return Followed.EDITED
+    return Followed.NOTHING
 
 
 def _is_divided_alone(guide_curves, surface, before):
@@ -92,7 +104,12 @@ def _carry(guide_curves, surface, change, depsgraph):
     """Keep guides and the hair between them in place, as an `Affine` was applied to their surface."""
     curves.require_not_linked(guide_curves)
     require_finite(surface.rest)
-    targets = [guide_curves, *applied_transforms.followed_by(guide_curves)]
+    between = applied_transforms.followed_by(guide_curves)
+    for hair in between:
+        bound = bindings.of(hair)
+        if bound is not None and not bound.is_written:
+            hair.vellus.is_stale = True  # what goes along is what its Curves hold
+    targets = [guide_curves, *between]
     applied_transforms.note(targets, surface, change)
     surface = scene.read_surface(guide_curves.surface, depsgraph)
     for target in targets:

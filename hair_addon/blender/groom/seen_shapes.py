@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that stay as they are seen where a transform with uneven scale is applied to a surface that is deformed.
+"""Strands that stay as they are seen where a transform is applied to a surface that is deformed.
 
 Strands turn rigidly with their surface in its local coordinates, which are other ones then: what turned by some angle
-in a space that is stretched turns by another in one that is not.
+in a space that is stretched turns by another in one that is not. Turns of vertices are blended by two of their axes,
+so a turn of the coordinates alone counts too: 3e-4 of the surface's size on one of 160 faces.
 """
 
 from collections.abc import Callable
@@ -23,7 +24,7 @@ def kept_by(strands: Curves, surface: Surface, change: Affine) -> Points | None:
 
     None where they stay as they are. surface: to which it was applied.
     """
-    if not surface.is_deformed or change.is_even or not len(strands.curves):
+    if not surface.is_deformed or change.keeps_axes or not len(strands.curves):
         return None
     back = change.inverse
     before = replace(

@@ -9,6 +9,7 @@ from ...core.errors import HairError
 from ..data import masks, scene
 from ..data.strands import curves, drawn_lines
 from ..groom import applied_transforms, bindings, edited_surfaces, frame_faces, staleness
+from ..groom.edited_surfaces import Followed
 from ..host.notices import text_of
 from ..settings import style_items
 from . import events, reported
@@ -19,17 +20,19 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
 
     is_mesh_edited: whether its mesh has changed, not modifiers alone, so that its weights may have too.
     """
-    applied = set()  # guides that are not live, and were carried by a transform that was applied
+    carried = set()  # guides that are not live, and have followed
+    kept = set()  # hair that a transform that was applied has left where it is
     for guides in bpy.data.hair_curves:
         state = guides.vellus
         if guides.surface != surface_object or not _is_carried(guides):
             continue
         try:
             place = reported.place_before(guides)
-            was_edited = edited_surfaces.follow_surface(guides, depsgraph, place, state.is_live)
+            followed = edited_surfaces.follow_surface(guides, depsgraph, place, state.is_live)
+            was_edited = followed is not Followed.NOTHING
             if not state.is_live:
                 state.is_stale = state.is_stale or (is_mesh_edited and not was_edited)
-                applied |= {guides} if was_edited else set()
+                carried |= {guides} if was_edited else set()
                 continue
             # Where its mask says, whose weights on the faces of another frame tell nothing.
             is_placed = not (curves.is_hand_made(guides) or frame_faces.are_others(guides))
@@ -40,21 +43,23 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
             continue
         if was_edited:
             events.strands_made(guides)
-            mark_followers(guides)
+            gone_along = set(applied_transforms.followed_by(guides)) if followed is Followed.APPLIED else set()
+            mark_followers(guides, gone_along)
+            kept |= gone_along
     edited_surfaces.follow_alone(surface_object, depsgraph, reported.place_before)
     for hair in bpy.data.hair_curves if is_mesh_edited else ():
         state = hair.vellus
         if hair.surface != surface_object or state.kind != "HAIR":
             continue
         if not state.is_live:
-            state.is_stale = state.is_stale or state.guide_curves not in applied
+            state.is_stale = state.is_stale or state.guide_curves not in carried
             continue
         if frame_faces.are_others(hair):
             continue
         with _refusal_as_status(state):
             if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):
                 _mark(hair)
-            elif has_masks(state):
+            elif has_masks(state) and hair not in kept:
                 state.is_stale = True
 
 
@@ -170,10 +175,12 @@ def follow_styles(changed):
             state.is_stale = True
 
 
-def mark_followers(guide_curves):
-    """Mark all hair between some guides as stale, but for kept hair that has followed them."""
+def mark_followers(guide_curves, gone_along=()):
+    """Mark all hair between some guides as stale, but for kept hair that has followed them, and what went along."""
     for hair in curves.followers(guide_curves):
-        if not (curves.is_hand_made(hair) and hair.vellus.followed == staleness.guides_digest(guide_curves)):
+        if hair in gone_along:
+            events.strands_made(hair)
+        elif not (curves.is_hand_made(hair) and hair.vellus.followed == staleness.guides_digest(guide_curves)):
             _mark(hair)
 
 

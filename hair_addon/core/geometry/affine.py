@@ -76,11 +76,10 @@ class Affine:
         return bool(np.isfinite(self.matrix).all()) and abs(np.linalg.det(self.axes)) >= 1e-30
 
     @property
-    def is_even(self) -> bool:
-        """Whether it keeps angles, beyond rounding: it scales all axes alike."""
-        squares = self.axes.T @ self.axes
-        even = np.eye(3) * np.trace(squares) / 3.0
-        return np.allclose(squares, even, rtol=0.0, atol=1e-5 * np.trace(squares))
+    def keeps_axes(self) -> bool:
+        """Whether it only shifts, and scales all axes by one factor, of either sign, beyond rounding."""
+        size = np.trace(self.axes) / 3.0
+        return np.allclose(self.axes, size * np.eye(3), rtol=0.0, atol=_ROUNDING * abs(size))
 
     @property
     def is_identity(self) -> bool:
