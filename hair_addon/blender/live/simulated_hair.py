@@ -15,7 +15,7 @@ import numpy as np
 from ...core.errors import HairError
 from ..data import scene
 from ..data.strands import curves, simulated_guides
-from ..groom import bindings, hair_outside
+from ..groom import applied_transforms, bindings, hair_outside
 from ..groom.dynamics import broken_guides, frame_folders, guide_baking, guide_simulation
 from ..groom.dynamics.broken_guides import Broken
 from ..groom.dynamics.guide_simulation import GuideSimulation, simulated
@@ -84,6 +84,7 @@ def follow_settings(blender_scene, depsgraph):
     """After an update: show guides as they are combed that do not simulate any more, and note changes of settings."""
     for guides in bpy.data.hair_curves:
         state = guides.vellus
+        _stay_as_seen(guides, blender_scene)
         if simulated_guides.is_shown(guides) and not frame_folders.is_simulated(guides):
             played_cache.invalidate(guides.session_uid)
             _show(guides, None, depsgraph)
@@ -197,10 +198,35 @@ def _play(guides, blender_scene, depsgraph):
 def _played_now(guides):
     """What was simulated of guides in this session; None where they are others now, and begin again."""
     played = played_cache.get(guides.session_uid)
-    if played is not None and not played.simulated.is_of(guides, properties.dynamics_of(guides.vellus)):
+    settings = properties.dynamics_of(guides.vellus)
+    if played is None or played.simulated.is_of(guides, settings):
+        return played
+    if not _follow_applied(guides, played) or not played.simulated.is_of(guides, settings):
         played_cache.invalidate(guides.session_uid)
         return None
     return played
+
+
+def _follow_applied(guides, played):
+    """Keep frames where they are in the world if a transform was applied to the surface; whether that is all."""
+    roots = played.simulated.roots
+    change = played.simulated.follow_applied(guides)
+    if change is None:
+        return False
+    now = played.simulated.roots
+    for frame, points in played.frames.items():
+        played.frames[frame] = applied_transforms.rooted_as(change.points(points), points, roots, now)
+    return True
+
+
+def _stay_as_seen(guides, blender_scene):
+    """Where a transform was just applied to the surface, keep the frame that is shown as its guides are seen."""
+    played, shown = played_cache.get(guides.session_uid), simulated_guides.point_cache.get(guides.session_uid)
+    if played is None or shown is None or not played.simulated.has_other_space(guides):
+        return
+    frame = scene_time.frame_of(blender_scene)
+    if _played_now(guides) is not None and frame in played.frames and len(shown) == len(guides.curves):
+        played.frames[frame] = shown.copy()
 
 
 def _last_known(played, frame):

@@ -303,6 +303,14 @@ class Simulation:
         places[rows] = motion.center + motion.way - self._origin
         self._rods.carry(is_chosen, turns, pivots, places)
 
+    def renew_obstacles(self, others: Mapping[str, Obstacle]) -> None:
+        """Let obstacles of the last frame have other faces from now on, where they are; others: by their names."""
+        if others:
+            self.world = replace(self.world, obstacles=tuple(others.get(one.name, one) for one in self.world.obstacles))
+            self._read_obstacles([one for one in self.world.obstacles if one.name not in others])
+            self._read_obstacles(self.world.obstacles)
+            self._contacts.forget()
+
     def _read_obstacles(self, obstacles):
         self._colliders.read([obstacle.seen_from(self._origin) for obstacle in obstacles])
 

@@ -30,6 +30,19 @@ def stopped(
     return tuple(taken), notes
 
 
+def divided(obstacles: Sequence[Obstacle], last: Mapping[str, Obstacle]) -> dict[str, Obstacle]:
+    """{name: obstacle of the frame before, with the faces of now} of those with as many vertices and other faces.
+
+    For where local coordinates have changed: Blender divides quads otherwise, and the mesh is the same.
+    """
+    found = {}
+    for obstacle in obstacles:
+        before = last.get(obstacle.name)
+        if before is not None and len(before.vertices) == len(obstacle.vertices) and not _is_same(before, obstacle):
+            found[obstacle.name] = replace(before, triangles=obstacle.triangles)
+    return found
+
+
 def _is_same(one, other):
     """Whether two obstacles have the same vertices and faces, wherever they are."""
     return len(one.vertices) == len(other.vertices) and np.array_equal(one.triangles, other.triangles)

@@ -6,13 +6,14 @@ object is scaled unevenly, its mean scale counts.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ....core import dynamics
 from ....core.errors import HairError
+from ....core.geometry.affine import Affine
 from ..strands import posed_strands, stored_roots
 from ..strands.posed_strands import Pose
 
@@ -70,6 +71,17 @@ class GuidePose:
         rotation = self._polar[0] @ _nearest_rotations(axes)
         turns = dynamics.rod.rotations.from_matrices(rotation)
         return dynamics.root_motion.RootPose(self._to_world(posed[:, 0]), turns, _rounded(self.scale / start.scale))
+
+    def after(self, change: Affine) -> "GuidePose":
+        """The same place in the world where an `Affine` was applied to the local coordinates.
+
+        Its scale and the axes of its groom are those of now, and nothing else.
+        """
+        return replace(self, matrix=self.matrix @ change.inverse.matrix)
+
+    def turn_to(self, other: "GuidePose") -> np.ndarray:
+        """(4,) rotation x, y, z, w from the axes of `other.groom` to those of this one's."""
+        return dynamics.rod.rotations.from_matrices((self._polar[0].T @ other._polar[0])[None])[0]
 
     def to_rest(self, points: np.ndarray) -> np.ndarray:
         """Points (G, P, 3) [m] in the world → (G, P, 3) float32, local coordinates at rest."""

@@ -14,10 +14,14 @@ from bpy.types import Curves, Depsgraph, Scene
 from ....core import dynamics
 from ....core.dynamics.rod.settings import DynamicsSettings
 from ....core.errors import HairError
+from ....core.files import frame_manifest
+from ....core.geometry.affine import Affine
 from ....core.params import given
+from ...data import surface_space
 from ...data.simulation import guide_poses, simulated_world, wet_guides
 from ...data.simulation.guide_poses import GuidePose
 from ...data.strands import curves
+from ...data.surfaces import cage_of
 from ...host import scene_time
 from ...host.caches import Cache
 from ...settings import preferences, properties
@@ -48,14 +52,18 @@ class FrameInput:
 class GuideSimulation:
     """Guides that are simulated, and the frame they have come to.
 
-    digest, topology: of guides and surface; start: their pose in the first frame; obstacles: {name: as hair last
+    digest, topology: of guides and surface; identity: of both, as `_identity_of`; start: their pose in the first frame;
+    start_space, space: `surface_space.applied` to guides in the first frame, and now; obstacles: {name: as hair last
     collided with it}; masks: {mask of wetness: (G,) its weights}; wetness: of the last frame, as in `FrameInput`.
     """
 
     digest: str
     topology: str
+    identity: tuple[str, ...]
     settings: DynamicsSettings
     start: GuidePose
+    start_space: Affine
+    space: Affine
     roots: np.ndarray  # (G, 3) float32 at rest, local
     simulation: "dynamics.simulation.Simulation"
     metres: float  # in a unit of the world
@@ -64,12 +72,18 @@ class GuideSimulation:
     masks: dict[tuple[str, str, bool], np.ndarray] = field(default_factory=dict)
     wetness: np.ndarray | None = None
     errors: tuple[HairError, ...] = ()  # of colliders, in the last frame
+    may_have_other_faces: bool = False  # the obstacles, in the next frame
 
     def see(self, frame: FrameInput) -> FrameInput:
         """The next frame as guides are simulated in it: where a collider has another topology, it stays as it was.
 
         Called for each frame in turn, it need not be simulated.
         """
+        if self.may_have_other_faces:
+            self.may_have_other_faces = False
+            others = dynamics.stopped_colliders.divided(frame.world.obstacles, self.obstacles)
+            self.obstacles |= others
+            self.simulation.renew_obstacles(others)
         obstacles, notes = dynamics.stopped_colliders.stopped(frame.world.obstacles, self.obstacles, frame.frame)
         self.obstacles = {obstacle.name: obstacle for obstacle in obstacles}
         return replace(frame, world=replace(frame.world, obstacles=obstacles), errors=(*frame.errors, *notes))
@@ -78,7 +92,7 @@ class GuideSimulation:
         """Simulate the next frame: (G, P, 3) float32 points at rest, in local coordinates."""
         frame = self.see(frame)
         self._change(frame)
-        self.simulation.advance(frame.pose.root_pose(self.start), frame.world, frame.seconds)
+        self.simulation.advance(self._root_pose(frame.pose), frame.world, frame.seconds)
         self.errors = (*frame.errors, *self.simulation.notes)
         points = frame.pose.to_rest(self.simulation.points())
         points[:, 0] = self.roots  # to the last bit, as what follows compares roots
@@ -103,7 +117,7 @@ class GuideSimulation:
         """Go on from a state that the simulation's `save` gave in a frame, as `see` returned it. Raises `HairError`."""
         self.obstacles = {obstacle.name: obstacle for obstacle in frame.world.obstacles}
         self._change(frame)
-        self.simulation.load(state, frame.pose.root_pose(self.start), frame.world)
+        self.simulation.load(state, self._root_pose(frame.pose), frame.world)
 
     def is_of(self, guides: Curves, settings: DynamicsSettings) -> bool:
         """Whether it simulates these guides as they are combed now, with as many vertices."""
@@ -112,6 +126,41 @@ class GuideSimulation:
             and self.settings.vertex_count == settings.vertex_count
             and self.digest == staleness.guides_digest(guides)
         )
+
+    def follow_applied(self, guides: Curves) -> Affine | None:
+        """Go on in the local coordinates of now where transforms were applied to the surface, or undone.
+
+        Returns what has become of the local coordinates since; None where these are other guides in the world, too.
+        Strands, their velocities and their shapes at rest are in the world, and stay.
+        """
+        if self.identity != _identity_of(guides):
+            return None
+        since = surface_space.applied(guides) @ self.space.inverse
+        self.space, self.may_have_other_faces = surface_space.applied(guides), True
+        self.digest, self.topology = staleness.guides_digest(guides), guides.vellus.topology
+        self.roots = combed_points(guides)[:, 0].copy()
+        return since
+
+    def has_other_space(self, guides: Curves) -> bool:
+        """Whether a transform was applied to the surface since, which `follow_applied` has not followed yet."""
+        return not np.array_equal(surface_space.applied(guides).matrix, self.space.matrix)
+
+    def _root_pose(self, pose):
+        """The `RootPose` of a pose in the coordinates of now, for the groom of the first frame."""
+        change = self.space @ self.start_space.inverse
+        if change.is_identity:
+            return pose.root_pose(self.start)
+        start = self.start.after(change)
+        found = pose.root_pose(start)
+        return replace(found, turns=dynamics.rod.rotations.product(found.turns, start.turn_to(self.start)))
+
+
+def _identity_of(guides):
+    """Digests of guides and faces, the same ones after a transform was applied to their surface; () without guides."""
+    if not len(guides.curves):
+        return ()
+    parts = curves.even_local_points(guides), cage_of(guides.vellus.topology)
+    return tuple(surface_space.known_as(guides, frame_manifest.digest(part)) for part in parts)
 
 
 def _are_same(one, other):
@@ -141,7 +190,8 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
         simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)
     digest, topology = staleness.guides_digest(guides), guides.vellus.topology
     _keep_stiffness(guides, frame, local)
-    begun = GuideSimulation(digest, topology, settings, pose, local[:, 0].copy(), simulation, metres)
+    ids, space = _identity_of(guides), surface_space.applied(guides)
+    begun = GuideSimulation(digest, topology, ids, settings, pose, space, space, local[:, 0].copy(), simulation, metres)
     begun.parted_by = guide_regions.parting_keys(guides)
     begun.masks, begun.wetness = masks, frame.wetness
     begun.see(frame)
