@@ -34,6 +34,7 @@ PURE = {
     "blender/gpu/drawing.py: _parts",
     "blender/gpu/uniforms.py: settings_block",
     "blender/host/paths.py: addon_version",
+    "blender/host/system_memory.py: _host",
     "blender/settings/setting_properties.py: _settings_of",
     "blender/settings/setting_properties.py: as_stored",
     "blender/settings/translations.py: _patterns",

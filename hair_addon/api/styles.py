@@ -14,7 +14,7 @@ from ..core.geometry.mesh import TriMesh
 from ..core.geometry.strands import Strands
 from ..core.grooming import following, groom, hair_styles
 from ..core.grooming.groom import HairSettings
-from ..core.long_work import Progress
+from ..core.long_work import Progress, no_progress, part_of, run_now
 from ..core.params import Param, array_of, declared, described, plain_value
 from ..core.styling.base import StyleSettings
 from ..core.styling.bend import Settings as Bend
@@ -30,7 +30,7 @@ from ..core.styling.smooth import Settings as Smooth
 from ..core.styling.style_inputs import Inputs
 from ..core.styling.trim import Settings as Trim
 from ..core.styling.wet import Settings as Wet
-from .arguments import changed, choice
+from .arguments import changed, choice, heard
 from .blender_access import blender
 
 Curves = Any
@@ -55,14 +55,21 @@ _SWITCH = Param("")
 
 
 def add_style(
-    hair: Curves, style: str | StyleSettings, *, name: str = "", fit: bool = True, **changes: Any
+    hair: Curves,
+    style: str | StyleSettings,
+    *,
+    name: str = "",
+    fit: bool = True,
+    progress: Progress = no_progress,
+    **changes: Any,
 ) -> StyleSettings:
     """Add a style after the other styles of hair Curves; returns its settings.
 
     style: a name of the menu such as "CURL" or "WAVE", or settings such as `Curl(…)`; name: in the list, by default the
     menu's; changes: fields of the style's settings; fit: whether the menu's lengths, which are for a human head, are
-    fitted to the surface: what `Curl(…)` and changes give is taken as it is. Without a `seed` a style of the menu gets
-    one that no other style of the hair has.
+    fitted to the surface: what `Curl(…)` and changes give is taken as it is; progress(step, part): callback while locks
+    are placed, which may raise to stop: then nothing is added. Without a `seed` a style of the menu gets one that no
+    other style of the hair has.
 
     >>> hair = bpy.data.objects["Hair"]
     >>> api.add_style(hair, "CURL", radius=0.004).radius
@@ -79,7 +86,8 @@ def add_style(
     settings = changed(type(settings), settings, changes)
     fit, name = plain_value("fit", fit, False, _SWITCH), plain_value("name", name, "", _SWITCH)
     target = blender.data.arguments.curves_of(hair, "HAIR")
-    return blender.groom.styles.hair_styles.add(target, settings, name, is_fitted=fit, kept=kept)
+    work = blender.groom.styles.hair_styles.adding(target, settings, name, is_fitted=fit, kept=kept)
+    return run_now(work, heard(progress))
 
 
 def styles_of(hair: Curves) -> tuple[StyleSettings, ...]:
@@ -91,22 +99,28 @@ def styles_of(hair: Curves) -> tuple[StyleSettings, ...]:
     return blender.settings.style_items.styles_of(blender.data.arguments.curves_of(hair, "HAIR").vellus)
 
 
-def set_styles(hair: Curves, styles: Sequence[StyleSettings]) -> None:
+def set_styles(hair: Curves, styles: Sequence[StyleSettings], *, progress: Progress = no_progress) -> None:
     """Replace the styles of hair Curves; a style keeps the name and the keys of one of its kind.
+
+    progress: as in `add_style`.
 
     >>> api.set_styles(bpy.data.objects["Hair"], [api.Clump(size=0.5), api.Curl(radius=0.006), api.Frizz()])
     >>> len(api.styles_of(bpy.data.objects["Hair"]))
     3
     """
     styles, _names = require_styles(styles)
-    blender.groom.styles.hair_styles.assign(blender.data.arguments.curves_of(hair, "HAIR"), styles)
+    target = blender.data.arguments.curves_of(hair, "HAIR")
+    run_now(blender.groom.styles.hair_styles.assigning(target, styles), heard(progress))
 
 
-def apply_style_preset(hair: Curves, preset: str, *, fit: bool = True, keep_styles: bool = False) -> None:
+def apply_style_preset(
+    hair: Curves, preset: str, *, fit: bool = True, keep_styles: bool = False, progress: Progress = no_progress
+) -> None:
     """Replace the styles of hair Curves by those of a preset such as "CURLY".
 
     fit: whether lengths, which are for a human head, are multiplied by the size of the surface; keep_styles: whether
-    the preset's styles come after the present ones, in place of replacing them.
+    the preset's styles come after the present ones, in place of replacing them; progress: as in
+    `add_style`.
 
     >>> api.apply_style_preset(bpy.data.objects["Hair"], "FRIZZY")
     >>> [style.octaves for style in api.styles_of(bpy.data.objects["Hair"])]
@@ -115,7 +129,8 @@ def apply_style_preset(hair: Curves, preset: str, *, fit: bool = True, keep_styl
     found = style_presets.read(choice(preset, "style preset", style_presets.PRESETS))
     fit, keep = plain_value("fit", fit, False, _SWITCH), plain_value("keep_styles", keep_styles, False, _SWITCH)
     target = blender.data.arguments.curves_of(hair, "HAIR")
-    blender.groom.styles.hair_styles.apply_preset(target, found, is_fitted=fit, keeps_styles=keep)
+    work = blender.groom.styles.hair_styles.applying_preset(target, found, is_fitted=fit, keeps_styles=keep)
+    run_now(work, heard(progress))
 
 
 def styled_strands(
@@ -133,9 +148,10 @@ def styled_strands(
     inputs = Inputs({key: _mask(mesh, masks or {}, key) for key in mask_keys(styles)})
     for style in styles:
         _require_arrays(style)
-    binding = groom.bind_hair(mesh, guides, settings, progress=progress)
+    binding = groom.bind_hair(mesh, guides, settings, progress=part_of(progress, 0.0, 0.5))
     trees = hair_styles.clump_trees(mesh, guides.roots, settings)
-    styling = hair_styles.bind_styles(binding, guides, settings, styles, trees, inputs)
+    placing = part_of(progress, 0.5, 1.0)
+    styling = hair_styles.bind_styles(binding, guides, settings, styles, trees, inputs, progress=placing)
     return following.follow_guides(binding, guides, styling)
 
 

@@ -18,6 +18,7 @@ from hair_addon import api
 from hair_addon.api import cards, dynamics, export, grooms, guide_tools, imports, library, pictures, styles, tables
 from hair_addon.api.blender_access import NO_BLENDER
 from hair_addon.core.kernels import compiled_kernels
+from hair_addon.core.long_work import Stopped
 from hair_addon.core.placement import cvt
 from hair_addon.core.shading import appearance
 from tests.support.dynamics.following import update
@@ -238,6 +239,66 @@ def test_styles_are_what_a_script_says(hair):
     api.set_styles(hair, [])
     api.apply_settings(hair, settings)
     assert api.settings_of(hair) == settings and settings.styles == (third, again, added)
+
+
+def _giving_locks(hair):
+    """{what: function of (progress) that gives hair locks}."""
+    other = api.Clump(size=0.3, seed=5)
+    return {
+        "add": lambda progress: api.add_style(hair, "CLUMP", progress=progress),
+        "set": lambda progress: api.set_styles(hair, [api.Frizz(), other], progress=progress),
+        "preset": lambda progress: api.apply_style_preset(hair, "CURLY", progress=progress),
+    }
+
+
+@pytest.mark.parametrize("what", ["add", "set", "preset"])
+def test_placing_locks_tells_how_far_it_is_and_leaves_nothing_where_it_is_stopped(hair, what, monkeypatch):
+    api.add_style(hair, "FRIZZ")
+    update()
+    before, shown = api.settings_of(hair), points(hair)
+    give, told = _giving_locks(hair)[what], []
+
+    def stop(step, part):
+        told.append((step, part))
+        if part > 0.5:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        give(stop)
+    update()
+    assert {step for step, _part in told} == {"Placing locks"} and len(told) > 3
+    assert [part for _step, part in told] == sorted(part for _step, part in told)
+    assert api.settings_of(hair) == before and hair.data.vellus.status == ""
+    np.testing.assert_array_equal(points(hair), shown)
+
+    heard = []
+    give(lambda step, part: heard.append((step, part)))
+    assert heard[: len(told)] == told and heard[-1][1] > 0.9
+    monkeypatch.setattr(cvt, "place", None)  # the update finds what was placed
+    update()
+    gathered = points(hair)
+    assert hair.data.vellus.status == "" and (gathered.shape != shown.shape or not np.allclose(gathered, shown))
+
+
+def test_new_hair_with_locks_tells_of_them_among_its_stages(sphere):
+    """As the command line's `groom` shows it."""
+    settings = api.GroomSettings(
+        api.GuideSettings(guide_count=20), api.HairSettings(strand_count=100), styles=(api.Clump(size=0.1),)
+    )
+    heard, objects = [], set(bpy.data.objects)
+    api.add_hair(sphere, settings, progress=lambda step, part: heard.append((step, part)))
+    steps, parts = list(dict.fromkeys(step for step, _part in heard)), [part for _step, part in heard]
+    assert steps[-3:] == ["Finding guides", "Placing locks", "Growing strands"]
+    assert parts == sorted(parts) and sum(step == "Placing locks" for step, _part in heard) > 5
+
+    def stop(step, _part):
+        if step == "Placing locks":
+            raise Stopped
+
+    made = set(bpy.data.objects) - objects
+    with pytest.raises(Stopped):
+        api.add_hair(sphere, settings, progress=stop)
+    assert set(bpy.data.objects) - objects == made
 
 
 @pytest.mark.parametrize("style", [api.Frizz(), "FRIZZ"], ids=["settings", "a name"])

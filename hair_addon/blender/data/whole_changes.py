@@ -248,7 +248,11 @@ def _state_of(owner):
         return state | {"active_uv": owner.uv_layers.active_index}
     guides = owner.vellus.guide_curves
     styles = [name_of(item) for item in owner.vellus.styles]
-    return state | {"guides": None if guides is None else guides.session_uid, "styles": styles}
+    return state | {
+        "guides": None if guides is None else guides.session_uid,
+        "styles": styles,
+        "active_style": owner.vellus.active_style,
+    }
 
 
 def _restore(owner, state):
@@ -275,6 +279,8 @@ def _restore(owner, state):
     styles, guides = owner.vellus.styles, owner.vellus.guide_curves
     for place in reversed([index for index, item in enumerate(styles) if name_of(item) not in state["styles"]]):
         styles.remove(place)
+    if owner.vellus.active_style != state["active_style"]:
+        owner.vellus.active_style = state["active_style"]
     if (None if guides is None else guides.session_uid) != state["guides"]:
         found = (one for one in bpy.data.hair_curves if one.session_uid == state["guides"])
         owner.vellus.guide_curves = next(found, None)

@@ -14,7 +14,7 @@ from ...core.geometry import strands
 from ...core.grooming import following, groom, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
-from ...core.long_work import Work, part_of, run_now
+from ...core.long_work import Work, no_progress, part_of, run_now
 from ...core.styling.base import StyleSettings
 from ..data import masks, scene, surface_space, whole_changes
 from ..data.strands import curves, drawn_lines, partings
@@ -136,7 +136,8 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
         else:
             binding = hair_binding.weigh_again(known.binding, settings)
             make_trees = styled_hair.trees_again(known.styles, settings)
-        styles = styled_hair.bind(read, binding, guides, settings, surface, make_trees)
+        placing = part_of(progress, 0.5, 0.8)
+        styles = styled_hair.bind(read, binding, guides, settings, surface, make_trees, placing)
         bound = BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, styles, fits=sized.fits)
         return _known_by(bound, progress)
 
@@ -211,7 +212,7 @@ def adding_hair(
         guides = _as_written(grown.strands, surface, device)
         progress = part_of(progress, 0.5, 1.0)
         binding = _bind(surface, guides, hair_settings, ground, None, progress)
-        styled = _styled(styling, binding, guides, hair_settings, surface, ground)
+        styled = _styled(styling, binding, guides, hair_settings, surface, ground, part_of(progress, 0.5, 0.8))
         known = binding, hair_settings, of_hair.root_key, parting.key, guides, None, surface, styled
         bound = BoundHair(*known, fits=of_hair.fits)
         return grown, _growing(bound, progress)
@@ -283,7 +284,7 @@ def _ground(surface, shown, mask, parting, device):
 
 
 def _bind(surface, guides, settings, ground, roots, progress):
-    return groom.bind_hair(surface.mesh, guides, settings, roots=roots, progress=part_of(progress, 0.0, 0.8), **ground)
+    return groom.bind_hair(surface.mesh, guides, settings, roots=roots, progress=part_of(progress, 0.0, 0.5), **ground)
 
 
 def _trees_on(surface, guides, settings, ground):
@@ -291,10 +292,10 @@ def _trees_on(surface, guides, settings, ground):
     return lambda: hair_styles.clump_trees(surface.mesh, guides.roots, settings, **ground)
 
 
-def _styled(read, binding, guides, settings, surface, ground):
+def _styled(read, binding, guides, settings, surface, ground, progress=no_progress):
     """The `StyledHair` of hair that is new."""
     make_trees = _trees_on(surface, guides, settings, ground)
-    return styled_hair.bind(read, binding, guides, settings, surface, make_trees)
+    return styled_hair.bind(read, binding, guides, settings, surface, make_trees, progress)
 
 
 def _growing(bound, progress):

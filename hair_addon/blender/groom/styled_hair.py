@@ -14,6 +14,7 @@ from ...core.geometry.affine import Affine
 from ...core.geometry.strands import Strands
 from ...core.grooming.groom import HairSettings
 from ...core.interpolation.hair_binding import HairBinding
+from ...core.long_work import Progress, no_progress
 from ...core.styling import program
 from ...core.styling.base import StyleSettings, has_effect
 from ...core.styling.clump_trees import ClumpTrees
@@ -118,6 +119,7 @@ def bind(
     settings: HairSettings,
     surface: Surface,
     make_trees: Callable[[], ClumpTrees],
+    progress: Progress = no_progress,
 ) -> StyledHair:
     """Bind styles to strands; make_trees: called where a style needs clump trees, or a surface."""
     if not any(map(has_effect, read.styles)) and settings.point_count == guides.point_count:
@@ -130,6 +132,7 @@ def bind(
         make_trees(),
         read.inputs,
         grooming.hair_styles.own_axes((Affine.linear(surface.to_world_axes) @ read.applied).matrix),
+        progress,
     )
     return StyledHair(read, styling, make_trees)
 

@@ -2,12 +2,11 @@
 """Free memory, asked for before work that takes much of it."""
 
 import contextlib
-import os
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from ...core.errors import HairError
+from . import system_memory
 from .notices import say
 
 try:
@@ -33,20 +32,18 @@ class MuchMemory(HairError):
 
 
 def free_bytes() -> int | None:
-    """Memory that programs can still get [bytes]; None where the system does not tell, as Windows."""
+    """Memory that programs can still get [bytes]; None where the system does not tell."""
     found = [_available(), _left_in_group(), _left_by_limit()]
     return min((count for count in found if count is not None), default=None)
 
 
 def _available():
-    """Of the computer: on a Mac all there is, which is no less."""
+    """Of the computer."""
     try:
         lines = _MEMINFO.read_text(encoding="ascii").splitlines()
         return next(1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
     except (OSError, ValueError, IndexError, StopIteration):  # another system, or an older one
-        if sys.platform != "darwin":
-            return None
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        return system_memory.free_bytes()
 
 
 def _left_in_group():

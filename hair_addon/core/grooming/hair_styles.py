@@ -13,6 +13,7 @@ from ..geometry.texture import Texture
 from ..interpolation.hair_binding import HairBinding
 from ..interpolation.regions import Regions
 from ..interpolation.root_binder import RootBinder
+from ..long_work import Progress, no_progress
 from ..styling.base import StyleSettings
 from ..styling.clump_trees import ClumpTrees
 from ..styling.style_inputs import Inputs
@@ -48,9 +49,16 @@ def clump_trees(
         placed_on = TriMesh(-placed_on.vertices, placed_on.triangles[:, [0, 2, 1]])
         its_texture = None if texture is None else texture.wound_otherwise()
 
-    def place(count, seed):
+    def place(count, seed, progress):
         found = placement.cvt.place(
-            placed_on, count, seed, _ROUNDS, density=density, texture=its_texture, device=device
+            placed_on,
+            count,
+            seed,
+            _ROUNDS,
+            density=density,
+            texture=its_texture,
+            device=device,
+            progress=lambda part: progress("Placing locks", part),
         )
         return found.wound_otherwise() if is_mirrored else found
 
@@ -65,13 +73,16 @@ def bind_styles(
     trees: ClumpTrees,
     inputs: Inputs | None = None,
     axes: np.ndarray | None = None,
+    progress: Progress = no_progress,
 ) -> "Styling | None":
     """The `Styling` of strands; None where strands follow the guides as they are.
 
-    axes: (4, 4) to the surface's own coordinates, as `own_axes` gives them, None where they are the same.
+    axes: (4, 4) to the surface's own coordinates, as `own_axes` gives them, None where they are the same;
+    progress(step, part): told while clump sites are placed, and may raise to stop.
     """
     if not any(map(styling.base.has_effect, styles)) and settings.point_count == guides.point_count:
         return None
+    trees.search([tree for tree, _level in styling.program.tree_levels(styles)], progress)
     inputs = Inputs() if inputs is None else inputs
     axes = np.eye(4) if axes is None else axes
     return styling.stack.bind(binding, guides, styles, inputs, trees, axes, settings.point_count)

@@ -140,14 +140,16 @@ def _descend(
     as going on does. spread_at: iterations before which crowded sites go to the widest gaps.
     """
     memory = Memory(steps_kept)
+    progress(0.0)
     state = best = _State(domain, cells, sites, device)
     energies = [state.energy]
     for iteration in range(iterations):
-        progress(iteration / iterations)
+        progress((iteration + 0.1) / iterations)
         spread = _spread(domain, state, device) if iteration in spread_at else None
         if spread is not None:
             memory.clear()
             state = _State(domain, cells, spread, device)
+        progress((iteration + 0.5) / iterations)
         moves = memory.direction(state.gradient, state.moves if steps_kept else state.lloyd_moves)
         moved = _State(domain, cells, state.stepped(moves), device)
         if moved.energy > (1.0 if is_strict else 1.0 + RISE) * state.energy and len(memory):
@@ -164,6 +166,7 @@ def _descend(
         energies.append(state.energy)
         if is_enough:
             break
+    progress(1.0)
     return _Descent(best.sites, np.array(energies))
 
 

@@ -18,6 +18,7 @@ from ..geometry.mesh import SurfacePoints
 from ..interpolation.hair_binding import HairBinding
 from ..interpolation.root_binder import RootBinder
 from ..kernels.checks import require_indices
+from ..long_work import Progress, no_progress, part_of
 from .base import TreeSettings
 from .random_numbers import CROSSOVER, random_numbers
 
@@ -43,28 +44,47 @@ def size_factor(area: float, tree: TreeSettings) -> float:
 class ClumpTrees:
     """The clump trees of one hair, each searched for once, while its surface, guides' roots and density stay.
 
-    binder: binds sites to guides; place(count, seed): `SurfacePoints` of evenly placed sites; area: that hair grows on
-    [m²].
+    binder: binds sites to guides; place(count, seed, progress): `SurfacePoints` of evenly placed sites; area: that hair
+    grows on [m²].
     """
 
     binder: RootBinder
-    place: Callable[[int, int], SurfacePoints]
+    place: Callable[[int, int, Progress], SurfacePoints]
     area: float
     _levels: dict[TreeSettings, list[HairBinding]] = field(default_factory=dict)
     _members: dict[tuple[Owner, TreeSettings], list[np.ndarray]] = field(default_factory=dict)
     _parents: dict[tuple[TreeSettings, int], np.ndarray] = field(default_factory=dict)
 
-    def levels(self, tree: TreeSettings) -> list[HairBinding]:
-        """The centres of each level, the coarsest first, bound to guides."""
+    def levels(self, tree: TreeSettings, progress: Progress = no_progress) -> list[HairBinding]:
+        """The centres of each level, the coarsest first, bound to guides.
+
+        progress(step, part): told while they are placed, and may raise to stop: then nothing of the tree is kept.
+        """
         if tree not in self._levels:
-            factor = size_factor(self.area, tree)
+            counts = self.site_counts(tree)
+            ends = [0.0, *(sum(counts[: level + 1]) / sum(counts) for level in range(len(counts)))]
             self._levels[tree] = [
-                self.binder.bind(self.place(site_count(self.area, factor * size), tree.seed + level))
-                for level, size in enumerate(tree.sizes)
+                self.binder.bind(self.place(count, tree.seed + level, part_of(progress, ends[level], ends[level + 1])))
+                for level, count in enumerate(counts)
             ]
         else:
             self._levels[tree] = self._levels.pop(tree)  # used last
         return self._levels[tree]
+
+    def site_counts(self, tree: TreeSettings) -> list[int]:
+        """Number of sites of each level, the coarsest first."""
+        factor = size_factor(self.area, tree)
+        return [site_count(self.area, factor * size) for size in tree.sizes]
+
+    def search(self, trees: Collection[TreeSettings], progress: Progress = no_progress) -> None:
+        """Find the centres of some trees that were not searched for yet; progress as in `levels`."""
+        missing = self.lacks(trees)
+        for place, tree in enumerate(missing):
+            self.levels(tree, part_of(progress, place / len(missing), (place + 1) / len(missing)))
+
+    def lacks(self, trees: Collection[TreeSettings]) -> list[TreeSettings]:
+        """Those of some trees that were not searched for yet, each once."""
+        return [tree for tree in dict.fromkeys(trees) if tree not in self._levels]
 
     def keep_only(self, used: Collection[TreeSettings]) -> None:
         """Forget trees that are not among the used ones, but for the last `MOST_SPARE`.

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from hair_addon.core.long_work import Stopped
 from hair_addon.core.styling import clump, clump_trees, program
 from tests.support.dynamics.stepped import curved_strands, largest_move, stepped, straight_strands
 from tests.support.strands.styled import head
@@ -158,6 +159,32 @@ def test_sites_are_as_many_as_the_size_says(hair):
         assert len(sites) == pytest.approx(hair.trees.area / (0.866 * size**2), abs=1.0)
         apart = np.linalg.norm(sites[:, None] - sites, axis=-1) + np.eye(len(sites))
         assert np.median(apart.min(axis=1)) == pytest.approx(size, rel=0.25)
+
+
+def test_progress_of_placing_locks_rises_and_may_stop_it(hair):
+    """What is stopped leaves nothing of the tree, and what is placed then is what is placed at once."""
+    settings = clump.Settings(size=0.01, levels=3, seed=11)
+    tree, told = program.tree_settings(settings), []
+
+    def stop(step, part):
+        told.append(part)
+        if part > 0.5:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        hair.trees.search([tree, tree], stop)
+    assert len(told) > 10 and hair.trees.lacks([tree, tree]) == [tree]
+    heard = []
+    hair.trees.search([tree, tree], lambda step, part: heard.append((step, part)))
+    steps, parts = zip(*heard, strict=True)
+    assert set(steps) == {"Placing locks"}
+    assert list(parts) == sorted(parts) and parts[: len(told)] == tuple(told)
+    assert parts[0] < 0.01 and parts[-1] > 0.9 and np.diff(parts).max() < 0.35
+    assert hair.trees.lacks([tree]) == []
+    hair.trees.search([tree], stop)  # which has nothing to do
+    found, at_once = hair.trees.levels(tree), hair.rooted(hair.binding.roots).trees.levels(tree)
+    for one, other in zip(found, at_once, strict=True):
+        np.testing.assert_array_equal(one.positions.numpy(), other.positions.numpy())
 
 
 def test_locks_too_small_for_a_surface_are_larger_ones(hair, monkeypatch):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles of a hair: add, replace, and fit to the size of its surface."""
+"""Styles of a hair: add, replace, and fit to the size of its surface.
+
+Where locks stand is found before styles are written, in steps: the update that follows finds it done.
+"""
 
 import math
 from collections.abc import Collection, Sequence
@@ -13,22 +16,24 @@ from ....core.files.settings_file import PartialSettings
 from ....core.geometry import strands
 from ....core.grooming import groom_defaults
 from ....core.grooming.groom import GuideSettings, HairSettings
+from ....core.long_work import Work
 from ....core.params import declared
-from ....core.styling import curl, fitting
+from ....core.styling import curl, fitting, program
 from ....core.styling.base import StyleSettings, has_effect
 from ...data import scene
 from ...data.strands import curves
+from ...host.datablocks import Remembered
 from ...settings import setting_properties, style_items
-from .. import pipeline
+from .. import bindings, pipeline
 from ..transfer import groom_settings
 
 _HEAD_LENGTH = next(length for name, length, _details in declared(GuideSettings) if name == "length")  # [m]
 
 
-def add(
+def adding(
     hair: Curves, settings: StyleSettings, name: str = "", is_fitted: bool = False, kept: Collection[str] = ()
-) -> StyleSettings:
-    """Add a style to a hair Curves datablock, after its other styles; returns its settings.
+) -> Work[StyleSettings]:
+    """Add a style to a hair Curves datablock, after its other styles, as work in steps; returns its settings.
 
     is_fitted: whether lengths are for a human head, and fitted to the surface; kept: names of settings that are not
     fitted. A seed that is none of them becomes one that no other style of the hair has. Raises `HairError` before any
@@ -40,20 +45,42 @@ def add(
         settings = fitting.fitted(settings, *surface_fit(hair), kept)
     if "seed" not in kept:
         settings = replace(settings, seed=style_items.new_seed(hair.vellus))
-    style_items.add(hair.vellus, settings, name)
-    return style_items.settings_of(style_items.active_of(hair.vellus))
+    place = Remembered(hair)
+    yield _placing_locks(hair, [settings])
+    state = _found(place).vellus
+    style_items.add(state, settings, name)
+    return style_items.settings_of(style_items.active_of(state))
 
 
-def assign(hair: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> None:
-    """Replace the styles of a hair Curves datablock; styles that stay keep their keys. Raises `HairError`."""
+def assigning(hair: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> Work[None]:
+    """Replace the styles of a hair Curves datablock, as work in steps; styles that stay keep their keys.
+
+    Raises `HairError` before any change.
+    """
     curves.require_editable(hair)
-    style_items.assign(hair.vellus, styles, names)
+    place = Remembered(hair)
+    yield _placing_locks(hair, styles)
+    style_items.assign(_found(place).vellus, styles, names)
 
 
-def apply_preset(hair: Curves, preset: PartialSettings, is_fitted: bool = True, keeps_styles: bool = False) -> None:
-    """Apply a style preset to a hair Curves datablock; what it leaves out stays. Raises `HairError` before any change.
+def duplicating(hair: Curves) -> Work[None]:
+    """Add a copy of a hair's active style after it, with another seed, as work in steps. Raises `HairError`."""
+    curves.require_editable(hair)
+    state, place = hair.vellus, Remembered(hair)
+    style_items.require_room(len(state.styles) + 1)
+    copied = replace(style_items.settings_of(style_items.active_of(state)), seed=style_items.new_seed(state))
+    yield _placing_locks(hair, [copied])
+    state = _found(place).vellus
+    style_items.duplicate(state, state.active_style)
 
-    is_fitted: as in `add`; keeps_styles: whether the preset's styles come after the present ones, which stay.
+
+def applying_preset(
+    hair: Curves, preset: PartialSettings, is_fitted: bool = True, keeps_styles: bool = False
+) -> Work[None]:
+    """Apply a style preset to a hair Curves datablock, as work in steps; what it leaves out stays.
+
+    Raises `HairError` before any change. is_fitted: as in `adding`; keeps_styles: whether the preset's styles come
+    after the present ones, which stay.
     """
     if is_fitted:
         preset = style_presets.fit(preset, *surface_fit(hair))
@@ -63,7 +90,27 @@ def apply_preset(hair: Curves, preset: PartialSettings, is_fitted: bool = True, 
         added = _with_new_seeds(preset.styles, present.styles)
         names = [*present.style_names, *(preset.style_names or [""] * len(added))]
         wanted = replace(wanted, styles=(*present.styles, *added), style_names=tuple(names))
-    groom_settings.apply_settings(hair, wanted)
+    place = Remembered(hair)
+    yield _placing_locks(hair, wanted.styles)
+    groom_settings.apply_settings(_found(place), wanted)
+
+
+def _found(place: Remembered) -> Curves:
+    """The hair that was remembered. Raises `HairError`."""
+    found: Curves = place.find()
+    return found
+
+
+def _placing_locks(hair, styles):
+    """The computation that finds where locks of styles stand on the surface of a hair, if its strands are known."""
+    trees = [tree for tree, _level in program.tree_levels([setting_properties.as_stored(style) for style in styles])]
+    bound = bindings.of(hair) if trees else None
+
+    def compute(progress):
+        if bound is not None:
+            bound.styles.trees.search(trees, progress)
+
+    return compute
 
 
 def surface_fit(hair: Curves) -> tuple[float, float]:

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators of styles: their list, painted masks, presets and saved ones."""
 
+import math
+
 import bpy
 
 from ....core.files import style_presets
 from ....core.styling.kinds import DESCRIPTIONS, OFFERS
+from ....core.styling.program import tree_settings
 from ...data.strands.curves import require_editable
 from ...groom.selection import hair_of
 from ...groom.styles import hair_styles, painted_masks
 from ...groom.transfer import groom_settings
 from ...settings import properties, saved_styles, style_items
 from .base.hair_operator import HairOperator, needs_hair
+from .base.modal import LongOperator
 
 
 def active_style_of(context):
@@ -37,7 +41,22 @@ def keep_switch():
     return properties.switch("Keep Styles", description, False)
 
 
-class VELLUS_OT_add_style(HairOperator, bpy.types.Operator):
+class _GivesStyles(LongOperator):
+    """Operators that give hair styles: where locks stand is found in a thread."""
+
+    applies = needs_hair
+    has_run = True  # kernels of styles are loaded as those of hair are
+
+    def styles(self, context):
+        """The styles to be given, as far as they need time."""
+        raise NotImplementedError
+
+    def seconds(self, context):
+        """Known before for nothing that has locks: on slivers they take a hundred times as long as elsewhere."""
+        return math.inf if any(tree_settings(style) is not None for style in self.styles(context)) else 0.0
+
+
+class VELLUS_OT_add_style(_GivesStyles, bpy.types.Operator):
     """Add a style to the active hair, after its other styles"""
 
     bl_idname = "vellus.add_style"
@@ -51,11 +70,16 @@ class VELLUS_OT_add_style(HairOperator, bpy.types.Operator):
         ),
         "is_fitted": fit_switch(),
     }
-    applies = needs_hair
 
-    def change(self, context):
+    def styles(self, context):
+        return [OFFERS[self.style].settings]
+
+    def work(self, context):
         offer = OFFERS[self.style]
-        hair_styles.add(hair_of(context.object), offer.settings, offer.label, self.is_fitted)
+        return hair_styles.adding(hair_of(context.object), offer.settings, offer.label, self.is_fitted)
+
+    def message(self, made):
+        return OFFERS[self.style].label, {}
 
 
 class VELLUS_OT_move_style(HairOperator, bpy.types.Operator):
@@ -96,7 +120,7 @@ class VELLUS_OT_remove_style(HairOperator, bpy.types.Operator):
         style_items.remove(hair.vellus, hair.vellus.active_style)
 
 
-class VELLUS_OT_duplicate_style(HairOperator, bpy.types.Operator):
+class VELLUS_OT_duplicate_style(_GivesStyles, bpy.types.Operator):
     """Duplicate the active style, without its keyframes; the copy has another random seed"""
 
     bl_idname = "vellus.duplicate_style"
@@ -106,10 +130,14 @@ class VELLUS_OT_duplicate_style(HairOperator, bpy.types.Operator):
     def applies(cls, context):
         return has_styles(cls, context)
 
-    def change(self, context):
-        hair = hair_of(context.object)
-        require_editable(hair)
-        style_items.duplicate(hair.vellus, hair.vellus.active_style)
+    def styles(self, context):
+        return [style_items.settings_of(active_style_of(context))]
+
+    def work(self, context):
+        return hair_styles.duplicating(hair_of(context.object))
+
+    def message(self, made):
+        return "Style duplicated", {}
 
 
 class VELLUS_OT_use_points(HairOperator, bpy.types.Operator):
@@ -163,7 +191,7 @@ class VELLUS_OT_mask_from_selection(HairOperator, bpy.types.Operator):
         return "{count} guides in the mask", {"count": count}
 
 
-class VELLUS_OT_apply_style_preset(HairOperator, bpy.types.Operator):
+class VELLUS_OT_apply_style_preset(_GivesStyles, bpy.types.Operator):
     """Give the active hair the styles of a built-in preset"""
 
     bl_idname = "vellus.apply_style_preset"
@@ -173,15 +201,19 @@ class VELLUS_OT_apply_style_preset(HairOperator, bpy.types.Operator):
         "is_fitted": fit_switch(),
         "keeps_styles": keep_switch(),
     }
-    applies = needs_hair
 
-    def change(self, context):
+    def styles(self, context):
+        return style_presets.read(self.preset).styles or ()
+
+    def work(self, context):
         preset = style_presets.read(self.preset)
-        hair_styles.apply_preset(hair_of(context.object), preset, self.is_fitted, self.keeps_styles)
+        return hair_styles.applying_preset(hair_of(context.object), preset, self.is_fitted, self.keeps_styles)
+
+    def message(self, made):
         return style_presets.PRESETS[self.preset], {}
 
 
-class VELLUS_OT_apply_saved_style(HairOperator, bpy.types.Operator):
+class VELLUS_OT_apply_saved_style(_GivesStyles, bpy.types.Operator):
     """Give the active hair the styles of a saved preset"""
 
     bl_idname = "vellus.apply_saved_style"
@@ -193,11 +225,16 @@ class VELLUS_OT_apply_saved_style(HairOperator, bpy.types.Operator):
         ),
         "keeps_styles": keep_switch(),
     }
-    applies = needs_hair
 
-    def change(self, context):
+    def styles(self, context):
+        return saved_styles.read(self.name).styles or ()
+
+    def work(self, context):
         preset = saved_styles.read(self.name)
-        hair_styles.apply_preset(hair_of(context.object), preset, self.is_fitted, self.keeps_styles)
+        return hair_styles.applying_preset(hair_of(context.object), preset, self.is_fitted, self.keeps_styles)
+
+    def message(self, made):
+        return "Style preset {name} applied", {"name": self.name}
 
 
 class VELLUS_OT_save_style_preset(HairOperator, bpy.types.Operator):
