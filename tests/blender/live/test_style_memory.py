@@ -13,6 +13,7 @@ from hair_addon import api
 from hair_addon.blender.groom import bindings
 from hair_addon.core.params import Settings, declared
 from hair_addon.core.styling.kinds import KINDS, OFFERS
+from tests.support.reading import points
 
 FEW, MANY = 3, 6
 LONG = 1000
@@ -48,23 +49,74 @@ def changed(kind, given, step):
     return values
 
 
-@pytest.mark.parametrize("offer", {offer.kind: name for name, offer in OFFERS.items()}.values())
-def test_changes_of_a_style_keep_nothing_of_those_before(hair, offer):
-    hair = hair.data
-    hair.vellus.hair.strand_count = 40
-    given = api.add_style(hair, offer)
-    bpy.context.view_layer.update()
-    item = hair.vellus.styles[0]
-    group = getattr(item, item.kind.lower())
-    counts = {}
-    for step in range(MANY):
-        for name, value in changed(item.kind, given, step).items():
-            setattr(group, name, value)
+class Changing:
+    """Hair of few strands with a style, all numbers of which change, a step at a time: dragged, keyed or driven."""
+
+    def __init__(self, hair, offer, strand_count):
+        self.object, self.hair = hair, hair.data
+        self.hair.vellus.hair.strand_count = strand_count
+        self.given = api.add_style(self.hair, offer)
+        self.item = self.hair.vellus.styles[0]
+        self.group = getattr(self.item, self.item.kind.lower())
         bpy.context.view_layer.update()
-        if step in (FEW, MANY - 1):
-            counts[step] = things_alive()
-    assert hair.vellus.status == "" and bindings.of(hair).styles.styling is not None
-    assert counts[MANY - 1] <= counts[FEW]
+
+    def _set(self, step):
+        for name, value in changed(self.item.kind, self.given, step).items():
+            setattr(self.group, name, int(value) if isinstance(getattr(self.group, name), int) else value)
+
+    def _animated(self):
+        names = changed(self.item.kind, self.given, 0)
+        return [name for name in names if self.group.bl_rna.properties[name].is_animatable]
+
+    def dragged(self):
+        """A function of the number of a step, which takes it."""
+
+        def drag(number):
+            self._set(number % 100 + number / LONG)
+            bpy.context.view_layer.update()
+
+        return drag
+
+    def keyed(self):
+        for frame in (1, LONG):
+            self._set(0.1 * frame)
+            for name in self._animated():
+                self.group.keyframe_insert(name, frame=frame)
+        return self._play
+
+    def driven(self):
+        self.hair.animation_data_clear()
+        first, second = (changed(self.item.kind, self.given, step) for step in (0, 1))
+        for name in self._animated():
+            curve = self.group.driver_add(name)
+            curve.driver.expression = f"{first[name]} + {second[name] - first[name]} * fmod(frame, 100)"
+        return self._play
+
+    @staticmethod
+    def _play(number):
+        bpy.context.scene.frame_set(number + 2)
+
+    def assert_shown(self):
+        """The style acts, and nothing is wrong with the hair."""
+        assert self.hair.vellus.status == "" and bindings.of(self.hair).styles.styling is not None
+
+
+OFFER_OF_KINDS = {offer.kind: name for name, offer in OFFERS.items()}.values()
+
+
+@pytest.mark.parametrize("offer", OFFER_OF_KINDS)
+def test_changes_of_a_style_keep_nothing_of_those_before(hair, offer):
+    changing = Changing(hair, offer, 40)
+    for begin in (changing.dragged, changing.keyed, changing.driven):
+        change, counts, shown = begin(), {}, set()
+        for step in range(MANY):
+            change(step)
+            shown.add(points(changing.object).tobytes())
+            if step in (FEW, MANY - 1):
+                counts[step] = things_alive()
+        assert len(shown) == MANY, begin.__name__
+        assert counts[MANY - 1] <= counts[FEW], begin.__name__
+    changing.assert_shown()
 
 
 def resident():
@@ -74,40 +126,22 @@ def resident():
 
 
 def grown(change):
-    """(things, memory) after `LONG` changes, over those after a hundredth of them; change(number): one of them."""
+    """((things, memory) after a hundredth of `LONG` changes, (things, memory) after all); change(number): one."""
     seen = []
     for number in range(LONG):
         change(number)
         if number + 1 in (LONG // 100, LONG):
             seen.append((things_alive(), resident()))
-    return tuple(after / before for before, after in zip(*seen, strict=True))
+    return seen
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("offer", {offer.kind: name for name, offer in OFFERS.items()}.values())
+@pytest.mark.parametrize("offer", OFFER_OF_KINDS)
 def test_memory_stays_as_it_is_in_a_thousand_changes_and_frames(hair, offer):
-    """Of all numbers of a style, dragged and keyed, with 300 strands."""
-    hair = hair.data
-    hair.vellus.hair.strand_count = 300
-    given = api.add_style(hair, offer)
-    item = hair.vellus.styles[0]
-    group = getattr(item, item.kind.lower())
-
-    def drag(number):
-        for name, value in changed(item.kind, given, number % 100 + number / LONG).items():
-            setattr(group, name, int(value) if isinstance(getattr(group, name), int) else value)
-        bpy.context.view_layer.update()
-
-    def play(number):
-        bpy.context.scene.frame_set(number + 1)
-
-    found = {"dragged": grown(drag)}
-    for frame in (1, LONG):
-        for name, value in changed(item.kind, given, 0.1 * frame).items():
-            setattr(group, name, int(value) if isinstance(getattr(group, name), int) else value)
-            if group.bl_rna.properties[name].is_animatable:
-                group.keyframe_insert(name, frame=frame)
-    found["keyed"] = grown(play)
-    print(offer, found)
-    assert hair.vellus.status == "" and bindings.of(hair).styles.styling is not None
-    assert all(things <= 1.0 + 1e-3 and memory <= ROOM for things, memory in found.values()), found
+    """Of all numbers of a style, dragged, keyed and driven, with 300 strands."""
+    changing = Changing(hair, offer, 300)
+    for begin in (changing.dragged, changing.keyed, changing.driven):
+        (few_things, few), (things, memory) = grown(begin())
+        print(f"{offer} {begin.__name__}: things {few_things} → {things}, MB {few / 1e6:.1f} → {memory / 1e6:.1f}")
+        assert things <= (1.0 + 1e-3) * few_things and memory <= ROOM * few
+    changing.assert_shown()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.groom.dynamics import guide_baking
+from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.settings import properties, shared_wetness, style_items
 from hair_addon.blender.ui import panels
 from tests.support.interface.layout import draw_all
@@ -121,9 +121,9 @@ def test_keyed_rain_wets_look_shape_and_baked_motion(hair, guide_curves, tmp_pat
     assert rain[0][2] == dry[0][2] and rain[1][2].roughness < dry[1][2].roughness
     np.testing.assert_allclose(rain[0][1], dry[0][1], atol=1e-6)
     assert np.abs(rain[1][1] - dry[1][1]).max() > 0.05
-    simulated = [api.blender.groom.dynamics.frame_folders.frames_of(guide_curves).points_at(6)]
+    simulated = [frame_folders.frames_of(guide_curves).points_at(6)]
     hair.data.animation_data_clear()
     style.amount = 0.0
     baked()
-    simulated.append(api.blender.groom.dynamics.frame_folders.frames_of(guide_curves).points_at(6))
+    simulated.append(frame_folders.frames_of(guide_curves).points_at(6))
     assert np.abs(simulated[0] - simulated[1]).max() > 1e-3
