@@ -45,7 +45,7 @@ def register():
     """Register classes, then handlers and drawing."""
     if bpy.app.timers.is_registered(_unregister_after_render):  # disabled a moment ago, and enabled again
         bpy.app.timers.unregister(_unregister_after_render)
-        _show_in_status_bars(None)
+        bpy.app.timers.register(_show_usual_status_bars)  # Blender hides its data while it enables an add-on
         return
     for cls in CLASSES:
         bpy.utils.register_class(cls)
@@ -87,6 +87,11 @@ def _unregister_after_render():
     _show_in_status_bars(None)
     _unregister()
     return None
+
+
+def _show_usual_status_bars():
+    """For `bpy.app.timers`."""
+    _show_in_status_bars(None)
 
 
 def _show_in_status_bars(text):

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on is disabled in the preferences while a window renders with its engine, and enabled again.
+
+Run by a desktop Blender as steps.py says.
+"""
+
+import math
+import sys
+import time
+from pathlib import Path
+
+import bpy
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
+from tests.desktop.window import MODULE, in_viewport, install, viewport, wait, wait_for  # noqa: E402
+
+SAMPLES = 300  # of a render that lasts some seconds with any driver
+
+
+def is_rendering():
+    return bpy.app.is_job_running("RENDER")
+
+
+def is_there():
+    """Whether the engine is registered, and hair has its settings."""
+    engines = {getattr(cls, "bl_idname", "") for cls in bpy.types.RenderEngine.__subclasses__() if cls.is_registered}
+    return ["VELLUS" in engines, hasattr(bpy.types.Curves, "vellus")]
+
+
+def build():
+    install(ZIP)
+    scene = bpy.context.scene
+    with in_viewport():
+        bpy.ops.object.select_all(action="SELECT")
+        bpy.ops.object.delete()
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+        bpy.ops.vellus.add_hair(guide_count=30, strand_count=400)
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.camera.location, scene.camera.rotation_euler = (0.0, -6.0, 0.0), (math.pi / 2, 0.0, 0.0)
+    scene.collection.objects.link(scene.camera)
+    scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "VELLUS", 320, 240
+    scene.render.image_settings.file_format = "PNG"
+    # A 3-D view waits for a render that has the GPU, and all of Blender with it: nobody can disable anything then.
+    bpy.context.preferences.view.render_display_type = "NONE"
+    viewport()[0].type = "PREFERENCES"
+    yield
+
+
+def begin_render(name, sample_count):
+    """F12, into a file."""
+    scene = bpy.context.scene
+    scene.vellus.sample_count, scene.render.filepath = sample_count, str(OUT / name)
+    bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
+    yield from wait_for(is_rendering, 10.0)
+
+
+def disable():
+    """In mid-render: it renders on, and Blender handles its events; when that has ended the add-on goes."""
+    yield from begin_render("disabled.png", SAMPLES)
+    yield from wait(1.0)  # it draws
+    start = time.monotonic()
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    facts["disable"] = {"took": time.monotonic() - start, "renders on": is_rendering(), "there": is_there()}
+    handled = 0
+    while is_rendering():
+        handled += is_there() == [True, True]
+        yield
+    facts["disable"]["handled"] = handled
+    facts["disable"]["rendered"] = (OUT / "disabled.png").exists()
+    yield from wait_for(lambda: not any(is_there()), 10.0)
+    facts["disable"]["then there"] = is_there()
+    facts["disable"]["listed"] = MODULE in bpy.context.preferences.addons
+
+
+def enable():
+    """Again; and what was disabled and enabled in one render stays."""
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    yield
+    facts["enable"] = {"there": is_there()}
+    bpy.context.scene.render.engine = "VELLUS"
+    yield from begin_render("enabled.png", SAMPLES)
+    yield from wait(1.0)
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    yield
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    facts["enable"]["renders on"] = is_rendering()
+    yield from wait_for(lambda: not is_rendering(), 120.0)
+    yield from wait(2.0)
+    facts["enable"] |= {"then there": is_there(), "rendered": (OUT / "enabled.png").exists()}
+
+
+if __name__ == "__main__":
+    take((build, disable, enable))
