@@ -12,9 +12,9 @@ _KINDS = {"GUIDES": "Vellus guides", "HAIR": "Vellus hair", None: "Vellus guides
 
 
 def curves_of(given, kind=None):
-    """Return a Curves datablock, given as such or as its object; for an evaluated copy, the original.
+    """Return a Curves datablock, given directly or as its object; for an evaluated copy, the original.
 
-    Raises `HairError` unless it is hair or guides, or the one that `kind` names.
+    Raises `HairError` unless it is hair or guides; kind: only "GUIDES" or only "HAIR".
     """
     found = _original(given)
     if isinstance(found, bpy.types.Object):
@@ -27,9 +27,9 @@ def curves_of(given, kind=None):
 
 
 def object_with_curves(given, view_layer):
-    """Return an object with curves, given as such or as its Curves, which an object of the view layer shows.
+    """Return a curves object, given directly or as the data of an object in the view layer.
 
-    For an evaluated copy, the original. Raises `HairError`.
+    For an evaluated copy, returns the original. Raises `HairError`.
     """
     found = _original(given)
     if isinstance(found, bpy.types.Curves | bpy.types.Curve):
@@ -40,7 +40,7 @@ def object_with_curves(given, view_layer):
 
 
 def guides_of(given):
-    """Return guide Curves as `curves_of` does, if their surface is evaluated."""
+    """Return guide Curves like `curves_of`. Raises `HairError` unless their surface is evaluated."""
     guides = curves_of(given, "GUIDES")
     if guides.surface is not None:
         usable_surfaces.require_evaluated(guides.surface)

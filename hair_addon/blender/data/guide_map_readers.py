@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether nodes read the guide weights of strands: those of geometry and materials name attributes by strings.
+"""Whether nodes of geometry or materials read the guide weights of strands, whose attributes they name by strings.
 
-A name may be joined from parts, as of a slot's number, so its beginning counts.
+Only the beginning of a string is compared, as nodes may append a slot's number.
 """
 
 import bpy
@@ -9,20 +9,20 @@ import bpy
 from ..host.caches import Cache
 
 _BEGINNINGS = ("guide_index", "guide_weight")
-_PROPERTIES = ("attribute_name", "string")  # of nodes that are not inputs
+_PROPERTIES = ("attribute_name", "string")  # properties of nodes, besides input sockets
 
-# What `_key` gives → "read" or "unread", until nodes change: `stored_guide_maps.follow`.
+# `_key` → "read" or "unread"; cleared when nodes change by `stored_guide_maps.follow`.
 reading_cache = Cache()
 
 
 def are_read(hair):
-    """Whether any nodes read the guide weights of hair Curves, or an input of a modifier of theirs names them."""
+    """Whether nodes, or inputs of modifiers, read the guide weights of hair Curves."""
     users = [user for user in bpy.data.objects if user.data == hair]
     modifiers = [
         modifier
         for user in users
         for modifier in user.modifiers
-        if modifier.type == "NODES" and modifier.node_group is not None  # else it has no inputs
+        if modifier.type == "NODES" and modifier.node_group is not None  # no inputs without a group
     ]
     if any(map(_has_input, modifiers)):
         return True
@@ -35,7 +35,7 @@ def _key(modifiers):
 
 
 def _has_input(modifier):
-    """Whether a modifier's inputs name an attribute of the guide map."""
+    """Whether a modifier's inputs contain the name of a guide weight attribute."""
     inputs = modifier.properties.inputs
     names = [p.identifier for p in inputs.bl_rna.properties if p.type == "POINTER"]
     sockets = [getattr(inputs, name) for name in names]

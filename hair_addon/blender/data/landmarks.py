@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Landmarks of a mesh: vertex groups and empty children whose names say so."""
+"""Landmarks of a mesh: vertex groups and child empties whose names begin with "landmark"."""
 
 import re
 
@@ -14,8 +14,8 @@ _PREFIX = "landmark"
 def read(surface_object, surface, depsgraph):
     """{name: (3,) float64 [m]} in the coordinates of a `Surface` at rest.
 
-    A vertex group is at the mean of its vertices by their weights; an empty is where it is. The numbers that Blender
-    puts behind names are left out: Landmark nose.001 is Landmark nose.
+    A vertex group is at the weighted mean of its vertices, an empty at its origin. Blender's numeric suffixes of names
+    are ignored: Landmark nose.001 is Landmark nose.
     """
     found = {}
     for group in surface_object.vertex_groups:

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Masks of guides and strands: a vertex group and an image. Strands use the mask of their guides, or one of their
-own.
-"""
+"""Masks of guides and strands: a vertex group and an image. Strands use their own mask, or else their guides' mask."""
 
 from dataclasses import dataclass
 
@@ -11,7 +9,7 @@ from . import scene
 
 @dataclass(frozen=True)
 class Mask:
-    """Names of a vertex group and of an image; empty where there is none."""
+    """Names of a vertex group and of an image; empty for none."""
 
     group: str = ""
     image: str = ""
@@ -20,18 +18,18 @@ class Mask:
         return bool(self.group or self.image)
 
     def read(self, surface_object, surface, depsgraph):
-        """Weights (V,) and `Texture` on the `Surface` of a mesh object, each None without a name."""
+        """(V,) weights and the `Texture` on the `Surface` of a mesh object, each None without a name."""
         weights = scene.read_weights(surface_object, surface, depsgraph, self.group)
         return weights, scene.read_texture(surface, self.image)
 
 
 def own(settings):
-    """The `Mask` that settings name: `GuideSettings`, `HairSettings`, or properties of the same names."""
+    """The `Mask` in `GuideSettings`, `HairSettings`, or properties of the same names."""
     return Mask(_name(settings, "density_group"), _name(settings, "density_image"))
 
 
 def of_strands(settings, guide_settings):
-    """The `Mask` of strands between guides; settings: `HairSettings`, or properties, and those of the guides."""
+    """The `Mask` of strands between guides, from `HairSettings` and `GuideSettings`, or properties of them."""
     return own(settings) or own(guide_settings)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces that are inside out: closed meshes whose normals point inward, where hair grows inward too."""
+"""Surfaces that are inside out: closed meshes whose normals point inward, so that hair grows inward."""
 
 from ...core.geometry import orientation
 from ..host.caches import Cache
@@ -12,8 +12,7 @@ inside_out_cache = Cache()  # session_uid of a mesh → whether it is inside out
 def is_inside_out(mesh_object):
     """Whether the mesh of an object, before its modifiers, is closed and its normals point inward.
 
-    Hair grows out of mirrored objects as out of others, as Blender draws them: their scale does not matter. The mesh is
-    read once after each edit.
+    The object's scale does not matter: hair grows out of mirrored objects too. The mesh is read once after each edit.
     """
     mesh = mesh_object.data
     return inside_out_cache.get(mesh.session_uid, lambda: _is_inside_out(mesh))
@@ -26,12 +25,12 @@ def _is_inside_out(mesh):
 
 
 def warning(mesh_object):
-    """(sentence, values) about a mesh that is inside out, for scripts and commands; None where it is not."""
+    """(sentence, values) for scripts and commands if a mesh is inside out, else None."""
     if not is_inside_out(mesh_object):
         return None
     return '"{name}" is inside out: hair grows inward. Flip the normals of its mesh.', {"name": name_of(mesh_object)}
 
 
 def mesh_changed(mesh):
-    """Forget what was read of a mesh that was edited."""
+    """Forget the orientation of an edited mesh."""
     inside_out_cache.invalidate(mesh.session_uid)

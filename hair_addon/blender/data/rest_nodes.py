@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rest positions of surfaces whose modifiers copy faces.
 
-Blender stores where vertices are at rest before it evaluates modifiers, and *Mirror* and *Solidify* give their copies
-the places of what they copy: both sides of a mirrored head would be one. Nodes behind these modifiers tell them apart.
+Blender stores rest positions before it evaluates modifiers, and *Mirror* and *Solidify* copy them unchanged: both
+sides of a mirrored head would coincide. Nodes after these modifiers separate them.
 """
 
 import bpy
@@ -21,9 +21,10 @@ _DEFORMING = {
 
 
 def tell_apart(surface_object):
-    """Add our nodes behind the last modifier that copies faces, or remove them where there is none.
+    """Add our nodes after the last modifier that copies faces, or remove them if there is none.
 
-    Whether anything was changed. Mirrored faces are told apart where a mesh is deformed before, too; `lost_copies` not.
+    Returns whether anything was changed. Mirrored faces are separated even if the mesh is deformed before them;
+    `lost_copies` are not.
     """
     if surface_object.library is not None:
         return False
@@ -39,7 +40,7 @@ def tell_apart(surface_object):
     if is_new:
         ours = len(modifiers)
         modifiers.new(_NAME, "NODES").node_group = _group()
-    # What is before the place is one modifier less once ours is taken out of it.
+    # If our modifier stands before the place, moving it shifts the place by one.
     wanted = after + 1 if ours > after else after
     if ours != wanted:
         modifiers.move(ours, wanted)
@@ -53,7 +54,7 @@ def tell_apart(surface_object):
 
 
 def lost_copies(surface_object):
-    """The modifier whose copies cannot be told apart, as the mesh is deformed before it; None without."""
+    """The modifier whose copies cannot be separated, as the mesh is deformed before it, or None."""
     copying = _copying(surface_object)
     if not copying or _axes(copying) is not None:
         return None
@@ -72,7 +73,7 @@ def _is_shown(modifier):
 
 
 def _axes(copying):
-    """(3,) one for each axis of the object across which modifiers mirror; None where they copy in other ways."""
+    """(3,) 1.0 for each axis of the object along which modifiers mirror, else 0.0; None if modifiers copy otherwise."""
     if any(m.type != "MIRROR" or m.mirror_object is not None for _index, m in copying):
         return None
     return tuple(float(any(m.use_axis[axis] for _index, m in copying)) for axis in range(3))
@@ -88,9 +89,9 @@ def _is_ours(modifier):
 
 
 def _group():
-    """The node group of this version, made if the file has none.
+    """The node group of this version, created if the file has none.
 
-    A vertex that is mirrored across an axis is on the other side at rest too; with *Placed* it is at rest where it is.
+    The rest position of a mirrored vertex is mirrored too; with *Placed* it is the vertex's position.
     """
     for group in bpy.data.node_groups:
         if group.get(_MARK) == _VERSION and group.library is None and group.bl_idname == "GeometryNodeTree":

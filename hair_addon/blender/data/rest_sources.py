@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rest positions of surfaces whose modifiers replace their geometry, such as by that of another object.
+"""Rest positions of surfaces whose modifiers replace their geometry, for example by that of another object.
 
-Blender stores where vertices of a mesh are at rest before its own modifiers: what geometry nodes take from another
-object has rest positions if that object stores them.
+Blender stores rest positions of a mesh before its own modifiers: geometry that nodes take from another object has rest
+positions if that object stores them.
 """
 
 import bpy
@@ -11,8 +11,11 @@ _REST = "rest_position"
 
 
 def keep(surface_object):
-    """Let the objects whose geometry a surface shows store rest positions, where it has none; whether any did not."""
-    # As it was evaluated last: to evaluate more, here, would have handlers called that may be why this is asked.
+    """If a surface lacks rest positions, let the objects whose geometry it shows store them.
+
+    Returns whether any of these objects changed.
+    """
+    # Uses the last evaluation: evaluating here would call handlers, one of which may be the caller.
     if not lacks(surface_object, bpy.context.view_layer.depsgraph):
         return False
     found = [o for o in _sources(surface_object) if o.library is None and not o.add_rest_position_attribute]
@@ -22,7 +25,7 @@ def keep(surface_object):
 
 
 def lacks(surface_object, depsgraph):
-    """Whether an evaluated mesh has no rest positions though its object stores them; no geometry is read."""
+    """Whether an evaluated mesh lacks rest positions although its object stores them; no geometry is read."""
     if depsgraph is None or surface_object.mode != "OBJECT" or not surface_object.add_rest_position_attribute:
         return False
     evaluated = surface_object.evaluated_get(depsgraph)
@@ -30,7 +33,7 @@ def lacks(surface_object, depsgraph):
 
 
 def _sources(surface_object):
-    """The mesh objects that geometry nodes of a surface name, themselves or in collections."""
+    """The mesh objects that geometry nodes of a surface use, directly or in collections."""
     named, known = set(), set()
     for modifier in surface_object.modifiers:
         if modifier.type == "NODES" and modifier.node_group is not None:
@@ -45,7 +48,7 @@ def _sources(surface_object):
 
 
 def _named_in(group, known):
-    """Objects and collections that sockets of a node group name, and those of groups in it."""
+    """Objects and collections in sockets of a node group, and in groups within it."""
     known.add(group)
     named = set()
     for node in group.nodes:

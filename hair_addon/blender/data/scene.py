@@ -17,17 +17,17 @@ from . import subdivided_surfaces, surface_readings, surface_space
 from .surface_readings import Reading
 from .surfaces import cage_of, transformed
 
-_MOST_CORNERS = 100_000  # of a face: the time to triangulate one grows faster than its corners
+_MOST_CORNERS = 100_000  # of a face: the time to triangulate a face grows faster than its number of corners
 
-# session_uid of a mesh object → (`Faces`, (C,) edges of its corners) that were read last.
+# session_uid of a mesh object → last read (`Faces`, (C,) edges of its corners).
 faces_cache = Cache(capacity=64)
 
-# session_uid of a surface → (`Reading`, `Surface`, (F, 3) corners of its triangles) that were read last.
+# session_uid of a surface → last read (`Reading`, `Surface`, (F, 3) corners of its triangles).
 surface_cache = Cache(capacity=16)
 
 
 def read_surface(surface_object, depsgraph):
-    """The evaluated mesh of an object, None if it was deleted, as a `Surface`. Raises `HairError`."""
+    """Return the evaluated mesh of an object as a `Surface`. Raises `HairError`, also for None, a deleted surface."""
     if surface_object is None:
         raise HairError("The surface is missing: pick a mesh.")
     if surface_object.type != "MESH":  # a script may have set it as the surface of Curves
@@ -54,9 +54,8 @@ def read_surface(surface_object, depsgraph):
         undivided = subdivided_surfaces.undivided_corners(surface_object, depsgraph, faces)
         if known is None or not known[0].is_same(read) or known[1].undivided_corners != undivided:
             if read.has_rest and (np.diff(faces.starts) > 3).any():
-                # Where polygons are cut depends on where vertices are: triangles are to stay the same in every pose.
-                # Written to the attribute, positions would not reach triangles that Blender shares with the evaluated
-                # mesh.
+                # The triangulation of polygons depends on vertex positions, and must be the same in every pose. Writing
+                # to the attribute instead would not update triangles that Blender shares with the evaluated mesh.
                 mesh.vertices.foreach_set("co", rest.ravel())
             corners = triangle_corners(mesh, faces, read.name)
             if is_turned:
@@ -88,7 +87,7 @@ def _loop_uvs(mesh):
 
 
 def _own_mesh(surface_object, uv_map):
-    """(`Faces`, (C, 2) float32 of the UV map or None) of a mesh before its modifiers; None for no faces."""
+    """(`Faces`, (C, 2) float32 of the UV map or None) of a mesh before its modifiers; None without faces."""
     mesh = surface_object.data
     if not len(mesh.polygons):
         return None
@@ -109,16 +108,16 @@ def read_own_mesh(surface_object, to_world_axes):
 
 
 def shown_surface(surface_object, surface):
-    """The `Surface` of an object as it was read last, where the one given has the faces of its cage; else that one.
+    """The last read `Surface` of an object if the given surface has the faces of its cage; else the given surface.
 
-    On it roots are stored that were placed on the cage.
+    Roots that were placed on the cage are stored on it.
     """
     known = None if surface_object is None else surface_cache.get(surface_object.session_uid)
     return known[1] if known is not None and known[1].cage.topology == surface.topology else surface
 
 
 def present_depsgraph():
-    """The dependency graph of the context's scene and view layer, evaluated. Raises `HairError` within a driver."""
+    """The evaluated dependency graph of the context's scene and view layer. Raises `HairError` within a driver."""
     with scene_time.outside_drivers():
         return bpy.context.evaluated_depsgraph_get()
 
@@ -131,7 +130,7 @@ def triangle_count(surface_object, view_layer):
 
 
 def _rest_positions(mesh, posed):
-    """(V, 3) float32 of the attribute that Blender adds before it deforms; where there is none, `posed`."""
+    """(V, 3) float32 of the attribute that Blender stores before modifiers; `posed` without it."""
     attribute = mesh.attributes.get("rest_position")
     if attribute is None or (attribute.data_type, attribute.domain) != ("FLOAT_VECTOR", "POINT") or not len(posed):
         return posed
@@ -146,10 +145,10 @@ def faces_of(mesh):
 
 
 def faces_read_again(mesh_object, mesh):
-    """`faces_of` the evaluated mesh of an object: the `Faces` that were read of it last, if they are the same.
+    """`faces_of` the evaluated mesh of an object; the last read `Faces` of the object if they are the same.
 
-    Blender takes longer to say where polygons begin than all else. Corners at the same vertices and edges, of as many
-    polygons, are of the same ones: the last edge of each leads back to its first vertex.
+    Reading the starts of polygons is the slowest part. With the same vertices and edges at corners and the same number
+    of polygons, the polygons are the same: the last edge of each leads back to its first vertex.
     """
     uid, vertices = mesh_object.session_uid, corner_values(mesh, ".corner_vert")
     edges, known = corner_values(mesh, ".corner_edge"), faces_cache.get(uid)
@@ -164,7 +163,7 @@ def faces_read_again(mesh_object, mesh):
 
 
 def corner_values(mesh, name):
-    """(C,) int32 of an attribute that each mesh has; two hundred times as fast as by `mesh.loops`."""
+    """(C,) int32 of an attribute that each mesh has; two hundred times as fast as `mesh.loops`."""
     values = np.empty(len(mesh.loops), np.int32)
     if len(values):
         mesh.attributes[name].data.foreach_get("value", values)
@@ -178,7 +177,7 @@ def _faces_of_corners(mesh, corner_vertices):
 
 
 def triangle_corners(mesh, faces, name):
-    """(F, 3) int32: the corners, in `Faces`, of the triangles that Blender cuts polygons into. Raises `HairError`."""
+    """(F, 3) int32: corners, in `Faces`, of Blender's triangulation of polygons. Raises `HairError`."""
     if np.diff(faces.starts).max(initial=0) > _MOST_CORNERS:
         sentence = '"{name}" has a face with more than {most} corners: split it into smaller faces.'
         raise HairError(sentence, name=name, most=_MOST_CORNERS)
@@ -189,7 +188,7 @@ def triangle_corners(mesh, faces, name):
 
 
 def vertex_positions(mesh):
-    """(V, 3) float32; a mesh without vertices has no attribute of positions either."""
+    """(V, 3) float32; also of a mesh without vertices, which has no position attribute."""
     vertices = np.empty((len(mesh.vertices), 3), np.float32)
     if len(vertices):
         mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
@@ -197,7 +196,7 @@ def vertex_positions(mesh):
 
 
 def evaluated_positions(mesh_object, depsgraph):
-    """(V, 3) float32 of an evaluated mesh object, in its own coordinates."""
+    """(V, 3) float32 of an evaluated mesh object, in local coordinates."""
     evaluated = mesh_object.evaluated_get(depsgraph)
     if "position" in evaluated.data.attributes or not len(evaluated.data.vertices):
         return vertex_positions(evaluated.data)
@@ -208,7 +207,7 @@ def evaluated_positions(mesh_object, depsgraph):
 
 
 def read_vertex_group(surface_object, depsgraph, name):
-    """(V,) float32 weights of a vertex group on the evaluated mesh, or None for the empty name."""
+    """(V,) float32 weights of a vertex group on the evaluated mesh, or None for an empty name."""
     if not name:
         return None
     group = surface_object.vertex_groups.get(name)
@@ -224,7 +223,7 @@ def read_vertex_group(surface_object, depsgraph, name):
 
 
 def read_weights(surface_object, surface, depsgraph, name):
-    """`read_vertex_group` on a `Surface` of an object: its cage, or as it was read at another level of subdivision."""
+    """`read_vertex_group` for a `Surface` of an object, which may be the cage or at another level of subdivision."""
     weights = read_vertex_group(surface_object, depsgraph, name)
     if weights is None or len(weights) == len(surface.rest):
         return weights
@@ -244,7 +243,7 @@ def read_cage_weights(surface_object, depsgraph, name):
 
 
 def on_surface(surface_object, surface, depsgraph, values, domain):
-    """Values of an evaluated mesh, of its POINT, FACE or CORNER: those of a `Surface` of it, which may be its cage."""
+    """Values of an evaluated mesh on the domain POINT, FACE or CORNER → values of its `Surface`, or of the cage."""
     present = read_surface(surface_object, depsgraph)
     if present.topology == surface.topology or present.cage.topology != surface.topology:
         return values
@@ -256,7 +255,7 @@ def on_surface(surface_object, surface, depsgraph, values, domain):
 
 
 def weights_in_group(mesh, index):
-    """(V,) float32. Blender offers no array access to vertex groups; by BMesh it takes a quarter of the time."""
+    """(V,) float32. Blender has no array access to vertex groups; BMesh takes a quarter of the time of vertices."""
     edited = bmesh.new()
     try:
         edited.from_mesh(mesh, face_normals=False, vertex_normals=False)
@@ -269,7 +268,7 @@ def weights_in_group(mesh, index):
 
 
 def read_texture(surface, name, may_be_black=False):
-    """The `Texture` of an image on a `Surface`, the mean of its colours, or None for the empty name."""
+    """The `Texture` of an image on a `Surface`, the mean of its color channels; None for an empty name."""
     values = read_image(name, may_be_black)
     if values is None:
         return None
@@ -280,7 +279,7 @@ def read_texture(surface, name, may_be_black=False):
 
 
 def read_image(name, may_be_black=False):
-    """(height, width) float32, at least zero, the mean of an image's colours; None for the empty name."""
+    """(height, width) float32, at least zero, the mean of an image's color channels; None for an empty name."""
     if not name:
         return None
     image = bpy.data.images.get(name)
@@ -300,7 +299,7 @@ def read_image(name, may_be_black=False):
 
 
 def curves_objects(view_layer, kind, viewport=None):
-    """The visible objects of a view layer that hold Curves of ours, of the kind GUIDES or HAIR."""
+    """The visible objects of a view layer with our Curves; kind: GUIDES or HAIR."""
     return [
         o
         for o in view_layer.objects
@@ -309,9 +308,9 @@ def curves_objects(view_layer, kind, viewport=None):
 
 
 def read_camera(scene, depsgraph, width, height, camera=None, eye=None):
-    """(world to view, view to clip), each (4, 4) float64, of a camera, the scene's own, for a picture of this size.
+    """(world to view, view to clip), each (4, 4) float64, of a camera, by default the scene's, for a picture size.
 
-    eye: (matrix, horizontal shift) of a view of a stereo picture, None: the camera's own.
+    eye: (matrix, horizontal shift) of a view of a stereo picture; None: those of the camera. Raises `HairError`.
     """
     camera = camera or scene.camera
     if camera is None:
@@ -325,7 +324,7 @@ def read_camera(scene, depsgraph, width, height, camera=None, eye=None):
     if shift:
         moved = 2.0 * shift * _shift_unit(render, camera.data, width, height) / width  # in clip space
         view_to_clip = Matrix(((1, 0, 0, -moved), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))) @ view_to_clip
-    # The size of a camera object does not affect the view, but what is mirrored sees a mirrored picture.
+    # The scale of a camera object does not affect the view, but a mirrored camera shows a mirrored picture.
     view_to_world = to_world.to_3x3().normalized().to_4x4()
     view_to_world.translation = to_world.translation
     if not can_be_drawn(camera, camera.matrix_world, view_to_clip):
@@ -335,22 +334,22 @@ def read_camera(scene, depsgraph, width, height, camera=None, eye=None):
 
 
 def _shift_unit(render, data, width, height):
-    """Pixels of the picture's width in a shift of one: the side of the picture that the sensor fits."""
+    """Pixels per unit of shift: the side of the picture that the sensor fits, in pixels of the width."""
     wide, high = width * render.pixel_aspect_x, height * render.pixel_aspect_y
     is_horizontal = data.sensor_fit == "HORIZONTAL" or (data.sensor_fit == "AUTO" and wide >= high)
     return width if is_horizontal else high / render.pixel_aspect_x
 
 
 def picture_size(render):
-    """((width, height), (left, bottom, width, height)) of a whole picture and of its render region [pixels].
+    """((width, height), (left, bottom, width, height)) of a full picture and of its render region [pixels].
 
-    render: a scene's `RenderSettings`, which may have a border.
+    render: a scene's `RenderSettings`, which may have a render region.
     """
     part = 0.01 * render.resolution_percentage
     width, height = max(int(render.resolution_x * part), 1), max(int(render.resolution_y * part), 1)
     if not render.use_border:
         return (width, height), (0, 0, width, height)
-    # As Blender rounds them, in single precision: 43 of 76 parts of 760 pixels are 430, and not 429.
+    # Rounded in single precision, as in Blender: 43 of 76 parts of 760 pixels are 430, and not 429.
     left, right = (int(np.float32(part) * np.float32(width)) for part in (render.border_min_x, render.border_max_x))
     bottom, top = (int(np.float32(part) * np.float32(height)) for part in (render.border_min_y, render.border_max_y))
     return (width, height), (left, bottom, right - left, top - bottom)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces that modifiers subdivide: how large the cage is, and the smooth surface at rest.
+"""Surfaces that modifiers subdivide: the size of the cage, and the smooth surface at rest.
 
 Blender's rest positions of a subdivided mesh lie on the flat faces of its cage; smooth_surface.py estimates the rest.
 """
@@ -12,13 +12,13 @@ from ...core import geometry
 from ..host import scene_time
 from ..host.caches import Cache
 
-smooth_cache = Cache(capacity=8)  # by all that smooth positions follow from
+smooth_cache = Cache(capacity=8)  # digest of all inputs → (V, 3) smooth positions
 
 
 def cage_corners(surface_object, depsgraph, faces):
-    """Number of corners of the mesh that an object's modifiers subdivide to a smooth one; 0 where none does.
+    """Number of corners of the cage that an object's modifiers subdivide smoothly; 0 without such modifiers.
 
-    faces: `Faces` of the mesh as a depsgraph has evaluated it. Other modifiers that add faces count as of the cage.
+    faces: `Faces` of the evaluated mesh. Faces that other modifiers add count as part of the cage.
     """
     smoothing = [modifier for modifier in surface_object.modifiers if _is_smoothing(modifier)]
     if not smoothing:
@@ -27,23 +27,23 @@ def cage_corners(surface_object, depsgraph, faces):
 
 
 def undivided_corners(surface_object, depsgraph, faces):
-    """The same of the mesh before modifiers subdivide it in any way; 0 where none does, as this depsgraph has it."""
+    """The same for modifiers that subdivide in any way; 0 if none does in this depsgraph."""
     return _corners_before(filter(_is_dividing, surface_object.modifiers), depsgraph, faces)
 
 
 def is_divided(surface_object):
-    """Whether an object's modifiers subdivide its mesh, at this level or at another one."""
+    """Whether an object's modifiers subdivide its mesh, at the current level or at another."""
     return any(map(_is_dividing, surface_object.modifiers))
 
 
 def moves_uvs(surface_object):
-    """Whether modifiers may change UV coordinates in other ways than to subdivide them."""
+    """Whether modifiers may change UV coordinates other than by subdivision."""
     return any(modifier.type in {"NODES", "UV_PROJECT", "UV_WARP"} for modifier in surface_object.modifiers)
 
 
 def _corners_before(modifiers, depsgraph, faces):
     levels = sum(_levels(modifier, depsgraph) for modifier in modifiers)
-    # The first level makes a quad of each corner, the others make four of each.
+    # The first level makes a quad of each corner, the others make four quads of each quad.
     return 0 if levels == 0 else (len(faces.starts) - 1) // 4 ** (levels - 1)
 
 
@@ -67,7 +67,7 @@ def _levels(modifier, depsgraph):
 
 
 def smooth_positions(rest, faces, corners):
-    """(V, 3) float32: where vertices are on the smooth surface at rest; `rest` itself where `cage_corners` is 0."""
+    """(V, 3) float32 positions of vertices on the smooth surface at rest; `rest` itself if `corners` is 0."""
     if corners == 0:
         return rest
     key = hashlib.blake2b(rest.tobytes(), digest_size=16)

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where new objects go: beside the surface that they belong to."""
+"""The collection of new objects: that of their surface."""
 
 import bpy
 
 
 def collection_of(surface_object):
-    """The collection of a surface that the view layer shows; else one that it has, else any; the scene's without any.
+    """A collection of a surface: preferably visible in the view layer, else in the view layer, else any.
 
-    A mesh may be in a collection that only lists it, as colliders are, which is hidden, excluded or in no scene. Where
-    Blender adds nothing, as the collection is linked or a library override, it is the scene's too.
+    A mesh may also be in a collection that only lists it, such as one of colliders, which may be hidden, excluded or in
+    no scene. The scene's collection if all of these are linked or library overrides, to which Blender adds nothing.
     """
     owners = surface_object.users_collection
     layers = list(_layers(bpy.context.view_layer.layer_collection))
@@ -24,7 +24,7 @@ def _takes_objects(collection):
 
 
 def _layers(layer_collection):
-    """A layer collection and all below it that are not excluded."""
+    """A layer collection and all of its children that are not excluded, recursively."""
     yield layer_collection
     for child in layer_collection.children:
         if not child.exclude:

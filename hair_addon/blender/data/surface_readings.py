@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces of what is read of a mesh, and of its cage: the faces before modifiers subdivide them, at rest.
+"""`Surface`s of data that was read from a mesh, and of its cage: the faces at rest before modifiers subdivide them.
 
-The cage is the same whatever level of subdivision is evaluated, to the last bit: triangles are cut here, and UV
-coordinates are those of the mesh, as Blender smooths them with its faces.
+The cage is exactly the same at every evaluated level of subdivision: it is triangulated here, and its UV coordinates
+are those of the mesh before modifiers, as Blender smooths UV coordinates with the faces.
 """
 
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from .surfaces import Surface, transformed
 
 @dataclass(frozen=True)
 class Reading:
-    """What a `Surface` follows from, but for its pose: arrays as of `Surface`."""
+    """Inputs of a `Surface` except its pose; arrays as in `Surface`."""
 
     name: str
     rest: np.ndarray
@@ -26,12 +26,12 @@ class Reading:
     uv_map: str
     loop_uvs: np.ndarray | None  # (C, 2) float32
     to_world_axes: np.ndarray
-    has_rest: bool  # whether Blender stores where vertices are at rest
+    has_rest: bool  # whether Blender stores rest positions
     is_turned: bool
-    is_divided: bool  # whether modifiers subdivide it, at this level or at another one
+    is_divided: bool  # whether modifiers subdivide the mesh, at the current level or at another
 
     def is_same(self, other):
-        """Whether a `Surface` follows from another reading as from this one."""
+        """Whether another reading results in the same `Surface`."""
         named = [(read.name, read.uv_map, read.has_rest, read.is_turned, read.is_divided) for read in (self, other)]
         if named[0] != named[1] or (self.loop_uvs is None) != (other.loop_uvs is None):
             return False
@@ -49,9 +49,9 @@ class Reading:
 
 
 def surface_of(read, posed, corners, cage_corners, undivided, own=None):
-    """The `Surface` of a `Reading` whose triangles have (F, 3) corners.
+    """The `Surface` of a `Reading`; corners: (F, 3) of its triangles.
 
-    own: (`Faces`, (C, 2) UV coordinates or None) of the mesh before its modifiers, where these may subdivide it.
+    own: (`Faces`, (C, 2) UV coordinates or None) of the mesh before its modifiers, if these may subdivide it.
     """
     cage = _cage_of(read, cage_corners, undivided, own) if read.is_divided else None
     return _surface(read, posed, corners, cage_corners, undivided, cage)
@@ -65,7 +65,7 @@ def _surface(read, posed, corners, cage_corners, undivided, cage):
     if is_mirrored:
         triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
         corner_uvs = None if corner_uvs is None else corner_uvs[:, [0, 2, 1]]
-    with np.errstate(invalid="ignore"):  # non-finite values are rejected by the check of the mesh
+    with np.errstate(invalid="ignore"):  # `check_mesh` rejects non-finite values
         smooth = None if smooth_rest is read.rest else transformed(smooth_rest, read.to_world_axes)
         mesh = TriMesh(transformed(read.rest, read.to_world_axes), triangles, smooth)
     return Surface(
@@ -87,7 +87,7 @@ def _surface(read, posed, corners, cage_corners, undivided, cage):
 
 
 def _cage_of(read, cage_corners, undivided, own):
-    """(`Surface` of the cage, (F,) a face of the subdivided ones in each of its faces); None where it is not known."""
+    """(`Surface` of the cage, (F,) index of one subdivided face for each of its faces); None if unknown."""
     faces, first_faces = read.faces, np.arange(len(read.faces.starts) - 1)
     loop_uvs = read.loop_uvs
     own_faces, own_uvs = own or (None, None)
@@ -110,7 +110,7 @@ def _cage_of(read, cage_corners, undivided, own):
 
 
 def _triangle_corners(faces, rest):
-    """(T, 3) int32 corners of the triangles that the faces of a cage are cut into."""
+    """(T, 3) int32 corners of the triangulated faces of a cage."""
     corners, sizes = geometry.cages.triangle_corners(faces, rest), np.diff(faces.starts)
     large = np.flatnonzero(sizes > 4)
     if not len(large):
@@ -130,18 +130,18 @@ def _triangle_corners(faces, rest):
 
 
 def turned_back(corners, faces, undivided):
-    """(T, 3) corners of triangles in the order that they had before faces, or those of their cage, were turned."""
+    """(T, 3) corners of triangles in their order before the faces, or those of the cage, were flipped."""
     turned = geometry.turned_faces.turned_cage(faces, undivided) if undivided else None
     if turned is None:
         return corners[_turned_order(faces)]
     quads = turned.corners.reshape(-1, 4)
-    is_cut_otherwise = (corners[::2, 2] % 4 == 3)[quads[:, 0] // 4]  # as Blender cuts quads that are not convex
+    is_cut_otherwise = (corners[::2, 2] % 4 == 3)[quads[:, 0] // 4]  # Blender's other diagonal for non-convex quads
     cuts = np.where(is_cut_otherwise[:, None], (0, 3, 1, 1, 3, 2), (0, 2, 1, 0, 3, 2))
     return np.take_along_axis(quads, cuts, axis=1).reshape(-1, 3).astype(corners.dtype)
 
 
 def _turned_order(faces):
-    """(T,) int: the triangles of each face from its last one on, as a turned face has them in the order of before."""
+    """(T,) int: the triangles of each face from last to first, which restores the order before a flip."""
     counts = np.diff(faces.starts) - 2
     firsts = np.repeat(np.cumsum(counts) - counts, counts)
     return 2 * firsts + np.repeat(counts, counts) - 1 - np.arange(len(firsts))

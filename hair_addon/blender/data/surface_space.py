@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The space of strands: the local coordinates of their surface, what it was, and what has become of these coordinates.
+"""The space of strands: the local coordinates of their surface, the former surface, and changes of the coordinates.
 
-*Apply*, *Set Origin* and their like change the local coordinates of a mesh and leave it where it is in the world. What
-is stored in these coordinates beside Curves, such as baked frames, is carried by `applied`.
+*Apply*, *Set Origin* and similar operators change the local coordinates of a mesh and leave it in place in the world.
+Other data in these coordinates, such as baked frames, is transformed by `applied`.
 """
 
 import bpy
@@ -11,14 +11,14 @@ import numpy as np
 from ...core.geometry.affine import Affine
 from ..host.notices import name_of
 
-# Properties of Curves. In groups, because Blender's USD exporter warns about bare arrays.
+# Properties of Curves. They are groups, because Blender's USD exporter warns about bare arrays.
 _STOOD_ON = "vellus_stood_on"  # the surface, when strands were rooted on it
 _APPLIED = "vellus_applied"
 _KNOWN_AS = "vellus_known_as"
 
 
 def to_world(an_object, depsgraph=None):
-    """The `Affine` from an object's local coordinates to the world; of a depsgraph's frame where one is given."""
+    """The `Affine` from an object's local coordinates to the world, in a depsgraph's frame if one is given."""
     placed = an_object if depsgraph is None else an_object.evaluated_get(depsgraph)
     return Affine.of(placed.matrix_world)
 
@@ -29,29 +29,29 @@ def between(an_object, surface_object):
 
 
 def keep_surface(curves, surface):
-    """Store a `Surface` at rest and where its object is: strands are transformed from there after an edit."""
+    """Store a `Surface` at rest and its object's transform, from which strands are transformed after an edit."""
     matrix = np.eye(4) if curves.surface is None else np.array(curves.surface.matrix_world)
-    kept = {"rest": surface.rest.ravel(), "to_world": matrix.ravel(), "name": surface.name}
+    values = {"rest": surface.rest.ravel(), "to_world": matrix.ravel(), "name": surface.name}
     if curves.surface is not None:
-        kept["surface"] = curves.surface
-    _keep(curves, _STOOD_ON, kept)
+        values["surface"] = curves.surface
+    _store(curves, _STOOD_ON, values)
 
 
 def remember_place(curves):
-    """Store where the surface's object is now, before a file is saved: transforms are applied elsewhere, too."""
-    kept = curves.get(_STOOD_ON)
-    if kept is not None and curves.surface is not None and curves.library is None and not has_other_surface(curves):
-        kept["to_world"], kept["name"] = np.array(curves.surface.matrix_world).ravel(), name_of(curves.surface)
-        kept["surface"] = curves.surface
+    """Store the surface's transform before a file is saved, as transforms may be applied without the add-on."""
+    stored = curves.get(_STOOD_ON)
+    if stored is not None and curves.surface is not None and curves.library is None and not has_other_surface(curves):
+        stored["to_world"], stored["name"] = np.array(curves.surface.matrix_world).ravel(), name_of(curves.surface)
+        stored["surface"] = curves.surface
 
 
 def has_other_surface(curves):
-    """Whether a surface was picked for Curves that they do not stand on yet: they are children of no such object."""
-    kept = curves.get(_STOOD_ON)
-    if curves.surface is None or kept is None:
+    """Whether another surface was picked for Curves to which their objects are not attached yet as children."""
+    stored = curves.get(_STOOD_ON)
+    if curves.surface is None or stored is None:
         return False
-    known, name = _stood_on(kept), kept.get("name")
-    # Names do for files of older versions: a surface that was renamed there is taken for another one.
+    known, name = _stood_on(stored), stored.get("name")
+    # Files of older versions only store the name: a renamed surface counts as another surface.
     is_same = known == curves.surface if known is not None else name == name_of(curves.surface)
     if is_same or (known is None and not isinstance(name, str)):
         return False
@@ -59,65 +59,65 @@ def has_other_surface(curves):
 
 
 def surface_before(curves):
-    """The object that Curves stand on, whichever was picked for them since; None where it is gone, or unknown."""
+    """The object that Curves stand on, even if another was picked since; None if deleted or unknown."""
     if not has_other_surface(curves):
         return curves.surface
-    kept = curves[_STOOD_ON]
-    return _stood_on(kept) or bpy.data.objects.get(kept.get("name", ""))
+    stored = curves[_STOOD_ON]
+    return _stood_on(stored) or bpy.data.objects.get(stored.get("name", ""))
 
 
-def _stood_on(kept):
-    """The object in what `keep_surface` stored, which Blender renames; None where it is gone, or in older files."""
-    found = kept.get("surface")
+def _stood_on(stored):
+    """The object stored by `keep_surface`, a reference that follows renaming; None if deleted, or in older files."""
+    found = stored.get("surface")
     return found if isinstance(found, bpy.types.Object) else None
 
 
 def rest_before(curves):
     """(V, 3) float32 vertices of the surface that `keep_surface` stored, or None."""
-    kept = curves.get(_STOOD_ON)
-    return None if kept is None else np.array(kept["rest"], np.float32).reshape(-1, 3)
+    stored = curves.get(_STOOD_ON)
+    return None if stored is None else np.array(stored["rest"], np.float32).reshape(-1, 3)
 
 
 def vertex_count_before(curves):
-    """How many vertices the surface had that `keep_surface` stored, or None."""
-    kept = curves.get(_STOOD_ON)
-    return None if kept is None else len(kept["rest"]) // 3
+    """The number of vertices of the surface that `keep_surface` stored, or None."""
+    stored = curves.get(_STOOD_ON)
+    return None if stored is None else len(stored["rest"]) // 3
 
 
 def to_world_before(curves):
-    """The `Affine` that was stored with the surface, or None: files of older versions have none."""
-    kept = curves.get(_STOOD_ON)
-    if kept is None or len(kept.get("to_world", ())) != 16:
+    """The `Affine` that was stored with the surface; None in files of older versions."""
+    stored = curves.get(_STOOD_ON)
+    if stored is None or len(stored.get("to_world", ())) != 16:
         return None
-    return Affine.of(kept["to_world"])
+    return Affine.of(stored["to_world"])
 
 
 def applied(curves):
-    """The `Affine` from the local coordinates that strands were made in to those that they have now."""
-    kept = curves.get(_APPLIED)
-    found = Affine.identity() if kept is None or len(kept.get("matrix", ())) != 16 else Affine.of(kept["matrix"])
+    """The `Affine` from the local coordinates in which strands were made to the current local coordinates."""
+    stored = curves.get(_APPLIED)
+    found = Affine.identity() if stored is None or len(stored.get("matrix", ())) != 16 else Affine.of(stored["matrix"])
     return found if found.is_valid else Affine.identity()
 
 
 def note_applied(curves, change, rest_before=None, vertices=None):
     """Note that an `Affine` was applied to the local coordinates.
 
-    rest_before: (V, 3) vertices at rest until then, in their present order; vertices: (V,) of `TurnedFaces` where this
-    is another than that of before.
+    rest_before: (V, 3) rest positions until then, in the current order of vertices; vertices: (V,) of `TurnedFaces` if
+    the order has changed.
     """
-    kept = {"matrix": (change @ applied(curves)).matrix.ravel(), "turns": _turns(curves) + int(change.is_mirroring)}
+    values = {"matrix": (change @ applied(curves)).matrix.ravel(), "turns": _turns(curves) + int(change.is_mirroring)}
     first = curves.get(_APPLIED, {}).get("rest")
     if rest_before is not None:
-        kept["rest"] = rest_before.ravel() if first is None else np.array(first, np.float32)
+        values["rest"] = rest_before.ravel() if first is None else np.array(first, np.float32)
         if first is not None and vertices is not None and len(first) == 3 * len(vertices):
-            kept["rest"] = kept["rest"].reshape(-1, 3)[vertices].ravel()
-    _keep(curves, _APPLIED, kept)
+            values["rest"] = values["rest"].reshape(-1, 3)[vertices].ravel()
+    _store(curves, _APPLIED, values)
 
 
 def made_on(curves, rest):
-    """(V, 3) vertices, to the last bit, that were at rest when strands were made, if they are (V, 3) now; else None.
+    """The exact (V, 3) rest positions when strands were made, if `applied` leads from them to `rest`; else None.
 
-    What is spread over a surface at random follows their bits.
+    Random distributions over a surface depend on their exact values.
     """
     first = curves.get(_APPLIED, {}).get("rest")
     if first is None or len(first) != rest.size:
@@ -128,42 +128,42 @@ def made_on(curves, rest):
 
 
 def note_same(curves, before, now):
-    """Note that what had one digest has another in the coordinates of now, and is the same in the world."""
+    """Note that data with the digest `before` has the digest `now` in new local coordinates, unchanged in the world."""
     known = dict(curves.get(_KNOWN_AS, {}))
     first = known.pop(before, before)
-    _keep(curves, _KNOWN_AS, known | {now: first})
+    _store(curves, _KNOWN_AS, known | {now: first})
 
 
 def known_as(curves, digest):
-    """The digest, before any `note_same`, of what has a digest now."""
+    """The original digest, before any `note_same`, of data with a digest now."""
     found = curves.get(_KNOWN_AS, {}).get(digest, digest)
     return found if isinstance(found, str) else digest
 
 
 def is_turned(surface_object):
-    """Whether a mirroring scale was applied to a mesh object on which hair grows, as then Blender turns its faces.
+    """Whether a mirroring scale was applied to a mesh object with hair, so that Blender has flipped its faces.
 
-    Hair that has not followed the last turn yet does not count.
+    Hair that has not followed the last flip yet does not count.
     """
     grown = (datablock for datablock in bpy.data.hair_curves if datablock.surface == surface_object)
     return max((_turns(datablock) for datablock in grown if _APPLIED in datablock), default=0) % 2 == 1
 
 
 def _turns(curves):
-    """How often a scale that mirrors was applied to what Curves are rooted on."""
+    """The number of mirroring scales that were applied to the surface of Curves."""
     turns = curves.get(_APPLIED, {}).get("turns")
     return turns if isinstance(turns, int) else int(applied(curves).is_mirroring)
 
 
 def forget_applied(curves):
-    """Count from the present local coordinates on, as for Curves that were copied to another surface."""
+    """Forget applied transforms, as for Curves that were copied to another surface."""
     for name in (_APPLIED, _KNOWN_AS):
         if name in curves:
             del curves[name]
 
 
-def _keep(curves, name, values):
+def _store(curves, name, values):
     if name in curves:
-        # Blender 5.2 writes an array over a shorter one, past its end.
+        # Blender 5.2 writes a longer array past the end of an existing shorter array.
         del curves[name]
     curves[name] = values

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A surface that hair grows on, as arrays."""
+"""The surface that hair grows on, as arrays."""
 
 import hashlib
 from dataclasses import dataclass, replace
@@ -12,20 +12,20 @@ from ...core.geometry.mesh import Faces, TriMesh, check_mesh
 from ...core.geometry.mirror import Mirror
 from ...core.kernels.checks import require_indices
 
-# What does not follow from where vertices are posed, and is kept in another pose.
+# Cached values that do not depend on posed vertices, and are copied to another pose.
 _AT_REST = ("to_local_axes", "local_mesh", "shape", "extent", "topology", "turned", "turned_topology", "cage_vertices")
 
-_RESIZED = 1.3  # times as large, and more than smoothing a cage may be
+_RESIZED = 1.3  # a factor of size beyond the change by smoothing a cage
 
-_MOST_TURNINGS = 8  # of a surface: of the hair and the guides on it
+_MOST_TURNINGS = 8  # maximum number of cached turnings of a surface, for hair and guides on it
 
 
 @dataclass(frozen=True)
 class Surface:
     """A mesh object at rest: world axes and scale [m], with the object's origin at zero.
 
-    So gravity is -Z and lengths are true, and an object far from the world's origin loses no precision. At rest means
-    before shape keys and modifiers deform it: hair is generated there, and deformed with the surface
+    Gravity is -Z, lengths are true, and an object far from the world's origin loses no precision. At rest means before
+    shape keys and modifiers deform the mesh: hair is generated at rest, and deformed with the surface
     (surface_deform.py).
     """
 
@@ -33,70 +33,69 @@ class Surface:
     mesh: TriMesh
     faces: Faces
     rest: np.ndarray  # (V, 3) float32, vertices at rest in local coordinates
-    posed: np.ndarray  # (V, 3) float32, where they are now, in local coordinates
+    posed: np.ndarray  # (V, 3) float32, deformed vertices in local coordinates
     corner_uvs: np.ndarray | None  # (F, 3, 2) float32, None without a UV map
     uv_map: str
-    to_world_axes: np.ndarray  # (3, 3) float64: local coordinates → these
-    is_mirrored: bool  # negative scale: triangles are wound the other way than in Blender
-    cage_corners: int  # of the faces that modifiers subdivide to a smooth surface, 0 for none
-    smooth_rest: np.ndarray  # (V, 3) float32, vertices on the smooth surface at rest; `rest` itself where none is
-    undivided_corners: int  # of the faces that modifiers subdivide in any way, 0 where none does
-    is_turned: bool = (
-        False  # whether Blender has turned its faces since hair grew: triangles are in the order of before
-    )
-    # The `Surface` of its faces before modifiers subdivide them, and one of the present faces (F,) in each of these.
-    is_cage: bool = False  # whether it is the cage of another one
+    to_world_axes: np.ndarray  # (3, 3) float64: local coordinates → this space
+    is_mirrored: bool  # negative scale: triangles are wound opposite to Blender's
+    cage_corners: int  # number of corners of the faces that modifiers subdivide smoothly, 0 for none
+    smooth_rest: np.ndarray  # (V, 3) float32, vertices on the smooth surface at rest; `rest` itself without one
+    undivided_corners: int  # number of corners of the faces that modifiers subdivide in any way, 0 for none
+    # Whether Blender has flipped the faces since hair grew: triangles keep their former order.
+    is_turned: bool = False
+    is_cage: bool = False  # whether this is the cage of another surface
+    # The `Surface` of the faces before subdivision, and (F,) one subdivided face for each of its faces.
     divided_of: "tuple[Surface, np.ndarray] | None" = None
 
     @cached_property
     def to_local_axes(self):
-        """(3, 3) float64: these coordinates → local ones."""
+        """(3, 3) float64: this space → local coordinates."""
         return np.linalg.inv(self.to_world_axes)
 
     def to_local(self, points):
-        """(S, P, 3) points of strands → the object's local coordinates, float32."""
+        """(S, P, 3) points of strands → float32 local coordinates."""
         return geometry.transform.transformed(points, self.to_local_axes)
 
     def from_local(self, positions):
-        """Transform (..., 3) local coordinates to this space, float32."""
+        """(..., 3) local coordinates → float32 in this space."""
         return transformed(positions, self.to_world_axes)
 
     @property
     def is_deformed(self):
-        """Whether shape keys or modifiers deform it."""
+        """Whether shape keys or modifiers deform the mesh."""
         return not np.array_equal(self.rest, self.posed)
 
     @cached_property
     def local_mesh(self):
-        """The `TriMesh` at rest in local coordinates. Raises `HairError` as `check_mesh`."""
+        """The `TriMesh` at rest in local coordinates. Raises the `HairError` of `check_mesh`."""
         mesh = TriMesh(self.rest, self.mesh.triangles)
         check_mesh(mesh)
         return mesh
 
     @cached_property
     def posed_mesh(self):
-        """The deformed `TriMesh`, with modifiers and shape keys, whose size the artist sees."""
+        """The `TriMesh` deformed by modifiers and shape keys, as the artist sees it."""
         return TriMesh(self.from_local(self.posed), self.mesh.triangles) if self.is_deformed else self.mesh
 
     @property
     def drawn_on(self):
-        """(V, 3) float32 vertices that lines are drawn near to; None where they are those of `mesh`.
+        """(V, 3) float32 vertices of the surface that lines are drawn on; None if they are those of `mesh`.
 
-        Of a cage they are: lines are drawn on what it is subdivided to (`drawn_lines.at_rest`).
+        None for a cage, whose lines `drawn_lines.at_rest` has moved to rest already.
         """
         return self.from_local(self.posed) if self.is_deformed and not self.is_cage else None
 
     @property
     def cage(self):
-        """The `Surface` at rest before modifiers subdivide it: the same at every level, to the last bit.
+        """The `Surface` at rest before subdivision, exactly the same at every level. Hair grows on the cage.
 
-        It is itself where nothing subdivides it, or where the faces of before are not known. Hair grows on it.
+        The surface itself if it is not subdivided, or its undivided faces are unknown.
         """
         return self if self.divided_of is None else self.divided_of[0]
 
     @cached_property
     def sized_cage(self):
-        """The `cage`, which is as large as this is posed where more than subdivision has changed that."""
+        """The `cage`, scaled to the size of the posed surface if more than subdivision has changed the size."""
         if self.divided_of is None or not self.is_deformed:
             return self.cage
         smooth = (
@@ -113,51 +112,51 @@ class Surface:
         """The same surface with its vertices at (V, 3) float32 local positions."""
         other = replace(self, posed=posed)
         known = {name: self.__dict__[name] for name in _AT_REST if name in self.__dict__}
-        other.__dict__.update(known, _turnings=self._turnings, _nearest=self._nearest)  # which are one for all poses
+        other.__dict__.update(known, _turnings=self._turnings, _nearest=self._nearest)  # shared by all poses
         return other
 
     @cached_property
     def _nearest(self):
-        """{bits of places: what `nearest_places` found}."""
+        """{digest of points: result of `nearest_places`}."""
         return {}
 
     def nearest_places(self, points):
-        """`places` nearest to (N, 3) float32 local points at rest; found once for all poses. Raises `HairError`."""
-        asked = hashlib.blake2b(points.tobytes(), digest_size=16).digest()
-        if asked not in self._nearest:
+        """`places` nearest to (N, 3) float32 local points at rest, cached for all poses. Raises `HairError`."""
+        key = hashlib.blake2b(points.tobytes(), digest_size=16).digest()
+        if key not in self._nearest:
             while len(self._nearest) >= _MOST_TURNINGS:
                 self._nearest.pop(next(iter(self._nearest)))
-            # In local coordinates, as the nodes of follow_nodes.py find it, whatever the scale of the object becomes.
+            # In local coordinates, like the nodes of follow_nodes.py, so that the object's scale does not matter.
             found = geometry.closest_point.SurfaceQuery(self.local_mesh).nearest(points)
-            self._nearest[asked] = self.places(found)
-        return self._nearest[asked]
+            self._nearest[key] = self.places(found)
+        return self._nearest[key]
 
     @cached_property
     def _turnings(self):
-        """{bits of the vertices that are asked for: `Turning`}."""
+        """{bit mask of vertices: `Turning`}."""
         return {}
 
     def turning(self, vertices):
-        """The `Turning` of vertices, indices in any shape: found once for all poses. Raises `HairError`."""
+        """The `Turning` of vertices, indices in any shape, cached for all poses. Raises `HairError`."""
         require_indices("vertices", vertices, len(self.rest))
-        is_asked = np.zeros(len(self.rest), bool)
-        is_asked[vertices] = True
-        asked = np.packbits(is_asked).tobytes()
-        if asked not in self._turnings:
+        is_chosen = np.zeros(len(self.rest), bool)
+        is_chosen[vertices] = True
+        key = np.packbits(is_chosen).tobytes()
+        if key not in self._turnings:
             while len(self._turnings) >= _MOST_TURNINGS:
                 self._turnings.pop(next(iter(self._turnings)))
-            chosen = np.flatnonzero(is_asked)
-            self._turnings[asked] = geometry.vertex_turns.turning(self.smooth_rest, self.faces, chosen)
-        return self._turnings[asked]
+            chosen = np.flatnonzero(is_chosen)
+            self._turnings[key] = geometry.vertex_turns.turning(self.smooth_rest, self.faces, chosen)
+        return self._turnings[key]
 
     def is_at_rest_as(self, other):
-        """Whether strands generated on one also fit the other."""
+        """Whether strands generated on one surface also fit the other."""
         mine, its = ((s.rest, s.mesh.triangles, s.to_world_axes) for s in (self, other))
         are_divided_alike = (self.cage_corners, self.undivided_corners) == (other.cage_corners, other.undivided_corners)
         return are_divided_alike and all(map(np.array_equal, mine, its))
 
     def is_same_cage(self, other):
-        """Whether another surface is this one at rest, at another level of subdivision."""
+        """Whether another surface is the same surface at rest, at any level of subdivision."""
         if cage_of(self.topology) != cage_of(other.topology) or self.cage_corners != other.cage_corners:
             return False
         mine, its = ((s.of_cage(s.rest), s.to_world_axes) for s in (self, other))
@@ -174,39 +173,39 @@ class Surface:
 
     @property
     def mirror(self):
-        """The `Mirror` across the object's own X axis."""
+        """The `Mirror` along the object's local X axis."""
         normal = self.to_local_axes[0] / np.linalg.norm(self.to_local_axes[0])
         axis = self.to_world_axes[:, 0]
         return Mirror(normal, axis / (axis @ normal))
 
     @cached_property
     def shape(self):
-        """The `TriMesh` at rest of which `mesh` is a rotated and uniformly scaled copy; None otherwise.
+        """The local `TriMesh` at rest if `mesh` is a rotated and uniformly scaled copy of it; else None.
 
-        Roots are placed on it, so that rotation and scale of the object do not move them, not even by rounding,
-        which relaxation would amplify.
+        Roots are placed on it, so that rotation and scale of the object do not change them, not even by rounding, which
+        relaxation would amplify.
         """
         if not _is_even(self.to_world_axes):
             return None
-        # A mirrored object's triangles are wound the other way, as those of the rest mirrored at its origin are.
+        # A mirrored object's triangles are wound the other way, like those of the rest shape mirrored at its origin.
         return TriMesh(-self.rest if self.is_mirrored else self.rest, self.mesh.triangles)
 
     def shape_made_on(self, rest, applied):
-        """`shape` as it was, or the mesh itself, when its vertices were at rest at (V, 3), None if they are now.
+        """`shape`, or else the mesh, at the time strands were made; rest: (V, 3) rest positions then, None: as now.
 
-        applied: `Affine` from the local coordinates of then to those of now.
+        applied: `Affine` from the local coordinates of that time to the current ones.
         """
         if rest is None:
             return self.shape
-        # To the last bit: Blender's matrices are of single precision.
+        # Rounded to single precision like Blender's matrices, for exactly the same result.
         axes = (self.to_world_axes @ applied.axes).astype(np.float32).astype(np.float64)
         if not _is_even(axes):
             return TriMesh(transformed(rest, axes), self.mesh.triangles)
         return TriMesh(-rest if self.is_mirrored != applied.is_mirroring else rest, self.mesh.triangles)
 
     def root_vertices(self, points):
-        """(N, 3) int32: the vertices that surface points lie between, in Blender's order of corners."""
-        vertices = self.mesh.triangles.take(points.triangle, axis=0)  # a third of the time of brackets
+        """(N, 3) int32 vertices of the triangles of surface points, in Blender's order of corners."""
+        vertices = self.mesh.triangles.take(points.triangle, axis=0)  # a third of the time of indexing
         return np.ascontiguousarray(vertices[:, [0, 2, 1]]) if self.is_mirrored else vertices
 
     def places(self, points):
@@ -215,48 +214,48 @@ class Surface:
 
     @property
     def names_otherwise(self):
-        """Whether triangles are wound otherwise than those by which strands are known: in Blender, before a turn."""
+        """Whether triangles are wound opposite to those that identify strands: Blender's, before any flip."""
         return self.is_mirrored != self.is_turned
 
     @property
     def scale(self):
-        """The mean scale of the object: metres in a unit of its local coordinates."""
+        """The mean scale of the object: metres per unit of its local coordinates."""
         return abs(np.linalg.det(self.to_world_axes)) ** (1.0 / 3.0)
 
     @cached_property
     def extent(self):
-        """The longest side of the box around its vertices at rest, in local coordinates."""
+        """The longest side of the bounding box at rest, in local coordinates."""
         return float(np.ptp(self.rest, axis=0).max())
 
     def of_cage(self, values):
-        """Values of vertices, None for none: those of the cage, which are the same at every level of subdivision."""
+        """Values of vertices → values of the cage's vertices, the same at every level of subdivision; None → None."""
         return values if values is None else values[: self.cage_size]
 
     @cached_property
     def topology(self):
-        """A key of the faces by their corners, in their order, whichever triangles they are cut into.
+        """A digest of the faces by the vertices at their corners, independent of triangulation.
 
-        Its first half is that of the faces before modifiers subdivide them, the same at every level.
+        The first half is of the faces before subdivision, and the same at every level.
         """
         return _half_key(self.cage_vertices) + _half_key(self.faces.corner_vertices, self.faces.starts)
 
     @cached_property
     def turned(self):
-        """The `TurnedFaces` of its faces, or of those of its cage, as Blender turns them."""
+        """The `TurnedFaces` of the faces, or of the cage's faces, as Blender flips them."""
         count = self.undivided_corners
         found = geometry.turned_faces.turned_cage(self.faces, count) if count else None
         return geometry.turned_faces.turned(self.faces) if found is None else found
 
     @cached_property
     def turned_topology(self):
-        """`topology` with each face turned, as Blender turns them where it applies a scale that mirrors."""
+        """`topology` with each face flipped, as by Blender when it applies a mirroring scale."""
         faces = Faces(self.turned.before(self.faces.corner_vertices), self.faces.starts)
         of_cage = geometry.cages.cage_vertices(faces, self.undivided_corners)
         return _half_key(of_cage) + _half_key(faces.corner_vertices, faces.starts)
 
     @cached_property
     def triangulated(self):
-        """The `Faces` in the order of their triangles, which is that of before where they are turned."""
+        """The `Faces` in the order of their triangles: the former order if the faces were flipped."""
         turned = self.turned
         if not self.is_turned or turned.vertices is None:
             return self.faces
@@ -265,21 +264,21 @@ class Surface:
 
     @cached_property
     def cage_vertices(self):
-        """(C,) int32: the vertices at the corners of faces before modifiers subdivide them, face after face."""
+        """(C,) int32: the vertices at the corners of faces before subdivision, face after face."""
         return geometry.cages.cage_vertices(self.faces, self.undivided_corners)
 
     @property
     def cage_size(self):
-        """The number of vertices of the cage, which are the first; of all where nothing is subdivided."""
+        """The number of vertices of the cage, which come first; of all vertices without subdivision."""
         is_divided = self.cage_vertices is not self.faces.corner_vertices
         return int(self.cage_vertices.max()) + 1 if is_divided else len(self.rest)
 
     def points_at(self, polygons, vertices, barycentric):
-        """(`SurfacePoints`, (N,) bool: which are none) of places in `triangulated` polygons, as of `places`."""
+        """(`SurfacePoints`, (N,) bool: whether invalid) of places in `triangulated` polygons, as returned by `places`."""
         return geometry.face_places.on_triangles(self.mesh, self.triangulated, polygons, vertices, barycentric)
 
     def to_local_normals(self, normals):
-        """(N, 3) unit normals → unit normals in local coordinates: the inverse transpose of `to_local`."""
+        """(N, 3) unit normals → unit normals in local coordinates, by the inverse transpose of `to_local`."""
         if np.array_equal(self.to_world_axes, np.eye(3)):
             return normals
         local = normals @ self.to_world_axes.astype(np.float32)
@@ -287,7 +286,6 @@ class Surface:
 
     def identities(self, roots):
         """(S,) int32 identities and (S,) float32 random numbers in [0, 1), independent of the other strands."""
-
         return geometry.root_frames.identities(roots, self.names_otherwise)
 
     def uvs(self, points):
@@ -296,7 +294,7 @@ class Surface:
             return np.zeros((len(points), 2), np.float32)
         of_corners = self.corner_uvs.take(points.triangle, axis=0)
         found = np.empty((len(points), 2), np.float32)
-        for axis in range(2):  # a sixth of the time of one sum over both
+        for axis in range(2):  # a sixth of the time of a single sum over both axes
             first, second, third = (points.barycentric[:, c] * of_corners[:, c, axis] for c in range(3))
             found[:, axis] = first + second + third
         return found
@@ -307,21 +305,21 @@ class Surface:
 
 
 def _is_even(axes):
-    """Whether (3, 3) axes turn, mirror and scale alike in all directions."""
+    """Whether (3, 3) axes are a rotation, possibly mirrored, with uniform scale."""
     squares = axes.T @ axes
     return np.allclose(squares, np.eye(3) * np.trace(squares) / 3.0, rtol=0.0, atol=1e-5 * np.trace(squares))
 
 
-_HALF = 16  # digits of a topology's key
+_HALF = 16  # hexadecimal digits of each half of a topology
 
 
 def cage_of(topology):
-    """The part of a `Surface.topology` that subdivision leaves as it is."""
+    """The half of a `Surface.topology` that subdivision does not change."""
     return topology[:_HALF]
 
 
 def faces_of(topology):
-    """The part of a `Surface.topology` that tells the faces that stored roots refer to."""
+    """The half of a `Surface.topology` of the faces that stored roots refer to."""
     return topology[_HALF:]
 
 
@@ -333,7 +331,7 @@ def _half_key(*arrays):
 
 
 def transformed(positions, matrix):
-    """(..., 3) float32 positions by a (3, 3) matrix, float32; the positions themselves where it changes nothing."""
+    """(..., 3) float32 positions transformed by a (3, 3) matrix; the same array for the identity."""
     if np.array_equal(matrix, np.eye(3)):
         return np.asarray(positions, np.float32)
     return np.asarray(positions, np.float32) @ matrix.T.astype(np.float32)

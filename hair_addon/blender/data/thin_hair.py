@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""EEVEE's width of strands, a setting of scenes: set once in each scene that shows hair, and the artist's from then on.
+"""EEVEE's hair shape, a setting of scenes: set once in each scene that shows hair, and then left to the artist.
 
-By Blender's default EEVEE draws lines a pixel wide or wider. A scene that appends, links or instances hair has that
-default, whatever the scene had that the hair was made in.
+By Blender's default EEVEE draws lines at least a pixel wide. A scene that appends, links or instances hair has that
+default, regardless of the scene in which the hair was made.
 """
 
 import bpy
 
-_SET = "vellus_thin_hair"  # custom property of scenes in which it was set, or left as it was found
+_SET = "vellus_thin_hair"  # custom property of scenes that `show_thin` has handled
 
 
 def show_thin(blender_scene):
-    """Let EEVEE draw strands as thin as they are, unless that was done in this scene before."""
+    """Let EEVEE draw strands with their true width, unless this was done in the scene before."""
     if blender_scene.library is not None or _SET in blender_scene:
         return
     blender_scene[_SET] = True
@@ -20,19 +20,19 @@ def show_thin(blender_scene):
 
 
 def state_of(blender_scene):
-    """(Whether `show_thin` was done in a scene, how EEVEE draws strands there)."""
+    """(Whether `show_thin` has handled a scene, its hair shape type)."""
     return _SET in blender_scene, blender_scene.render.hair_type
 
 
 def restore(blender_scene, was_set, hair_type):
-    """Bring back what `state_of` gave, before `show_thin`."""
+    """Restore the values of `state_of` from before `show_thin`."""
     if not was_set and _SET in blender_scene:
         del blender_scene[_SET]
         blender_scene.render.hair_type = hair_type
 
 
 def follow(blender_scenes):
-    """Do it in those of some scenes that show hair of ours: in their own objects, in instances or in the background."""
+    """`show_thin` in those scenes that show our hair: in their objects, in instances or in the background set."""
     waiting = [one for one in blender_scenes if one.library is None and _SET not in one]
     if waiting and any(curves.vellus.kind == "HAIR" for curves in bpy.data.hair_curves):
         for blender_scene in waiting:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changes of the open file that happen as a whole or not at all: after an error, or Esc, everything is as it was.
+"""Atomic changes of the open file: after an error or Esc, the file is as before.
 
-Whatever is made meanwhile is known before it is filled, as what was not there at the beginning: datablocks, and on
-those that are changed vertex groups, attributes, modifiers, materials, styles and flags.
+A change compares the file with its state at the beginning: new datablocks are removed, and from changed datablocks new
+vertex groups, attributes, modifiers, materials, styles and flags.
 """
 
 import contextlib
@@ -22,16 +22,16 @@ from . import thin_hair
 P = ParamSpec("P")
 T = TypeVar("T")
 
-# Of Blender's windows, and of files that are linked: not the scene's. And all together.
+# Collections of Blender's interface and of libraries, and the one of all datablocks.
 _NOT_OURS = {"all_ids", "libraries", "screens", "window_managers", "workspaces"}
 
-_open: list["_Change"] = []  # changes that are under way, the outermost first; none between calls
+_open: list["_Change"] = []  # running changes, the outermost first; empty between calls
 
 
 def whole(work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
-    """Work in steps that leaves nothing behind where it fails or is stopped.
+    """Decorate work in steps: it leaves nothing behind if it fails or is stopped.
 
-    What its arguments name is what it changes: objects, Curves, and their surfaces.
+    The work may change the objects and Curves among its arguments, and their surfaces.
     """
 
     @functools.wraps(work)
@@ -58,7 +58,7 @@ def whole(work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
 
 
 def whole_if_new(work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
-    """`whole` of work that makes something, as its argument `target` is None; other work is done at each update."""
+    """`whole` for work whose argument `target` is None; work with a target runs unguarded, as at each update."""
     guarded, signature = whole(work), inspect.signature(work)
 
     @functools.wraps(work)
@@ -71,7 +71,7 @@ def whole_if_new(work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
 
 @contextlib.contextmanager
 def whole_change(*given: Any) -> Iterator[None]:
-    """The same of a change at once; given: what it changes."""
+    """`whole` for a single context; given: objects and Curves that are changed."""
     change = _Change(given)
     try:
         with change.noting():
@@ -83,21 +83,21 @@ def whole_change(*given: Any) -> Iterator[None]:
 
 
 def keep_copy(curves_object: Object) -> None:
-    """Let an object come back as it is now where the change that is under way fails: it is to become another in place.
+    """Copy an object that is about to be converted in place, so that the running change can restore it if it fails.
 
-    Its place in the file is then taken by a copy.
+    The copy then replaces the object in the file.
     """
     if _open:
         _open[0].keep_copy(curves_object)
 
 
 def kept_copies() -> set[int]:
-    """Session UIDs of the copies that `keep_copy` has made of objects and their data, which nobody is to use."""
+    """Session UIDs of the copies of objects and their data by `keep_copy`, which other code must ignore."""
     return {uid for change in _open for uid in change.copies()}
 
 
 def _next(steps, answer):
-    """(The next step, None), or (None, the result)."""
+    """(the next step, None), or (None, the result)."""
     try:
         return steps.send(answer), None
     except StopIteration as end:
@@ -106,7 +106,7 @@ def _next(steps, answer):
 
 @dataclass(frozen=True)
 class _Copy:
-    """An object's copy, by session UIDs: its own, its data's, of the object's data; both names; its collections."""
+    """Session UIDs of an object's copy, of the copy's data and of the object's data; their names; the collections."""
 
     uid: int
     data: int
@@ -117,12 +117,12 @@ class _Copy:
 
 
 class _Change:
-    """What is there before a change. It holds no reference to a datablock: an undo step may come between two steps."""
+    """The state before a change, without references to datablocks, as an undo may happen between two steps."""
 
     def __init__(self, given: Iterable[Any]) -> None:
         self._there = {*_datablocks()}
         self._made: set[int] = set()  # session UIDs
-        self._copies: dict[int, _Copy] = {}  # by the object's
+        self._copies: dict[int, _Copy] = {}  # by session UID of the object
         self._owners = {owner.session_uid: _state_of(owner) for owner in _owners(given)}
         self._without_rest = {o.session_uid for o in bpy.data.objects if not o.add_rest_position_attribute}
         scene, layer = bpy.context.scene, bpy.context.view_layer
@@ -133,7 +133,7 @@ class _Change:
 
     @contextlib.contextmanager
     def noting(self):
-        """Note what is made meanwhile."""
+        """Note the datablocks that are created in a context."""
         before = _datablocks().keys()
         _open.append(self)
         try:
@@ -153,11 +153,11 @@ class _Change:
         self._copies[curves_object.session_uid] = kept
 
     def copies(self):
-        """The session UIDs of the copies that may be needed yet, and of their data."""
+        """The session UIDs of the copies that may still be needed, and of their data."""
         return {uid for kept in self._copies.values() for uid in (kept.uid, kept.data)}
 
     def end(self):
-        """Nothing is to be undone any more, but by a change that this is a part of."""
+        """Finish the change, which only an enclosing change can still undo."""
         if _open:
             _open[-1]._owners = self._owners | _open[-1]._owners
         present = _datablocks()
@@ -167,7 +167,7 @@ class _Change:
         self._copies.clear()
 
     def undo(self):
-        """Bring back what was there."""
+        """Restore the state before the change."""
         layer = bpy.context.view_layer
         active = None if layer is None else layer.objects.active
         if active is not None and (active.session_uid, active.mode) != self._active and active.mode != "OBJECT":
@@ -191,7 +191,7 @@ class _Change:
             if uid in self._there and kept.uid in present:
                 present[kept.uid].name, present[kept.uid].data.name = kept.name, kept.data_name
         if layer is not None:
-            layer.update()  # otherwise it still lists removed objects, as None
+            layer.update()  # otherwise the layer still lists removed objects as None
             self._select(layer)
 
     def _select(self, layer):
@@ -233,7 +233,7 @@ def _owners(given):
 
 
 def _state_of(owner):
-    """What is there of a datablock, to be compared with what is there later."""
+    """The parts of a datablock that `_restore` compares."""
     if isinstance(owner, Object):
         return {
             "vertex_groups": [name_of(group) for group in owner.vertex_groups],
@@ -256,7 +256,7 @@ def _state_of(owner):
 
 
 def _restore(owner, state):
-    """Take away what was not there. What is as it was is not written, so that nothing is evaluated again."""
+    """Remove new parts of a datablock. Unchanged values are not written, so that nothing is evaluated again."""
     if isinstance(owner, Object):
         for collection, names in ((owner.vertex_groups, "vertex_groups"), (owner.modifiers, "modifiers")):
             for one in [one for one in collection if name_of(one) not in state[names]]:
@@ -287,7 +287,7 @@ def _restore(owner, state):
 
 
 def _put_back(present, uid, kept):
-    """Let the copy of an object take its place, also where it is gone."""
+    """Replace an object by its copy, also if the object was deleted."""
     changed, copy, own_data = present.get(uid), present[kept.uid], present.get(kept.own_data)
     is_converted = changed is not None and own_data is not None and changed.data != own_data
     if changed is not None:
@@ -297,7 +297,7 @@ def _put_back(present, uid, kept):
     for collection in (masters.get(uid, present.get(uid)) for uid in kept.collections):
         if collection is not None and all(one != copy for one in collection.objects):
             collection.objects.link(copy)
-    if is_converted:  # Blender leaves what it converts as it was
+    if is_converted:  # Blender does not change the data that it converts
         of_copy, copy.data = copy.data, own_data
         bpy.data.batch_remove([of_copy])
 
@@ -310,7 +310,7 @@ def _remove_object(one):
 
 
 def _remove(made):
-    """Remove datablocks, but for those that something else uses now, which would lose them."""
+    """Remove datablocks, except those that other datablocks use now."""
     present = _datablocks()
     bpy.data.batch_remove([one for uid, one in present.items() if uid in made and isinstance(one, Object)])
     present = _datablocks()

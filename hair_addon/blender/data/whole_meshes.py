@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a mesh is one: an importer may have made anything of a damaged file."""
+"""Validity of meshes: an importer may create invalid meshes from damaged files."""
 
 import numpy as np
 
 
 def is_whole(mesh):
-    """Whether the faces of a mesh name corners and vertices that it has."""
+    """Whether all corner and vertex indices of a mesh's faces are valid."""
     corners = np.empty(len(mesh.loops), np.int32)
     mesh.loops.foreach_get("vertex_index", corners)
     starts, totals = (np.empty(len(mesh.polygons), np.int32) for _ in range(2))

@@ -9,20 +9,20 @@ _command = None
 
 
 def register(run):
-    """Let Blender call run(arguments), which returns the exit status."""
+    """Register the command: Blender calls run(arguments), which returns the exit status."""
     global _command
     _command = bpy.utils.register_cli_command("vellus", run)
 
 
 def unregister():
-    """Take the command away again."""
+    """Remove the command."""
     global _command
     bpy.utils.unregister_cli_command(_command)
     _command = None
 
 
 def words():
-    """Return the command line that starts another process like this one."""
+    """Return the arguments that start another process like this one."""
     if bpy.app.module:
         return [sys.executable, "-m", "hair_addon"]
     return [bpy.app.binary_path, "--command", "vellus"]

@@ -8,7 +8,7 @@ from .notices import name_of
 
 
 class Remembered:
-    """A reference to a datablock, or None, by session UID."""
+    """A reference to a datablock by session UID; the datablock may be None."""
 
     def __init__(self, datablock):
         self._uid = None if datablock is None else datablock.session_uid

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Free memory, asked for before work that takes much of it."""
+"""Free memory, checked before work that needs much of it."""
 
 import contextlib
 from collections.abc import Iterator
@@ -14,17 +14,17 @@ try:
 except ModuleNotFoundError:  # Windows
     resource = None
 
-MUCH, MOST = 0.3, 0.7  # of what is free: said or asked before work begins, and refused
+MUCH, MOST = 0.3, 0.7  # fractions of the free memory: reported or confirmed before work begins, and refused
 
 _MEMINFO = Path("/proc/meminfo")
 _OWN = Path("/proc/self/statm")
-_GROUP = Path("/sys/fs/cgroup")  # of a container, or a job of a farm
+_GROUP = Path("/sys/fs/cgroup")  # of a container or a render farm's job
 
-_asks = False  # whether work that takes much is put off until the artist agrees
+_asks = False  # whether work that needs much memory waits until the artist confirms
 
 
 class MuchMemory(HairError):
-    """Work that takes much of the free memory, and was not begun; needed, percent: as the artist reads them."""
+    """Work needs much of the free memory, and was not begun; needed, percent: as displayed."""
 
     def __init__(self, sentence: str, **values: object) -> None:
         super().__init__(sentence, **values)
@@ -32,13 +32,13 @@ class MuchMemory(HairError):
 
 
 def free_bytes() -> int | None:
-    """Memory that programs can still get [bytes]; None where the system does not tell."""
+    """Memory available to this process [bytes]; None if it is unknown."""
     found = [_available(), _left_in_group(), _left_by_limit()]
     return min((count for count in found if count is not None), default=None)
 
 
 def _available():
-    """Of the computer."""
+    """Available memory of the computer [bytes]."""
     try:
         lines = _MEMINFO.read_text(encoding="ascii").splitlines()
         return next(1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
@@ -47,43 +47,43 @@ def _available():
 
 
 def _left_in_group():
-    """Of a group of processes with a limit."""
+    """Available memory of a control group with a limit [bytes]."""
     try:
         most, used = (int((_GROUP / f"memory.{name}").read_text(encoding="ascii")) for name in ("max", "current"))
-        # What of files is kept there goes when it is needed.
-        kept = (_GROUP / "memory.stat").read_text(encoding="ascii").splitlines()
-        used -= next(int(line.split()[1]) for line in kept if line.startswith("inactive_file "))
+        # The system drops cached pages of files on demand.
+        statistics = (_GROUP / "memory.stat").read_text(encoding="ascii").splitlines()
+        used -= next(int(line.split()[1]) for line in statistics if line.startswith("inactive_file "))
     except (OSError, ValueError, IndexError, StopIteration):  # no limit, or no groups
         return None
     return max(most - used, 0)
 
 
 def _left_by_limit():
-    """Of this process, where its address space is limited."""
+    """Free address space of this process [bytes]; None without a limit."""
     if resource is None:
         return None
     most, _hard = resource.getrlimit(resource.RLIMIT_AS)
     if most == resource.RLIM_INFINITY:
         return None
-    with contextlib.suppress(OSError, ValueError):  # a system that does not tell
+    with contextlib.suppress(OSError, ValueError):  # unknown on this system
         return max(most - _own_bytes(), 0)
     return None
 
 
 def _own_bytes():
-    """The address space of this process. Raises OSError where the system does not tell."""
+    """Address space used by this process [bytes]. Raises OSError where it is unknown."""
     return int(_OWN.read_text(encoding="ascii").split()[0]) * resource.getpagesize()
 
 
 def share_of_free(byte_count: float) -> float:
-    """The part of the free memory that work takes; 0 where it is not known."""
+    """The fraction of the free memory that `byte_count` bytes take; 0 if free memory is unknown."""
     free = free_bytes()
     return 0.0 if free is None else byte_count / max(free, 1)
 
 
 @contextlib.contextmanager
 def asking(is_asked: bool = True) -> Iterator[None]:
-    """Have `require_for_hair` raise `MuchMemory` in a context, where it only says so otherwise."""
+    """Let `require_for_hair` raise `MuchMemory` in a context; otherwise it only prints a message."""
     global _asks
     before, _asks = _asks, is_asked
     try:
@@ -93,7 +93,7 @@ def asking(is_asked: bool = True) -> Iterator[None]:
 
 
 def require(byte_count: int) -> None:
-    """Raise `HairError` where work would take more memory than there is to spare."""
+    """Raise `HairError` if work needs more memory than can be spared."""
     if share_of_free(byte_count) > MOST:
         raise HairError(
             "This needs {needed} GB of memory, and {free} GB are free: use fewer guides or points per guide.",
@@ -102,7 +102,7 @@ def require(byte_count: int) -> None:
 
 
 def require_for_hair(byte_count: int) -> None:
-    """The same of guides and strands; raise `MuchMemory` where they take much of it, if that is asked for."""
+    """The same for strands; raise `MuchMemory` within `asking` if they take much of the free memory."""
     if byte_count <= 0:
         return
     share = share_of_free(byte_count)
@@ -127,12 +127,12 @@ def _figures(byte_count):
 
 
 def limit_this_process() -> None:
-    """Let memory run out for this process alone, where it asks for more than there is to spare.
+    """Limit the address space of this process to the memory that can be spared, so that its allocations fail.
 
-    Otherwise the system would end any process for it. Nothing is done where the system does not tell.
+    Without a limit the system may end other processes. No effect where free memory is unknown.
     """
     free = free_bytes()
     if free is None or resource is None:
         return
-    with contextlib.suppress(OSError, ValueError):  # a lower limit holds already
+    with contextlib.suppress(OSError, ValueError):  # a lower limit is set already
         resource.setrlimit(resource.RLIMIT_AS, (_own_bytes() + int(MOST * free),) * 2)

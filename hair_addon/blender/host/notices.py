@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Console messages about data, each printed once, as drawing would repeat them."""
+"""Console messages about data. Each message is printed once, as drawing would repeat it."""
 
 import sys
 
@@ -8,7 +8,6 @@ import numpy as np
 from .caches import Cache
 
 LARGEST = 1e15  # squares of single-precision numbers must stay finite
-
 
 said_cache = Cache()  # sentence → True
 
@@ -37,7 +36,7 @@ def text_of(owner, name):
 
 
 def can_be_drawn(datablock, *values):
-    """Whether numbers of a datablock are finite and not absurdly large; if not, say that it is left out."""
+    """Whether values of a datablock are finite and at most `LARGEST`; if not, print that it is skipped."""
     # Written so that NaN fails too: every comparison with it is false.
     if all((np.abs(np.asarray(value, np.float64)) <= LARGEST).all() for value in values):
         return True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths that a .blend or a user names, operators that this Blender has, and the version that goes into file headers."""
+"""Paths given by a .blend file or a user, operators of this Blender, and the add-on's version for file headers."""
 
 import contextlib
 import os
@@ -12,14 +12,14 @@ import bpy
 
 from ...core.errors import HairError
 
-# Two slashes of either kind, or the name by which Windows knows its devices, of which networks are one.
+# Two slashes of either kind, or Windows' prefix of device paths, which include network paths.
 _ELSEWHERE = re.compile(r"[\\/]([\\/]|\?\?[\\/])")
 
 
 def resolve(path, library=None):
-    """A path of Blender's, `//` and all, as an absolute `Path`. Raises `HairError` for one that leads nowhere.
+    """Return a Blender path, which may begin with `//`, as an absolute `Path`. Raises `HairError` for invalid paths.
 
-    library: the `bpy.types.Library` whose path it is; None for the open file.
+    library: the `bpy.types.Library` that contains the path; None for the open file.
     """
     if not path.strip("/"):
         raise HairError("No file or folder was given: pick one.")
@@ -34,44 +34,44 @@ def resolve(path, library=None):
 
 
 def names_other_computer(path):
-    """Whether Windows would look for a path of Blender's on another computer: a .blend could so learn who opens it.
+    """Whether Windows would look for a Blender path on another computer, so that a .blend could track who opens it.
 
-    Either slash counts there, and a path below `//` that begins with one is not below it. One that is relative to a
-    file on another computer is where the artist has the file.
+    Windows accepts either slash, and a path whose `//` is followed by a slash is not relative. Paths relative to a
+    file on another computer are accepted, as the artist has opened that file.
     """
     return _ELSEWHERE.match(path.removeprefix("//")) is not None
 
 
 def from_open_file(library):
-    """The path of a `bpy.types.Library` from the folder of the open file, so that a project may be moved as a whole.
+    """The path of a `bpy.types.Library` relative to the open file's folder, so that a project can be moved as a whole.
 
-    Absolute where there is none: the file was never saved, or the library is on another drive.
+    Absolute if the file was never saved or the library is on another drive.
     """
     path = os.path.normpath(bpy.path.abspath(library.filepath))
     return relative(path, os.path.dirname(bpy.data.filepath)) if bpy.data.filepath else Path(path).as_posix()
 
 
 def of_library(library):
-    """The file of a `bpy.types.Library` as an absolute `Path`, in the folder that it is really in."""
+    """The file of a `bpy.types.Library` as an absolute `Path` with links of its folder resolved."""
     file = Path(bpy.path.abspath(library.filepath))
     return file.parent.resolve() / file.name
 
 
 def relative(path, folder):
-    """An absolute path as seen from a folder, with slashes; as it is where it is on another drive."""
+    """A path relative to a folder, with forward slashes; absolute if it is on another drive."""
     with contextlib.suppress(ValueError):
         path = os.path.relpath(path, folder)
     return Path(path).as_posix()
 
 
 def has_operator(name):
-    """Whether this Blender has an operator such as "wm.usd_import": some are built without, some are in add-ons."""
+    """Whether this Blender has an operator such as "wm.usd_import", which depends on its build and its add-ons."""
     category, operator = name.split(".")
     return operator in dir(getattr(bpy.ops, category))
 
 
 @cache
 def addon_version():
-    """The version in blender_manifest.toml."""
+    """Return the version in blender_manifest.toml."""
     manifest = Path(__file__).resolve().parents[3] / "blender_manifest.toml"
     return tomllib.loads(manifest.read_text(encoding="utf-8"))["version"]

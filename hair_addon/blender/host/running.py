@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running long operation, if any, and whether there is a window for one.
+"""The running long operation, if any, and whether there is a window for it.
 
-Panels show it, handlers wait for it, unregistering ends it.
-
-There is at most one: its operator blocks all input except Esc and navigation until it has ended.
+Panels show the operation, handlers wait for it, and unregistering ends it. At most one runs at a time, as its operator
+blocks all input except Esc and navigation.
 """
 
 import contextlib
@@ -16,12 +15,12 @@ _timer = None
 
 
 def has_window():
-    """Whether there is a window, and timers run."""
+    """Whether Blender has a window, and runs timers."""
     return not bpy.app.background
 
 
 def is_rendering():
-    """Whether a window renders, in a thread of its own."""
+    """Whether a render job runs in a thread beside the window."""
     return bpy.app.is_job_running("RENDER")
 
 
@@ -31,9 +30,9 @@ def job():
 
 
 def begin(context, started, work):
-    """Take note of a `Job`, a step of some work, and have its window send timer events for as long as it runs.
+    """Set the running `Job`, one step of some work, and let the window send timer events until `end`.
 
-    It is called as the step before it until it says what it does.
+    The job keeps the label of the previous step until it sets its own.
     """
     global _job, _work, _timer
     if _job is not None and not started.step:
@@ -45,19 +44,20 @@ def begin(context, started, work):
 
 @contextlib.contextmanager
 def set_aside():
-    """As if no operation ran: for a step of the running one that needs hair to follow a change of the scene."""
+    """Hide the running operation in a context, in which hair must follow changes of the scene."""
     global _job
-    kept, _job = _job, None
+    before, _job = _job, None
     try:
         yield
     finally:
-        _job = kept
+        _job = before
 
 
 def end(context):
-    """Stop the job if it still runs, wait for it, close its work, and leave no timer and no status behind.
+    """Stop the job if it still runs, wait for it, close its work, and remove the timer and the status text.
 
-    What was stopped leaves all as it was: now, not when Python comes to the generator, as the add-on may be disabled.
+    The work is closed at once, which restores the scene after a stop: the garbage collector might close it after the
+    add-on was disabled.
     """
     global _job, _work, _timer
     if _job is not None:

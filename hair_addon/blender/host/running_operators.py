@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that hold on to a window: strokes, drags and the like."""
+"""Modal operators: strokes, drags and the like."""
 
 import bpy
 
 
 def found(window_managers=None):
-    """Operators that run in any window; window_managers: by default those of the file."""
+    """Return the modal operators of all windows; window_managers: by default those of the file."""
     managers = bpy.data.window_managers if window_managers is None else window_managers
     windows = (window for manager in managers for window in manager.windows)
-    # Blender lists handlers without an operator as None, as of one whose type was removed.
+    # Blender lists a handler without an operator as None, for example if the operator's type was removed.
     return [operator for window in windows for operator in window.modal_operators if operator is not None]
 
 
 def is_running(prefix, window_managers=None):
-    """Whether an operator whose identifier begins with a prefix runs in any window."""
+    """Whether a modal operator whose identifier begins with a prefix runs in any window."""
     return any(operator.bl_idname.startswith(prefix) for operator in found(window_managers))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scene time: the current frame, changing frames, sub-frames, and what a dependency graph is evaluated for.
+"""Scene time: the current frame, changing frames, sub-frames, and the purpose of a dependency graph.
 
 Code that depends on time uses these functions. A viewport's dependency graph is at the scene's current frame; a render
-has a dependency graph of its own. `live/handlers.py` reacts to frame changes.
+has its own dependency graph. `live/handlers.py` reacts to frame changes.
 """
 
 import contextlib
@@ -19,9 +19,9 @@ def frame_of(blender_scene):
 
 
 def time_of(blender_scene):
-    """Return the current time of a scene in frames, between two of them while a render samples motion.
+    """Return the current time of a scene [frames], which is not whole while a render samples motion.
 
-    Frames are numbered as the timeline has them, also where the animation's time is remapped.
+    Frames are those of the timeline, also if Time Stretching remaps the animation.
     """
     return blender_scene.frame_current + blender_scene.frame_subframe
 
@@ -38,7 +38,7 @@ def is_playing():
 
 
 def is_shown_moving():
-    """Return whether any window plays the animation, or its frame is dragged."""
+    """Return whether any window plays or scrubs the animation."""
     screens = [window.screen for manager in bpy.data.window_managers for window in manager.windows]
     return any(screen.is_animation_playing or screen.is_scrubbing for screen in screens)
 
@@ -54,35 +54,35 @@ def scene_frames():
 
 
 def go_to(blender_scene, frame):
-    """Change a scene to a whole frame and evaluate it."""
+    """Set a scene to a whole frame and evaluate it."""
     blender_scene.frame_set(frame)
 
 
 def go_to_time(blender_scene, time):
-    """Change a scene to a time in frames, which need not be whole, and evaluate it."""
+    """Set a scene to a time [frames], which need not be whole, and evaluate it."""
     whole = math.floor(time)
     blender_scene.frame_set(whole, subframe=time - whole)
 
 
 def frame_rate(blender_scene):
-    """Return the frames a second of a scene."""
+    """Return the frame rate of a scene [frames per second]."""
     return blender_scene.render.fps / blender_scene.render.fps_base
 
 
 def remapping(blender_scene):
-    """Return the frames of the animation in a frame of a scene: below one in slow motion (Time Stretching)."""
+    """Return the animation frames per scene frame: below 1 in slow motion (Time Stretching)."""
     return blender_scene.render.frame_map_old / blender_scene.render.frame_map_new
 
 
 def animation_rate(blender_scene):
-    """Return the frames of a scene in a second of its animation."""
+    """Return the scene frames per second of the animation."""
     return frame_rate(blender_scene) / remapping(blender_scene)
 
 
 def exposure_times(blender_scene, steps):
-    """Return the times [frames] from a frame at which Cycles samples the motion of objects; [0.0] without motion blur.
+    """Return the times [frames], relative to a frame, at which Cycles samples motion; [0.0] without motion blur.
 
-    steps: of the objects, as Cycles has it: 2^steps + 1 times, from one end of the exposure to the other.
+    steps: motion steps of the objects, as in Cycles: 2^steps + 1 times from the start to the end of the exposure.
     """
     render = blender_scene.render
     if not render.use_motion_blur or not render.motion_blur_shutter > 0.0:
@@ -93,15 +93,15 @@ def exposure_times(blender_scene, steps):
 
 
 def exposed_frames(blender_scene, frame):
-    """Return the range of frames that an exposure of a frame lies between: that frame alone without motion blur."""
+    """Return the range of whole frames that encloses the exposure of a frame; only that frame without motion blur."""
     ends = exposure_times(blender_scene, 0)
     return range(math.floor(frame + ends[0]), math.ceil(frame + ends[-1]) + 1)
 
 
 def visit(blender_scene, offsets, set_frame):
-    """Change a scene to several times in turn, and back afterwards: a generator of the indices of `offsets`.
+    """Generate the indices of `offsets` with the scene at each time in turn, and restore the time afterwards.
 
-    offsets: in frames, relative to the current time; set_frame: called with a whole frame and the fraction as
+    offsets: [frames] relative to the current time; set_frame: called with a whole frame and the fraction as
     `subframe`, like a render engine's `frame_set`.
     """
 
@@ -131,13 +131,13 @@ def is_rendered(depsgraph):
 
 
 def may_write(blender_scene, depsgraph):
-    """Whether data may be written now: a render runs in parallel to the interface unless that is locked."""
+    """Whether data may be written now: a render runs in parallel to the interface unless the interface is locked."""
     return is_shown(depsgraph) or bpy.app.background or blender_scene.render.use_lock_interface
 
 
 @contextlib.contextmanager
 def outside_drivers():
-    """Raise a `HairError` where Blender is asked, in a context, to evaluate a scene while it evaluates it."""
+    """Turn the error of evaluating a scene during its evaluation into a `HairError`, in a context."""
     try:
         yield
     except RuntimeError as error:

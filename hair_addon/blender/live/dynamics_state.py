@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the Dynamics panel says of simulated or baked guides: found when something has changed, and kept for panels."""
+"""The status of simulated or baked guides in the Dynamics panel, updated on changes and cached for drawing."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +23,7 @@ _OTHER = {
 
 @dataclass
 class _State:
-    """What is said of some guides, and what it follows from."""
+    """The status of some guides and the inputs it was computed from."""
 
     marks: tuple[Any, ...]
     sentence: str
@@ -31,48 +31,48 @@ class _State:
 
 
 state_cache = Cache()  # session_uid of guide Curves → _State
-# session_uid of guide Curves → (FrameCache, {frame: what moves otherwise there than when it was baked})
+# session_uid of guide Curves → (FrameCache, {frame: the part of the animation that changed since the bake})
 change_cache = Cache()
 
 
 def state_of(guides):
-    """(sentence, values) for the panel: what is baked or simulated of some guides, and what has changed since."""
+    """Return (sentence, values) for the panel: the baked or simulated frames of guides, and changes since."""
     state = state_cache.get(guides.session_uid)
     return _unknown() if state is None else (state.sentence, state.values)
 
 
 def note(guides, blender_scene, played):
-    """Find out what `state_of` says; played: what `simulated_hair` has simulated of the guides, or None."""
+    """Update the result of `state_of`; played: the simulation of the guides by `simulated_hair`, or None."""
     baked = frame_folders.frames_of(guides)
     if baked is not None and baked.manifest is not None:
         marks = (baked.manifest, _first_change(guides), *_inputs(guides, blender_scene))
         known = state_cache.get(guides.session_uid)
         if known is not None and known.marks == marks:
             return
-        said = _of_baked(baked.manifest, guides, blender_scene)
+        status = _of_baked(baked.manifest, guides, blender_scene)
     else:
-        marks, said = (), _unknown() if played is None else _of_played(played, scene_time.frame_of(blender_scene))
-    state_cache.keep(guides.session_uid, _State(marks, *said))
+        marks, status = (), _unknown() if played is None else _of_played(played, scene_time.frame_of(blender_scene))
+    state_cache.keep(guides.session_uid, _State(marks, *status))
 
 
 def note_combed(guides, blender_scene, played):
-    """Find it out of guides that were combed, once in a stroke: they are others than those that were baked."""
+    """Update the status of combed guides once per stroke: they differ from the baked guides."""
     known = state_cache.get(guides.session_uid)
     if known is None or known.sentence != _BAKED_OTHERWISE:
         note(guides, blender_scene, played)
 
 
 def check_animation(guides, frame, blender_scene, depsgraph):
-    """Note whether the animation is as when a frame was baked, which a depsgraph is evaluated for.
+    """Note whether the animation has changed since the current frame of a depsgraph was baked.
 
-    frame: `frame_cache.Frame` of the scene's present one.
+    frame: `frame_cache.Frame` of the scene's current frame.
     """
     changed, number = _changes(guides), scene_time.frame_of(blender_scene)
     try:
         settings = properties.dynamics_of(guides.vellus)
         now = frame_animation.digest_of(guides, blender_scene, depsgraph, settings)
         what = frame_animation.change(frame.digest, now, frame.is_carried)
-    except HairError:  # of the surface: baked frames are shown nevertheless
+    except HairError:  # invalid surface: baked frames are shown nevertheless
         what = frame_animation.SURFACE
     if what is None:
         changed.pop(number, None)
@@ -83,20 +83,20 @@ def check_animation(guides, frame, blender_scene, depsgraph):
 
 
 def _changes(guides):
-    """{frame: what moves otherwise} of the frames that are baked now."""
-    baked, kept = frame_folders.frames_of(guides), change_cache.get(guides.session_uid)
-    if kept is None or kept[0] is not baked:
-        kept = change_cache.keep(guides.session_uid, (baked, {}))
-    return kept[1]
+    """{frame: changed part of the animation} of the current bake."""
+    baked, known = frame_folders.frames_of(guides), change_cache.get(guides.session_uid)
+    if known is None or known[0] is not baked:
+        known = change_cache.keep(guides.session_uid, (baked, {}))
+    return known[1]
 
 
 def _first_change(guides):
-    """(frame, what moves otherwise) of the first changed one that was shown, or None."""
+    """(frame, changed part of the animation) of the first changed frame that was shown, or None."""
     return min(_changes(guides).items(), default=None)
 
 
 def _inputs(guides, blender_scene):
-    """What `guide_baking.key_of` follows from, quickly read."""
+    """The inputs of `guide_baking.key_of`, which are fast to read."""
     state, rate = guides.vellus, scene_time.animation_rate(blender_scene)
     units = blender_scene.unit_settings.scale_length
     parted = guide_regions.parting_keys(guides)

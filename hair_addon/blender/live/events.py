@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each event makes stale: a function for each, of the caches that it concerns.
+"""One function for each event, which invalidates the caches that the event makes stale.
 
-After an event nothing is drawn or computed from what was cached before it.
+After an event nothing is drawn or computed from values that were cached before it.
 """
 
 from ..gpu import world_texture
@@ -11,27 +11,27 @@ from ..render.viewport import viewport
 
 
 def scene_changed(is_hair_only=False):
-    """Anything was changed, hidden or shown: viewports read their scenes again; is_hair_only: nothing but hair."""
+    """Anything was changed, hidden or shown: viewports read their scenes again; is_hair_only: only hair changed."""
     viewport.invalidate(is_hair_only=is_hair_only)
 
 
 def curves_reported(datablock):
-    """Blender reports a Curves datablock as changed, which it may be: its strands, and what binds them."""
+    """Blender reports a Curves datablock, which may have changed: invalidate its strands and their guide states."""
     hair_cache.invalidate_unless_same(datablock)
     guide_states.state_cache.invalidate(datablock.session_uid)
 
 
 def strands_made(datablock):
-    """Guides or hair were computed again: strands of the datablock."""
+    """Guides or hair were computed again: invalidate the strands of the datablock."""
     hair_cache.strand_cache.invalidate(datablock.session_uid)
     guide_states.state_cache.invalidate(datablock.session_uid)
 
 
 def surface_moved(surface_object):
-    """A surface may have another shape: its pose, and by it where strands are."""
+    """A surface may be deformed: invalidate its pose, which places strands."""
     hair_cache.invalidate_pose(surface_object)
 
 
 def image_changed():
-    """Pixels of images, or a world, may be others: the world's light. Each render looks by itself."""
+    """Pixels of images or a world may have changed: check the world's light. Each render checks by itself."""
     world_texture.check_image()

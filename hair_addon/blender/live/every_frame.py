@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Playback that drops no frame, as guides are simulated from the frame before; put back when playing stops."""
+"""Playback without dropped frames, as guides are simulated frame by frame; restored when playback stops."""
 
 import bpy
 
@@ -7,11 +7,11 @@ from ..host.caches import Cache
 
 PLAY_EVERY_FRAME = "NONE"  # of `Scene.sync_mode`
 
-before_cache = Cache()  # session_uid of a scene → its playback before
+before_cache = Cache()  # session_uid of a scene → its former `sync_mode`
 
 
 def begin(blender_scene):
-    """Let the next playback of a scene show every frame; returns whether that is a change."""
+    """Let the next playback of a scene show every frame; returns whether the scene changed."""
     if blender_scene.sync_mode == PLAY_EVERY_FRAME:
         return False
     before_cache.keep(blender_scene.session_uid, blender_scene.sync_mode)
@@ -20,7 +20,7 @@ def begin(blender_scene):
 
 
 def end():
-    """Put back what was changed, unless somebody has chosen another playback since."""
+    """Restore the playback settings that `begin` changed, unless they were changed again since."""
     for blender_scene in bpy.data.scenes:
         before = before_cache.get(blender_scene.session_uid)
         if before is not None and blender_scene.sync_mode == PLAY_EVERY_FRAME:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The first-time setup in the background, once for each version of the add-on: Warp imported, kernels loaded.
+"""The first-time setup in the background, once per version of the add-on: Warp is imported, kernels are loaded.
 
-Python compiles Warp's sources then, and Warp the kernels that did not come compiled with the extension. It begins a
-while after Blender has started with the add-on, in a thread. Hair that is asked for meanwhile shares the work
-(core/kernels/kernel_setup.py). Never without a window, and never in a checkout.
+Python then compiles Warp's sources, and Warp compiles the kernels that the extension does not include. The setup begins
+in a thread a few seconds after Blender has started. Hair that is generated meanwhile shares the work
+(core/kernels/kernel_setup.py). It never runs without a window or in a checkout.
 """
 
 import contextlib
@@ -19,19 +19,19 @@ from ..host import paths
 from ..settings import preferences
 
 _DELAY = 3.0  # [s] after registration: Blender's own start comes first
-_INTERVAL = 0.5  # [s] between checks whether it is done
+_INTERVAL = 0.5  # [s] between checks whether the setup is done
 
 _job = None
 
 
 def register():
-    """Begin in a while, unless it was done before."""
+    """Schedule the setup, unless it was done before."""
     if preferences.is_extension() and not bpy.app.background:
         bpy.app.timers.register(_advance, first_interval=_DELAY, persistent=True)
 
 
 def unregister():
-    """Stop it, and wait for the module that is being compiled: three seconds at most."""
+    """Stop the setup, and wait for the module that is being compiled: three seconds at most."""
     if bpy.app.timers.is_registered(_advance):
         bpy.app.timers.unregister(_advance)
     _end()
@@ -43,22 +43,22 @@ def _advance():
     if _job is None:
         if _is_done():
             return None
-        if kernel_setup.is_under_way():  # for hair that the user waits for
+        if kernel_setup.is_under_way():  # the user waits for hair
             return _INTERVAL
-        # One thread: other cores are left to the user's work.
+        # A single thread leaves the other cores to the user's work.
         _job = Job(_load)
         return _INTERVAL
     if not _job.is_done:
         return _INTERVAL
     job, _job = _job, None
     job.result()
-    with contextlib.suppress(OSError):  # then the next session finds them in Warp's cache
+    with contextlib.suppress(OSError):  # the next session repeats the setup from Warp's cache
         _stamp().write_text(paths.addon_version(), encoding="utf-8")
     return None
 
 
 def _load(progress):
-    """Kernels of the first hair, which is draped on a scalp, then those of what comes next."""
+    """Load the kernels of the first hair, which is draped on a scalp, then the kernels of later steps."""
     groom.load_kernels("cpu", part_of(progress, 0.0, 0.5), most_threads=1)
     dynamics.draped_growth.load_kernels("cpu", part_of(progress, 0.5, 0.8), most_threads=1)
     groom.load_later_kernels("cpu", part_of(progress, 0.8, 1.0), most_threads=1)
@@ -80,6 +80,6 @@ def _is_done():
 
 
 def _stamp():
-    """The file that holds the version of the add-on that was set up last."""
+    """The file with the version of the add-on that was set up last."""
     folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="setup", create=True)
     return Path(folder) / "version"

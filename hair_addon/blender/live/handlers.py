@@ -33,10 +33,10 @@ from . import (
     updates,
 )
 
-# Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
+# Whether a window is about to evaluate a file that was just opened, which reports all datablocks as updated.
 _is_opening = False
 
-# Whether an undo or redo may have brought back guides without the hair that was written for them, or the reverse.
+# Whether an undo or redo may have restored guides without the hair that was written for them, or the reverse.
 _is_undone = False
 
 
@@ -58,7 +58,7 @@ def after_depsgraph_update(scene, depsgraph):
     if _is_opening:
         _is_opening = False
         animated.follow(depsgraph)
-        _evaluate(depsgraph, {})  # what a script has set since
+        _evaluate(depsgraph, {})  # for settings that a script has changed since
         return
     deformed = updates.deformed(reports)
     moving_surfaces.shape_changed(deformed & _surfaces())
@@ -66,7 +66,7 @@ def after_depsgraph_update(scene, depsgraph):
     told_apart = []
     for surface_object in deformed:
         events.surface_moved(surface_object)
-        # Hair waits until the surface leaves edit and paint modes, and until copies of its faces are told apart.
+        # Hair waits until the surface leaves edit and paint modes, and until copies of its faces are separated.
         if surface_object.mode != "OBJECT":
             continue
         if copied_faces.tell_apart(surface_object):
@@ -105,7 +105,7 @@ def after_depsgraph_update(scene, depsgraph):
     if running.job() is None:
         stored_guide_maps.follow(reports, depsgraph)
         live_hair.follow_masks(_painted(reports), depsgraph)
-    if told_apart:  # last: the update that it asks for calls this again
+    if told_apart:  # last: the update of the view layer calls this handler again
         copied_faces.follow(told_apart, scene.view_layers[depsgraph.view_layer.name])
 
 
@@ -115,7 +115,7 @@ def _surfaces():
 
 
 def _is_only_carried(update, deformed):
-    """Whether Blender reports paused Curves because their surface moved: what was tagged by itself has all flags."""
+    """Whether paused Curves are reported only because their surface moved: Curves that were tagged have all flags."""
     datablock = update.datablock
     if not isinstance(datablock, bpy.types.Curves) or datablock.surface not in deformed:
         return False
@@ -132,13 +132,13 @@ def _painted(reports):
 
 
 def _is_hair_only(reports):
-    """Whether nothing but the geometry of Curves has changed: surfaces, lights and the world are as they were."""
+    """Whether only the geometry of Curves has changed, and not surfaces, lights or the world."""
     # Blender reports no datablock for changes of visibility.
     return len(reports) > 0 and all(map(_are_curves, reports))
 
 
 def _is_hair_only_in_frame(reports):
-    """The same of a change of the frame, of which Blender reports all that it evaluates, but no images."""
+    """The same for a change of the frame: Blender reports all evaluated datablocks, but no images."""
     if any(image.source in {"SEQUENCE", "MOVIE"} for image in bpy.data.images):
         return False
     others = [report for report in reports if not report.is_of(bpy.types.Action, bpy.types.Camera)]
@@ -146,7 +146,7 @@ def _is_hair_only_in_frame(reports):
 
 
 def _type_of_object(report):
-    """Blender's type of an object; None for other datablocks, and for what is gone."""
+    """Blender's type of an object; None for other datablocks and for deleted objects."""
     return report.datablock.type if report.is_of(bpy.types.Object) and report.datablock is not None else None
 
 
@@ -157,7 +157,7 @@ def _are_curves(report):
 
 
 def _mark_painted(images, depsgraph):
-    """Mark guides and hair as stale whose images were painted: if these did not change, roots stay."""
+    """Mark guides and hair as stale if their images were painted: roots stay if the pixels did not change."""
     names = {name_of(image) for image in images}
     painting = set()
     for datablock in bpy.data.hair_curves:
@@ -190,9 +190,9 @@ def _evaluate(depsgraph, combed):
         for guides in combed:
             stale_marks.mark_followers(guides)
         return
-    # Called last to first. An error that nobody expects is raised when all were called, so that it stops no other hair.
+    # Callbacks run last to first. An unexpected error is raised after all of them, so that it stops no other hair.
     with contextlib.ExitStack() as stack:
-        # What takes much memory is asked for by an operator; a render is not to lack it.
+        # In a window hair that needs much memory waits for an operator; a render must not lack hair.
         stack.enter_context(memory.asking(running.has_window() and not running.is_rendering()))
         stack.callback(live_hair.show_styles, depsgraph)
         for hair in reversed(_of_kind("HAIR")):
@@ -215,7 +215,7 @@ def _evaluate_hair(hair, depsgraph, combed):
     state = hair.vellus
     follows = state.guide_curves in combed
     if not (state.is_live and _is_surface_at_rest(hair)):
-        # Guides that are reported for the first time may be those that the hair was made with.
+        # Guides that are reported for the first time may be the guides that the hair was made with.
         state.is_stale = state.is_stale or (follows and staleness.is_left_by_undo(hair))
     elif state.is_stale and not live_hair.is_ahead(hair):
         live_hair.make_again(hair, depsgraph)
@@ -226,19 +226,19 @@ def _evaluate_hair(hair, depsgraph, combed):
 
 
 def _is_surface_at_rest(curves):
-    """Whether the surface is not in an edit or paint mode: hair waits until that mode is left."""
+    """Whether the surface is in Object Mode or missing: hair waits until edit and paint modes are left."""
     return curves.surface is None or curves.surface.mode == "OBJECT"
 
 
 @persistent
 def before_frame_change(_scene, _depsgraph):
-    """Store setting values, to detect animated changes."""
+    """Remember setting values, to detect animated changes."""
     animated.remember()
 
 
 @persistent
 def after_frame_change(scene, depsgraph):
-    """Deform strands with their surfaces in this frame; regenerate animated hair, in renders too."""
+    """Deform strands with their surfaces; regenerate animated hair, in renders too."""
     reports = updates.read(depsgraph, bpy.app.handlers.frame_change_post, after_frame_change)
     if scene_time.is_shown(depsgraph):
         events.scene_changed(is_hair_only=_is_hair_only_in_frame(reports))
@@ -265,25 +265,25 @@ def after_frame_change(scene, depsgraph):
 
 @persistent
 def before_reading(*_args):
-    """Write hair before its Curves are read by a save or a render, and what a render reads of hair's own scene."""
+    """Write hair before a save or a render reads its Curves, and update the hidden scene that a render composites."""
     moving_surfaces.resume()
     stale_marks.follow_applied()
     live_hair.write_all()
     file_changes.follow(bpy.data.scenes)
-    if bpy.app.background:  # in a window a timer repairs, and a render runs beside it
+    if bpy.app.background:  # in a window a timer repairs, as a render runs in parallel
         composite.repair()
     composite.follow_all()
 
 
 @persistent
 def before_rendering(*_args):
-    """Forget what earlier renders could not show."""
+    """Forget the hair that earlier renders refused."""
     refused_hair.begin()
 
 
 @persistent
 def before_saving(*_args):
-    """Store in the file what it is known by under another name."""
+    """Store in the file where its baked frames and surfaces are, so that they are found under another file name."""
     frame_folders.remember()
     for datablock in bpy.data.hair_curves:
         surface_space.remember_place(datablock)
@@ -291,7 +291,7 @@ def before_saving(*_args):
 
 @persistent
 def after_import(*_args):
-    """Make the names of styles readable, which Blender passes to a rename; what was saved paused goes on."""
+    """Make names of styles readable for Blender's rename operators; resume surfaces that were saved paused."""
     moving_surfaces.resume()
     file_changes.take_as_it_is()
     for hair in _of_kind("HAIR"):
@@ -300,7 +300,7 @@ def after_import(*_args):
 
 @persistent
 def after_load(*_args):
-    """Hair in a file is up to date; without a window Blender reports no update of it."""
+    """Take the hair of a file as up to date; without a window Blender reports no update of it."""
     global _is_opening, _is_undone
     _is_opening = not bpy.app.background
     _is_undone = True  # does not affect a file that was saved during a stroke
@@ -312,18 +312,18 @@ def after_load(*_args):
     stale_marks.follow_applied()
     file_changes.follow(bpy.data.scenes)
     _hide_drawn_hair()
-    composite.follow_all()  # of linked hair a file does not store that it is hidden from engines
+    composite.follow_all()  # a file does not store that linked hair is hidden from other engines
 
 
 def _hide_drawn_hair():
-    """Keep Blender from drawing hair that Vellus draws: in older files, and after the add-on was disabled, it does."""
+    """Stop Blender from drawing hair that Vellus draws, as in older files and after the add-on was disabled."""
     for hair in _of_kind("HAIR"):
         if hair.vellus.is_drawn:
             curves_objects.draw_natively(hair, False)
 
 
 def _take_over():
-    """Draw what Blender drew while the add-on was disabled."""
+    """Draw the hair that Blender drew while the add-on was disabled."""
     older_files.renew()
     file_changes.follow(bpy.data.scenes)
     _hide_drawn_hair()
@@ -337,21 +337,21 @@ def after_undo(*_args):
     global _is_undone
     _is_undone = True
     live_hair.cancel_writing()
-    moving_surfaces.resume()  # which may have been kept paused
+    moving_surfaces.resume()  # the undo step may have been saved paused
     invalidation.data_replaced()
     file_changes.take_as_it_is()
 
 
 @persistent
 def after_render(scene, *_args):
-    """Say what a render could not show."""
+    """Report the hair that a render could not show."""
     unlocked_renders.end(scene)
     refused_hair.end(scene)
 
 
 @persistent
 def after_playing(*_args):
-    """Put back the playback that Play from Start has changed, and let Blender carry hair again."""
+    """Restore the playback settings that Play from Start has changed, and let Blender deform hair again."""
     every_frame.end()
     moving_surfaces.resume()
 
@@ -375,15 +375,15 @@ _HANDLERS = (
 
 
 def register():
-    """Listen to Blender."""
+    """Add the handlers."""
     for handlers, handler in _HANDLERS:
         handlers.append(handler)
-    # While Blender enables an add-on, it gives no access to the file.
+    # Blender gives no access to the file while it enables an add-on.
     bpy.app.timers.register(_take_over)
 
 
 def unregister():
-    """Remove the handlers; write pending hair, and leave composited hair to the engines."""
+    """Remove the handlers, write pending hair, and stop compositing hair over other engines' renders."""
     for handlers, handler in _HANDLERS:
         handlers.remove(handler)
     for timer in (_take_over, unlocked_renders.offer, refused_hair.offer, composite.repair):

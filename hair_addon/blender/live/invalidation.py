@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every cache of the add-on by name, and what clears many of them: undo, another file, the end of Python.
+"""Every cache of the add-on by name, and the events that clear many of them: undo, another file, the end of Python.
 
-What makes single ones stale is in `events`. Functions of their arguments alone, under `functools.cache`, never become
-stale.
+`events` invalidates single caches. Pure functions under `functools.cache` never become stale.
 """
 
 from ..data import guide_map_readers, orientation, scene, subdivided_surfaces
@@ -20,7 +19,7 @@ from ..render.viewport import region_pictures, viewport
 from ..settings import animated
 from . import dynamics_state, every_frame, moving_surfaces, reported, simulated_hair, unlocked_renders
 
-# Copies of Blender's data, and what was made of them. Undo and redo put other data in its place.
+# Copies of Blender's data, and values computed from them. Undo and redo replace the data.
 COPIES = (
     hair_cache.strand_cache,
     hair_cache.pose_cache,
@@ -43,7 +42,7 @@ COPIES = (
     guide_map_readers.reading_cache,
 )
 
-# Values keyed by everything they depend on, or that check by themselves whether they are up to date.
+# Values that are keyed by all of their inputs, or check by themselves whether they are up to date.
 OTHERS = (
     hair_cache.shading_cache,
     scene.faces_cache,
@@ -71,25 +70,25 @@ OTHERS = (
 )
 
 # If a bound program is freed and a new one gets its address, the GPU module takes the new one for bound, so programs
-# stay until Python ends. Blender must not free them after its graphics either. A texture of no file stays too.
+# stay until Python ends. They must be freed before Blender's graphics end. So must textures that belong to no file.
 PROGRAMS = (shaders.program_cache, light_grid.none_cache)
 
 CACHES = COPIES + OTHERS + PROGRAMS
 
 
 def data_replaced():
-    """Undo or redo: all copies of data."""
+    """Clear all copies of data, after undo or redo."""
     for cache in COPIES:
         cache.clear()
 
 
 def clear():
-    """Drop all there is, but programs: another file, or the add-on is switched off."""
+    """Clear all caches except programs, when another file is opened or the add-on is disabled."""
     for cache in COPIES + OTHERS:
         cache.clear()
 
 
 def end():
-    """Drop programs too: Python ends, and what is on the GPU is freed while there is one."""
+    """Clear all caches and programs when Python ends, while the GPU context still exists."""
     for cache in CACHES:
         cache.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kept hair that follows its guides while these are combed or simulated; its Curves are written at once."""
+"""Kept hair follows its guides while they are combed or simulated; its Curves are written at once."""
 
 from ...core.errors import HairError
 from ..groom import bindings
@@ -8,9 +8,9 @@ from . import events
 
 
 def follow(hair, depsgraph, local=None):
-    """Let kept hair follow its guides; whether they were others than it has followed. An error becomes its status.
+    """Let kept hair follow its guides; returns whether the guides have changed. An error becomes its status.
 
-    local: (N, 3) points of the guides now, if they have been read already.
+    local: (N, 3) current points of the guides, if they have been read already.
     """
     try:
         is_other = kept_following.follow(hair, depsgraph, local)

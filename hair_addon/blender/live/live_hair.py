@@ -27,9 +27,9 @@ _STROKES = ("SCULPT_CURVES_OT_", "CURVES_OT_", "TRANSFORM_OT_")
 
 
 def follow_guides(hair, depsgraph, local=None):
-    """Update a hair's strands after combing: no search, unless guides were added, removed or slid.
+    """Update a hair's strands after combing; guides are only searched if some were added, removed or slid.
 
-    local: (N, 3) points of the guides now, if they have been read already.
+    local: (N, 3) current points of the guides, if they have been read already.
     """
     if curves.is_hand_made(hair):
         kept_strands.follow(hair, depsgraph, local)
@@ -38,7 +38,7 @@ def follow_guides(hair, depsgraph, local=None):
     if bound is None:
         is_simulated = simulated_guides.is_shown(hair.vellus.guide_curves)
         if hair.vellus.followed and not is_simulated and not staleness.is_left_by_undo(hair):
-            return  # written for these guides, in another session or before an undo
+            return  # was written for these guides, in another session or before an undo
         make_again(hair, depsgraph)
         return
     try:
@@ -62,7 +62,7 @@ def follow_guides(hair, depsgraph, local=None):
 
 
 def show_guides(guides, points, depsgraph):
-    """Show guides at (G, POINT_COUNT, 3) simulated points, as `simulated_guides.show`, and let their hair follow."""
+    """Show guides at (G, POINT_COUNT, 3) simulated points like `simulated_guides.show`, and let their hair follow."""
     simulated_guides.show(guides, points)
     events.strands_made(guides)
     for hair in curves.followers(guides):
@@ -71,14 +71,14 @@ def show_guides(guides, points, depsgraph):
 
 
 def show_styles(depsgraph):
-    """Show hair with its styles, or without while its guides are combed and artists want it so."""
+    """Show hair with its styles; without styles while its guides are combed, if that is set."""
     for hair in bpy.data.hair_curves:
         state = hair.vellus
         if state.kind != "HAIR":
             continue
         is_styled, bound = not _is_combed_straight(state), bindings.of(hair)
         if bound is None and not is_styled and state.is_live and not text_of(state, "status"):
-            make_again(hair, depsgraph)  # as the first stroke would, and refused once
+            make_again(hair, depsgraph)  # as the first stroke would; a refusal sets the status, so not again
             bound = bindings.of(hair)
         if bound is not None and is_styled != (bound.straight is None):
             bound.show_styles(is_styled)
@@ -86,7 +86,7 @@ def show_styles(depsgraph):
 
 
 def _is_combed_straight(state):
-    """Whether the guides of hair with styles are in Sculpt Mode, and it is to be shown without these."""
+    """Whether hair is shown without its styles because its guides are in Sculpt Mode."""
     guides = state.guide_curves
     if guides is None or guides.vellus.shows_styles_while_combing or not len(state.styles) or not running.has_window():
         return False
@@ -130,7 +130,7 @@ def make_again(hair, depsgraph):
 
 
 def _is_reweighed(hair, depsgraph):
-    """Show hair with other weights of its guides, other lengths or radii, if nothing else of it has changed."""
+    """Show hair with new guide weights, lengths or radii; returns False if anything else has changed."""
     bound = None if hair_outside.is_wanted(hair) else reweighed_hair.reweighed(hair, depsgraph)
     if bound is None:
         return False
@@ -141,7 +141,7 @@ def _is_reweighed(hair, depsgraph):
 
 
 def _follow_linked(hair, depsgraph):
-    """Let hair of a library, or between its guides, follow where dynamics has moved these: points alone are written."""
+    """Let hair of a library, or hair between its guides, follow simulated guides: only points are written."""
     try:
         pipeline.require_uncombed(hair)
         bound = pipeline.bind_hair(*pipeline.inputs_of(hair), depsgraph, hair)
@@ -150,7 +150,7 @@ def _follow_linked(hair, depsgraph):
         hair.vellus.is_stale = False
         hair.vellus.status = str(error)
         return
-    bound.is_written = bound.has_moved_only = bound.is_map_written = fits  # by its own file
+    bound.is_written = bound.has_moved_only = bound.is_map_written = fits  # the library's file holds the rest
     bindings.keep(hair, bound)
     _follow_simulated(hair)
     events.strands_made(hair)
@@ -158,7 +158,7 @@ def _follow_linked(hair, depsgraph):
 
 
 def _follow_simulated(hair):
-    """Let hair that was bound to combed guides follow where dynamics has moved them; whether it had to."""
+    """Let hair that was bound to combed guides follow their simulated points; returns whether there are any."""
     bound = bindings.of(hair)
     if bound is None or not simulated_guides.is_shown(hair.vellus.guide_curves):
         return False
@@ -172,7 +172,7 @@ def _shown_guides(hair, bound, local=None):
 
 
 def _restyle(hair, depsgraph):
-    """Show and write soon what `pipeline.restyle` makes; whether it does."""
+    """Show and soon write the result of `pipeline.restyle`; returns whether it applies."""
 
     def is_drawn(bound, styles):
         return hair_cache.may_restyle(hair.session_uid, bound, styles) and not hair_outside.is_wanted(hair)
@@ -192,7 +192,7 @@ def _restyle(hair, depsgraph):
 
 
 def is_ahead(hair):
-    """Whether stale hair has been regenerated already, and only has to be written."""
+    """Whether stale hair has been regenerated already, and only needs to be written."""
     bound = bindings.of(hair)
     if bound is None or bound.is_written or bound.has_moved_only or hair.vellus.guide_curves is None:
         return False
@@ -221,7 +221,7 @@ def _write(hair):
         writing.write_hair(hair)
         bound = bindings.of(hair)
         if bound is not None and bound.free is not None:
-            events.strands_made(hair)  # of which some were kept outside
+            events.strands_made(hair)  # some strands were moved out of colliders
     except HairError as error:
         bindings.invalidate(hair)
         hair.vellus.status = str(error)
@@ -239,12 +239,12 @@ def write_soon(hair):
     if not running.has_window():
         _write(hair)
         return
-    cancel_writing()  # put off with every change: a stroke brings many
+    cancel_writing()  # restarts the pause with every change: a stroke consists of many
     bpy.app.timers.register(write_after_pause, first_interval=_PAUSE, persistent=True)
 
 
 def write_after_pause():
-    """For `bpy.app.timers`: write once nothing has changed for a while; seconds until the next try, or None."""
+    """Timer: write hair unless a stroke is running; returns the seconds until the next try, or None."""
     if is_stroke_running():
         return _PAUSE
     write_all()
@@ -252,14 +252,14 @@ def write_after_pause():
 
 
 def is_stroke_running():
-    """Whether an operator holds on to guides, in any window."""
+    """Whether a modal operator moves guides in any window."""
     return running_operators.is_running(_STROKES)
 
 
 def follow_masks(surfaces, depsgraph):
-    """Style hair again while masks of its styles are painted, or settings of its styles change meanwhile.
+    """Style hair again while masks of its styles are painted, or if settings of its styles change meanwhile.
 
-    surfaces: mesh objects in a paint mode that changed. Roots wait until the mode is left.
+    surfaces: changed mesh objects in a paint mode. Roots wait until the mode is left.
     """
     for hair in bpy.data.hair_curves:
         state = hair.vellus

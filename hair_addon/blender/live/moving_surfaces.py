@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces that an animation, a slider or a bone moves: Blender carries their hair again when they have come to rest.
+"""Surfaces moved by an animation, a slider or a bone: Blender's nodes deform their hair again once they are at rest.
 
-A script that moves a surface and reads hair sees it carried: hair is paused only while viewports draw between one move
-and the next.
+Hair is paused only while viewports draw between two moves, so a script that moves a surface reads deformed hair.
 """
 
 import time
@@ -14,29 +13,29 @@ from ..host import running, running_operators, scene_time
 from ..host.caches import Cache
 from ..render import hair_cache
 
-_REST = 0.2  # seconds without a move, twice in turn, after which a surface is at rest
-# Seconds between two moves that may be of one interaction: where a processor draws, a picture takes long.
+_REST = 0.2  # seconds; a surface is at rest after two such periods without a move
+# Maximum seconds between two moves of one interaction; software rendering takes long to draw a picture.
 _TOGETHER = 4.0
 
 # Name prefix of operators that move objects and bones while a mouse button is held.
 _TRANSFORMS = "TRANSFORM_OT_"
 
-moved_cache = Cache()  # session_uid of a surface → when it moved, by `time.monotonic`
+moved_cache = Cache()  # session_uid of a surface → `time.monotonic` of its last move
 
-# session_uid of a surface → True: its mesh was reported while hair was paused, and may have other weights.
+# session_uid of a surface → True: its mesh was reported while hair was paused, and its weights may have changed.
 unchecked_cache = Cache()
 
 
 def frame_changed(surfaces):
-    """Surfaces have another shape in this frame: pause their hair while the animation plays."""
+    """Pause the hair of surfaces that are deformed in this frame, while the animation plays."""
     if surfaces and scene_time.is_shown_moving():
         _pause(surfaces)
 
 
 def shape_changed(surfaces):
-    """Surfaces have got another shape: pause their hair if viewports have drawn the one before, a moment ago.
+    """Pause the hair of deformed surfaces whose previous shape was drawn by viewports a moment ago.
 
-    To be called before their poses are invalidated.
+    Must be called before their poses are invalidated.
     """
     now, dragged = time.monotonic(), set()
     for surface_object in surfaces:
@@ -50,18 +49,18 @@ def shape_changed(surfaces):
 
 def _pause(surfaces):
     paused_hair.pause(surfaces)
-    _cancel()  # put off with every move
+    _cancel()  # restarts the wait with every move
     if paused_hair.is_any() and running.has_window():
         bpy.app.timers.register(settle, first_interval=_REST, persistent=True)
 
 
 def settle():
-    """For `bpy.app.timers`: wait once more, as the next move may have waited for a picture to be drawn."""
+    """Timer: wait a second time, as the next move may have waited for a picture to be drawn."""
     bpy.app.timers.register(resume_at_rest, first_interval=_REST, persistent=True)
 
 
 def resume_at_rest():
-    """For `bpy.app.timers`: let Blender carry hair once nothing moves; seconds until the next try, or None."""
+    """Timer: let Blender deform hair again once nothing moves; returns the seconds until the next try, or None."""
     if scene_time.is_shown_moving() or _is_transforming():
         return _REST
     resume()
@@ -69,20 +68,20 @@ def resume_at_rest():
 
 
 def resume():
-    """Let Blender carry all hair, before anybody may read it."""
+    """Let Blender deform all hair again, before its Curves are read."""
     _cancel()
     paused_hair.resume()
-    moved_cache.clear()  # what follows is no move
+    moved_cache.clear()  # the next update begins a new interaction
     for surface_object in bpy.data.objects if len(unchecked_cache) else ():
         if unchecked_cache.get(surface_object.session_uid) is not None:
-            surface_object.data.update_tag()  # to be reported again
+            surface_object.data.update_tag()  # so that Blender reports it again
     unchecked_cache.clear()
 
 
 def is_to_be_checked_later(surface_object):
-    """Whether the weights of a mesh that Blender reports as edited are compared when it has come to rest.
+    """Whether the weights of a mesh that Blender reports as edited are compared only once it is at rest.
 
-    Sliders of shape keys report it with each move, and reading weights takes longer than all else.
+    Sliders of shape keys report the mesh with each move, and reading weights is the slowest step of an update.
     """
     is_later = paused_hair.is_any()
     if is_later:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands of older files on subdivided surfaces.
 
-They turned from the flat faces of the cage, and turn from its smooth surface now (smooth_surface.py). Points at rest
-are moved so that strands stay where they were seen. Live hair is then computed again between its guides, where its
-neighbouring strands stay together.
+Older versions rotated strands with the flat faces of the cage; this version rotates them with its smooth surface
+(smooth_surface.py). Rest points are moved so that strands stay in place. Live hair is computed again between its
+guides, which keeps neighbouring strands together.
 """
 
 import bpy
@@ -16,22 +16,22 @@ from ..data.strands import curves, follow_nodes, posed_strands, stored_roots
 
 
 def renew():
-    """Let strands of older files on subdivided surfaces turn from smooth surfaces; what is linked stays as it is."""
+    """Update strands of older files on subdivided surfaces; linked strands stay as they are."""
     older = [o for o in bpy.data.objects if o.type == "CURVES" and o.library is None and follow_nodes.is_older(o)]
     found = {o.data.session_uid: o.data for o in older if o.data.library is None}
-    read = []  # all before any is written: hair between guides is computed again when these are
+    read = []  # all strands are read before any are written: writing guides regenerates their hair
     for datablock in found.values():
         try:
             read.append((datablock, *_seen(datablock)))
         except HairError:
-            continue  # what is wrong with the surface is said where hair is updated
+            continue  # the next update of the hair reports the error
     for datablock, surface, points in read:
         if points is not None:
             _write(datablock, surface, points)
 
 
 def _seen(datablock):
-    """The surface of strands and (N, 3) points at rest that it carries to where they were; (None, None): no change.
+    """Return the surface of strands and the (N, 3) rest points that keep them in place; (None, None) for no change.
 
     Raises `HairError`.
     """

@@ -7,18 +7,18 @@ from ..render.frames import composite
 
 
 def begin():
-    """A render begins: what those before lack is no longer of interest."""
+    """Clear the refusals of earlier renders when a render begins."""
     composite.refused_cache.clear()
 
 
 def end(blender_scene):
-    """The render has ended: say what is missing in it. Called in the render's thread."""
+    """Report missing hair when a render has ended. Called in the render's thread."""
     if composite.refusals(blender_scene) and not bpy.app.timers.is_registered(offer):
         bpy.app.timers.register(offer)
 
 
 def offer():
-    """For `bpy.app.timers`: the sentences, in a menu of the first window."""
+    """Timer: show the refusals in a menu of the first window."""
     for window in bpy.context.window_manager.windows[:1]:
         with bpy.context.temp_override(window=window):
             bpy.ops.wm.call_menu(name="VELLUS_MT_refused_hair")

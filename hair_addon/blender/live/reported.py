@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Data as of Blender's last update, to find what the next update changed."""
+"""Data at Blender's last update, to detect what the next update changed."""
 
 import bpy
 import numpy as np
@@ -15,13 +15,13 @@ guide_cache = Cache()
 # session_uid of a surface in Texture Paint mode → True. Blender may not report painting before that mode ends.
 painting_cache = Cache()
 
-# session_uid of Curves → `Affine`, where their surface was. After a transform was applied to it, or it was deleted,
-# nothing else may know.
+# session_uid of Curves → the former `Affine` of their surface, which is lost once the surface is deleted or its
+# transform is applied.
 place_cache = Cache()
 
 
 def have_guides_moved(guide_curves):
-    """Whether guides have moved since this was last called for them; True the first time."""
+    """Whether guides have moved since the last call for them; True the first time."""
     points = curves.read_points(guide_curves)
     before = guide_cache.get(guide_curves.session_uid)
     guide_cache.keep(guide_curves.session_uid, points)
@@ -29,17 +29,17 @@ def have_guides_moved(guide_curves):
 
 
 def points_of(guide_curves):
-    """(N, 3) local points of guides, as `have_guides_moved` has read them."""
+    """(N, 3) local points of guides, as last read by `have_guides_moved`."""
     return guide_cache.get(guide_curves.session_uid)
 
 
 def remember_places():
-    """Store where all surfaces are, after an update."""
+    """Store the transforms of all surfaces, after an update."""
     for datablock in bpy.data.hair_curves:
         if datablock.surface is not None and not surface_space.has_other_surface(datablock):
             place_cache.keep(datablock.session_uid, surface_space.to_world(datablock.surface))
 
 
 def place_before(datablock):
-    """The `Affine` of the surface of Curves in the last update, or None."""
+    """The `Affine` of the surface of Curves at the last update, or None."""
     return place_cache.get(datablock.session_uid)

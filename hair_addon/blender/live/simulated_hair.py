@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guides that are simulated while the timeline plays, and hair that follows them.
 
-The frame after the last one is simulated on the spot and kept in memory; a jump simulates nothing. Nothing here holds
-on to Blender's data: simulations are kept by the guides' session UID.
+The frame after the last simulated frame is simulated when it is shown, and stored in memory; a jump simulates nothing.
+Simulations are stored by the guides' session UID, without references to Blender's data.
 """
 
 import math
@@ -29,11 +29,11 @@ MOST_BYTES = 1 << 30  # of frames in memory
 
 @dataclass
 class _Played:
-    """Guides that were simulated in this session, and their frames."""
+    """The simulation of some guides in this session, and its frames."""
 
     simulated: GuideSimulation
-    frame: int  # that it has come to
-    frames: dict[int, np.ndarray] = field(default_factory=dict)  # points of frames, local at rest
+    frame: int  # the last simulated frame
+    frames: dict[int, np.ndarray] = field(default_factory=dict)  # points by frame, local at rest
     outdated: int | None = None  # the last frame that was simulated with other settings
     notes: tuple[HairError, ...] = ()
     worst: Broken = broken_guides.NONE
@@ -43,9 +43,9 @@ played_cache = Cache()  # session_uid of guide Curves → _Played
 
 
 def follow_frame(blender_scene, depsgraph):
-    """Bring all guides that simulate to the scene's time, and their hair with them.
+    """Move all simulated guides and their hair to the scene's time.
 
-    For a viewport the next frame is simulated where it is not baked; a render shows what is there already.
+    For a viewport the next frame is simulated if it is not baked; a render only shows existing frames.
     """
     if running.job() is not None or guide_baking.is_baking():
         return
@@ -63,11 +63,11 @@ def follow_frame(blender_scene, depsgraph):
             _show(guides, None, shown_in)
             guides.vellus.dynamics_status = str(error)
         else:
-            _say(guides, blender_scene, points, time)
+            _update_status(guides, blender_scene, points, time)
 
 
-def _say(guides, blender_scene, points, time):
-    """Say what is known of guides, which are shown at some points; or what is wrong with settings or a baked frame."""
+def _update_status(guides, blender_scene, points, time):
+    """Update the status of guides shown at `points`: errors of settings or a baked frame, if any."""
     try:
         _note_state(guides, blender_scene)
         fault = frame_folders.fault_of(guides, sorted({math.floor(time), math.ceil(time)}))
@@ -81,7 +81,7 @@ def _say(guides, blender_scene, points, time):
 
 
 def follow_settings(blender_scene, depsgraph):
-    """After an update: show guides as they are combed that do not simulate any more, and note changes of settings."""
+    """After an update, show guides whose simulation was disabled as combed, and note changes of settings."""
     for guides in bpy.data.hair_curves:
         state = guides.vellus
         _stay_as_seen(guides, blender_scene)
@@ -94,7 +94,7 @@ def follow_settings(blender_scene, depsgraph):
 
 
 def note_combed(combed, blender_scene):
-    """Note that guides have moved, for the panel: frames that are there are of guides as they were."""
+    """Note for the panel that guides were combed: existing frames are of the former guides."""
     for guides in frame_folders.simulating() if combed and not guide_baking.is_baking() else ():
         if guides in combed:
             try:
@@ -104,7 +104,7 @@ def note_combed(combed, blender_scene):
 
 
 def follow_undo(blender_scene, depsgraph):
-    """After an undo, a redo or a load, which show guides as they are combed: show them where they were simulated."""
+    """Show simulated guides again after an undo, a redo or a load, which show them as combed."""
     for guides in frame_folders.simulating() if running.has_window() else ():
         try:
             live_hair.show_guides(guides, _known(guides, blender_scene), depsgraph)
@@ -114,14 +114,14 @@ def follow_undo(blender_scene, depsgraph):
 
 
 def _follow_known(guides, blender_scene, depsgraph):
-    """Show guides where they are known to be, if they are shown elsewhere: frames were baked or removed."""
+    """Show guides at their known points if they are shown elsewhere, as frames were baked or removed."""
     points, shown = _known(guides, blender_scene), simulated_guides.point_cache.get(guides.session_uid)
     if (points is None) != (shown is None) or (points is not None and not np.array_equal(points, shown)):
         _show(guides, points, depsgraph)
 
 
 def _known(guides, blender_scene):
-    """Points of guides at the scene's time, or in the last frame before it that is known; None as combed."""
+    """Points of guides at the scene's time, or in the last known frame before it; None for combed guides."""
     points = _points_at(guides, scene_time.time_of(blender_scene))
     played = _played_now(guides)
     if points is None and played is not None:
@@ -141,7 +141,7 @@ def _note_change(guides, blender_scene, depsgraph):
 
 
 def _write_again(guides):
-    """Write the hair of guides again where it is to be kept outside of something, or not any more."""
+    """Write the hair of guides again if keeping it outside of colliders was enabled or disabled."""
     for hair in curves.followers(guides):
         bound = bindings.of(hair)
         if bound is not None and hair_outside.is_wanted(hair) != (bound.free is not None):
@@ -150,9 +150,9 @@ def _write_again(guides):
 
 
 def _points_at(guides, time, checked_in=None):
-    """Points of guides at a time in frames where they are baked, or were simulated in this session; else None.
+    """Points of guides at a time [frames] if it is baked or was simulated in this session; else None.
 
-    checked_in: (scene, depsgraph) of a viewport whose animation is to be compared with that of the baked frame.
+    checked_in: (scene, depsgraph) of a viewport whose animation is compared with the baked frame's.
     """
     baked = frame_folders.frames_of(guides)
     if baked is not None and baked.manifest is not None and baked.manifest.guide_count == len(guides.curves):
@@ -181,7 +181,7 @@ def _note_state(guides, blender_scene):
 
 
 def _play(guides, blender_scene, depsgraph):
-    """Points of guides in a frame that is not known: of the next one, or of the last that is; None as combed."""
+    """Points of guides in an unknown frame: simulates the next frame, else the last known; None for combed guides."""
     frame, settings = scene_time.frame_of(blender_scene), properties.dynamics_of(guides.vellus)
     if frame <= settings.start_frame:
         if frame == settings.start_frame:
@@ -196,7 +196,7 @@ def _play(guides, blender_scene, depsgraph):
 
 
 def _played_now(guides):
-    """What was simulated of guides in this session; None where they are others now, and begin again."""
+    """The `_Played` of guides in this session; None if the guides have changed, so that they begin again."""
     played = played_cache.get(guides.session_uid)
     settings = properties.dynamics_of(guides.vellus)
     if played is None or played.simulated.is_of(guides, settings):
@@ -230,7 +230,7 @@ def _stay_as_seen(guides, blender_scene):
 
 
 def _last_known(played, frame):
-    """Points of guides in a frame, or in the last one before it that is known; None without any."""
+    """Points of guides in a frame, or in the last known frame before it; None if there is none."""
     known = [number for number in played.frames if number <= frame]
     return played.frames[max(known)] if known else None
 
@@ -241,7 +241,7 @@ def _begin(guides, blender_scene, depsgraph):
 
 
 def _advance(played, guides, blender_scene, depsgraph, settings):
-    """Simulate one frame more, with the settings as they are now."""
+    """Simulate one more frame with the current settings."""
     settings = simulated(settings)
     before = played.simulated.settings
     if guide_simulation.unkeyed(guides, settings) != guide_simulation.unkeyed(guides, before):
@@ -267,7 +267,7 @@ def _show(guides, points, depsgraph):
 
 
 def notes_of(guides):
-    """Errors of colliders and force fields that were left out of the last frame that was played, and broken guides."""
+    """Errors of colliders and force fields that the last played frame leaves out, and of broken guides."""
     played, worst = played_cache.get(guides.session_uid), broken_guides.baked(guides)
     if not worst.count and played is not None:
         worst = played.worst

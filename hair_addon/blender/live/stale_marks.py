@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides and hair that are marked as stale: what they read has changed, and they are regenerated when it is time."""
+"""Marks guides and hair as stale when their inputs have changed; handlers regenerate them later."""
 
 from contextlib import contextmanager
 
@@ -18,10 +18,10 @@ from . import events, reported
 def follow_surface(surface_object, depsgraph, is_mesh_edited):
     """Transform the guides of a possibly edited surface, and update the hair between them.
 
-    is_mesh_edited: whether its mesh has changed, not modifiers alone, so that its weights may have too.
+    is_mesh_edited: whether the mesh itself has changed, not only modifiers, so that its weights may have changed too.
     """
     carried = set()  # guides that are not live, and have followed
-    kept = set()  # hair that a transform that was applied has left where it is
+    kept = set()  # hair that an applied transform has left in place
     for guides in bpy.data.hair_curves:
         state = guides.vellus
         if guides.surface != surface_object or not _is_carried(guides):
@@ -34,7 +34,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
                 state.is_stale = state.is_stale or (is_mesh_edited and not was_edited)
                 carried |= {guides} if was_edited else set()
                 continue
-            # Where its mask says, whose weights on the faces of another frame tell nothing.
+            # Masks limit its roots. Weights on another frame's faces cannot be compared.
             is_placed = not (curves.is_hand_made(guides) or frame_faces.are_others(guides))
             if is_mesh_edited and not was_edited and is_placed and _may_be_painted(guides, depsgraph):
                 state.is_stale = True
@@ -64,7 +64,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
 
 
 def follow_applied():
-    """Carry hair whose surface had a transform applied where nothing said so: in a file, by Blender without Vellus."""
+    """Move hair whose surface had a transform applied without a report: in a file, or while Vellus was disabled."""
     due = {datablock.surface for datablock in bpy.data.hair_curves if applied_transforms.is_due(datablock)}
     for surface_object in due:
         if surface_object.type == "MESH" and surface_object.mode == "OBJECT":
@@ -81,18 +81,18 @@ def _refusal_as_status(state):
 
 
 def _is_carried(datablock):
-    """Whether an edited surface carries Curves: guides, and hair that is kept as it came; other hair grows again."""
+    """Whether an edited surface moves Curves: guides and kept hair; other hair is regenerated."""
     kind = datablock.vellus.kind
     return kind == "GUIDES" or (kind == "HAIR" and curves.is_hand_made(datablock))
 
 
 def _may_be_painted(target, depsgraph):
-    """Whether weights that limit where roots are have changed; nothing is read where none do."""
+    """Whether weights that limit roots have changed; nothing is read without a vertex group."""
     return masks.of_curves(target).group != "" and staleness.has_other_mask(target, depsgraph)
 
 
 def follow_mask(guides, depsgraph):
-    """Mark hair as stale whose guides' mask has changed; the guides may be unchanged."""
+    """Mark hair as stale if the mask of its guides has changed; the guides may be unchanged."""
     for hair in curves.followers(guides):
         state = hair.vellus
         if not state.is_live or hair.surface is None:
@@ -103,7 +103,7 @@ def follow_mask(guides, depsgraph):
 
 
 def follow_partings(changed, depsgraph):
-    """Mark hair as stale whose part lines or guide regions are among some datablocks and have changed."""
+    """Mark hair as stale if its part lines or guide regions are among `changed` datablocks and differ."""
     for hair in bpy.data.hair_curves:
         state = hair.vellus
         if state.kind != "HAIR" or not _parts_by(state, changed):
@@ -117,7 +117,7 @@ def follow_partings(changed, depsgraph):
 
 
 def follow_flow(changed, depsgraph):
-    """Mark guides as stale whose flow lines are among some datablocks and have changed."""
+    """Mark guides as stale if their flow lines are among `changed` datablocks and differ."""
     for guides in bpy.data.hair_curves:
         state = guides.vellus
         lines = text_of(state.guides, "flow_lines")
@@ -134,13 +134,13 @@ def follow_flow(changed, depsgraph):
 def _parts_by(state, changed):
     if drawn_lines.is_among(text_of(state.hair, "part_lines"), changed):
         return True
-    # Read with each step of a stroke: so only if guides have regions of their own.
+    # Guides are read with each step of a stroke, so only if they have a region attribute.
     guides = state.guide_curves
     return guides is not None and guides in changed and text_of(state.hair, "region_attribute") in guides.attributes
 
 
 def images_of(target):
-    """The names of the images that guides or hair are masked by; hair's guides have their own."""
+    """The names of the images that mask guides or hair; hair does not include its guides' image."""
     state = target.vellus
     if state.kind == "GUIDES":
         return {text_of(state.guides, "density_image")} - {""}
@@ -149,7 +149,7 @@ def images_of(target):
 
 
 def follow_images(target, depsgraph):
-    """Mark guides or hair as stale whose images may have been painted. Roots wait until Texture Paint is left."""
+    """Mark guides or hair as stale, as their images may have been painted. Roots wait until Texture Paint is left."""
     state = target.vellus
     state.is_stale = True
     if state.kind != "HAIR" or not text_of(state.hair, "density_image") or target.surface.mode == "TEXTURE_PAINT":
@@ -160,12 +160,12 @@ def follow_images(target, depsgraph):
 
 
 def has_masks(state):
-    """Whether some of its styles has a mask."""
+    """Whether any style of a hair's settings has a mask."""
     return any(any(style_items.masks_of(item)) for item in state.styles)
 
 
 def follow_styles(changed):
-    """Mark hair as stale whose styles read some of the objects that changed, or whose surface moved among them."""
+    """Mark hair as stale if its styles read any of the `changed` objects, or read objects and its surface changed."""
     for hair in bpy.data.hair_curves:
         state = hair.vellus
         if state.kind != "HAIR" or not state.styles:
@@ -176,7 +176,7 @@ def follow_styles(changed):
 
 
 def mark_followers(guide_curves, gone_along=()):
-    """Mark all hair between some guides as stale, but for kept hair that has followed them, and what went along."""
+    """Mark all hair between some guides as stale, except kept hair that has followed them, and `gone_along`."""
     for hair in curves.followers(guide_curves):
         if hair in gone_along:
             events.strands_made(hair)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guide weights are stored with hair when nodes begin to read them."""
+"""Stores guide weights with hair when nodes begin to read them."""
 
 import bpy
 
@@ -11,7 +11,7 @@ from . import live_hair
 
 
 def follow(reports, depsgraph):
-    """Store the guide weights of hair that nodes read them of, and that has none; reports: `updates.Update`s."""
+    """Store the missing guide weights of hair whose nodes read them; reports: `updates.Update`s."""
     have_nodes_changed = any(report.is_of(bpy.types.NodeTree, bpy.types.Material) for report in reports)
     if have_nodes_changed:
         guide_map_readers.reading_cache.clear()

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides and hair that are not updated automatically, updated when the artist asks for it."""
+"""Updates guides and hair without Auto Update on demand."""
 
 from ..data.strands import curves
 from . import live_hair
 
 
 def update_once(parts, view_layer):
-    """Update Curves as if Auto Update were on for a moment; the others stay as they are."""
+    """Update Curves as if Auto Update were on for a moment; parts with Auto Update stay as they are."""
     waiting = [part for part in parts if not part.vellus.is_live]
     try:
         for part in waiting:
@@ -14,7 +14,7 @@ def update_once(parts, view_layer):
             part.vellus.is_stale = part.vellus.is_stale and not curves.is_combed(part)
             part.update_tag()
             if part.surface is not None and part.surface.data is not None:
-                part.surface.data.update_tag()  # which may have been edited meanwhile
+                part.surface.data.update_tag()  # the mesh may have been edited meanwhile
         view_layer.update()
         live_hair.write_all()
     finally:

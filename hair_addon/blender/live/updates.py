@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender reports as updated, copied before anything else is done.
+"""Blender's reports of updates, copied before anything else is done.
 
-Handlers of other add-ons may have run before ours, and deleted what is reported: Blender's reports lead to it all the
-same, where its memory was. Its evaluated copy is there, which the depsgraph owns: by it
-what is left is known.
+Handlers of other add-ons may have deleted reported datablocks before ours runs; the reports then point to freed memory.
+The evaluated copies still exist, as the depsgraph owns them: they identify the remaining datablocks.
 """
 
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ import bpy
 class Update:
     """A report of one datablock.
 
-    datablock: None for what was deleted since, and, where others have run before, for what is part of another one.
+    datablock: None if deleted since, and, if other handlers have run before, for data embedded in another datablock.
     """
 
     kind: type
@@ -28,12 +27,12 @@ class Update:
     is_shading: bool
 
     def is_of(self, *kinds: type) -> bool:
-        """Whether it is of some of Blender's types."""
+        """Whether the datablock is of any of some Blender types."""
         return issubclass(self.kind, kinds)
 
 
 def read(depsgraph: Any, handlers: Sequence[Any], own: Any) -> list[Update]:
-    """All reports of an update; handlers: the list of Blender's that `own`, which runs, is in."""
+    """All reports of an update; own: the running handler; handlers: Blender's list that contains it."""
     present = None if handlers[0] is own else _Present(depsgraph)
     found = []
     for update in depsgraph.updates:
@@ -45,13 +44,13 @@ def read(depsgraph: Any, handlers: Sequence[Any], own: Any) -> list[Update]:
 
 
 class _Present:
-    """The datablocks that there are, of types that are asked for, by where their evaluated copies are."""
+    """Existing datablocks by the address of their evaluated copies, read per type on demand."""
 
     def __init__(self, depsgraph):
         self._depsgraph, self._known = depsgraph, {}
 
     def original_of(self, evaluated):
-        """The datablock of an evaluated one, None for one that is gone."""
+        """The original of an evaluated datablock; None if it was deleted."""
         name = _collection_of(type(evaluated))
         if name is None:
             return None
@@ -63,13 +62,13 @@ class _Present:
 
 @cache
 def _collection_of(kind):
-    """The name in `bpy.data` of what holds datablocks of a type; None for one that no collection holds."""
+    """The name of the collection in `bpy.data` for datablocks of a type, or None."""
     held = {p.fixed_type.identifier: p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"}
     return next((held[base.__name__] for base in kind.__mro__ if base.__name__ in held), None)
 
 
 def originals(updates: list[Update], is_geometry: bool = False, is_transform: bool = False) -> list[bpy.types.ID]:
-    """The datablocks of reports of any of some kinds of change."""
+    """The datablocks reported with any of the given kinds of change."""
     wanted = (u for u in updates if (is_geometry and u.is_geometry) or (is_transform and u.is_transform))
     return [update.datablock for update in wanted if update.datablock is not None]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes of hair that follow the armature of their surface: each piece with the weights of the surface at its root."""
+"""Meshes of hair that follow the armature of their surface: each piece has the weights of the surface at its root."""
 
 import bpy
 import numpy as np
@@ -8,7 +8,7 @@ from ....core import geometry
 from ....core.geometry.mesh import interpolate
 from .. import scene, vertex_groups
 
-_LEAST = 1e-4  # weights below it are left out
+_LEAST = 1e-4  # smaller weights are ignored
 
 
 def armatures_of(mesh_object):
@@ -17,10 +17,10 @@ def armatures_of(mesh_object):
 
 
 def bind(mesh_object, surface_object, piece_size):
-    """Give a mesh object on a surface the surface's armatures, and each of its pieces one place's weights.
+    """Give a mesh object the armatures of its surface, and each of its pieces the weights at the piece's root.
 
-    piece_size: vertices of each piece, which lie one after the other from the root; the mesh is where the hair is now.
-    Its vertices move to where the armature's pose takes them from, so that it stays there.
+    piece_size: number of consecutive vertices of each piece, from root to tip. The mesh is in the current pose; its
+    vertices are transformed by the inverse of the pose, so that the armature leaves the mesh in place.
     """
     modifiers = armatures_of(surface_object)
     bones = {bone.name for modifier in modifiers for bone in modifier.object.data.bones if bone.use_deform}
@@ -41,7 +41,7 @@ def bind(mesh_object, surface_object, piece_size):
 
 
 def _weights_at(places, surface_object, names):
-    """(N, K) weights, that sum to one or are zero, of the surface nearest to local places (N, 3)."""
+    """(N, K) weights of the surface nearest to local places (N, 3); each row sums to one or is zero."""
     depsgraph = scene.present_depsgraph()
     surface = scene.read_surface(surface_object, depsgraph)
     weights = np.stack([scene.read_vertex_group(surface_object, depsgraph, name) for name in names], axis=1)
@@ -52,7 +52,7 @@ def _weights_at(places, surface_object, names):
 
 
 def _add(mesh_object, names, weights, piece_size, modifiers):
-    """Vertex groups with weights of pieces (N, K), and modifiers like others."""
+    """Add vertex groups with weights (N, K) of pieces, and copies of modifiers."""
     for name, of_pieces in zip(names, weights.T, strict=True):
         if of_pieces.any():
             vertex_groups.paint(mesh_object.vertex_groups.new(name=name), np.repeat(of_pieces, piece_size))
@@ -64,7 +64,7 @@ def _add(mesh_object, names, weights, piece_size, modifiers):
 
 
 def _poses(places, weights, names, mesh_object, surface_object):
-    """(N, 4, 3) rows x, y, z and origin of the affine map by which the pose takes each piece: seen on four points."""
+    """(N, 4, 3) rows x, y, z and origin of the pose's affine map of each piece, measured with four points."""
     span = max(float(np.ptp(places, axis=0).max()), *surface_object.dimensions, 1e-6)
     corners = np.concatenate([span * np.eye(3), np.zeros((1, 3))]).astype(np.float32)
     probe = bpy.data.meshes.new("Probe")

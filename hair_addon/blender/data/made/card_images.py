@@ -12,7 +12,7 @@ from ...host.notices import name_of
 
 
 def new_images(name, maps):
-    """{map: image} of `texels.maps`, not kept yet; "color" has alpha too. name: that images begin with."""
+    """{map: image} of `texels.maps`, neither packed nor saved; "color" includes alpha. name: prefix of image names."""
     pixels = {"color": np.dstack([texels.srgb(maps["color"]), maps["alpha"]])}
     pixels |= {kind: maps[kind] for kind in texels.MAPS if kind != "color"}
     return {kind: _new_image(f"{name} {kind}", kind, values) for kind, values in pixels.items()}
@@ -21,7 +21,7 @@ def new_images(name, maps):
 def keep(levels, folder, stem):
     """Pack the images of levels into the .blend, or write them as .png files, all or none. Raises `HairError`.
 
-    levels: [`new_images`]; folder: of the files, None to pack; they are named after `stem`, the level and the map.
+    levels: [`new_images`]; folder: of the files, None to pack. Files are named after `stem`, the level and the map.
     """
     images = [(f"{stem}{index}_{kind}", image) for index, made in enumerate(levels) for kind, image in made.items()]
     if folder is None:
@@ -32,18 +32,18 @@ def keep(levels, folder, stem):
 
 
 def files_of_others(name, folder):
-    """Names of the files in a folder, in small letters, of images whose names begin in another way."""
+    """Case-folded names of the files in a folder that belong to images whose names do not begin with `name`."""
     others = [image for image in bpy.data.images if image.filepath and not name_of(image).startswith(name)]
     files = [Path(bpy.path.abspath(image.filepath, library=image.library)).resolve() for image in others]
     return {file.name.casefold() for file in files if file.parent == folder.resolve()}
 
 
 def _new_image(name, kind, values):
-    """A new image with 8 bits a channel of (n, n), (n, n, 3) or (n, n, 4) values from 0 to 1."""
+    """A new image with 8 bits per channel of (n, n), (n, n, 3) or (n, n, 4) values from 0 to 1."""
     size = len(values)
     image = bpy.data.images.new(name, size, size, alpha=kind == "color")
     image.file_format = "PNG"
-    image.alpha_mode = "CHANNEL_PACKED"  # colors go on beyond the edges of strands
+    image.alpha_mode = "CHANNEL_PACKED"  # colors continue beyond the edges of strands
     if kind != "color":
         image.colorspace_settings.name = "Non-Color"
     rgba = np.ones((size, size, 4), np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a groom in an asset library stands on: arrays ↔ a mesh object of its own; and its picture."""
+"""The surface and the preview of a groom in an asset library: arrays ↔ a mesh object and pixels."""
 
 import bpy
 import numpy as np
@@ -12,7 +12,7 @@ _UV_MAP = "UVMap"
 
 
 def surface_object(name, mesh, corner_uvs, masks):
-    """A new mesh object, in no scene, of a `TriMesh`.
+    """A new mesh object of a `TriMesh`, not linked to a scene.
 
     corner_uvs: (F, 3, 2), None for no UV map; masks: {name: (V,) weights}, which become vertex groups.
     """
@@ -28,7 +28,7 @@ def surface_object(name, mesh, corner_uvs, masks):
 
 
 def read_surface(owner):
-    """(`TriMesh`, (F, 3, 2) UV coordinates of its corners or None) of a mesh object as it is stored."""
+    """(`TriMesh`, (F, 3, 2) UV coordinates of corners or None) of a mesh object, without its modifiers."""
     mesh = owner.data
     faces = scene.faces_of(mesh)
     corners = scene.triangle_corners(mesh, faces, name_of(owner))
@@ -41,14 +41,14 @@ def read_surface(owner):
 
 
 def set_picture(datablock, pixels):
-    """Make pixels (height, width, 4), sRGB, the first row at the bottom, the preview of a datablock."""
+    """Set the preview of a datablock to (height, width, 4) sRGB pixels, bottom row first."""
     preview = datablock.preview_ensure()
     preview.image_size = pixels.shape[1], pixels.shape[0]
     preview.image_pixels_float.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
 
 
 def read_picture(datablock):
-    """(height, width, 4) float32 of a datablock's preview; None without one."""
+    """(height, width, 4) float32 of a datablock's preview, or None."""
     preview = datablock.preview
     if preview is None or not all(preview.image_size):
         return None
@@ -59,7 +59,7 @@ def read_picture(datablock):
 
 
 def read_pixels(image):
-    """(height, width, 4) float32 of an image with an alpha channel, the first row at the bottom."""
+    """(height, width, 4) float32 of an image with an alpha channel, bottom row first."""
     width, height = image.size
     pixels = np.empty((height, width, image.channels), np.float32)
     image.pixels.foreach_get(pixels.ravel())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that are made of hair: arrays → objects in a collection of their own."""
+"""Meshes made of hair: arrays → objects in their own collection."""
 
 import bpy
 import numpy as np
@@ -10,14 +10,14 @@ UV_MAP = "UVMap"
 
 
 def new_collection(name, surface_object):
-    """A new collection beside a surface."""
+    """A new collection in the collection of a surface."""
     made = bpy.data.collections.new(name)
     surface_collections.collection_of(surface_object).children.link(made)
     return made
 
 
 def new_object(name, made, surface_object, collection, material):
-    """A mesh object of a `PolygonMesh` in a surface's local coordinates, a child of the surface."""
+    """A new mesh object of a `PolygonMesh` in a surface's local coordinates, a child of the surface."""
     mesh = bpy.data.meshes.new(name)
     faces = made.faces
     mesh.vertices.add(len(made.vertices))
@@ -39,6 +39,6 @@ def new_object(name, made, surface_object, collection, material):
 
 def hide(mesh_object):
     """Hide an object in the viewport and in renders."""
-    if bpy.context.view_layer.objects.get(mesh_object.name) == mesh_object:  # as its surface is
+    if bpy.context.view_layer.objects.get(mesh_object.name) == mesh_object:  # the view layer may exclude it
         mesh_object.hide_set(True)
     mesh_object.hide_render = True

@@ -5,17 +5,17 @@ import numpy as np
 
 from ....core.imaging.thin_lens import Lens
 
-_LEAST = 1e-5  # of an f-stop, and of a distance [m], as in Blender
+_LEAST = 1e-5  # minimum of an f-stop and of a distance [m], as in Blender
 
 
 def read_lens(scene, depsgraph, camera=None):
-    """The `Lens` of a camera, the scene's own, or None where everything is in focus."""
+    """The `Lens` of a camera, by default the scene's; None if everything is in focus."""
     camera = camera or scene.camera
     if camera is None or camera.type != "CAMERA" or not camera.data.dof.use_dof or camera.data.type == "PANO":
         return None
     camera = camera.evaluated_get(depsgraph)
     depth_of_field = camera.data.dof
-    # As in Cycles: with a parallel projection the f-stop alone gives the aperture, by a lens of one metre.
+    # As in Cycles: with a parallel projection the aperture follows from the f-stop and a focal length of one metre.
     focal_length = 1.0 if camera.data.type == "ORTHO" else 1e-3 * camera.data.lens
     lens = Lens(
         0.5 * focal_length / max(depth_of_field.aperture_fstop, _LEAST),
@@ -28,7 +28,7 @@ def read_lens(scene, depsgraph, camera=None):
 
 
 def _focus_distance(camera, depth_of_field):
-    """[m] along the view, to an object or to a bone of it, if one is in focus."""
+    """Distance [m] along the view; to the focus object or its bone, if set."""
     focused = depth_of_field.focus_object
     if focused is None:
         return depth_of_field.focus_distance

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compositor nodes that lay hair of another scene over what a scene renders, in the artist's node tree or a new one.
+"""Compositor nodes that composite hair of another scene over a scene's render, in the artist's node tree or a new one.
 
-Between a Render Layers node and whatever its image goes to: its image, multiplied by the light that hair leaves on
-surfaces, and the hair over it. They are found again by their names.
+The nodes stand between a Render Layers node and the targets of its image: they multiply the image by the light that
+hair leaves on surfaces, and lay hair over the result. They are identified by their names.
 """
 
 import bpy
@@ -13,7 +13,7 @@ _PREFIX = "Vellus "  # of the names of our nodes
 _HAIR, _SHADOW, _OVER = "Hair", "Hair Shadow", "Hair Over Surfaces"
 _OURS = "is_vellus_composite"  # the custom property of trees created by Vellus
 
-# Type and place from the Render Layers node.
+# Type, and location relative to the Render Layers node.
 _NODES = {
     _HAIR: ("CompositorNodeRLayers", (0.0, -420.0)),
     _SHADOW: ("ShaderNodeMix", (300.0, 0.0)),
@@ -22,31 +22,31 @@ _NODES = {
 
 
 def has_nodes(blender_scene):
-    """Whether a scene's compositor has nodes of ours."""
+    """Whether a scene's compositor has our nodes."""
     tree = blender_scene.compositing_node_group
     return tree is not None and any(_ours(tree))
 
 
 def have_lost_scene(blender_scene):
-    """Whether the scene was deleted that renders the hair for a scene's compositor."""
+    """Whether the hair scene of a scene's compositor was deleted."""
     return any(_is_hair(node) and node.scene is None for node in _ours(blender_scene.compositing_node_group))
 
 
 def are_of(blender_scene, hair_scene):
-    """Whether a scene has a node tree of its own that lays what `hair_scene` renders over something."""
+    """Whether a scene's node tree composites the render of `hair_scene`, and no other scene uses the tree."""
     tree = blender_scene.compositing_node_group
     return any(_is_hair(node) and node.scene == hair_scene for node in _ours(tree)) and tree.users == 1
 
 
 def lay_over(blender_scene, hair_scene):
-    """Let the nodes of `insert` lay over what another hair's scene renders."""
+    """Let the nodes of `insert` composite the render of another hair scene."""
     for node in _ours(blender_scene.compositing_node_group):
         if _is_hair(node):
             node.scene = hair_scene
 
 
 def insert(blender_scene, hair_scene):
-    """Lay what `hair_scene` renders over what a scene renders. Raises `HairError`."""
+    """Composite the render of `hair_scene` over a scene's render. Raises `HairError`."""
     tree = blender_scene.compositing_node_group
     if tree is None:
         tree = blender_scene.compositing_node_group = _new_tree(blender_scene)
@@ -67,7 +67,7 @@ def insert(blender_scene, hair_scene):
 
 
 def adjust(blender_scene, is_shadowed, is_laid_over):
-    """Multiply surfaces by hair's shadow, or not; lay hair over them, or leave out its render too."""
+    """Enable or disable hair's shadow on surfaces, and compositing hair at all, including its render."""
     nodes = {node.name.removeprefix(_PREFIX): node for node in _ours(blender_scene.compositing_node_group)}
     factors = {_SHADOW: ("Factor_Float", is_shadowed and is_laid_over), _OVER: ("Factor", is_laid_over)}
     for name, (socket, is_on) in factors.items():
@@ -78,7 +78,7 @@ def adjust(blender_scene, is_shadowed, is_laid_over):
 
 
 def remove(blender_scene):
-    """Take away the nodes of `insert`, and a tree of ours in which nothing else was added."""
+    """Remove the nodes of `insert`, and our tree if nothing else was added to it."""
     tree = blender_scene.compositing_node_group
     if tree is None:
         return
@@ -105,7 +105,7 @@ def _is_hair(node):
 
 
 def _rendered(tree, blender_scene):
-    """The Render Layers node of a scene whose image is used; of several that of the view layer that a set shows."""
+    """The used Render Layers node of a scene; if there are several, the one of `_shown_layer`."""
     layers = [n for n in tree.nodes if n.bl_idname == "CompositorNodeRLayers" and n.scene == blender_scene]
     used = [node for node in layers if node.outputs["Image"].links]
     if not used:
@@ -114,7 +114,7 @@ def _rendered(tree, blender_scene):
 
 
 def _shown_layer(blender_scene):
-    """The name of the first view layer that is rendered, of the first where none is."""
+    """The name of the first view layer that is rendered, or of the first if none is."""
     layers = blender_scene.view_layers
     return next((layer.name for layer in layers if layer.use), layers[0].name)
 
@@ -139,7 +139,7 @@ def _new_node(tree, name, rendered):
 
 
 def _input(node, key):
-    """A socket by its identifier or name: those of a Mix node share their names."""
+    """A socket by its identifier or name: sockets of a Mix node share their names."""
     return next(socket for socket in node.inputs if key in {socket.identifier, socket.name})
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes as they are drawn around hair: triangles, normals and materials of all that a viewport or a render shows."""
+"""Meshes around hair in a viewport or a render: triangles, normals and materials."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,23 +16,23 @@ from .rendered_instances import is_rendered, placed_by
 
 @dataclass(frozen=True)
 class DrawnMesh:
-    """Triangles as they are drawn: (V, 3) float32 vertices in the object's coordinates, (3 F,) vertices of corners.
+    """Triangles of a drawn mesh: (V, 3) float32 vertices in the object's coordinates, (3 F,) vertices of corners.
 
-    to_world: (4, 4), from there to world space [m]; normals: unit, (V, 3) of vertices or (3 F, 3) of corners, in the
-    object's coordinates too; uvs: (3 F, 2), None: zero; parts: (first corner, number of corners, `SurfaceMaterial`) of
-    each material. A holdout has none: where it is nearest the picture is empty. owner: `owner_of` it; is_seen: whether
-    a camera sees it; casts_shadow: whether it stops light.
+    to_world: (4, 4), from the object's coordinates to world space [m]; normals: unit, (V, 3) of vertices or (3 F, 3) of
+    corners, in the object's coordinates; uvs: (3 F, 2), None: zero; parts: (first corner, number of corners,
+    `SurfaceMaterial`) of each material; None for a holdout, which leaves the picture empty where it is nearest.
+    owner: by `owner_of`; is_seen: visible to cameras; casts_shadow: whether the mesh blocks light.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
     to_world: np.ndarray
-    normals: np.ndarray | None  # None where they were not read
+    normals: np.ndarray | None  # None if they were not read
     has_vertex_normals: bool
     uvs: np.ndarray | None
     parts: tuple | None
     owner: tuple = ()
-    materials: tuple = ()  # (number of corners, `SurfaceMaterial`), in the corners' order: of a holdout too
+    materials: tuple = ()  # (number of corners, `SurfaceMaterial`) in the corners' order, also for a holdout
     is_seen: bool = True
     casts_shadow: bool = True
 
@@ -67,16 +67,16 @@ class DrawnMesh:
 
     @property
     def is_clear(self):
-        """Whether all of it lets light through: it hides nothing, and casts no shadow."""
+        """Whether all materials let light through: the mesh hides nothing and casts no shadow."""
         return self.parts is not None and all(material.is_clear for _first, _count, material in self.parts)
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """Triangles of a mesh in the order in which they are drawn, which a mesh keeps while it moves."""
+    """Triangles of a mesh in drawing order, which stays the same while the mesh moves."""
 
     faces: Faces
-    slots: np.ndarray  # (F,) material indices of its polygons, empty where it has one material
+    slots: np.ndarray  # (F,) material indices of its polygons; empty with a single material
     loops: np.ndarray  # (3 F',) corners of its triangles
     runs: tuple  # (material slot, number of its triangles)
 
@@ -97,10 +97,10 @@ layout_cache = Cache(capacity=64)  # session_uid of a mesh object → `_Layout`
 
 
 def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=True):
-    """A `DrawnMesh` for every mesh that a 3-D viewport shows as a surface, or without one a render; instances too.
+    """A `DrawnMesh` for every mesh, including instances, that a 3D viewport shows as a surface; None: a render.
 
-    is_moving: whether polygons may be cut as they were before a moment ago, while their corners are the same;
-    has_normals: whether they are needed, which Blender computes for each pose.
+    is_moving: reuse the last triangulation of polygons if their corners are the same; has_normals: whether normals are
+    needed, which Blender computes for each pose.
     """
     meshes, override = [], depsgraph.view_layer_eval.material_override
     for instance in depsgraph.object_instances:
@@ -116,12 +116,12 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
 
 
 def told_apart(meshes):
-    """The same meshes where materials are shown: what is solid of each and what is clear, without what is invisible."""
+    """Split meshes into solid and clear parts, for drawing with materials; invisible parts are left out."""
     return [part for mesh in meshes for part in _solid_and_clear(mesh)]
 
 
 def held_out(meshes):
-    """The same meshes as holdouts, without those that are clear, which hide nothing."""
+    """The meshes as holdouts, without clear meshes, which hide nothing."""
     return [replace(mesh, parts=None) for mesh in meshes if not mesh.is_clear]
 
 
@@ -139,12 +139,12 @@ def _is_surface_seen(instance, viewport):
 
 
 def _has(instance, question, view_layer):
-    """What a view layer says of an instance; as in Cycles, that of what places it."""
+    """A view layer's setting of an instance; as in Cycles, that of the object that places it."""
     return getattr(placed_by(instance).original, question)(view_layer=view_layer)
 
 
 def _rays_of(instance, view_layer):
-    """{`DrawnMesh` field: value} of the rays that see a mesh in a render."""
+    """{`DrawnMesh` field: value} from the ray visibility of a mesh in a render."""
     placed = {instance.object, placed_by(instance)}
     is_seen = all(one.visible_camera for one in placed) and not _has(instance, "indirect_only_get", view_layer)
     return {"is_seen": is_seen, "casts_shadow": all(one.visible_shadow for one in placed)}
@@ -164,7 +164,7 @@ def _solid_and_clear(mesh):
 
 
 def _some_parts(mesh, parts):
-    """A `DrawnMesh` of some of the parts of another."""
+    """A `DrawnMesh` with some of a mesh's parts."""
     corners = np.concatenate([np.arange(first, first + count) for first, count, _material in parts])
     ends = np.cumsum([count for _first, count, _material in parts])
     return replace(
@@ -204,7 +204,7 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, 
 
 
 def _normals(mesh, layout, has_vertex_normals):
-    """Float32 unit normals of vertices (V, 3), or of drawn corners (3 F, 3)."""
+    """Float32 unit normals of vertices (V, 3) or of drawn corners (3 F, 3)."""
     if has_vertex_normals:
         normals = np.empty((len(mesh.vertices), 3), np.float32)
         mesh.vertex_normals.foreach_get("vector", normals.ravel())
@@ -215,7 +215,7 @@ def _normals(mesh, layout, has_vertex_normals):
 
 
 def _layout(mesh_object, mesh, is_moving):
-    """The `_Layout` of an evaluated mesh: with `is_moving` the one before, if it fits."""
+    """The `_Layout` of an evaluated mesh; with `is_moving` the previous layout, if it fits."""
     faces, slots = scene.faces_read_again(mesh_object.original, mesh), np.zeros(0, np.int32)
     if len(mesh_object.material_slots) > 1:
         slots = np.zeros(len(mesh.polygons), np.int32)
@@ -238,7 +238,7 @@ def _layout(mesh_object, mesh, is_moving):
 
 
 def _parts(mesh_object, runs, override):
-    """`DrawnMesh.parts` of an evaluated mesh, with as many materials as it has; override: the view layer's material."""
+    """`DrawnMesh.parts` of an evaluated mesh, one for each material; override: the view layer's material."""
     materials = [override or slot.material for slot in mesh_object.material_slots] or [override]
     ends = 3 * np.cumsum([count for _slot, count in runs])
     return tuple(
@@ -248,7 +248,7 @@ def _parts(mesh_object, runs, override):
 
 
 def _read_uvs(mesh, loops, parts):
-    """(3 F, 2) float32 UVs of drawn corners, of each part by the UV map of its images; None where there is none."""
+    """(3 F, 2) float32 UVs of drawn corners, for each part from the UV map of its images; None without UV maps."""
     names = [material.uv_map for _first, _count, material in parts]
     layers = [None if name is None else (mesh.uv_layers.get(name) or _active_uvs(mesh)) for name in names]
     if all(layer is None for layer in layers):
@@ -263,5 +263,5 @@ def _read_uvs(mesh, loops, parts):
 
 
 def _active_uvs(mesh):
-    """The UV map that renders use, None where there is none."""
+    """The UV map that renders use, or None."""
     return next((layer for layer in mesh.uv_layers if layer.active_render), None)

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light linking: which objects a light lights, and which cast its shadows."""
+"""Light linking: the objects that a light illuminates, and the objects that cast its shadows."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Links:
-    """Objects that a rule includes and excludes, by their session_uid; without any included it holds for all others."""
+    """Session UIDs of objects that a rule includes and excludes; without included objects it applies to all others."""
 
     included: frozenset
     excluded: frozenset
 
     def has(self, owner):
-        """Whether a rule holds for an object; owner: session_uids of its instancer, or 0, and of itself.
+        """Whether the rule applies to an object; owner: session UIDs of its instancer, or 0, and of the object.
 
-        An instance follows its instancer where the rule knows that, as in Cycles.
+        An instance follows its instancer if the rule contains the instancer, as in Cycles.
         """
         known = self.included | self.excluded
         uid = next((uid for uid in owner if uid in known), None)
@@ -25,7 +25,7 @@ ALL = Links(frozenset(), frozenset())
 
 
 def read_links(light_object):
-    """(`Links` of what an original light lights, `Links` of what casts its shadows)."""
+    """(`Links` of the objects that an original light illuminates, `Links` of the objects that cast its shadows)."""
     linking = light_object.light_linking
     return _links(linking.receiver_collection), _links(linking.blocker_collection)
 
@@ -33,7 +33,7 @@ def read_links(light_object):
 def _links(collection):
     if collection is None:
         return ALL
-    states = {}  # the last one counts: an object's own after those of collections
+    states = {}  # the last state applies: objects after collections
     for child, item in zip(collection.children, collection.collection_children, strict=True):
         states |= dict.fromkeys((o.session_uid for o in child.all_objects), item.light_linking.link_state)
     for linked, item in zip(collection.objects, collection.collection_objects, strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Nodes of a tree that its result follows from: links lead from them to an output."""
+"""Nodes of a tree that contribute to its result: links lead from them to an output."""
 
 import bpy
 
@@ -7,7 +7,7 @@ _VIEWERS = (bpy.types.CompositorNodeViewer, bpy.types.GeometryNodeViewer)
 
 
 def images(owner):
-    """(image, node) of the nodes with an image that the result of a node tree, or of its owner, follows from."""
+    """(image, node) of the nodes with an image that contribute to the result of a node tree, or of its owner's tree."""
     tree = owner if isinstance(owner, bpy.types.NodeTree) else owner.node_tree
     if tree is None:
         return []
@@ -20,7 +20,7 @@ def images(owner):
 
 
 def _live(tree):
-    """The nodes from which links lead to one without outputs, but for viewers; muted ones give nothing of their own."""
+    """The nodes from which links lead to an output node other than a viewer; muted nodes are left out."""
     before = {}
     for link in tree.links:
         if not link.is_muted:

@@ -14,9 +14,9 @@ def is_panoramic(camera):
 
 
 def read_panorama(blender_scene, camera, size, shift_x=None):
-    """The `Panorama` of an evaluated camera for a picture of this size [pixels], None of one that is not panoramic.
+    """The `Panorama` of an evaluated camera for a picture of this size [pixels]; None if it is not panoramic.
 
-    shift_x: in place of the camera's own. Raises `HairError`.
+    shift_x: replaces the camera's value. Raises `HairError`.
     """
     if not is_panoramic(camera):
         return None
@@ -40,7 +40,7 @@ def read_panorama(blender_scene, camera, size, shift_x=None):
 
 
 def _sensor(data, render, size):
-    """(width, height) [mm] of the part of the sensor that a picture shows, as Cycles fits it."""
+    """(width, height) [mm] of the visible part of the sensor, fitted as in Cycles."""
     width, height = size[0] * render.pixel_aspect_x, size[1] * render.pixel_aspect_y
     is_horizontal = data.sensor_fit == "HORIZONTAL" or (data.sensor_fit == "AUTO" and width > height)
     length = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
@@ -48,7 +48,7 @@ def _sensor(data, render, size):
 
 
 def _cylinder(data):
-    """Angles [rad], and heights by the radius."""
+    """(u_min, u_max) angles [rad] and (v_min, v_max) heights divided by the radius."""
     radius = max(data.central_cylindrical_radius, 1e-9)
     heights = data.central_cylindrical_range_v_min / radius, data.central_cylindrical_range_v_max / radius
     return (data.central_cylindrical_range_u_min, data.central_cylindrical_range_u_max, *heights)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that renders of a scene read: linked libraries, images, caches of meshes, volumes; which of them are missing.
+"""Files that renders of a scene read, and which of them are missing: linked libraries, images, mesh caches, volumes.
 
-Blender renders without them, black or otherwise wrong, and calls that a success.
+Blender renders without missing files, black or otherwise wrong, and reports success.
 """
 
 import hashlib
@@ -16,9 +16,9 @@ import bpy
 from ....core.errors import HairError
 from . import live_nodes
 
-MOST_NAMED = 4  # of missing files in a sentence
+MOST_NAMED = 4  # maximum number of missing files in a sentence
 
-# How files begin that Blender's image readers know; it is asked about others.
+# First bytes of Blender's image formats; files with others are checked by loading them in Blender.
 _SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"#?", b"RIFF", b"8BPS", b"SDPX")
 _SIGNATURES += (b"XPDS", b"BM", b"\0\0\0\x0cjP", b"\xff\x4f\xff\x51")
 _OWNERS_WITH_NODES = (bpy.types.Material, bpy.types.World, bpy.types.Light, bpy.types.NodeTree)
@@ -26,9 +26,9 @@ _OWNERS_WITH_NODES = (bpy.types.Material, bpy.types.World, bpy.types.Light, bpy.
 
 @dataclass(frozen=True)
 class RenderedFile:
-    """A file of a scene, or one for each number or tile.
+    """A file of a scene, or a series of files by number or tile.
 
-    name: its path as the .blend has it; paths: those that some frames need; siblings: all files of a numbered row.
+    name: path in the .blend; paths: files that the given frames need; siblings: all files of a numbered series.
     """
 
     name: str
@@ -38,7 +38,7 @@ class RenderedFile:
 
 
 def require(scene: bpy.types.Scene, numbers: Iterable[int]) -> None:
-    """Raise `HairError`, which names them, if files are missing that frames of these numbers need."""
+    """Raise a `HairError` with the names of missing files, if these frame numbers need any."""
     names = missing(scene, numbers)
     if names:
         raise HairError(
@@ -48,13 +48,13 @@ def require(scene: bpy.types.Scene, numbers: Iterable[int]) -> None:
 
 
 def in_short(names: list[str]) -> str:
-    """Names for a sentence, of which there may be many."""
+    """The first names, and the number of the others, for a sentence."""
     rest = len(names) - MOST_NAMED
     return ", ".join(names[:MOST_NAMED]) + (f" + {rest}" if rest > 0 else "")
 
 
 def missing(scene: bpy.types.Scene, numbers: Iterable[int]) -> list[str]:
-    """Names of the files that are not there, or cannot be read, and of datablocks that are not in their library."""
+    """Names of files that are missing or unreadable, and of datablocks that are missing in their library."""
     reached = _reached(scene)
     names = [_name_of_missing(datablock) for datablock in reached if datablock.is_missing]
     names += [file.name for file in _files(reached, list(numbers)) if not all(map(_reader_of(file), file.paths))]
@@ -62,9 +62,9 @@ def missing(scene: bpy.types.Scene, numbers: Iterable[int]) -> list[str]:
 
 
 def states(scene: bpy.types.Scene) -> dict[str, str]:
-    """{name: what tells a file from a later version of it} of a scene's files, in whichever frame they are read.
+    """{name: state} of all files that a scene reads in any frame, to detect changed files.
 
-    Size and time of change in seconds, "missing" without a file; of a numbered row a digest of these of all its files.
+    A state is the size and the time of change [s], or "missing"; for a numbered series a digest of its files' states.
     """
     reached, found = _reached(scene), {}
     for library in {datablock.library for datablock in reached} - {None}:
@@ -98,7 +98,7 @@ def _name_of_missing(datablock):
 
 
 def _reached(scene):
-    """All datablocks that a scene uses, and they: in a render, but for what the interface shows of them."""
+    """All datablocks that renders of a scene use, directly or indirectly, without data of the interface."""
     used = {}
     for datablock, users in bpy.data.user_map().items():
         for user in users:
@@ -115,20 +115,20 @@ def _reached(scene):
 
 
 def _is_rendered(user, datablock):
-    """Whether a render shows what a datablock uses."""
+    """Whether a render shows `datablock`, which `user` uses."""
     if isinstance(datablock, (bpy.types.Brush, bpy.types.Palette, bpy.types.MovieClip, bpy.types.Sound)):
         return False
     if not isinstance(datablock, bpy.types.Image):
         return True
     if isinstance(user, _OWNERS_WITH_NODES):
         return any(image == datablock for image, _node in live_nodes.images(user))
-    # Of a scene the images that are painted on, of cameras and empties what they show in viewports.
+    # Scenes use images for painting; cameras and empties show images in viewports.
     is_shown = isinstance(user, (bpy.types.Scene, bpy.types.Camera))
     return not is_shown and not (isinstance(user, bpy.types.Object) and user.type == "EMPTY")
 
 
 def _named_images(curves):
-    """Images that settings of hair name, as masks."""
+    """Images of masks in the settings of hair."""
     owners = [curves.vellus.hair, curves.vellus.guides, *curves.vellus.styles]
     names = {getattr(owner, name) for owner in owners for name in owner.bl_rna.properties.keys() if "image" in name}
     images = (bpy.data.images.get(name) for name in names if isinstance(name, str) and name)
@@ -136,7 +136,7 @@ def _named_images(curves):
 
 
 def _files(reached, numbers) -> Iterator[RenderedFile]:
-    """Files beside libraries, for frames of some numbers; without any, the first of each numbered row."""
+    """Files other than libraries, for some frame numbers; without numbers, the first file of each numbered series."""
     users = {}
     for datablock in reached:
         for image, user in _image_users(datablock):
@@ -152,7 +152,7 @@ def _files(reached, numbers) -> Iterator[RenderedFile]:
 
 
 def _image_users(datablock):
-    """(image, what says which of its numbers is read in a frame) of a datablock's nodes, or a texture."""
+    """(image, its image user, which selects the frame of a sequence) of a datablock's nodes, or of a texture."""
     if isinstance(datablock, bpy.types.ImageTexture):
         return [(datablock.image, datablock.image_user)]
     if not isinstance(datablock, _OWNERS_WITH_NODES):
@@ -190,7 +190,7 @@ def _numbered_file(datablock, is_sequence, numbers):
 
 
 def _image_number(user, frame):
-    """Number of the image that an image user reads in a frame, as Blender counts."""
+    """Number of the image that an image user reads in a frame, as in Blender."""
     length = user.frame_duration
     place = frame - user.frame_start + 1
     if length and user.use_cyclic:
@@ -199,7 +199,7 @@ def _image_number(user, frame):
 
 
 def _numbered(path, number):
-    """A path with another number in the place of the last one in its name."""
+    """A path with the last number in its name replaced."""
     found = list(re.finditer(r"\d+", path.stem))
     if not found:
         return path
@@ -209,7 +209,7 @@ def _numbered(path, number):
 
 
 def _row_of(path):
-    """All files whose names differ from that of a path in the last number alone."""
+    """All files whose names differ from that of a path only in the last number."""
     found = list(re.finditer(r"\d+", path.stem))
     if not found or not path.parent.is_dir():
         return (path,)
@@ -233,12 +233,12 @@ def _reader_of(file):
 
 
 def _is_there(path):
-    """Whether there is a file that is not empty."""
+    """Whether a file exists and is not empty."""
     return path.is_file() and path.stat().st_size > 0
 
 
 def _is_readable_image(path):
-    """Whether there is a file that Blender takes for an image."""
+    """Whether a file exists and Blender can read it as an image."""
     if not _is_there(path):
         return False
     with path.open("rb") as file:

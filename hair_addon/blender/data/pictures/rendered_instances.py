@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Instances of a depsgraph that a render shows, where the depsgraph is that of viewports too."""
+"""Whether a render shows an instance of a depsgraph, which may be that of a viewport."""
 
 
 def placed_by(instance):
@@ -8,10 +8,9 @@ def placed_by(instance):
 
 
 def is_rendered(instance):
-    """Whether a render shows what stands at an instance.
+    """Whether a render shows the object of an instance.
 
-    Nodes, faces and particles scatter objects that are disabled in renders themselves; a collection's instances leave
-    them out.
+    Nodes, faces and particles also scatter objects that are disabled in renders; collection instances leave them out.
     """
     placed = placed_by(instance)
     follows = not instance.is_instance or placed.instance_type == "COLLECTION"

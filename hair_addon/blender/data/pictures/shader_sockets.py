@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where sockets of shader nodes take their values: past reroutes and muted nodes, into node groups and out of them."""
+"""Sources of shader sockets' values, followed through reroutes, muted nodes and node groups."""
 
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
-LUMINANCE = (0.2126, 0.7152, 0.0722, 0.0)  # Rec. 709: a color that is read as a number
+LUMINANCE = (0.2126, 0.7152, 0.0722, 0.0)  # Rec. 709, for a color that is read as a number
 
 
 @dataclass(frozen=True)
 class ShaderNode:
-    """A node of a shader; groups: the group nodes that it stands in, the outermost first."""
+    """A node of a shader; groups: the group nodes that contain it, the outermost first."""
 
     node: bpy.types.Node
     groups: tuple = ()
@@ -33,12 +33,12 @@ class ShaderInput:
     groups: tuple = ()
 
     def source(self):
-        """(`ShaderNode`, its output) that the socket takes its value from; (None, None) where it is a constant."""
+        """(`ShaderNode`, output) that the socket reads; (None, None) for a constant."""
         _end, node, output = self._followed()
         return node, output
 
     def constant(self):
-        """What the socket is set to, or the one that it leads to, or a node of one value; None where others give it."""
+        """The constant value of the socket, of the socket it is linked to, or of a value node; None for other nodes."""
         end, node, output = self._followed()
         if node is not None and node.type not in {"RGB", "VALUE"}:
             return None
@@ -49,12 +49,12 @@ class ShaderInput:
         return (value,) * len(own) if is_color else _as_number(value)
 
     def value(self):
-        """The same, or where other nodes give it what the socket would be set to without them."""
+        """The constant value; if other nodes compute the value, the socket's default."""
         found = self.constant()
         return self.socket.default_value if found is None else found
 
     def _followed(self):
-        """(the last socket on the way, the `ShaderNode` that is linked to it, its output, or None for both)."""
+        """(last socket on the way, the linked `ShaderNode`, its output); None for node and output if none is linked."""
         socket, groups = self.socket, self.groups
         while (link := _link_of(socket)) is not None:
             node, output = _past_what_passes_on(link)
@@ -73,7 +73,7 @@ class ShaderInput:
 
 
 def shown_shader(tree, kinds):
-    """The `ShaderNode` that a tree's output shows, of certain kinds; else the first of its first kind, or None."""
+    """The `ShaderNode` that is linked to a tree's output if of `kinds`; else the first of the first kind, or None."""
     if tree is None:
         return None
     output = tree.get_output_node("ALL")
@@ -84,7 +84,7 @@ def shown_shader(tree, kinds):
 
 
 def nodes_of(tree, groups=()):
-    """Each `ShaderNode` of a tree, with those of its groups."""
+    """Each `ShaderNode` of a tree and of its groups."""
     for node in tree.nodes:
         yield ShaderNode(node, groups)
         if node.type == "GROUP" and node.node_tree is not None:
@@ -92,16 +92,16 @@ def nodes_of(tree, groups=()):
 
 
 def _link_of(socket):
-    """The link that a socket takes its value from; None where there is none, or one that leads around in a circle."""
+    """The link that a socket reads; None without one, or if it is part of a cycle."""
     if not socket.is_linked:
         return None
     return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
 
 
 def _past_what_passes_on(link):
-    """(node, output) that a link comes from, past reroutes and muted nodes.
+    """(node, output) that a link comes from, through reroutes and muted nodes.
 
-    (None, None) where nothing leads to these: they set nothing, as in Cycles.
+    (None, None) if these are not linked: they set no value, as in Cycles.
     """
     while link is not None and (link.from_node.mute or link.from_node.type == "REROUTE"):
         before = _passed_on(link.from_node, link.from_socket)
@@ -110,14 +110,14 @@ def _past_what_passes_on(link):
 
 
 def _passed_on(node, output):
-    """The input that a reroute, or a muted node, passes on to an output; None without."""
+    """The input that a reroute or a muted node passes on to an output, or None."""
     if node.type == "REROUTE":
         return node.inputs[0]
     return next((link.from_socket for link in node.internal_links if link.to_socket == output), None)
 
 
 def _inside(group, output):
-    """The input of a group's output node that is behind an output of the group; None without."""
+    """The input of a group's output node for an output of the group, or None."""
     nodes = group.node_tree.nodes if group.node_tree else ()
     inside = next((node for node in nodes if node.type == "GROUP_OUTPUT" and node.is_active_output), None)
     return None if inside is None else _of_identifier(inside.inputs, output)
@@ -129,5 +129,5 @@ def _of_identifier(sockets, other):
 
 
 def _as_number(value):
-    """A color, or a vector, as Blender takes it for a number."""
+    """A color or a vector as a number, converted as in Blender."""
     return float(np.dot(LUMINANCE, value)) if len(value) == 4 else float(np.mean(value))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of surfaces as they are drawn around hair: base color, roughness, reflectance, and images of these."""
+"""Materials of the surfaces drawn around hair: base color, roughness, reflectance, and images of these."""
 
 from dataclasses import dataclass
 
@@ -23,10 +23,10 @@ _EXTENSIONS = {"REPEAT": "REPEAT", "EXTEND": "EXTEND", "CLIP": "CLAMP_TO_BORDER"
 
 @dataclass(frozen=True)
 class ImageMap:
-    """An image of a material: which UV map it lies on, "" for the active one, and where.
+    """An image of a material. uv_map: name of its UV map, "" for the active one.
 
-    rows: (2, 3) float, from (u, v, 1) to coordinates of the image; channels: weights (4,) of RGBA where it is read as a
-    number; extension: of a GPU texture; is_opaque: whether its alpha does not darken its color.
+    rows: (2, 3) float, from (u, v, 1) to coordinates of the image; channels: (4,) weights of RGBA for an image that is
+    read as a number; extension: of a GPU texture; is_opaque: whether alpha does not darken the color.
     """
 
     image: bpy.types.Image
@@ -40,9 +40,9 @@ class ImageMap:
 
 @dataclass(frozen=True)
 class SurfaceMaterial:
-    """Inputs of a Principled BSDF. color: linear RGB; reflectance: at normal incidence, of all but metal.
+    """Inputs of a Principled BSDF. color: linear RGB; reflectance: of non-metals at normal incidence.
 
-    is_clear: whether it lets light through, as glass or a cornea does: it is seen by what it reflects.
+    is_clear: whether the surface lets light through, like glass or a cornea, and only shows its reflections.
     """
 
     color: tuple = (0.8, 0.8, 0.8)
@@ -57,20 +57,20 @@ class SurfaceMaterial:
 
     @property
     def is_invisible(self):
-        """Whether it is not seen at all."""
+        """Whether the surface is not visible at all."""
         return self.is_clear and self.reflectance == 0.0
 
     @property
     def uv_map(self):
-        """Name of the UV map of all its images, "" for the active one; None without images."""
+        """Name of the UV map of all images, "" for the active one; None without images."""
         images = (self.color_image, self.roughness_image, self.normal_image)
         return next((image.uv_map for image in images if image is not None), None)
 
 
 def read_material(material):
-    """The `SurfaceMaterial` of a Blender material; without a shader of `_READERS` it is matt, of its viewport's color.
+    """The `SurfaceMaterial` of a Blender material; matte with its viewport color without a shader of `_READERS`.
 
-    Without a material a surface has a Principled BSDF as it is added, as in EEVEE and Cycles.
+    None is a Principled BSDF with default values, as in EEVEE and Cycles.
     """
     if material is None:
         return SurfaceMaterial(roughness=0.5, reflectance=_reflectance(1.5, 0.5))
@@ -117,18 +117,18 @@ _READERS = {
     "BSDF_PRINCIPLED": _read_principled,
     "BSDF_DIFFUSE": _read_diffuse,
     "BSDF_GLASS": _read_glass,
-    "BSDF_REFRACTION": _read_transparent,  # which it is without what it bends
+    "BSDF_REFRACTION": _read_transparent,  # refraction itself is not drawn
     "BSDF_TRANSPARENT": _read_transparent,
 }
 
 
 def _reflectance(refractive_index, level):
-    """Reflectance at normal incidence; level: ½ leaves it as it is."""
+    """Reflectance at normal incidence; level: a factor, 1 at ½."""
     return min(2.0 * level * ((refractive_index - 1.0) / (refractive_index + 1.0)) ** 2, 0.99)
 
 
 def _image_map(shader_input, material, uv_map=""):
-    """The `ImageMap` that is linked to a `ShaderInput`, also by one of its channels; None where there is none."""
+    """The `ImageMap` that is linked to a `ShaderInput`, directly or by one of its channels; or None."""
     found, output = shader_input.source()
     channels = LUMINANCE
     if found is not None and found.type == "SEPARATE_COLOR" and found.node.mode == "RGB":
@@ -147,13 +147,13 @@ def _image_map(shader_input, material, uv_map=""):
         return None
     rows, own_map = mapping
     extension, is_smooth = _EXTENSIONS[node.extension], node.interpolation != "Closest"
-    # Blender lays straight alpha over black, unless a material reads it.
+    # Blender multiplies colors by straight alpha, unless a material reads the alpha.
     is_opaque = node.outputs["Alpha"].is_linked or node.image.is_float or node.image.alpha_mode != "STRAIGHT"
     return ImageMap(node.image, own_map or uv_map, rows, channels, extension, is_smooth, is_opaque)
 
 
 def _is_readable(image, material):
-    """Whether an image has pixels of one picture; if not, say so."""
+    """Whether an image has pixels of a single picture; if not, print a message."""
     if image.source not in {"FILE", "GENERATED"}:
         say(f'"{name_of(image)}" is not a single picture: "{name_of(material)}" is drawn in its plain color.')
     elif not all(image.size):  # the access loads the file if necessary
@@ -164,9 +164,9 @@ def _is_readable(image, material):
 
 
 def _mapping(vector):
-    """((2, 3) rows, name of the UV map) of a texture's coordinates, a `ShaderInput`; None where they are no UVs."""
+    """((2, 3) rows, name of the UV map) of a texture's coordinates, a `ShaderInput`; None if they are not UVs."""
     found, output = vector.source()
-    if found is None:  # where a group sets it, it is one place
+    if found is None:  # a constant set by a group is a single point
         return None if vector.socket.is_linked else (np.eye(2, 3), "")
     node = found.node
     if node.type == "UVMAP":
@@ -176,7 +176,7 @@ def _mapping(vector):
     if node.type != "MAPPING" or node.vector_type not in {"POINT", "TEXTURE"}:
         return None
     inner = _mapping(found["Vector"]) if found["Vector"].source()[0] is not None else None
-    # Vectors have no location, and their node hides its socket.
+    # The location of a Mapping node of type Vector is hidden.
     inputs = {socket.identifier: ShaderInput(socket, found.groups).constant() for socket in node.inputs}
     values = [inputs.get(name) for name in ("Location", "Rotation", "Scale")]
     if inner is None or any(value is None for value in values):

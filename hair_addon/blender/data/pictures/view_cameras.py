@@ -3,9 +3,9 @@
 
 
 def camera_of_view(blender_scene, camera, view):
-    """The camera of a view, also where it is in a scene's background set, in which Blender does not look for it.
+    """The camera of a view; also found in a scene's background set, where Blender does not search.
 
-    camera: that which Blender has found.
+    camera: the camera found by Blender.
     """
     render, background = blender_scene.render, blender_scene.background_set
     if not view or render.views_format != "MULTIVIEW" or background is None:

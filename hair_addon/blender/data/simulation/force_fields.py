@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Force fields of a scene → those that hair is simulated in; Blender's Python does not evaluate its own."""
+"""Force fields of a scene → `ForceField`s, as Blender's Python API cannot evaluate force fields."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from ....core import dynamics
 from ....core.errors import HairError
 from ...host.notices import name_of
 
-# Kinds that move other things than hair: they are left out without a word.
+# Types that do not act on hair, which are ignored without an error.
 _OF_OTHERS = {"NONE", "BOID", "GUIDE", "FLUID_FLOW"}
 
 
 def read(depsgraph, metres):
-    """(`ForceField`s of the objects that a depsgraph was evaluated with, errors of those that cannot act).
+    """(`ForceField`s of the objects in a depsgraph, errors of unsupported force fields).
 
-    metres: in a unit of the world.
+    metres: per unit of the world.
     """
     fields, errors = [], []
     for evaluated in depsgraph.objects:

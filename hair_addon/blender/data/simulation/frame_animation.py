@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The animation that guides are simulated in, frame by frame, as a digest: baked frames tell by it whether it changed.
+"""Digests of the animation of each frame, by which baked frames detect changes.
 
-Only vertices are read, as this is asked in every frame that plays.
+Only vertices are read, as a digest is computed for every played frame.
 """
 
 from dataclasses import asdict
@@ -18,17 +18,17 @@ from .. import scene
 from ..strands import stored_roots
 from . import force_fields, simulated_world
 
-_HALF = 16  # digits of a digest, for what carries guides, and for what else acts on them
-_LEVEL = 4  # of these, for how far the surface is subdivided
+_HALF = 16  # digits of a digest for the surface, and for everything else that acts on guides
+_LEVEL = 4  # the first of these digits: the level of subdivision of the surface
 
 SURFACE, SURROUNDINGS = "the surface", "colliders, force fields, gravity or keyed settings"
 
 
 def digest_of(guides, blender_scene, depsgraph, settings):
-    """32 hexadecimal digits of what moves guides with these `DynamicsSettings` in a depsgraph's frame.
+    """32 hexadecimal digits of all that moves guides with these `DynamicsSettings` in a depsgraph's frame.
 
-    Half of them are of the surface at their roots and its size, half of colliders, force fields, gravity and settings
-    that are keyed. Raises `HairError` where the surface cannot be read.
+    The first half covers the surface's size and its points at the roots, the second half colliders, force fields,
+    gravity and keyed settings. Raises `HairError` if the surface cannot be read.
     """
     metres = simulated_world.metres_of(blender_scene, settings)
     surface = guides.surface
@@ -47,10 +47,10 @@ def digest_of(guides, blender_scene, depsgraph, settings):
 
 
 def change(baked, now, is_carried=False):
-    """What moves otherwise than in the digest of a baked frame, in a few words; None where nothing does.
+    """The part of the animation that differs from the digest of a baked frame, SURFACE or SURROUNDINGS, or None.
 
-    is_carried: whether the surface has other coordinates since, by which its half of the digest tells nothing. Nor does
-    it where the surface is subdivided otherwise now; other faces are known by `guide_baking.key_of`.
+    is_carried: whether the surface's local coordinates have changed since; the first half of the digest is then
+    ignored, as also after a change of its level of subdivision. `guide_baking.key_of` detects other faces.
     """
     is_other = is_carried or baked[:_LEVEL] != now[:_LEVEL]
     if baked == now or (is_other and baked[_HALF:] == now[_HALF:]):
@@ -59,7 +59,7 @@ def change(baked, now, is_carried=False):
 
 
 def _acting(guides, blender_scene, depsgraph, settings, metres):
-    """What acts on guides beside their surface, as values of JSON in single precision."""
+    """Everything but the surface that acts on guides, as JSON values in single precision."""
     gravity = blender_scene.gravity if blender_scene.use_gravity else simulated_world.NO_GRAVITY
     colliders = [
         _collider(collider, depsgraph, settings, metres)
@@ -83,7 +83,7 @@ def _collider(collider, depsgraph, settings, metres):
 
 
 def _rounded(value):
-    """Numbers of single precision, in tuples too; other values as they are."""
+    """Numbers, also in tuples, in single precision; strings and None unchanged."""
     if isinstance(value, str) or value is None:
         return value
     return np.float32(value).tolist()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a surface carries guides in a frame, in metres and world axes, for their simulation; and back to rest.
+"""Poses of guides on their surface in a frame, in metres and world axes, for simulation; and the way back to rest.
 
-A guide moves rigidly with the surface at its root, as hair does (posed_strands.py), and then with the object. Where an
-object is scaled unevenly, its mean scale counts.
+A guide moves rigidly with the surface at its root, like hair (posed_strands.py), and then with the object. The mean
+scale of an unevenly scaled object is used.
 """
 
 import math
@@ -22,8 +22,8 @@ from ..strands.posed_strands import Pose
 class GuidePose:
     """A surface in one frame, and the roots of guides on it.
 
-    places: root vertices and barycentric coordinates; matrix: (3, 4) float64, local coordinates → the world's [m];
-    slides: (G, 3) from where guides begin at rest to their places, None where they begin there.
+    places: root vertices and barycentric coordinates; matrix: (3, 4) float64, local coordinates → world [m];
+    slides: (G, 3) offsets from first points to roots at rest, None if guides begin at their roots.
     """
 
     pose: Pose
@@ -47,7 +47,7 @@ class GuidePose:
 
     @property
     def scale(self) -> float:
-        """Metres in a unit of local coordinates, the mean."""
+        """Metres per unit of local coordinates, averaged over the axes."""
         return float(abs(np.linalg.det(self.matrix[:, :3]))) ** (1.0 / 3.0)
 
     @cached_property
@@ -57,11 +57,11 @@ class GuidePose:
         return np.einsum("nc,ncx->nx", barycentric.astype(np.float64), self.vertices[vertices])
 
     def groom(self, local: np.ndarray) -> np.ndarray:
-        """Points (G, P, 3) of combed guides in local coordinates → (G, P, 3) float64 [m] before any rotation."""
+        """Points (G, P, 3) of combed guides in local coordinates → (G, P, 3) float64 [m] without rotation."""
         return local @ self._polar[1].T
 
     def root_pose(self, start: "GuidePose") -> "dynamics.root_motion.RootPose":
-        """The `RootPose` now of a groom that `start.groom` gives; roots have to be those of `start`."""
+        """The current `RootPose` of a groom returned by `start.groom`; roots must be those of `start`."""
         vertices, barycentric = self.places
         roots = np.einsum("nc,ncx->nx", barycentric.astype(np.float64), self._rest[vertices])
         size = max(self.pose.surface.extent, 1e-20)
@@ -109,18 +109,18 @@ class GuidePose:
 
 
 def _rounded(factor):
-    """A factor to 20 bits: an object that only turns has a matrix in single precision, whose size is not quite one.
+    """A factor rounded to 20 bits, so that rounding in the matrix of a rotating object does not change the scale.
 
-    To another size guides would be given another shape at rest, in each frame.
+    A change of scale would give guides a new rest shape in each frame.
     """
     mantissa, exponent = math.frexp(factor)
     return math.ldexp(round(math.ldexp(mantissa, 20)), exponent - 20)
 
 
 def read(guides, depsgraph, metres):
-    """The `GuidePose` of guide Curves as a depsgraph has evaluated their surface; metres: in a unit of the world.
+    """The `GuidePose` of guide Curves in a depsgraph; metres: per unit of the world.
 
-    Raises `HairError` where there is no surface, or guides are not rooted on it.
+    Raises `HairError` if there is no surface or guides are not rooted on it.
     """
     surface_object = guides.surface
     if surface_object is None:
@@ -141,7 +141,7 @@ def read(guides, depsgraph, metres):
 
 
 def _polar(matrix):
-    """(rotation R, P) with R P = matrix; R proper, so P mirrors where the matrix does."""
+    """(rotation R, P) with R P = matrix; R is proper, so that P mirrors if the matrix does."""
     left, sizes, right = np.linalg.svd(matrix)
     sign = np.sign(np.linalg.det(left @ right))
     return sign * (left @ right), sign * (right.T * sizes) @ right

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What acts on simulated guides in a scene: gravity, and the meshes that they collide with, in metres."""
+"""The world of simulated guides in metres: gravity, colliders and force fields."""
 
 import bpy
 import numpy as np
@@ -16,20 +16,20 @@ from . import force_fields
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
 
-# (topology, fingerprint of its vertices at rest) of a surface → `closed_parts.open_parts`
+# (topology, fingerprint of the rest positions) of a surface → `closed_parts.open_parts`
 parts_cache = Cache(capacity=16)
 
 
 def metres_of(blender_scene, settings):
-    """Metres in a unit of the scene's world, for guides with these `DynamicsSettings`."""
+    """Metres per unit of the scene's world, for guides with these `DynamicsSettings`."""
     return blender_scene.unit_settings.scale_length * settings.size
 
 
 def read(blender_scene, depsgraph, settings, guide_pose, surface_object, ways):
-    """The `World` of guides in the frame that a depsgraph was evaluated for, and errors of colliders left out.
+    """The `World` of guides in a depsgraph's frame, and errors of colliders and force fields that are left out.
 
-    guide_pose: their `GuidePose` in that frame; surface_object: which they grow on; ways: (G, 3) from their roots to
-    their next points at rest, in local coordinates.
+    guide_pose: their `GuidePose` in that frame; surface_object: their surface; ways: (G, 3) from roots to the next
+    points at rest, in local coordinates.
     """
     gravity = tuple(blender_scene.gravity) if blender_scene.use_gravity else NO_GRAVITY
     metres = metres_of(blender_scene, settings)
@@ -52,7 +52,7 @@ def read(blender_scene, depsgraph, settings, guide_pose, surface_object, ways):
 
 
 def _facing_hair(surface, corners, ways):
-    """(F, 3) triangles of a `Surface`: hair is in front of an open mesh, whichever way its faces are turned."""
+    """(F, 3) triangles of a `Surface`; those of an open mesh are flipped if hair is behind them."""
     key = surface.topology, geometry.fingerprint.fingerprint(surface.rest)
     parts = parts_cache.get(key, lambda: dynamics.collision.closed_parts.open_parts(surface.mesh))
     return dynamics.collision.closed_parts.facing_hair(surface.mesh, parts, corners, surface.from_local(ways))
@@ -66,7 +66,7 @@ def _obstacle(mesh_object, vertices, triangles, settings, metres):
 
 
 def require_colliders(settings, depsgraph):
-    """Raise `HairError` where guides with these `DynamicsSettings` would not collide with what they name."""
+    """Raise `HairError` if guides with these `DynamicsSettings` would not collide with all of their colliders."""
     problem = collider_problem(settings)
     if problem is not None:
         raise problem
@@ -77,7 +77,7 @@ def require_colliders(settings, depsgraph):
 
 
 def collider_problem(settings):
-    """The `HairError` of a collection that is missing or has nothing to collide with; None where all is well.
+    """The `HairError` of a collection of colliders that is missing or has no meshes, or None.
 
     settings: `DynamicsSettings`, or properties. No geometry is read.
     """
@@ -92,7 +92,7 @@ def collider_problem(settings):
 
 
 def colliders(collection_name):
-    """The mesh objects of a collection, by name."""
+    """The mesh objects of the collection of this name."""
     collection = bpy.data.collections.get(collection_name) if collection_name else None
     return [] if collection is None else [o for o in collection.all_objects if o.type == "MESH"]
 

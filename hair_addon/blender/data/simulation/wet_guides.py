@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How wet each guide is: where the hair's Wet styles have masks, the weights of these at the guides' roots count."""
+"""The wetness of each guide: masks of the hair's Wet styles are read at the guides' roots."""
 
 import numpy as np
 
@@ -14,10 +14,10 @@ from ..strands import stored_roots, style_inputs
 
 
 def of_guides(guides, surface, depsgraph, known, roots=None):
-    """(G,) float32 wetness, from 0 to 1, that guides on a `Surface` move with; None where no mask makes them differ.
+    """(G,) float32 wetness of simulated guides on a `Surface`, from 0 to 1; None if no mask makes guides differ.
 
-    known: {mask: (G,) weights} as read before; those that are missing are read and added; roots: `SurfacePoints`, None
-    for those that are stored. Raises `HairError`.
+    known: {mask: (G,) weights} that were read before; missing masks are read and added; roots: `SurfacePoints`, None:
+    stored roots. Raises `HairError`.
     """
     evenly = shared_wetness.evenly_of_guides(guides.vellus)
     styles = [style for style in shared_wetness.masked_styles(guides.vellus) if has_effect(style)]
@@ -31,7 +31,7 @@ def of_guides(guides, surface, depsgraph, known, roots=None):
 
 
 def unkeyed(guides, depsgraph):
-    """(K, G) float32 wetness by each mask, the weights alone where keys move amounts; None without a mask.
+    """(K, G) float32 wetness by each mask, or only its weights if amounts are keyed; None without a mask.
 
     Raises `HairError`.
     """
@@ -45,7 +45,7 @@ def unkeyed(guides, depsgraph):
 
 
 def _weights(guides, surface, depsgraph, key, known, roots=None):
-    """(G,) float32 of a mask; kept in {mask: weights}."""
+    """(G,) float32 weights of a mask, cached in `known`."""
     if key not in known:
         roots = stored_roots.points(guides, surface) if roots is None else roots
         if roots is None:

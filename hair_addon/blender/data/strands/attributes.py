@@ -22,13 +22,13 @@ LAYOUTS = {
     "FLOAT4X4": ("value", 16, np.float32),
 }
 
-RADIUS = 0.005  # of Curves without one, as Blender has it
+RADIUS = 0.005  # Blender's default for Curves without radii
 
-CATMULL_ROM, POLY = 0, 1  # of Blender's types of curves; the others are above
+CATMULL_ROM, POLY = 0, 1  # Blender's curve types; other types have greater numbers
 
 
 def write(curves, name, data_type, domain, values):
-    """Write a value for every point or curve, unless it is unchanged: writing copies, and triggers updates."""
+    """Write a value for every point or curve, unless all are unchanged: writing copies data and triggers updates."""
     attribute = curves.attributes.get(name)
     if attribute is not None and (attribute.data_type, attribute.domain) != (data_type, domain):
         curves.attributes.remove(attribute)
@@ -37,48 +37,48 @@ def write(curves, name, data_type, domain, values):
     values = np.ascontiguousarray(values, scalar).ravel()
     if attribute is None:
         attribute = curves.attributes.new(name, data_type, domain)
-    elif _holds(attribute, value_name, values):
+    elif _is_equal(attribute, value_name, values):
         return
     attribute.data.foreach_set(value_name, values)
 
 
 def write_positions(curves, points, name="position"):
-    """Write float32 points (..., 3) of all curves, those of linked and overridden Curves too, which no file keeps.
+    """Write float32 points (..., 3) of all curves, also of linked and overridden Curves, for which no file stores them.
 
-    name: of the attribute, which is there. Returns the fingerprint of the points, which are read once for both. Raises
-    `ValueError` where it has another type, or other points are given than the curves have: memory would be overrun.
+    name: of an existing attribute. Returns the fingerprint of the points, computed in the same pass. Raises
+    `ValueError` if the type or the number of points does not match, as memory would be overrun.
     """
     data, points = curves.attributes[name].data, np.asarray(points, np.float32)
     if not has(curves, name, "FLOAT_VECTOR", "POINT") or points.size != 3 * len(data):
         raise ValueError("points are not as many as those of the curves, or are no vectors")
     if not len(data):
         return geometry.fingerprint.fingerprint(points)
-    # Into Blender's own memory: `foreach_set` takes one thread, and where Blender's interface lets nobody edit it does
-    # nothing, without a word. Single elements may be written there.
+    # Points are written into Blender's memory: `foreach_set` uses one thread, and silently does nothing where data is
+    # not editable in the interface. Single elements can be written there.
     unshare_positions(curves, name)
-    there = kernels.foreign_memory.at(data[0].as_pointer(), points.size)
-    written = geometry.fingerprint.fingerprint(points, there)
-    data[0].vector = there[:3]  # so that Blender forgets the bounds of the points before
+    target = kernels.foreign_memory.at(data[0].as_pointer(), points.size)
+    written = geometry.fingerprint.fingerprint(points, target)
+    data[0].vector = target[:3]  # so that Blender recomputes the bounds
     return written
 
 
 def unshare_positions(curves, name="position"):
-    """Give points of Curves memory of their own, which they share with evaluated copies and steps of undo."""
+    """Make the memory of points unique, which may be shared with evaluated copies and undo steps."""
     data = curves.attributes[name].data
     if len(data):
-        _ = data[0]  # the first access to an element does it
+        _ = data[0]  # the first access to an element copies shared memory
 
 
 def is_from_library(curves):
-    """Whether another file holds what Curves are: they are linked, or a library override."""
+    """Whether Curves are linked from another file or a library override."""
     return curves.library is not None or curves.override_library is not None
 
 
-def _holds(attribute, value_name, values):
+def _is_equal(attribute, value_name, values):
     count = len(attribute.data)
     if not count:
         return True
-    # Changed values usually differ everywhere: compare three of them before reading all.
+    # Changed values usually differ everywhere: three of them are compared before all are read.
     rows = values.reshape(count, -1)
     for place in {0, count // 2, count - 1}:
         if not np.array_equal(getattr(attribute.data[place], value_name), rows[place].squeeze()):
@@ -116,7 +116,7 @@ def repeats(values, row):
 
 
 def valid_radii(radii):
-    """Radii as they are, Blender's own default in place of negative ones and of those too large to compute with."""
+    """Radii with negative and excessive values replaced by Blender's default."""
     return np.where((radii >= 0.0) & (radii <= notices.LARGEST), radii, np.float32(RADIUS))
 
 
@@ -132,7 +132,7 @@ def are_smooth(curves):
 
 
 def reorder_points(curves, order):
-    """Reorder all point attributes: point i gets the value of point order[i]; order: (N,) indices."""
+    """Reorder all point attributes: point i gets the value of point order[i]; order: (N,)."""
     for attribute in curves.attributes:
         layout = LAYOUTS.get(attribute.data_type)
         if attribute.domain != "POINT" or layout is None:

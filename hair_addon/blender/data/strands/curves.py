@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands: arrays ↔ Blender's Curves, with the attributes that sculpt mode, hair nodes and renderers expect.
+"""Strands: arrays ↔ Blender's Curves, with the attributes that Sculpt Mode, hair nodes and renderers expect.
 
 Curves are poly lines: 41 points are smooth enough, every hair node group supports them, and Blender's
 evaluation of Catmull-Rom curves would cost more than generating the strands.
@@ -20,14 +20,14 @@ from . import attributes, follow_nodes, simulated_guides, stored_roots
 
 _GUIDE_MAP = ("guide_index", "guide_weight")
 
-_WETNESS = "wetness"  # a strand's, where a mask or a variation of the style Wet makes strands differ
+_WETNESS = "wetness"  # per strand, if a mask or a variation of the style Wet makes strands differ
 
-# A stored root further than this part of the surface's size from the curve's first point is out of date.
+# A stored root is outdated if its distance from the curve's first point exceeds this fraction of the surface's size.
 _ROOT_TOLERANCE = 1e-4
 
 
 def _write_positions(curves, points):
-    """Write points (..., 3) float32 of all curves, and their fingerprint for `is_combed`."""
+    """Write (..., 3) float32 points of all curves, and their fingerprint for `is_combed`."""
     curves.vellus.written = attributes.write_positions(curves, points)
 
 
@@ -42,10 +42,10 @@ def _write_radii(curves, radii):
 def make_strands(curves, surface, roots, radii, identities, *, leaders=None, normals=None, written_radii=None):
     """Resize the curves for strands, and write everything except their points.
 
-    roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; identities: as `Surface.identities` gives them;
-    leaders: (S,) int32, the strand that stands for the guide of each, or None where strands are guides themselves;
-    normals: (S, 3) float32 of the surface at the roots, if they are known; written_radii: (P,) that the curves have, if
-    they are known. Returns the `Surface` that the roots are stored on, as `write_roots`.
+    roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; identities: from `Surface.identities`;
+    leaders: (S,) int32, the strand that represents the guide of each strand; None for guides;
+    normals: (S, 3) float32 of the surface at the roots, if known; written_radii: (P,) radii of the curves, if known.
+    Returns the `Surface` that the roots are stored on, like `write_roots`.
     """
     if len(roots) == 0:
         raise ValueError("no strands: an empty list of curves would crash Blender")
@@ -53,7 +53,7 @@ def make_strands(curves, surface, roots, radii, identities, *, leaders=None, nor
     if is_new or "radius" not in curves.attributes or not np.array_equal(radii, written_radii):
         _write_radii(curves, radii)
     if leaders is not None:
-        # Blender's hair nodes look up this curve among the strands, and clump, curl and braid around it.
+        # Blender's hair nodes clump, curl and braid strands around this curve.
         attributes.write(curves, "guide_curve_index", "INT", "CURVE", leaders)
     for name, data_type, values in zip(("id", "strand_random"), ("INT", "FLOAT"), identities, strict=True):
         attributes.write(curves, name, data_type, "CURVE", values)
@@ -61,9 +61,9 @@ def make_strands(curves, surface, roots, radii, identities, *, leaders=None, nor
 
 
 def write_guide_map(curves, guide_map):
-    """Store (S, k) int32 guides of strands and (S, k) float32 weights, a pair of attributes for each k; None: remove.
+    """Store (S, k) int32 guides of strands and (S, k) float32 weights, one pair of attributes for each k.
 
-    guide_index_0 and guide_weight_0 are the nearest's.
+    guide_index_0 and guide_weight_0 belong to the nearest guide. None removes the attributes.
     """
     slot_count = 0 if guide_map is None else guide_map[0].shape[1]
     for attribute in list(curves.attributes):
@@ -76,13 +76,13 @@ def write_guide_map(curves, guide_map):
 
 
 def write_clumps(curves, clumps):
-    """Store (S,) int32 clumps of strands and (S,) float32 random numbers of these, for shaders; None: remove them."""
+    """Store (S,) int32 clumps of strands and (S,) float32 random numbers of clumps, for shaders; None removes them."""
     for name, data_type, place in (("clump_index", "INT", 0), ("clump_random", "FLOAT", 1)):
         _write_or_remove(curves, name, data_type, None if clumps is None else clumps[place])
 
 
 def write_wetness(curves, wetness):
-    """Store (S,) float32 wetness of strands, for shaders; None: remove it. Returns whether it came or went."""
+    """Store (S,) float32 wetness of strands, for shaders; None removes it. Returns whether it was added or removed."""
     had_wetness = has_wetness(curves)
     _write_or_remove(curves, _WETNESS, "FLOAT", wetness)
     return had_wetness != (wetness is not None)
@@ -96,17 +96,17 @@ def _write_or_remove(curves, name, data_type, values):
 
 
 def write_roots(curves, surface, roots, normals=None, firsts=None):
-    """Store the roots of strands: for Vellus, for the nodes that deform them, and for Blender's tools.
+    """Store the roots of strands for Vellus, for the nodes that deform strands, and for Blender's tools.
 
-    Those on a cage are stored at the nearest places of the surface as it is subdivided now, too: returns the `Surface`
-    that they are stored on. firsts: (S, 3) where strands begin that were rooted before, and keep their places on the
-    cage if they have any; None for new ones, which begin at their roots.
+    Roots on a cage are also stored at the nearest points of the current subdivided surface. Returns the `Surface` that
+    they are stored on. firsts: (S, 3) first points of strands that were rooted before, and keep their roots on the
+    cage if they have any; None for new strands, which begin at their roots.
     """
     normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots) if normals is None else normals)
     cage, shown = surface.cage, scene.shown_surface(curves.surface, surface)
     on_cage = None if firsts is None else stored_roots.cage_points(curves, cage)
     if on_cage is None and firsts is not None and stored_roots.are_on_cage(curves, cage):
-        on_cage = read_roots(curves, cage, cage.from_local(firsts))  # some were added
+        on_cage = read_roots(curves, cage, cage.from_local(firsts))  # some strands were added
     if shown.topology != surface.topology:
         on_cage, firsts = roots, mesh_math.interpolate(surface.rest, surface.mesh, roots)
         surface, roots = shown, geometry.closest_point.SurfaceQuery(shown.local_mesh).nearest(firsts)
@@ -135,7 +135,7 @@ def write_roots(curves, surface, roots, normals=None, firsts=None):
 
 
 def write_smoothness(curves, surface):
-    """Write only how smooth modifiers make the surface now."""
+    """Update only the nodes' input for the surface's current subdivision."""
     for user in bpy.data.objects:
         if user.data == curves and user.library is None:
             follow_nodes.set_smoothness(user, surface.cage_corners)
@@ -153,15 +153,15 @@ def write_uvs(curves, surface):
 
 def write_points(curves, growing):
     """Write the points of strands that `make_strands` created; growing: a future of local (S, P, 3) float32."""
-    # Blender copies the array that it shares with its last evaluation, half of the writing time: it does so while
-    # strands are computed.
+    # Blender copies the array that it shares with its last evaluation, which takes half of the writing time. The copy
+    # is made while strands are computed.
     attributes.unshare_positions(curves)
     _write_positions(curves, growing.result())
     curves.update_tag()
 
 
 def write_moved(curves, points):
-    """Write positions of strands that moved with their surface: combed ones remain combed."""
+    """Write points of strands that moved with their surface: combed strands remain combed."""
     if not len(curves.points):
         return
     before, was_combed = curves.vellus.written, is_combed(curves)
@@ -171,21 +171,21 @@ def write_moved(curves, points):
 
 
 def _resize(curves, strand_count, point_count):
-    """Resize for strands; returns whether all strands are new."""
+    """Resize curves; returns whether all strands are new."""
     if len(curves.curves) == strand_count and len(curves.points) == strand_count * point_count:
         sizes = point_counts(curves)
         if (sizes == point_count).all():
             return False
     if len(curves.curves):
         curves.remove_curves()
-    # Plain integers only.
+    # `add_curves` accepts plain integers only.
     curves.add_curves([int(point_count)] * int(strand_count))
     curves.set_types(type="POLY")
     return True
 
 
 def curve_offsets(curves):
-    """(S+1,) int32: where each curve's points begin, and where the last one's end."""
+    """(S+1,) int32: the index of each curve's first point, and the number of points."""
     offsets = np.zeros(len(curves.curves) + 1, np.int32)
     if len(curves.curves):
         curves.curve_offset_data.foreach_get("value", offsets)
@@ -193,7 +193,7 @@ def curve_offsets(curves):
 
 
 def point_counts(curves):
-    """(S,) int32: how many points each curve has."""
+    """(S,) int32: the number of points of each curve."""
     return np.diff(curve_offsets(curves))
 
 
@@ -211,7 +211,7 @@ def read_points(curves):
 
 
 def read_radii(curves):
-    """(all points,) float32 in local units, at least zero; Blender's own default where curves carry no radius."""
+    """(all points,) float32 in local units, at least zero; Blender's default if curves have no radii."""
     radii = attributes.read(curves, "radius", "FLOAT", "POINT")
     if radii is None:
         return np.full(len(curves.points), attributes.RADIUS, np.float32)
@@ -219,7 +219,7 @@ def read_radii(curves):
 
 
 def widen(curves, change):
-    """Multiply radii as an `Affine` scales widths; those of Blender's own default where curves carry none."""
+    """Scale radii, or Blender's default radius if curves have none, as an `Affine` scales widths."""
     radii = attributes.read(curves, "radius", "FLOAT", "POINT")
     if radii is None and change.is_as_wide:
         return
@@ -229,7 +229,7 @@ def widen(curves, change):
 
 
 def read_randoms(curves):
-    """(S,) random numbers, float32 in [0, 1], of strands; by index for curves without them."""
+    """(S,) float32 random numbers of strands in [0, 1]; by index for curves without them."""
     randoms = attributes.read(curves, "strand_random", "FLOAT", "CURVE")
     if randoms is None:
         return strands.random_numbers(len(curves.curves))
@@ -237,12 +237,12 @@ def read_randoms(curves):
 
 
 def has_wetness(curves):
-    """Whether strands store a wetness each."""
+    """Whether wetness is stored per strand."""
     return attributes.has(curves, _WETNESS, "FLOAT", "CURVE")
 
 
 def read_wetness(curves):
-    """(S,) wetness, float32 in [0, 1], of strands; None for curves without it."""
+    """(S,) float32 wetness of strands in [0, 1]; None for curves without it."""
     wetness = attributes.read(curves, _WETNESS, "FLOAT", "CURVE")
     return None if wetness is None else np.clip(np.where(np.isfinite(wetness), wetness, np.float32(0.0)), 0.0, 1.0)
 
@@ -258,21 +258,20 @@ BY_HAND = "made by hand"
 
 
 def is_hand_made(curves):
-    """Whether these are guides not created by Vellus."""
+    """Whether these are guides or hair not created by Vellus."""
     return curves.vellus.written == BY_HAND
 
 
 def is_combed(curves):
     """Whether points were moved, added or removed since `write_points`, or were not written by it."""
-
     written = curves.vellus.written
     return written != "" and written != geometry.fingerprint.fingerprint(read_points(curves))
 
 
 def read_roots(curves, surface, first_points):
-    """Find the roots of (S, 3) first points: as stored, or the nearest point if that is missing or outdated.
+    """Find the roots of (S, 3) first points: stored roots, or the nearest point if a root is missing or outdated.
 
-    Roots of curves that were added or slid in sculpt mode are outdated, and all roots if the triangles changed.
+    Roots of curves that were added or slid in Sculpt Mode are outdated, and all roots if the triangles changed.
     """
     mesh_math.check_mesh(surface.mesh)
     is_here = curves.vellus.topology == surface.topology
@@ -298,9 +297,9 @@ def read_roots(curves, surface, first_points):
 
 
 def nearest_roots(surface, places, mesh=None):
-    """`SurfacePoints` on a `Surface`, each nearest to one of (S, 3) places [m].
+    """`SurfacePoints` on a `Surface` that are nearest to (S, 3) places [m].
 
-    mesh: the `TriMesh` of its triangles that they are nearest on, None: the surface at rest.
+    mesh: the `TriMesh` to search, with the triangles of the surface; None: the surface at rest.
     """
     mesh = surface.mesh if mesh is None else mesh
     mesh_math.check_mesh(mesh)
@@ -308,17 +307,17 @@ def nearest_roots(surface, places, mesh=None):
 
 
 def read_guides(curves, surface, device, known=None, local=None):
-    """Guides as they are combed now: `Strands` on a device, of one point count, however many each curve has.
+    """Return combed guides as `Strands` on a device, with the same point count for all.
 
-    known: `Strands` of the same guides on the same surface as they were read before: those that are where they were
-    rooted then, all of them, keep their roots. local: what `read_points` gives now, if that is known.
+    known: `Strands` read before from the same guides on the same surface, whose roots are reused if no first point has
+    moved. local: the result of `read_points`, if known.
     """
     counts = point_counts(curves)
     if not len(counts):
         raise HairError('"{name}" has no guides: generate guides first.', name=name_of(curves))
     local = read_points(curves) if local is None else local
     flat = local.ravel()
-    # The sum of squares tells it in a tenth of the time, where it does not overflow.
+    # A finite sum of squares proves that all are finite, in a tenth of the time.
     with np.errstate(over="ignore", invalid="ignore"):
         squared = flat @ flat
     if not (np.isfinite(squared) or np.isfinite(flat).all()):
@@ -328,7 +327,7 @@ def read_guides(curves, surface, device, known=None, local=None):
     offsets = np.concatenate([[0], np.cumsum(counts)])
     firsts = points[offsets[:-1]]
     has_known_roots = known is not None and np.array_equal(firsts, known.numpy()[:, 0])
-    # They may be stored on faces that are subdivided otherwise now.
+    # Known roots may refer to faces of another subdivision.
     has_known_roots = has_known_roots and cage_of(curves.vellus.topology) == cage_of(surface.topology)
     roots = None if has_known_roots else read_roots(curves, surface, firsts)
     points = even_points(points, offsets, lambda: attributes.are_smooth(curves))
@@ -336,7 +335,7 @@ def read_guides(curves, surface, device, known=None, local=None):
 
 
 def read_shown_guides(curves, surface, device, known=None, local=None):
-    """Guides as hair follows them in this frame: where dynamics has moved them, else as `read_guides` reads them."""
+    """Return the guides that hair follows in this frame: simulated if shown, else as by `read_guides`."""
     guides = read_guides(curves, surface, device, known, local)
     shown = simulated_guides.point_cache.get(curves.session_uid)
     return guides if shown is None or len(shown) != len(guides) else guides.moved(surface.from_local(shown))
@@ -345,8 +344,8 @@ def read_shown_guides(curves, surface, device, known=None, local=None):
 def even_points(points, offsets, are_smooth):
     """(G, POINT_COUNT, 3) float32 of guides of any point counts; points (N, 3), offsets (G+1,).
 
-    are_smooth: called for which of them are smooth, (G,) bool. Guides that all have as many points are taken as they
-    are.
+    are_smooth: a function that returns whether each guide is smooth, (G,) bool. Guides are resampled unless all have
+    POINT_COUNT points.
     """
     if (np.diff(offsets) == groom.POINT_COUNT).all():
         return points.reshape(-1, groom.POINT_COUNT, 3)
@@ -369,14 +368,14 @@ def follows_library(hair):
 
 
 def require_overridable(datablock):
-    """Raise `HairError` for linked data, before changes that library overrides store: of dynamics, of objects."""
+    """Raise `HairError` for linked data, before changes that a library override stores, of dynamics or objects."""
     if datablock.library is not None:
         sentence = '"{name}" is linked from another file: make a library override of it first.'
         raise HairError(sentence, name=name_of(datablock))
 
 
 def require_not_linked(datablock):
-    """Raise `HairError` for linked data, before changes that overridden data has until its file is closed."""
+    """Raise `HairError` for linked data, before changes that overridden data keeps until the file is closed."""
     if datablock.library is not None:
         sentence = '"{name}" is linked from another file: make it local first, with Object ▸ Relations ▸ Make Local.'
         raise HairError(sentence, name=name_of(datablock))

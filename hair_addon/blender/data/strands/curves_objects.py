@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects of Curves in the scene: made, and shown or not in renders and by Blender's own drawing."""
+"""Objects of Curves in the scene: creation, and visibility in renders and in Blender's viewports."""
 
 import bpy
 import numpy as np
@@ -41,7 +41,7 @@ def render(curves_object, is_rendered):
         setattr(curves_object, f"visible_{ray}", is_rendered)
 
 
-_RAYS_BEFORE = "vellus_rays"  # custom property: which kinds of rays saw an object before it was hidden
+_RAYS_BEFORE = "vellus_rays"  # custom property: the ray visibility of an object before it was hidden
 
 
 def hide_from_engines(curves_object, is_seen_by_rays):
@@ -63,57 +63,56 @@ def show_again(curves_object):
 
 
 def objects_of(curves):
-    """The objects that hold Curves."""
+    """The objects of a Curves datablock."""
     return [user for user in bpy.data.objects if user.data == curves]
 
 
 def stand_on(curves_object, surface_object):
-    """Make an object a child of its surface without a transform of its own: local coordinates are the surface's."""
+    """Make an object a child of its surface without its own transform, so that they share local coordinates."""
     curves_object.parent, curves_object.parent_type = surface_object, "OBJECT"
     curves_object.matrix_parent_inverse.identity()
     curves_object.delta_location, curves_object.delta_scale = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
     curves_object.delta_rotation_euler = (0.0, 0.0, 0.0)
     curves_object.delta_rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
-    curves_object.matrix_basis.identity()  # last, as Blender takes what deltas do away from it
+    curves_object.matrix_basis.identity()  # last, as Blender removes the delta transforms when it is set
 
 
 def stands_apart(curves_object):
-    """Whether an object is no child of its surface, or has a transform of its own."""
+    """Whether an object is not a child of its surface, or has its own transform."""
     if curves_object.parent != curves_object.data.surface or curves_object.parent_type != "OBJECT":
         return True
     return curves_object.matrix_parent_inverse != _UNMOVED or curves_object.matrix_basis != _UNMOVED
 
 
-_APART = 1e-4  # parts of a surface's size and of how far it is from the origin, which rounding does not reach
+_APART = 1e-4  # fraction of a surface's size and distance from the origin, which exceeds rounding
 
 
 def is_elsewhere(curves_object, surface_object):
-    """Whether an object's local coordinates are others than those of its surface, in the world; no geometry is read.
+    """Whether an object's transform visibly differs from that of its surface, at the corners of its bounding box.
 
-    As far as it is seen: where corners of the surface's box would be.
+    No geometry is read.
     """
     change = np.array(curves_object.matrix_world) - np.array(surface_object.matrix_world)
     corners = np.hstack([np.array(surface_object.bound_box, np.float64), np.ones((8, 1))])
-    there = corners @ np.array(surface_object.matrix_world)[:3].T
-    reach = np.linalg.norm(np.ptp(there, axis=0)) + abs(there).max() * 1e-2
+    places = corners @ np.array(surface_object.matrix_world)[:3].T
+    reach = np.linalg.norm(np.ptp(places, axis=0)) + abs(places).max() * 1e-2
     return bool(abs(corners @ change[:3].T).max() > _APART * reach)
 
 
 def keep_rest(surface_object):
-    """Let Blender store the rest positions of a surface's vertices, on which strands are rooted."""
+    """Let Blender store the rest positions of a surface's vertices, in which strands are rooted."""
     is_new = not surface_object.add_rest_position_attribute
     if is_new:
         surface_object.add_rest_position_attribute = True
     if rest_nodes.tell_apart(surface_object) or is_new:
-        # Blender reports this as a change of the mesh: update before there is hair that would react to it.
+        # Blender reports this as a change of the mesh: update before hair exists that would react to it.
         bpy.context.view_layer.update()
     if rest_sources.keep(surface_object):
         bpy.context.view_layer.update()
 
 
-# Blender draws the bounds of objects that are displayed as bounds in one of five shapes, and draws nothing for a number
-# that stands for none of these. Of Curves that are displayed in any other way it draws the outline of each strand while
-# they are selected, for which it uploads all strands.
+# Objects displayed as bounds are drawn in one of five shapes, and not at all if the number of the shape is invalid.
+# For selected Curves with any other display type Blender draws the outline of each strand, and uploads all strands.
 _BOX, _NO_SHAPE = 0, 4
 
 
@@ -129,4 +128,4 @@ def draw_natively(curves, is_shown):
         # Only foreach_set accepts a number outside the enumeration.
         bpy.data.objects.foreach_set("display_bounds_type", shapes)
     for index in changed:
-        users[index].display_type = display  # which has Blender evaluate the shape too
+        users[index].display_type = display  # makes Blender evaluate the shape too

@@ -13,9 +13,9 @@ from .. import scene
 
 @dataclass(frozen=True)
 class Cutter:
-    """A mesh, or a plane: a point of it and the unit normal to the side that is cut off, (3,) each. In [m].
+    """A mesh [m], or a plane: a point on it [m] and the unit normal towards the side that is cut off, (3,) each.
 
-    In the axes of a `Surface`, whose origin is that of its object.
+    Coordinates are relative to a `Surface`.
     """
 
     mesh: TriMesh | None
@@ -24,7 +24,7 @@ class Cutter:
 
 
 def read_cutter(name, surface_object, depsgraph):
-    """The `Cutter` that an object of this name is for guides on a mesh object. Raises `HairError`."""
+    """Return the `Cutter` of the object of this name for guides on a mesh object. Raises `HairError`."""
     if not name:
         raise HairError("Pick the object that cuts: a mesh, or an empty whose +Z side is cut off.")
     found = bpy.data.objects.get(name)
@@ -35,7 +35,7 @@ def read_cutter(name, surface_object, depsgraph):
     evaluated = found.evaluated_get(depsgraph)
     matrix = np.array(evaluated.matrix_world, np.float64)
     origin = matrix[:3, 3] - np.array(surface_object.matrix_world.translation, np.float64)
-    across = np.cross(matrix[:3, 0], matrix[:3, 1])  # at right angles to its XY plane, however it is sheared
+    across = np.cross(matrix[:3, 0], matrix[:3, 1])  # perpendicular to the XY plane, even if sheared
     across *= 1.0 if np.dot(across, matrix[:3, 2]) >= 0.0 else -1.0
     size = np.linalg.norm(across)
     if not (np.isfinite(matrix).all() and size > 0.0):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that plays frames of a file: Blender's own *Mesh Sequence Cache* in the place where hair follows its surface.
+"""Delivered hair: Blender's *Mesh Sequence Cache* plays frames of a file, in place of following the surface.
 
 Files that link the hair, render farms and Blender without the add-on play it.
 """
@@ -10,13 +10,13 @@ import bpy
 
 from . import curves_objects, follow_nodes
 
-ROOT = "vellus_hair"  # of a file's hierarchy, by which the modifier is known whatever its name is
+ROOT = "vellus_hair"  # root of the file's hierarchy, which identifies the modifier even if renamed
 
 _NAME = "Delivered Hair"
 
 
 def modifier_of(hair_object):
-    """The modifier that plays delivered frames; None where hair follows its surface."""
+    """The modifier that plays delivered frames; None if hair follows its surface."""
     found = (modifier for modifier in hair_object.modifiers if is_ours(modifier))
     return next(found, None)
 
@@ -59,7 +59,7 @@ def deliver(hair, cache_file, object_path):
 
 
 def take_off(hair_object):
-    """Let an object's hair follow its surface again; whether it played delivered frames."""
+    """Let an object's hair follow its surface again; returns whether it played delivered frames."""
     modifier = modifier_of(hair_object)
     if modifier is None:
         return False
@@ -68,22 +68,22 @@ def take_off(hair_object):
     if following is not None:
         following.show_viewport = following.show_render = True
     if hair_object.parent is not None and hair_object.parent == hair_object.data.surface:
-        curves_objects.stand_on(hair_object, hair_object.parent)  # where frames stood when transforms were applied
+        curves_objects.stand_on(hair_object, hair_object.parent)  # applied transforms had moved the object
     return True
 
 
 def open_file(path):
-    """A new CacheFile of a file, relative to the .blend where that is saved."""
+    """Return a new CacheFile of a file; its path is relative if the .blend is saved."""
     before = {*bpy.data.cache_files}
     bpy.ops.cachefile.open(filepath=str(path))
-    (made,) = {*bpy.data.cache_files} - before
+    (opened,) = {*bpy.data.cache_files} - before
     if bpy.data.filepath:
-        made.filepath = bpy.path.relpath(str(path))
-    return made
+        opened.filepath = bpy.path.relpath(str(path))
+    return opened
 
 
 def close_files(path):
-    """Remove the CacheFiles of a file, which is about to be replaced: modifiers play nothing until it is opened."""
+    """Remove the CacheFiles of a file that is about to be replaced: modifiers play nothing until it is opened."""
     opened = [c for c in bpy.data.cache_files if c.library is None and _absolute(c.filepath) == path]
     bpy.data.batch_remove(opened)
 
@@ -93,9 +93,9 @@ def _absolute(filepath):
 
 
 def new_probe(hair_object):
-    """A copy of an object that shows its Curves as their surface carries them, and no modifiers after that.
+    """Return a copy of an object whose Curves follow their surface, without the modifiers after that.
 
-    It is visible whatever is hidden, and to be removed.
+    The copy is always visible. The caller removes it.
     """
     probe = hair_object.copy()
     bpy.context.scene.collection.objects.link(probe)

@@ -10,13 +10,13 @@ from ....core import interpolation
 from ....core.errors import HairError
 from .curves import curve_offsets
 
-_POINT_LIMIT = 10_000  # each strand reads all
+_POINT_LIMIT = 10_000  # as each strand reads all segments
 
 
 def read(surface_object, surface, name, depsgraph):
-    """(L, 2, 3) float64 segments [m] of a curve object, or of a mesh's loose edges, as a `Surface` is.
+    """(L, 2, 3) float64 segments [m] of a curve object, or of a mesh's loose edges, in a `Surface`'s coordinates.
 
-    Lines run from the start of their curves to the end. None for the empty name. Raises `HairError`.
+    Lines run from the start to the end of their curves. None for an empty name. Raises `HairError`.
     """
     if not name:
         return None
@@ -40,9 +40,9 @@ def read(surface_object, surface, name, depsgraph):
 
 
 def at_rest(lines, shown, surface, device):
-    """Lines that are drawn on a `Surface` as it is shown: moved to where it is at rest, if `surface` is its cage.
+    """Move lines from the shown `Surface` to the surface at rest, if `surface` is its cage.
 
-    Both are the same one where nothing subdivides it.
+    The two are the same without subdivision.
     """
     if lines is None or not surface.is_cage or shown.drawn_on is None:
         return lines
@@ -50,7 +50,7 @@ def at_rest(lines, shown, surface, device):
 
 
 def key(lines):
-    """A key that changes with lines; empty for None."""
+    """A digest of lines; empty for None."""
     return "" if lines is None else hashlib.blake2b(lines.tobytes(), digest_size=16).hexdigest()
 
 

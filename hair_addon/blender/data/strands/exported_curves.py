@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What guides and strands store that other programs take: guides of strands, UV coordinates of roots, widths."""
+"""Exported data of guides and strands: guides of strands, UV coordinates of roots, widths, points."""
 
 import numpy as np
 
@@ -9,9 +9,9 @@ from . import attributes, curves
 
 
 def read_guide_map(hair, guide_count):
-    """(S, k) int32 guides of strands, -1 for none, and (S, k) float32 weights; None where hair stores none.
+    """(S, k) int32 guides of strands, -1 for none, and (S, k) float32 weights; None if hair stores none.
 
-    Guides that are not among so many are none.
+    Guide indices outside of `guide_count` become -1.
     """
     indices, weights = [], []
     while True:
@@ -26,7 +26,7 @@ def read_guide_map(hair, guide_count):
 
 
 def read_root_uvs(datablock):
-    """(S, 2) float32; None where the surface has no UV map, or coordinates are not finite."""
+    """(S, 2) float32; None if the surface has no UV map or coordinates are not finite."""
     surface = datablock.surface
     if surface is None or surface.type != "MESH" or not surface.data.uv_layers:
         return None
@@ -35,9 +35,9 @@ def read_root_uvs(datablock):
 
 
 def read_radii(datablock, point_count):
-    """A function of a slice of curves that gives radii (n, P) float32 in local units, at least zero.
+    """Return a function of a slice of curves that returns (n, P) float32 radii in local units, at least zero.
 
-    Of curves with other point counts they are interpolated along each.
+    Radii are interpolated along curves with other point counts.
     """
     stored, counts = attributes.read(datablock, "radius", "FLOAT", "POINT"), curves.point_counts(datablock)
     if stored is None or len(stored) != len(counts) * point_count:
@@ -50,34 +50,34 @@ def read_radii(datablock, point_count):
 
 
 def counts_kept(datablock):
-    """(S,) int32: points of each curve in files that can keep them.
+    """(S,) int32: points of each curve in file formats that keep point counts.
 
-    Polylines have their own points. Catmull-Rom splines of few have points between them too, at least as many as
-    strands have, by their number alone: they are as many at all times.
+    Polylines keep their points. Catmull-Rom splines with few points are subdivided to at least the point count of
+    strands. The counts depend only on the number of points, so they are constant over time.
     """
     counts = curves.point_counts(datablock)
     return ((counts - 1) * _lines_of_segments(datablock, counts) + 1).astype(np.int32)
 
 
 def points_kept(datablock):
-    """(N, 3) float32 local points of curves, as many as `counts_kept` says."""
+    """(N, 3) float32 local points of curves, `counts_kept` for each."""
     return _kept(datablock, curves.read_points(datablock))
 
 
 def radii_kept(datablock):
-    """(N,) float32 radii in local units, at least zero, of the points that `points_kept` has."""
-    kept = _kept(datablock, attributes.valid_radii(curves.read_radii(datablock))[:, None])[:, 0]
-    return np.maximum(kept, np.float32(0.0))
+    """(N,) float32 radii in local units, at least zero, of the points of `points_kept`."""
+    radii = _kept(datablock, attributes.valid_radii(curves.read_radii(datablock))[:, None])[:, 0]
+    return np.maximum(radii, np.float32(0.0))
 
 
 def _lines_of_segments(datablock, counts):
-    """(S,) into how many lines the segments of each curve are divided."""
+    """(S,) the number of lines for each segment of a curve."""
     is_divided = attributes.are_smooth(datablock) & (counts > 2) & (counts < groom.POINT_COUNT)
     return np.where(is_divided, -((1 - groom.POINT_COUNT) // np.maximum(counts - 1, 1)), 1)
 
 
 def _kept(datablock, values):
-    """Values (N, D) at the points of curves → (M, D) float32 at those that `counts_kept` counts."""
+    """Values (N, D) at the points of curves → (M, D) float32 at the points of `points_kept`."""
     counts = curves.point_counts(datablock)
     lines = _lines_of_segments(datablock, counts)
     is_divided = lines > 1

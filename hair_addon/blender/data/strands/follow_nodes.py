@@ -2,8 +2,8 @@
 """Geometry nodes that deform strands with their surface: surface_deform.py as a modifier.
 
 Hair follows an armature in every frame that Cycles renders or an exporter writes, in linked files, and without the
-add-on. Nodes find a root by its stored vertices, and need no UV map; on a surface with another number of vertices, such
-as a finer subdivision for renders, by the nearest point of the surface at rest, on which they begin.
+add-on. Nodes locate a root by its stored vertices, without a UV map. On a surface with another number of vertices, such
+as a finer subdivision for renders, strands begin at the nearest point of the surface at rest.
 """
 
 from collections import Counter
@@ -15,18 +15,18 @@ from ...host.notices import name_of
 from . import stored_roots
 
 _NAME = "Vellus Follow Surface"
-# Of the nodes below. Groups of other versions, from older files, are not changed: on surfaces without subdivision they
-# do the same. Hair takes a new one where strands would turn from the faces of a cage, as they do in groups before
-# `_SMOOTH_SINCE`, and where `_ADDED` nodes are all that a group lacks.
+# Version of the nodes below. Groups of other versions, from older files, are not changed: on surfaces without
+# subdivision their result is the same. Hair switches to a new group if strands would rotate with the faces of a cage,
+# as in groups before `_SMOOTH_SINCE`, and if a group lacks nothing but the `_ADDED` nodes.
 _VERSION = 6
 _SMOOTH_SINCE = 3
-# Nodes that versions added: a group that lacks no others is taken for a new one.
+# Nodes that versions added: a group that lacks only these is replaced by a new one.
 _ADDED = {
     4: ("GeometryNodeIsViewport", "FunctionNodeBooleanMath", "GeometryNodeSwitch"),
     5: ("GeometryNodeInputNamedAttribute", "GeometryNodeSwitch"),
     6: ("GeometryNodeInputNamedAttribute", "ShaderNodeVectorMath"),
 }
-# Of the group: identifiers, which stay when an artist renames inputs, and types.
+# Inputs of the group: identifiers, which stay when an artist renames inputs, and types.
 _INPUTS = {
     "Surface": ("Socket_1", "NodeSocketObject"),
     "Vertices": ("Socket_2", "NodeSocketInt"),
@@ -46,15 +46,15 @@ def add_modifier(curves_object):
 def set_surface(curves_object, surface_object, vertex_count, is_combed, cage_corners):
     """Set the surface that an object's strands follow, if it still has the modifier.
 
-    vertex_count: of the evaluated surface that the strands' root vertices count in; is_combed: whether brushes are to
-    move strands where the surface has carried them, which needs a UV map; cage_corners: of a `Surface`.
+    vertex_count: of the evaluated surface that root vertices refer to; is_combed: whether brushes move the deformed
+    strands, which needs a UV map; cage_corners: of a `Surface`.
     """
     inputs = {"Surface": surface_object, "Vertices": vertex_count, "Combed": is_combed, "Cage Corners": cage_corners}
     _set(curves_object, inputs)
 
 
 def set_smoothness(curves_object, cage_corners):
-    """Set only how smooth the surface is that an object's strands follow."""
+    """Set only the cage corners of the surface that an object's strands follow."""
     _set(curves_object, {"Cage Corners": cage_corners})
 
 
@@ -71,7 +71,7 @@ def _set(curves_object, inputs):
 
 
 def _lacks_only_new(group):
-    """Whether a group is as an earlier version made it; one that an artist has added nodes to is to stay."""
+    """Whether a group is unchanged since an earlier version created it; groups that an artist has edited stay."""
     if not _is_before(group, _VERSION) or _is_before(group, _SMOOTH_SINCE):
         return False
     added = Counter(kind for since, kinds in _ADDED.items() if group["vellus_version"] < since for kind in kinds)
@@ -80,17 +80,17 @@ def _lacks_only_new(group):
 
 
 def is_paused(curves_object):
-    """Whether viewports' evaluation leaves an object's strands at rest; never in a render's."""
+    """Whether evaluation for viewports leaves an object's strands at rest; evaluation for renders never does."""
     return any(_paused_input(modifier).value for modifier in _pausable_modifiers(curves_object))
 
 
 def pause(curves_object, is_paused):
-    """Let viewports' evaluation leave an object's strands at rest, or carry them again; whether there is a way to."""
+    """Let evaluation for viewports leave an object's strands at rest or deform them; returns whether it can."""
     modifiers = _pausable_modifiers(curves_object)
     for modifier in modifiers:
         if _paused_input(modifier).value != is_paused:
             _paused_input(modifier).value = is_paused
-            curves_object.update_tag(refresh={"DATA"})  # Blender does not notice
+            curves_object.update_tag(refresh={"DATA"})  # Blender does not tag the change itself
     return bool(modifiers)
 
 
@@ -99,30 +99,30 @@ def _paused_input(modifier):
 
 
 def _pausable_modifiers(curves_object):
-    """Those of our modifiers whose nodes can be paused: not in older files, or where an artist removed the input."""
+    """Our modifiers whose nodes can be paused: older groups, and groups that an artist edited, may lack the input."""
     found = (m for m in curves_object.modifiers if m.type == "NODES" and _is_ours(m.node_group))
     return [modifier for modifier in found if "Paused" in _intact_inputs(modifier.node_group)]
 
 
 def modifier_of(curves_object):
-    """The modifier that deforms an object's strands with their surface; None where an artist has removed it."""
+    """The modifier that deforms an object's strands with their surface; None if an artist has removed it."""
     found = (m for m in curves_object.modifiers if m.type == "NODES" and _is_ours(m.node_group))
     return next(found, None)
 
 
 def is_older(curves_object):
-    """Whether an object's strands turn from the flat faces of a cage, as files of older versions have it."""
+    """Whether an object's strands rotate with the flat faces of a cage, as in files of older versions."""
     modifier = modifier_of(curves_object)
     return modifier is not None and _is_before(modifier.node_group, _SMOOTH_SINCE)
 
 
 def _is_before(group, version):
     found = group["vellus_version"]
-    return not isinstance(found, int) or found < version  # anything may stand in a damaged file
+    return not isinstance(found, int) or found < version  # a damaged file may contain any type
 
 
 def modifiers_of_artist(curves_object):
-    """Names of an object's modifiers that renders show, but for the one that deforms strands with their surface."""
+    """Names of an object's modifiers that renders show, except the one that deforms strands with their surface."""
     shown = [modifier for modifier in curves_object.modifiers if modifier.show_render]
     return [name_of(m) for m in shown if m.type != "NODES" or (m.node_group is not None and not _is_ours(m.node_group))]
 
@@ -172,9 +172,9 @@ class _Tree:
         self._group = group
 
     def build(self):
-        """All of the group, from its input to its output."""
+        """Build the whole group, from its input to its output."""
         given = self._node("NodeGroupInput").outputs
-        # In the surface's own coordinates, which are those of its children.
+        # In the surface's local coordinates, which its children share.
         info = self._node("GeometryNodeObjectInfo", {"Object": given["Surface"]}, transform_space="ORIGINAL")
         position = self._node("GeometryNodeInputPosition").outputs[0]
         # Rest positions of strands, for nodes that use them: Blender shares the array.
@@ -196,7 +196,7 @@ class _Tree:
             secondary_axis="Z",
         ).outputs[0]
         turned = self._node("FunctionNodeRotateVector", {0: before, 1: rotation}).outputs[0]
-        # Computed once a strand, not once a point.
+        # Computed once per strand, not once per point.
         offset = self._on_domain(self._vector("SUBTRACT", after, turned), "FLOAT_VECTOR", "CURVE")
         rotation = self._on_domain(rotation, "QUATERNION", "CURVE")
         curves, (position,) = self._capture(at_rest, [position])
@@ -215,12 +215,12 @@ class _Tree:
         self._spread_out()
 
     def _spread_out(self):
-        """Place the nodes in a row: all at once, as Blender would check the group after each."""
+        """Place the nodes in a row; at once, as Blender would check the group after each assignment."""
         count = len(self._group.nodes)
         self._group.nodes.foreach_set("location", [part for column in range(count) for part in (180.0 * column, 0.0)])
 
     def _is_paused(self, given):
-        """Never in renders: these carry strands whatever a viewport does."""
+        """Paused in viewports only: renders always deform strands."""
         in_viewport = self._node("GeometryNodeIsViewport").outputs[0]
         return self._node("FunctionNodeBooleanMath", {0: given["Paused"], 1: in_viewport}, operation="AND").outputs[0]
 
@@ -236,7 +236,7 @@ class _Tree:
         return self._switch(is_combed, curves, deformed, "GEOMETRY")
 
     def _smooth_rest(self, surface, cage_corners, rest):
-        """The surface and, per vertex, where it is on the smooth surface at rest: smooth_surface.py."""
+        """The surface and each vertex's position on the smooth surface at rest: smooth_surface.py."""
         by = geometry.smooth_surface
         face_count = self._node("GeometryNodeAttributeDomainSize", {0: surface}).outputs["Face Count"]
         refinement = self._math("DIVIDE", self._math("MULTIPLY", face_count, 4.0), cage_corners)
@@ -255,7 +255,7 @@ class _Tree:
         return surface, smooth_rest
 
     def _with_motion(self, surface, smooth_rest, position):
-        """The surface and, per vertex, its position and where the rotation there takes the x and the y axis."""
+        """The surface and each vertex's position and rotated x and y axes."""
         face = self._node("GeometryNodeInputIndex").outputs[0]
         corners = []
         for offset in (0, 1, -1):
@@ -301,9 +301,9 @@ class _Tree:
                 {"Mesh": at_rest.outputs[0], "Value": value, "Sample Position": root},
                 data_type="FLOAT_VECTOR",
             ).outputs[0]
-            if is_start:  # where strands that were placed on a cage begin
+            if is_start:  # strands that were placed on a cage begin off the surface
                 known = self._vector("SUBTRACT", known, self._named(stored_roots.SLIDE, "FLOAT_VECTOR"))
-            if is_start:  # faces at another level of subdivision do not lie in those of a bent cage
+            if is_start:  # faces at another level of subdivision do not lie within the faces of a bent cage
                 nearest = self._switch(floats.outputs["Exists"], root, nearest)
             return self._switch(is_other, known, nearest)
 

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides of a Curves datablock one by one: which are selected, which come and which go. All others keep their bits."""
+"""Single guides of a Curves datablock: selection, removal and addition. All other guides keep their exact values."""
 
 import numpy as np
 
 from . import attributes
 
-_SELECTION = ".selection"  # Blender's own, of Sculpt Mode and Edit Mode; absent where all is selected
+_SELECTION = ".selection"  # Blender's attribute of Sculpt Mode and Edit Mode; absent if all is selected
 _POINTS, _CURVES = "POINT", "CURVE"
 
 
 def selection(curves, starts):
-    """(S,) float32 in [0, 1]: how much of each curve is selected, the most of its points; None where no one is chosen.
+    """(S,) float32 in [0, 1]: the selection of each curve, or its most selected point; None if nothing is selected.
 
-    starts (S+1,): where each curve's points begin.
+    starts (S+1,): index of each curve's first point.
     """
     for data_type in ("BOOLEAN", "FLOAT"):
         values = attributes.read(curves, _SELECTION, data_type, _CURVES)
@@ -29,7 +29,7 @@ def selection(curves, starts):
 
 
 def remove(curves, indices):
-    """Remove some curves. At least one has to stay: an empty list of them would crash Blender's nodes."""
+    """Remove some curves. At least one must remain: an empty list of curves would crash Blender's nodes."""
     if len(indices) >= len(curves.curves):
         raise ValueError("all curves would be removed")
     if len(indices):
@@ -37,10 +37,10 @@ def remove(curves, indices):
 
 
 def append(curves, points, sources, starts):
-    """Append curves of points (M, P, 3) float32 in local coordinates, with the attributes of others, smooth like them.
+    """Append curves of (M, P, 3) float32 points in local coordinates, with the attributes and types of existing curves.
 
-    sources: (M,) indices of these; their points' attributes are taken at the same share of the number of points.
-    starts (S+1,): where the present curves' points begin.
+    sources: (M,) indices of these curves; attributes of their points are sampled at the same fraction of the points.
+    starts (S+1,): index of each existing curve's first point.
     """
     count, point_count = points.shape[:2]
     if not count:
@@ -69,7 +69,7 @@ def append(curves, points, sources, starts):
 
 
 def write_tail(curves, name, data_type, values):
-    """Write an attribute of the last curves, if there is one of this name and type; values: one each."""
+    """Write an attribute of the last curves, if one of this name and type exists; values: one per curve."""
     present = attributes.read(curves, name, data_type, _CURVES)
     if present is not None and len(values):
         present[-len(values) :] = values

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes that Curves had when their hair came from elsewhere: of guides derived from it, and of strands they moved.
+"""Original shapes of kept hair and of the guides derived from it.
 
-Stored as points in an attribute, so files, undo and brushes that remove curves keep them with their curves.
+Stored as points in an attribute, so that files, undo and brushes that remove curves keep them with their curves.
 """
 
 import numpy as np
@@ -13,12 +13,12 @@ _SHAPE = "kept_position"
 
 
 def read(datablock):
-    """(N, 3) float32 points that were kept, in local coordinates; None for none."""
+    """(N, 3) float32 points of the kept shape in local coordinates, or None."""
     return attributes.read(datablock, _SHAPE, "FLOAT_VECTOR", "POINT")
 
 
 def keep(datablock, points):
-    """Keep (N, 3) points as the shape of Curves; of linked and overridden ones until their file is read again."""
+    """Store (N, 3) points as the kept shape; of linked and overridden Curves until their file is read again."""
     if not attributes.is_from_library(datablock):
         attributes.write(datablock, _SHAPE, "FLOAT_VECTOR", "POINT", points)
         return
@@ -32,28 +32,28 @@ def keep(datablock, points):
 
 
 def forget(datablock):
-    """Remove what was kept."""
+    """Remove the kept shape."""
     if attributes.has(datablock, _SHAPE, "FLOAT_VECTOR", "POINT"):
         datablock.attributes.remove(datablock.attributes[_SHAPE])
     datablock.vellus.kept_written = ""
 
 
 def write_strands(hair, points):
-    """Write (N, 3) points of kept strands where guides have moved them."""
+    """Write (N, 3) points of kept strands that guides have moved."""
     hair.vellus.kept_written = attributes.write_positions(hair, points)
     hair.update_tag()
 
 
 def is_edited(hair, present):
-    """Whether an artist has moved strands since `write_strands`; present: (N, 3) points where they are."""
+    """Whether an artist has moved strands since `write_strands`; present: (N, 3) current points."""
     written = hair.vellus.kept_written
     return written != "" and written != geometry.fingerprint.fingerprint(present)
 
 
 def move(datablock, function, of_shape=None):
-    """Move points of Curves and the shape that was kept of them; function: (N, 3) float32 → (N, 3) float32.
+    """Move points of Curves and their kept shape; function: (N, 3) float32 → (N, 3) float32.
 
-    of_shape: the same of the shape, None where it moves as the points do.
+    of_shape: the function for the shape; None: the same as for points.
     """
     present, shape = curves.read_points(datablock), read(datablock)
     was_written = datablock.vellus.kept_written != "" and not is_edited(datablock, present)

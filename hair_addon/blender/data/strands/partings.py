@@ -18,14 +18,14 @@ _WHOLE = {"INT", "INT8", "BOOLEAN"}
 
 @dataclass(frozen=True)
 class Partings:
-    """regions: tuple of `Regions`; lines: (L, 2, 3) float64 [m] as a `Surface` is, or None."""
+    """regions: tuple of `Regions`; lines: (L, 2, 3) float64 [m] in a `Surface`'s coordinates, or None."""
 
     regions: tuple
     lines: np.ndarray | None
 
     @property
     def key(self):
-        """A key that changes with them; empty for none."""
+        """A digest of regions and lines; empty for none."""
         if not self.regions and self.lines is None:
             return ""
         digest = hashlib.blake2b(digest_size=16)
@@ -35,12 +35,12 @@ class Partings:
 
 
 def is_wanted(settings):
-    """Whether `HairSettings` (or their properties) name anything that parts hair."""
+    """Whether `HairSettings` (or their properties) contain a region or part lines."""
     return any(text_of(settings, name) for name in ("region_group", "region_attribute", "part_lines"))
 
 
 def read(surface_object, surface, guide_curves, settings, depsgraph):
-    """The `Partings` that `HairSettings` name, on a `Surface`; guide_curves: None if there are none yet."""
+    """Read the `Partings` of `HairSettings` on a `Surface`; guide_curves: None if there are none yet."""
     regions = []
     weights = scene.read_weights(surface_object, surface, depsgraph, settings.region_group)
     if weights is not None:

@@ -18,20 +18,20 @@ from ..surfaces import Surface, cage_of
 
 @dataclass(frozen=True)
 class Pose:
-    """A surface at one time."""
+    """The deformation of a surface at one time."""
 
-    surface: Surface | None  # None of strands that grow on no mesh
-    is_deformed: bool = False  # whether shape keys or modifiers have moved it from its rest shape
+    surface: Surface | None  # None for strands that are not on a mesh
+    is_deformed: bool = False  # whether shape keys or modifiers have moved the surface from its rest shape
 
     @cached_property
     def _motions(self):
-        """{id of a `Turning`: (it, its `SurfaceMotion`)}."""
+        """{id of a `Turning`: (the `Turning`, its `SurfaceMotion`)}."""
         return {}
 
     def motion_at(self, vertices):
-        """The `SurfaceMotion` from the rest shape as it is at some vertices, indices in any shape; None at rest.
+        """The `SurfaceMotion` from the rest shape at some vertices, an array of indices; None at rest.
 
-        Rotations elsewhere are missing: there are fewer roots than vertices on many a surface.
+        Rotations of other vertices are missing, as many surfaces have fewer roots than vertices.
         """
         if not self.is_deformed:
             return None
@@ -45,9 +45,9 @@ class Pose:
         """Return (M, P, 3) float32: the chosen strands on the deformed surface; unchanged if it is not deformed.
 
         points: (S, P, 3) float32 of all strands at rest, in local coordinates; topology: of the surface that they were
-        rooted on; places: their roots there, as `Surface.places` or `stored_roots.places` returns them, or None.
-        Strands are rooted at the nearest place where the surface has other faces now, or what is stored is damaged;
-        may_float: whether they may begin apart from the surface, and are to.
+        rooted on; places: their roots from `Surface.places` or `stored_roots.places`, or None. Strands are rooted at
+        the nearest point if the faces of the surface have changed or stored roots are damaged; may_float: whether
+        strands may begin off the surface.
         """
         if not self.is_deformed:
             return points[chosen]
@@ -56,9 +56,9 @@ class Pose:
         return carried(points, self.motion_at(vertices), (vertices[chosen], barycentric[chosen]))
 
     def carry_rooted(self, points, counts, places, chosen):
-        """The same of points (N, 3) of chosen strands that have counts (M,) each, and whose places `rooted` gave.
+        """The same for (N, 3) points of chosen strands with (M,) counts; places: from `rooted`.
 
-        For parts of many strands.
+        For processing many strands in parts.
         """
         if not self.is_deformed:
             return points
@@ -68,10 +68,10 @@ class Pose:
         return carried(points, self.motion_at(vertices), (vertices[chosen], barycentric[chosen]), counts)
 
     def rooted(self, topology, places, firsts, may_float=False):
-        """Root places on this surface, as `carry_rooted` takes them; firsts: (S, 3) local first points.
+        """Roots on this surface for `carry_rooted`; firsts: (S, 3) local first points.
 
-        A third array where strands were rooted on the cage, or at another level of subdivision: (S, 3) from where they
-        begin to their places at rest. Faces at another level do not lie in those of a bent cage.
+        A third array follows if strands were rooted on the cage or at another level of subdivision: (S, 3) offsets from
+        first points to roots at rest. Faces at another level do not lie within the faces of a bent cage.
         """
         surface = self.surface
         if not self.is_deformed:
@@ -95,14 +95,14 @@ class Pose:
 
 
 def read_pose(surface_object, depsgraph):
-    """The `Pose` of what strands grow on, as a depsgraph has evaluated it; at rest of what is no mesh."""
+    """The `Pose` of a surface in a depsgraph; at rest if it is None or not a mesh."""
     if surface_object is None or surface_object.type != "MESH":
         return Pose(None)
     return pose_of(scene.read_surface(surface_object, depsgraph))
 
 
 def pose_of(surface):
-    """The `Pose` of a `Surface` as it was read. Raises `HairError` where it is deformed to non-finite vertices."""
+    """The `Pose` of a `Surface`. Raises `HairError` if it is deformed and has non-finite vertices."""
     if surface.is_deformed:
         require_finite(surface.rest)
         require_finite(surface.posed)
@@ -110,10 +110,10 @@ def pose_of(surface):
 
 
 def carried(points, motion, places, counts=None, is_back=False):
-    """float32 points of strands, each carried rigidly as a `SurfaceMotion` goes at its root.
+    """float32 points of strands, each moved rigidly with a `SurfaceMotion` at its root.
 
-    points: (S, P, 3), or (N, 3) of strands that have `counts` (S,) points; places: (S, 3) root vertices and barycentric
-    coordinates; is_back: the inverse, from where the surface went to where it was.
+    points: (S, P, 3), or (N, 3) of strands with `counts` (S,) points; places: (S, 3) root vertices and barycentric
+    coordinates; is_back: move by the inverse motion.
     """
     carry = geometry.surface_deform.carry
     if counts is None:

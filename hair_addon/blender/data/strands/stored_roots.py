@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Roots as Curves store them: a triangle, its vertices, and barycentric coordinates.
+"""Stored roots of Curves: a triangle, its vertices, and barycentric coordinates.
 
-The vertices tell the place in a face, whichever triangles this is cut into now. Where modifiers subdivide the surface,
-roots that were placed on its cage are stored there too, to the bit, and strands begin there: how far that is from their
-place on the surface as it is subdivided is their slide.
+The vertices locate a root in a face regardless of its triangulation. If modifiers subdivide the surface, roots that
+were placed on its cage are stored exactly on the cage too, and strands begin there: their slide is the offset to the
+root on the subdivided surface.
 """
 
 import numpy as np
@@ -18,14 +18,14 @@ _CAGE = ("cage_triangle", "cage_barycentric")
 
 
 def points(curves, surface, is_complete=False):
-    """`SurfacePoints` of roots on a surface with the faces that they were stored on; impossible ones become a corner.
+    """`SurfacePoints` of roots on a surface with the faces that they were stored on; None if there are none.
 
-    is_complete: None if any of them is impossible; None too if none are stored, or the surface has no faces.
+    Invalid roots are replaced by a triangle's corner. is_complete: return None if any root is invalid.
     """
     triangle, barycentric = raw(curves)
     if barycentric is None or triangle is None or not len(surface.mesh.triangles):
         return None
-    # Curves that sculpt mode adds carry zeros; a surface that lost faces leaves indices out of range.
+    # Curves that Sculpt Mode adds have zeros; on a surface that lost faces indices are out of range.
     known = are_barycentric(barycentric) & (triangle >= 0) & (triangle < len(surface.mesh.triangles))
     triangle[~known] = 0
     found = surface.swap_winding(SurfacePoints(triangle, barycentric))
@@ -37,8 +37,8 @@ def points(curves, surface, is_complete=False):
         known &= are_vertices
         if len(cut_otherwise):
             polygons = geometry.face_places.owners(surface.triangulated)[triangle[cut_otherwise]]
-            its_places = vertices[cut_otherwise], barycentric[cut_otherwise]
-            present, are_none = surface.points_at(polygons, *its_places)
+            stored_places = vertices[cut_otherwise], barycentric[cut_otherwise]
+            present, are_none = surface.points_at(polygons, *stored_places)
             found.triangle[cut_otherwise], found.barycentric[cut_otherwise] = present.triangle, present.barycentric
             known[cut_otherwise[are_none]] = False
     if is_complete and not known.all():
@@ -49,7 +49,7 @@ def points(curves, surface, is_complete=False):
 
 
 def write_cage(curves, surface, roots):
-    """Store `SurfacePoints` on the `Surface.cage`; None: forget those that are stored."""
+    """Store `SurfacePoints` on the `Surface.cage`; None removes stored points."""
     curves.vellus.cage_topology = "" if roots is None else surface.topology
     if roots is None:
         _remove(curves, *_CAGE)
@@ -60,12 +60,12 @@ def write_cage(curves, surface, roots):
 
 
 def are_on_cage(curves, surface):
-    """Whether roots were placed on a `Surface.cage` beside which they are stored."""
+    """Whether roots on a `Surface.cage` are stored besides roots on the subdivided surface."""
     return curves.vellus.cage_topology != "" and curves.vellus.cage_topology == surface.topology
 
 
 def cage_points(curves, surface, is_complete=True):
-    """`SurfacePoints` on a `Surface.cage` as they were placed, None if none is; impossible ones as of `points`."""
+    """`SurfacePoints` on a `Surface.cage`, or None; invalid roots are handled as in `points`."""
     if curves.vellus.topology == surface.topology:
         return points(curves, surface, is_complete)
     if not are_on_cage(curves, surface):
@@ -82,7 +82,7 @@ def cage_points(curves, surface, is_complete=True):
 
 
 def write_slides(curves, slides):
-    """Store (S, 3) from where strands begin to their places on the surface at rest; None: they begin there."""
+    """Store (S, 3) offsets from first points to roots on the surface at rest; None: strands begin at their roots."""
     if slides is None or not slides.any():
         _remove(curves, SLIDE)
     else:
@@ -90,12 +90,12 @@ def write_slides(curves, slides):
 
 
 def slides(curves):
-    """(S, 3) float32 as `write_slides` stored them; None without."""
+    """(S, 3) float32 slides stored by `write_slides`, or None."""
     return attributes.read(curves, SLIDE, "FLOAT_VECTOR", "CURVE")
 
 
 def slid_places(curves):
-    """`places` on a mesh of any size, and the slides where strands have any: as `Pose.rooted` takes them."""
+    """`places` on a mesh of any size, followed by the slides if strands have any, for `Pose.rooted`."""
     found, stored = places(curves, np.inf), slides(curves)
     return found if found is None or stored is None else (*found, stored)
 
@@ -107,7 +107,7 @@ def _remove(curves, *names):
 
 
 def raw(curves):
-    """(S,) int32 triangles and (S, 3) float32 barycentric coordinates as they are stored, each None if it is not."""
+    """Stored (S,) int32 triangles and (S, 3) float32 barycentric coordinates, each None if missing."""
     triangle = attributes.read(curves, "root_triangle", "INT", "CURVE")
     return triangle, attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
 
@@ -115,7 +115,7 @@ def raw(curves):
 def places(curves, vertex_count):
     """Stored (S, 3) int32 root vertices and (S, 3) float32 barycentric coordinates in Blender's order; or None.
 
-    Rows that are invalid for a mesh with so many vertices are zero.
+    Rows that are invalid for a mesh with `vertex_count` vertices are zero.
     """
     barycentric, vertices = attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE"), _vertices(curves)
     if barycentric is None or vertices is None:
@@ -126,7 +126,7 @@ def places(curves, vertex_count):
 
 
 def turn(curves, turned):
-    """Turn the triangles that roots are stored in, as Blender turns faces where it applies a scale that mirrors.
+    """Flip the triangles of stored roots, as Blender flips faces when it applies a mirroring scale.
 
     turned: the `TurnedFaces` of the surface.
     """
@@ -145,18 +145,18 @@ def turn(curves, turned):
 
 
 def may_float(curves):
-    """Whether strands may begin apart from their surface, as curves that came from elsewhere do."""
+    """Whether strands may begin off their surface, as imported curves do."""
     return attributes.has(curves, "root_distance", "FLOAT", "CURVE")
 
 
 def are_barycentric(coordinates):
-    """(S,) bool: whether rows of (S, 3) are places inside a triangle, to rounding. NaN is not."""
+    """(S,) bool: whether rows of (S, 3) are inside a triangle up to rounding; False for NaN."""
     is_inside = ((coordinates >= -1e-3) & (coordinates <= 1.0 + 1e-3)).all(axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
         return is_inside & (abs(coordinates.sum(axis=1) - 1.0) < 1e-3)
 
 
 def _vertices(curves):
-    """(S, 3) int32 vertices that roots lie between, in Blender's order of corners; None where they are not stored."""
+    """(S, 3) int32 root vertices in Blender's order of corners; None if they are not stored."""
     corners = [attributes.read(curves, name, "INT", "CURVE") for name in VERTICES]
     return None if any(corner is None for corner in corners) else np.stack(corners, axis=1)

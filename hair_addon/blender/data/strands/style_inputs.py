@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What styles name, read from Blender: masks, cutting planes and directions of objects."""
+"""Inputs of styles, read from Blender: masks, cutting planes and directions of objects."""
 
 from collections.abc import Sequence
 
@@ -39,7 +39,7 @@ def read(surface_object, surface, guide_curves, styles: Sequence[StyleSettings],
 
 
 def _matrix_of(name, label):
-    """(4, 4) float64: an object's place in the world. Raises `HairError`."""
+    """(4, 4) float64 world matrix of an object. Raises `HairError`."""
     found = bpy.data.objects.get(name)
     if found is None:
         sentence = 'There is no object "{name}" for the style {style}: pick another object, or clear the field.'
@@ -100,7 +100,7 @@ def _read_surface_attribute(surface_object, surface, name, depsgraph):
 
 
 def _require_same(is_same, surface_object):
-    """Raise `HairError` unless a mesh has as many vertices and faces as its `Surface`, which was read before."""
+    """Raise `HairError` if a mesh has changed since its `Surface` was read."""
     if not is_same:
         sentence = 'The mesh of "{name}" has changed: the hair updates when you leave its paint mode.'
         raise HairError(sentence, name=name_of(surface_object))
