@@ -274,7 +274,7 @@ class Surface:
         return int(self.cage_vertices.max()) + 1 if is_divided else len(self.rest)
 
     def points_at(self, polygons, vertices, barycentric):
-        """(`SurfacePoints`, (N,) bool: whether invalid) of places in `triangulated` polygons, as returned by `places`."""
+        """(`SurfacePoints`, (N,) bool: whether invalid) of places, as from `places`, in `triangulated` polygons."""
         return geometry.face_places.on_triangles(self.mesh, self.triangulated, polygons, vertices, barycentric)
 
     def to_local_normals(self, normals):

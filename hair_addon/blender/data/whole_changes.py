@@ -149,21 +149,21 @@ class _Change:
         copy.data = curves_object.data.copy()
         names = name_of(curves_object), name_of(curves_object.data)
         collections = tuple(one.session_uid for one in curves_object.users_collection)
-        kept = _Copy(copy.session_uid, copy.data.session_uid, curves_object.data.session_uid, *names, collections)
-        self._copies[curves_object.session_uid] = kept
+        saved = _Copy(copy.session_uid, copy.data.session_uid, curves_object.data.session_uid, *names, collections)
+        self._copies[curves_object.session_uid] = saved
 
     def copies(self):
         """The session UIDs of the copies that may still be needed, and of their data."""
-        return {uid for kept in self._copies.values() for uid in (kept.uid, kept.data)}
+        return {uid for saved in self._copies.values() for uid in (saved.uid, saved.data)}
 
     def end(self):
         """Finish the change, which only an enclosing change can still undo."""
         if _open:
             _open[-1]._owners = self._owners | _open[-1]._owners
         present = _datablocks()
-        for kept in self._copies.values():
-            if kept.uid in present:
-                _remove_object(present[kept.uid])
+        for saved in self._copies.values():
+            if saved.uid in present:
+                _remove_object(present[saved.uid])
         self._copies.clear()
 
     def undo(self):
@@ -181,15 +181,15 @@ class _Change:
                 one.add_rest_position_attribute = False
         if self._thin is not None and self._thin[0] in present:
             thin_hair.restore(present[self._thin[0]], *self._thin[1:])
-        for uid, kept in self._copies.items():
-            if uid in self._there and kept.uid in present:
-                _put_back(present, uid, kept)
-                self._made -= {kept.uid, kept.data}
+        for uid, saved in self._copies.items():
+            if uid in self._there and saved.uid in present:
+                _put_back(present, uid, saved)
+                self._made -= {saved.uid, saved.data}
         _remove(self._made - {uid for outer in _open for uid in outer.copies()})
         present = _datablocks()
-        for uid, kept in self._copies.items():
-            if uid in self._there and kept.uid in present:
-                present[kept.uid].name, present[kept.uid].data.name = kept.name, kept.data_name
+        for uid, saved in self._copies.items():
+            if uid in self._there and saved.uid in present:
+                present[saved.uid].name, present[saved.uid].data.name = saved.name, saved.data_name
         if layer is not None:
             layer.update()  # otherwise the layer still lists removed objects as None
             self._select(layer)
@@ -286,15 +286,15 @@ def _restore(owner, state):
         owner.vellus.guide_curves = next(found, None)
 
 
-def _put_back(present, uid, kept):
+def _put_back(present, uid, saved):
     """Replace an object by its copy, also if the object was deleted."""
-    changed, copy, own_data = present.get(uid), present[kept.uid], present.get(kept.own_data)
+    changed, copy, own_data = present.get(uid), present[saved.uid], present.get(saved.own_data)
     is_converted = changed is not None and own_data is not None and changed.data != own_data
     if changed is not None:
         changed.user_remap(copy)
         _remove_object(changed)
     masters = {one.collection.session_uid: one.collection for one in bpy.data.scenes}
-    for collection in (masters.get(uid, present.get(uid)) for uid in kept.collections):
+    for collection in (masters.get(uid, present.get(uid)) for uid in saved.collections):
         if collection is not None and all(one != copy for one in collection.objects):
             collection.objects.link(copy)
     if is_converted:  # Blender does not change the data that it converts

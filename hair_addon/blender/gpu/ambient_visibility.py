@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Visibility of the world from strands and surfaces, as ambient cubes.
 
-Opacity maps are drawn from 14 directions; each point sums their transmittances. The result changes with the
-geometry, not with the light or the view.
+Opacity maps are drawn from 14 directions; each point sums their transmittances. The result depends on the geometry, not
+on lights or the view.
 """
 
 import numpy as np
@@ -11,19 +11,20 @@ from ...core.imaging import ambient_cube
 from . import drawing, driver_textures, scene_programs, seen_programs, shadows, uniforms
 from .strand_textures import seen_points
 
-# Environment light is soft: its maps are coarser than a lamp's, and drawn from as many strands as they can resolve.
-# Fewer and thicker strands cover places less evenly, which lets more light through.
+# Environment light is soft: its maps are coarser than a lamp's, and drawn with as many strands as they can resolve.
+# Fewer and thicker strands cover an area less evenly, which lets more light through.
 _SIZE = 256
 _POINT_COUNT, _LEAST_STRANDS = 11, 10_000
-_FULL_WIDTH = 0.5  # texels that a strand may be wide that is drawn for several
+_FULL_WIDTH = 0.5  # maximum width [texels] of a strand that represents several
 
 
 def measure(hair, blockers, opacities, surfaces, forwards=None):
-    """Visibility textures {sampler: texture} of each strands and of each surface: two lists.
+    """Visibility textures {sampler: texture} for each hair and for each surface: two lists.
 
-    hair: [(StrandsOnGPU, object to world)]; blockers: [SurfaceOnGPU] that hide the world; opacities: of each hair's
-    strands, for which its visibility holds; the surfaces' is for the densest; surfaces: [SurfaceOnGPU] that see it;
-    forwards: what a strand of each hair passes on, (3,) each, None: the same of all channels, by the opacities.
+    hair: [(StrandsOnGPU, object to world)]; blockers: [SurfaceOnGPU] that hide the world; opacities: of strands, one
+    for each hair, for which its visibility is computed; that of surfaces is for the densest hair; surfaces:
+    [SurfaceOnGPU] that receive light; forwards: (3,) fraction of light that a strand of each hair passes on, None: by
+    the opacities, equal for all channels.
     """
     if forwards is None:
         forwards = [np.full(3, 1.0 - opacity) for opacity in opacities]
@@ -38,21 +39,21 @@ def measure(hair, blockers, opacities, surfaces, forwards=None):
 
 
 class Renewal:
-    """Visibility that follows what moves, one direction of the world with each change of it.
+    """Visibility that follows moving geometry, and adds one direction of the world with each change.
 
-    What is complete is shown while the next is added up, so all that is shown is from the same few changes.
+    The last complete visibility is shown while the next is summed, so that all receivers are equally up to date.
     """
 
     def __init__(self):
         self._lights = _suns(ambient_cube.DIRECTIONS, ambient_cube.WEIGHTS)
-        self._maps = shadows.ShadowMaps(_SIZE, len(ambient_cube.DIRECTIONS))  # of all, whose surfaces may stay
+        self._maps = shadows.ShadowMaps(_SIZE, len(ambient_cube.DIRECTIONS))  # one per direction, to reuse surfaces
         self._targets, self._turn = [], 0
 
     def step(self, seen, hair, blockers, through, surfaces):
-        """Add a direction; the visibility textures that are complete now, as `measure` returns them.
+        """Add a direction; returns the last complete visibility textures, as `measure` does.
 
-        seen: those that were complete before, of as many places; through: (opacity, what is passed on (3,)) of each
-        hair; the rest as for `measure`.
+        seen: the previous complete textures, of the same receivers; through: (opacity, (3,) fraction that is passed on)
+        for each hair; the rest as for `measure`.
         """
         places = _places(hair, surfaces, through)
         if [target.size for target in self._targets] != [_size_of(*place) for place in places]:
@@ -76,7 +77,7 @@ class Renewal:
 
 
 def _places(hair, receivers, through):
-    """[(`uniforms.VIEW` record, {sampler: texture})] of what receives light: strands, then surfaces."""
+    """[(`uniforms.VIEW` record, {sampler: texture})] of the receivers: strands, then surfaces."""
     views = [_view_of_strands(strands, to_world) for strands, to_world in hair]
     views += [_view_of_surface(surface) for surface in receivers]
     of_surfaces = through[densest([strands for strands, _ in hair])] if hair else (1.0, np.zeros(3))
@@ -93,7 +94,7 @@ def _split(textures, hair_count):
 
 
 def _steps(hair):
-    """The `drawing.Steps` in which the maps are drawn of [(StrandsOnGPU, object to world)]."""
+    """The `drawing.Steps` of the maps; hair: [(StrandsOnGPU, object to world)]."""
     if not hair:
         return drawing.Steps()
     texel = 2.0 * drawing.bounding_sphere(hair)[1] / _SIZE
@@ -105,7 +106,7 @@ def _steps(hair):
 
 
 def densest(hair):
-    """Index of the `StrandsOnGPU` with most strands: brows do not color the shadow of the hair beside them."""
+    """Index of the `StrandsOnGPU` with most strands, so that brows do not color the shadow of the hair."""
     return max(range(len(hair)), key=lambda index: hair[index].strand_count)
 
 
@@ -115,7 +116,7 @@ def _suns(directions, weights):
     chosen = lights["light"][: len(directions)]
     chosen["kind"], chosen["casts_shadow"] = shadows.SUN, True
     chosen["axis"][:, :3] = -directions
-    # Each side is open to a sixth of the sphere.
+    # Each side of the cube covers a sixth of the sphere.
     chosen["power"][:, 0] = 6.0 * weights
     return lights
 
@@ -137,9 +138,9 @@ def _view_of_surface(surface):
 
 
 class _Target:
-    """Textures that visibility is added up in, a texel for each place.
+    """Textures in which visibility is summed, a texel for each place.
 
-    is_in_bytes: whether all lights are added at once and stored in bytes: see shaders/light/visibility_bytes.glsl.
+    is_in_bytes: add all lights at once and store bytes: see shaders/light/visibility_bytes.glsl.
     """
 
     def __init__(self, place, is_in_bytes=False):
@@ -148,13 +149,13 @@ class _Target:
         self.take({name: _texture(self.size, self._format) for name in scene_programs.VISIBILITY_SAMPLERS})
 
     def take(self, textures):
-        """Add up in these textures {sampler: texture}, from zero."""
+        """Sum in these textures {sampler: texture}, from zero."""
         self.textures, self._is_first = textures, True
 
     def completed(self, before):
-        """Textures {sampler: texture} of what was added up; it begins again from zero.
+        """Return textures {sampler: texture} of the sums, and begin again from zero.
 
-        before: those that were shown so far. What strands see is put into these; surfaces' take turns.
+        before: the textures shown so far. Strands' visibility is converted into these; surfaces swap textures.
         """
         found = self.textures
         if _is_surface((self.view, self.places)):
@@ -186,7 +187,7 @@ def _size_of(view, places):
 
 
 def _is_surface(place):
-    """Whether a place of `_places` is a surface."""
+    """Whether an item of `_places` is a surface."""
     return int(place[0]["point_count"]) == 1
 
 

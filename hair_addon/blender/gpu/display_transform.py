@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A scene's colour management, with view transform, look and gamma, as a table of display colours.
+"""A scene's color management, with view transform, look and gamma, as a table of display colors.
 
-Draw handlers draw onto the viewport after its view transform, so they have to apply it themselves. The shader applies
-the exposure: changing it needs no new table.
+Draw handlers draw onto the viewport after its view transform, so they must apply it themselves. The shader applies the
+exposure, so that changing it needs no new table.
 """
 
 import os
@@ -16,31 +16,31 @@ import numpy as np
 # Texels per side. With 64, the error of interpolation is at most one step of an 8-bit display, see the tests.
 SIZE = 64
 
-# Scene-linear values up to MOST have a place in the table, spaced by their logarithm but for the least ones.
+# The table covers scene-linear values up to MOST, spaced logarithmically except near zero.
 MOST = 512.0
 _KNEE = 1.0 / 1024.0
 
 
 @dataclass(frozen=True)
 class DisplayTransform:
-    """The part of a scene's colour management that is in the table."""
+    """The part of a scene's color management that the table contains."""
 
     display: str
     view: str
     look: str
     gamma: float
-    working_space: str  # what scene-linear colours are in
+    working_space: str  # color space of scene-linear colors
 
     @classmethod
     def of(cls, scene):
-        """As a scene has it set."""
+        """The settings of a scene."""
         view = scene.view_settings
         look = "" if view.look == "None" else view.look
         space = bpy.data.colorspace.working_space
         return cls(scene.display_settings.display_device, view.view_transform, look, view.gamma, space)
 
     def table(self):
-        """(SIZE, SIZE, SIZE, 3) float32 display colours in [0, 1], red running fastest."""
+        """(SIZE, SIZE, SIZE, 3) float32 display colors in [0, 1], red running fastest."""
         axis = linear_at(np.linspace(0.0, 1.0, SIZE)).astype(np.float32)
         blue, green, red = np.meshgrid(axis, axis, axis, indexing="ij")
         colors = np.ascontiguousarray(np.stack([red, green, blue], axis=-1).reshape(-1, 3))
@@ -53,14 +53,14 @@ def display_place(linear):
 
 
 def linear_at(places):
-    """Scene-linear values at places in [0, 1]: the inverse of `display_place`."""
+    """Scene-linear values at table coordinates in [0, 1]: the inverse of `display_place`."""
     return (np.exp2(places * np.log2(MOST / _KNEE + 1.0)) - 1.0) * _KNEE
 
 
 def apply(transform, colors):
-    """(N, 3) scene-linear float32 → (N, 3) display colours, by Blender's OpenColorIO configuration.
+    """(N, 3) scene-linear float32 → (N, 3) display colors, by Blender's OpenColorIO configuration.
 
-    If OpenColorIO is missing or lacks the transform, Blender's Standard, sRGB, with a message on the console.
+    If OpenColorIO is missing or lacks the transform: by the Standard view for sRGB, with a message on the console.
     """
     bpy.utils.expose_bundled_modules()
     try:
@@ -79,7 +79,7 @@ def apply(transform, colors):
 
 
 def _processor(ocio, transform):
-    """As Blender builds it: the look in scene-linear colours, the view, and the scene's gamma over all."""
+    """The processor as in Blender: the look in scene-linear colors, then the view, then the scene's gamma."""
     path = os.environ.get("OCIO") or Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")
     config = ocio.Config.CreateFromFile(str(path))
     steps = ocio.GroupTransform()

@@ -19,7 +19,7 @@ from .strand_textures import bare_vertices, run_for_each, vertex_count
 
 @dataclass(frozen=True)
 class Steps:
-    """Level of detail: the points drawn of each strand, the number of strands drawn, and the first index."""
+    """Level of detail: the number of points drawn per strand, the number of strands drawn, and the first index."""
 
     point_count: int | None = None
     strand_count: int | None = None
@@ -29,15 +29,15 @@ class Steps:
 _ALL = Steps()
 _LEAST_RADIUS = 1e-6  # [m]
 
-# A render runs beside the window, and both share programs and their uniforms: a lock serialises drawing.
+# A render runs in parallel to the window, and both share programs and their uniforms: a lock serializes drawing.
 ALONE = threading.RLock()
 
 
 def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     """A `uniforms.VIEW` record of a camera.
 
-    world_to_view, view_to_clip: (4, 4); height: of the picture [pixels]; least_width: strands thinner than this many
-    pixels are drawn that wide.
+    world_to_view, view_to_clip: (4, 4); height: of the picture [pixels]; least_width: minimum width of strands
+    [pixels].
     """
     record = uniforms.VIEW.record()
     view_to_world = np.linalg.inv(world_to_view)
@@ -60,10 +60,10 @@ def pass_shift(turn):
 
 
 def pass_record(world_to_view, view_to_clip, size, turn=0, tile=None):
-    """The `view_record` of a pass over a picture, each of which takes other places of its samples.
+    """The `view_record` of a pass over a picture; each pass moves the samples.
 
-    size: (width, height) of the picture [samples]; turn: which pass, the first one as it is and the others moved by
-    `pass_shift`; tile: (left, bottom, width, height) [samples] of what is drawn.
+    size: (width, height) of the picture [samples]; turn: index of the pass, which is moved by `pass_shift`; tile:
+    (left, bottom, width, height) [samples] of the part that is drawn.
     """
     left, bottom, width, height = tile or (0, 0, *size)
     shift, window = np.eye(4), np.eye(4)
@@ -80,15 +80,15 @@ def pass_record(world_to_view, view_to_clip, size, turn=0, tile=None):
 
 def scale_of(object_to_world):
     """Return the mean scale of a (4, 4) matrix, for radii."""
-    # Written out: with each strand's record, it takes a tenth of the time of NumPy's.
+    # Written out, as it is called for each record of strands: a tenth of the time of NumPy's determinant.
     (a, b, c), (d, e, f), (g, h, i) = object_to_world[:3, :3].tolist()
     return abs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)) ** (1.0 / 3.0)
 
 
 def bounding_sphere(hair):
-    """Centre (3,) and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)].
+    """(3,) center and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)].
 
-    The radius is above zero, also of hair that was scaled to a point.
+    The radius is positive, also for hair that is scaled to a point.
     """
     corners = []
     for strands, to_world in hair:
@@ -99,7 +99,7 @@ def bounding_sphere(hair):
 
 
 def tight_sphere(hair):
-    """`bounding_sphere` without the corners of boxes: of one hair, some strand touches it."""
+    """`bounding_sphere` around strands instead of the corners of their boxes; tight for a single hair."""
     centres, radii = [], []
     for strands, to_world in hair:
         centre, radius = strands.ball
@@ -127,13 +127,13 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
     return record
 
 
-# Strands in a part: with their stride they are multiplied in a shader, whose integers have 32 bits.
+# Maximum strands in a part: a shader multiplies their number by the stride in 32-bit integers.
 _LARGEST_PART = 32_768
 
 
 @functools.cache
 def _parts(strand_count):
-    """Strands in each of as few equal parts as may be, and a stride near the golden ratio of it that meets them all."""
+    """(size, stride) of the fewest equal parts of strands; the stride, near size times the golden ratio, visits all."""
     size = strand_count // -(-strand_count // _LARGEST_PART)
     stride = round(0.61803399 * size)
     while math.gcd(stride, size) != 1:
@@ -144,15 +144,15 @@ def _parts(strand_count):
 def draw_strands(strands, program, view, lights, object_to_world, samplers=None, steps=_ALL, clip_planes=None):
     """Draw `StrandsOnGPU` as strips into the bound framebuffer, by a program of `scene_programs.strip_program`.
 
-    view, lights: records of `uniforms`; samplers: {sampler: texture} that the program reads beside the strands; steps:
-    for pictures too coarse to show all; clip_planes: (6, 4) of a program that is clipped.
+    view, lights: records of `uniforms`; samplers: {sampler: texture} of the program besides those of strands; steps:
+    level of detail; clip_planes: (6, 4) for a program that is clipped.
     """
     record = strand_record(strands, view, object_to_world, steps)
     draw_strip(strands, program, record, uniforms.uniform_buffer(lights), samplers, clip_planes)
 
 
 def draw_strip(strands, program, record, lights, samplers=None, clip_planes=None):
-    """The same with a record of `strand_record` and lights on the GPU."""
+    """`draw_strands` with a record of `strand_record` and lights on the GPU."""
     count = vertex_count(int(record["drawn_strands"]), int(record["drawn_points"]))
     blocks = {"view": uniforms.uniform_buffer(record), "lights": lights, **uniforms.clipping_blocks(clip_planes)}
     with bound(program, blocks, {**strand_samplers(strands), **(samplers or {})}):
@@ -160,27 +160,27 @@ def draw_strip(strands, program, record, lights, samplers=None, clip_planes=None
 
 
 def strand_samplers(strands):
-    """{sampler: texture} of `StrandsOnGPU` in programs that draw them."""
+    """{sampler: texture} of `StrandsOnGPU` for programs that draw them."""
     return {"strands": strands.texture, "strand_radii": strands.radii_texture}
 
 
 def runs_of_strand(record):
-    """How many runs of segments each strand of a record of `strand_record` is walked along in."""
+    """Number of runs of segments per strand; record: of `strand_record`."""
     return -(-(int(record["drawn_points"]) - 1) // scene_programs.RUN_LENGTH)
 
 
-# Which of the strands are walked along, and how many in how many: WALK_ALL and the like of
+# The strands that `walk_strands` rasterizes, and the denominator of the first share: as in
 # shaders/visibility/rasterize_segment.glsl.
 WALK_ALL, WALK_FIRST, WALK_OTHERS = range(3)
 _FIRST_SHARE = 8
 
 
 def walk_strands(strands, program, record, blocks, samplers, images, constants, part=WALK_ALL):
-    """Run a compute program of `shaders` that walks along segments on those of a record of `strand_record`.
+    """Run a compute program that rasterizes the segments of strands; record: of `strand_record`.
 
-    blocks: {instance: GPUUniformBuf}, the record as "view", and "lights"; samplers, images: {name: texture} that it
-    reads and writes; constants: {name: int}; part: of the strands, all or those of `WALK_FIRST` or `WALK_OTHERS`, which
-    are all together.
+    blocks: {instance: GPUUniformBuf}, the record as "view", and "lights"; samplers, images: {name: texture} that the
+    program reads and writes; constants: {name: int}; part: `WALK_ALL` of the strands, `WALK_FIRST` or the remaining
+    `WALK_OTHERS`.
     """
     strand_count = int(record["drawn_strands"])
     first_count = -(-strand_count // _FIRST_SHARE)
@@ -196,7 +196,7 @@ def walk_strands(strands, program, record, blocks, samplers, images, constants, 
 
 
 def dispatch_over(program, size):
-    """Run a bound compute program once for every texel of a picture of this size."""
+    """Run a bound compute program once for every texel of a picture; size: (width, height)."""
     width, height = (-(-length // scene_programs.PICTURE_GROUP_SIZE) for length in size)
     gpu.compute.dispatch(program, width, height, 1)
 
@@ -206,7 +206,7 @@ def bound(program, blocks, samplers):
     """Bind a program with its blocks {instance: GPUUniformBuf} and textures {sampler: GPUTexture}.
 
     The program does not own them: they must live until the context exits. A bound program must not be freed: Blender
-    mistakes another one at the same address for bound, and draws with the old one.
+    would take a new program at the same address for bound, and draw with the old one.
     """
     program.bind()
     for name, block in blocks.items():
@@ -238,7 +238,7 @@ def cover(program):
     _cover_vertices().draw(program)
 
 
-@shaders.kept  # as programs are: it is drawn several times for each light and frame
+@shaders.cached  # cached like programs, as it is drawn several times for each light and frame
 def _cover_vertices():
     return bare_vertices(3, "TRIS")
 
@@ -261,7 +261,7 @@ def gpu_state(depth_test, depth_writes, blend="NONE"):
 
 @contextmanager
 def cleared(framebuffer, color, depth=1.0):
-    """Bind a framebuffer, all of it one colour and depth."""
+    """Bind a framebuffer, cleared to a color and depth."""
     with framebuffer.bind():
         framebuffer.clear(color=color, depth=depth)
         yield framebuffer

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Textures as large as hair is, which a driver may refuse."""
+"""Textures that may be too large for the graphics driver."""
 
 import gpu
 import numpy as np
@@ -10,9 +10,9 @@ _TEXEL_BYTES = {"RGBA32F": 16, "RG32F": 8, "RGBA16F": 8, "R32F": 4, "R16": 2}
 
 
 def made(size: tuple[int, ...], texture_format: str, texels: np.ndarray | None = None) -> gpu.types.GPUTexture:
-    """A texture of `size` texels that are not filtered; texels: float32 values in it, None for nothing.
+    """Return a texture of `size` texels without filtering; texels: float32 values, None: undefined.
 
-    Raises `HairError` where the driver refuses it, which it does by its limits and its memory.
+    Raises `HairError` if the texture exceeds the driver's limits or memory.
     """
     try:
         data = {} if texels is None else {"data": gpu.types.Buffer("FLOAT", texels.size, texels.ravel())}

@@ -13,7 +13,7 @@ from ...core.shading.fibre import kajiya_kay, strand_variation
 from ...core.shading.tables import albedo, dual_scattering
 from . import scene_programs, uniforms
 
-# What the two modes of the Marschner model read; in the energy-conserving one M is evaluated.
+# Files and tables of the two modes of the Marschner model; the energy-conserving mode evaluates M.
 _TABLES = {
     "classic": ("fibre/marschner.comp", ("m", "n", "n_trt")),
     "energy": ("fibre/energy_conserving.comp", ("n", "n_trt", "n_res")),
@@ -26,32 +26,32 @@ class Shading:
     """Inputs of a strand shader, apart from the scene."""
 
     program: gpu.types.GPUShader
-    variant: Callable[..., gpu.types.GPUShader]  # the same with options of `shading_program`; compiled if used
+    variant: Callable[..., gpu.types.GPUShader]  # the program with options of `shading_program`; compiled on demand
     blocks: dict = field(default_factory=dict)  # {instance: GPUUniformBuf}
     samplers: dict = field(default_factory=dict)
-    forward: np.ndarray = field(default_factory=lambda: np.zeros(3))  # passed on to strands behind
+    forward: np.ndarray = field(default_factory=lambda: np.zeros(3))  # fraction passed on to strands behind
     reflectance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # of infinitely many strands
     is_varied: bool = False  # whether strands differ by their random numbers
-    # Of the energy-conserving model: `lookup_tables.Settings` and, where strands differ, `strand_variation.Settings`.
+    # For the energy-conserving model: (`lookup_tables.Settings`, `strand_variation.Settings` or None).
     fibre: tuple | None = None
 
     @property
     def opacity(self):
-        """Opacity of a strand, the mean over the channels."""
+        """Opacity of a strand, averaged over the channels."""
         return _opacity(self.forward)
 
     @property
     def layers(self):
-        """[(`Shading`, `Mix`)] that are drawn one over the other; None in place of a `Mix` for all of the light."""
+        """[(`Shading`, `Mix`)] that are drawn over each other; `Mix` is None for the whole light."""
         return [(self, None)]
 
 
 @dataclass(frozen=True)
 class Mix:
-    """Which share of a strand's light a `Shading` has: constants of shaders/fibre/mixed_looks.glsl."""
+    """The share of a `Shading` in a strand's light: constants of shaders/fibre/mixed_looks.glsl."""
 
-    wetness_range: tuple  # of the driest look and of the wettest
-    is_wet: bool  # the share of the wettest, or of the driest
+    wetness_range: tuple  # wetness of the driest and of the wettest look
+    is_wet: bool  # whether this is the share of the wettest look, or of the driest
 
 
 @dataclass(frozen=True)
@@ -61,31 +61,31 @@ class MixedShading:
     driest: Shading
     wettest: Shading
     wetness_range: tuple
-    mean_share: float  # of the wettest, in all strands
+    mean_share: float  # of the wettest look, averaged over the strands
 
     @property
     def forward(self):
-        """As a `Shading` has it, the mean over the strands."""
+        """`Shading.forward`, averaged over the strands."""
         return (1.0 - self.mean_share) * self.driest.forward + self.mean_share * self.wettest.forward
 
     @property
     def reflectance(self):
-        """The same."""
+        """`Shading.reflectance`, averaged over the strands."""
         return (1.0 - self.mean_share) * self.driest.reflectance + self.mean_share * self.wettest.reflectance
 
     @property
     def opacity(self):
-        """The same."""
+        """Opacity of a strand, averaged over the channels and strands."""
         return _opacity(self.forward)
 
     @property
     def layers(self):
-        """The same: the driest first."""
+        """`Shading.layers`: the driest look first."""
         return [(self.driest, Mix(self.wetness_range, False)), (self.wettest, Mix(self.wetness_range, True))]
 
 
 def mixed(driest, wettest, wetness, wetness_range):
-    """The `MixedShading` of two `Shading`s for strands of a wetness (S,); wetness_range: of both, least and most."""
+    """The `MixedShading` of two `Shading`s for strands with (S,) wetness; wetness_range: wetness of the two looks."""
     return MixedShading(driest, wettest, wetness_range, float(wet_share(wetness, *wetness_range).mean()))
 
 
@@ -94,20 +94,20 @@ def _opacity(forward):
 
 
 def kajiya_kay_shading(settings):
-    """The Kajiya-Kay model, ready to draw. The cylinder is opaque: half of its scattering is forward."""
+    """The `Shading` of the Kajiya-Kay model. The cylinder is opaque: half of its scattering is forward."""
     forward = 0.5 * kajiya_kay.mean_albedo(settings)
     return _shading("fibre/kajiya_kay.comp", {"settings": settings}, {}, forward)
 
 
 def kajiya_kay_strand_shading(settings, variation):
-    """The same for varied strands: `kajiya_kay.StrandSettings` and `strand_variation.Settings`."""
+    """The `Shading` of varied strands, from `kajiya_kay.StrandSettings` and `strand_variation.Settings`."""
     forward = 0.5 * kajiya_kay.mean_albedo_of_strands(settings, strand_variation.sample_sigma_a(variation))
     blocks = {"settings": settings, "variation": variation}
     return _shading("fibre/kajiya_kay_varied.comp", blocks, {}, forward, is_varied=True)
 
 
 def marschner_shading(tables):
-    """The Marschner model from baked `lookup_tables.Tables`, ready to draw."""
+    """The `Shading` of the Marschner model, from baked `lookup_tables.Tables`."""
     file, names = _TABLES[tables.settings.mode]
     arrays = {f"{name}_table": getattr(tables, name) for name in names}
     forward, backward = albedo.mean_parts(tables.lobes, tables.settings)
@@ -120,7 +120,7 @@ def marschner_shading(tables):
 
 
 def marschner_strand_shading(tables):
-    """The Marschner model for strands that differ, from `strand_tables.StrandTables`."""
+    """The `Shading` of the Marschner model for varied strands, from `strand_tables.StrandTables`."""
     slices = tables.slices
     blocks = {"settings": tables.settings, "variation": tables.variation, "slices": slices.range}
     arrays = {"return_slices": tables.returned, "n_slices": slices.n}
@@ -139,7 +139,7 @@ def _fibre(settings, variation):
 
 
 def _deep(settings, forward, backward):
-    """(part passed on by one strand, reflectance) in deep hair whose strands scatter these parts, (3,) each."""
+    """(fraction passed on by one strand, reflectance) in deep hair; forward, backward: (3,) scattered by a strand."""
     if settings.mode != "energy":
         return forward, np.zeros(3)
     attenuation, reflectance = dual_scattering.deep_hair(forward, backward)
@@ -147,7 +147,7 @@ def _deep(settings, forward, backward):
 
 
 def _shading(file, blocks, arrays, forward, reflectance=(0.0, 0.0, 0.0), is_varied=False):
-    """`Shading` of a .comp with blocks {instance: settings} and tables {sampler: (H, W, C) or (D, H, W, C)}."""
+    """The `Shading` of a .comp with blocks {instance: settings} and tables {sampler: (H, W, C) or (D, H, W, C)}."""
     kinds = [(name, "FLOAT_2D" if array.ndim == 3 else "FLOAT_3D") for name, array in arrays.items()]
     if is_varied:
         kinds.append(("strand_randoms", "FLOAT_2D"))

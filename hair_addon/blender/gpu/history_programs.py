@@ -8,15 +8,15 @@ from . import shaders, uniforms
 BLOCK_SIDE = 8  # pixels: BLOCK_SIDE of shaders/picture/history_blocks.glsl
 
 
-@shaders.kept
+@shaders.cached
 def blocks_program():
-    """The program of the mean and deviation of each block of a picture's pixels: see picture/history_blocks.frag."""
+    """The program for the mean and deviation of each block of pixels: see picture/history_blocks.frag."""
     return _filter("picture/history_blocks.frag", ("picture",), (("mean", "VEC4"), ("deviation", "VEC4")), ("weight",))
 
 
-@shaders.kept
+@shaders.cached
 def carry_program():
-    """The program that moves the previous picture to where its contents are now: see picture/history_carry.frag."""
+    """The program that reprojects the previous picture: see picture/history_carry.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.HISTORY.source)
     info.uniform_buf(0, "History", "history")
@@ -29,9 +29,9 @@ def carry_program():
     return shaders.compile_drawing(info, "picture/history_carry.vert", "picture/history_carry.frag", _PICTURE)
 
 
-@shaders.kept
+@shaders.cached
 def mix_program():
-    """The program that blends carried pixels with the passes so far: see picture/history_mix.frag."""
+    """The program that blends reprojected pixels with the passes so far: see picture/history_mix.frag."""
     samplers = ("sums", "carried", "carried_passes")
     return _filter("picture/history_mix.frag", samplers, _PICTURE, ("weight", "pass_count", "part_left"))
 

@@ -2,15 +2,15 @@
 """Level of detail in viewports: with distance, fewer strands, thicker in proportion, with fewer points.
 
 Consecutive indices are a uniform subset of all strands (shaders/strands/level_of_detail.glsl) [Cook07]; their number
-changes one by one with the distance, without popping. Each pass of a picture uses another subset: at rest all strands
-contribute.
+changes one by one with the distance, without popping. Each pass of a picture uses another subset, so that all strands
+contribute to a still view.
 """
 
 import numpy as np
 
 from . import drawing
 
-# Samples that a strand is wide, up to which strands are drawn in place of others; samples between two points.
+# Maximum width [samples] of strands that represent others; distance [samples] between two points.
 _FULL_WIDTH = 0.5
 _PIECE_LENGTH = 2.0
 
@@ -20,7 +20,7 @@ _LEAST_STRANDS, _LEAST_POINTS = 10_000, 9
 def steps_of(strands, view, object_to_world, part=1.0):
     """The `drawing.Steps` that suffice for `StrandsOnGPU` in a view.
 
-    view: a `uniforms.VIEW` record; object_to_world: (4, 4); part: of all strands, which are drawn at most.
+    view: a `uniforms.VIEW` record; object_to_world: (4, 4); part: maximum fraction of all strands.
     """
     count = strands.strand_count
     samples_per_metre = _closest(strands, view, object_to_world) * drawing.scale_of(object_to_world)
@@ -28,13 +28,13 @@ def steps_of(strands, view, object_to_world, part=1.0):
     strand_count = int(np.clip(count * min(wanted, part), min(_LEAST_STRANDS, count * part), count))
     pieces = strands.mean_length * samples_per_metre / _PIECE_LENGTH
     point_count = int(np.clip(np.ceil(min(pieces, strands.point_count)) + 1, _LEAST_POINTS, strands.point_count))
-    # Strands that the artist leaves out are left out of every pass.
+    # With a limit by the artist each pass draws the same strands.
     turn = float(view["coverage_turn"]) % 1.0 if part == 1.0 else 0.0
     return drawing.Steps(point_count, max(strand_count, 1), int(turn * count))
 
 
 def _closest(strands, view, object_to_world):
-    """Samples per metre at the hair nearest to the viewer; infinite if the viewer is inside."""
+    """Samples per meter at the nearest hair; infinite if the viewer is inside."""
     pixels_per_unit = float(view["pixels_per_unit"])
     if not view["is_perspective"]:
         return pixels_per_unit

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among strands as a texture, by voxel: `core.shading.light_paths`."""
+"""Light among strands as a 3D texture of voxels: `core.shading.light_paths`."""
 
 import gpu
 import numpy as np
@@ -7,13 +7,13 @@ import numpy as np
 from ...core.imaging.texture_sides import beside_powers
 from ..host.caches import Cache
 
-_GREATEST = 60000.0  # of half floats
+_GREATEST = 60000.0  # within the range of half floats
 
 none_cache = Cache(capacity=1)
 
 
 def upload(means):
-    """A texture of `voxel_means.shares` (Z, Y, X, 4), linear between voxels, with `beside_powers` of them."""
+    """A texture of (Z, Y, X, 4) `voxel_means.shares`, linear between voxels, whose sides avoid powers of two."""
     beside = beside_powers(means.shape[:3]) - means.shape[:3]
     texels = np.clip(means, -_GREATEST, _GREATEST).astype(np.float32)
     texels = np.pad(texels, [*((0, more) for more in beside), (0, 0)], mode="edge")
@@ -25,5 +25,5 @@ def upload(means):
 
 
 def none():
-    """A texture for pictures without a grid: what is drawn is kept."""
+    """A neutral texture for pictures without a grid."""
     return none_cache.get("none", lambda: upload(np.array([[[[0.0, 0.0, 0.0, 1.0]]]])))

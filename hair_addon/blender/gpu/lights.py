@@ -18,21 +18,21 @@ from . import uniforms
 
 KINDS = {"SUN": lamps.SUN, "POINT": lamps.POINT, "SPOT": lamps.SPOT, "AREA": lamps.AREA}
 
-frame_cache = Cache()  # session_uid of a sequence or movie → the frame that is loaded
+frame_cache = Cache()  # session_uid of a sequence or movie → the loaded frame
 
 # Ray types that a light may be invisible to. A light invisible to all of them has no effect.
 _RAYS = ("visible_diffuse", "visible_glossy", "visible_transmission")
 
 
 def read_lights(depsgraph, for_render):
-    """(`uniforms.LIGHT` records (N,) of every visible light, or of every one that is rendered; their links (N,)).
+    """((N,) `uniforms.LIGHT` records of all visible lights, or of all rendered lights; (N,) links).
 
-    The links are as of `light_linking.read_links`. Lights with non-finite values are skipped with a message.
+    The links are from `light_linking.read_links`. Lights with non-finite values are skipped with a message.
     """
     lights, links = [], []
     for instance in depsgraph.object_instances:
         if instance.object.type == "LIGHT" and _shines(instance, for_render):
-            with np.errstate(all="ignore"):  # such values are checked below
+            with np.errstate(all="ignore"):  # values are checked below
                 light = _read_light(instance.object.data, np.array(instance.matrix_world))
             if can_be_drawn(instance.object, *(light[name] for name in light.dtype.names)):
                 lights.append(light)
@@ -49,7 +49,7 @@ def _read_light(light, matrix):
     record["kind"] = KINDS[light.type]
     record["position"][:3] = matrix[:3, 3]
     if light.type != "POINT":
-        axis = -matrix[:3, 2]  # a light shines along its own -Z
+        axis = -matrix[:3, 2]  # a light shines along its local -Z
         record["axis"][:3] = axis / np.linalg.norm(axis)
     record["power"][:3] = _color(light) * light.energy * 2.0**light.exposure
     if not light.normalize:
@@ -57,7 +57,8 @@ def _read_light(light, matrix):
     record["casts_shadow"] = light.use_shadow
     if light.type == "SUN":
         record["radius"] = np.tan(0.5 * min(light.angle, 3.0))
-        # Its strength is what a plane across it receives. A small ball receives more; surface.frag takes it off again.
+        # The strength of a sun is the irradiance of a perpendicular plane. A small ball receives more; the surface
+        # shader divides by the factor again.
         record["power"][:3] /= 1.0 - 0.25 * min(float(record["radius"]) ** 2, 1.0)
     elif light.type == "AREA":
         record["cos_cone"] = np.cos(0.5 * light.spread)
@@ -71,7 +72,7 @@ def _read_light(light, matrix):
 
 
 def _color(light):
-    """RGB: the light's colour times the emission of its nodes."""
+    """RGB: the light's color times the emission of its nodes."""
     color = np.array(light.color)
     if light.use_temperature:
         color = color * light.temperature_color
@@ -83,9 +84,9 @@ def _color(light):
 
 
 def _emitting_area(light, matrix):
-    """Return the factor of a light without normalisation: its area [m²], or the sun's solid angle.
+    """Return the factor for a light without Normalize: its area [m²], or the sun's solid angle.
 
-    As Cycles does it, which takes the disk of a point without size for one.
+    As in Cycles, 1 replaces the disk's area of a point light without size.
     """
     if light.type == "AREA":
         return _area(light, matrix)
@@ -95,7 +96,7 @@ def _emitting_area(light, matrix):
 
 
 def _area(light, matrix):
-    """Of an area light [m²]."""
+    """Area of an area light [m²]."""
     width, height = light.size, light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
     x_scale, y_scale = np.linalg.norm(matrix[:3, :2], axis=0)
     part = 0.25 * np.pi if light.shape in {"DISK", "ELLIPSE"} else 1.0
@@ -104,10 +105,10 @@ def _area(light, matrix):
 
 @dataclass(frozen=True)
 class World:
-    """Environment lighting: radiance color (3,), a factor of the image if there is one.
+    """Environment lighting: (3,) radiance, multiplied by the image if there is one.
 
-    to_image: (4, 4), from world directions to those that the image is looked up in; is_mirror_ball: how it is unrolled;
-    frame: of the image, where it is a sequence or a movie.
+    to_image: (4, 4), from world directions to directions of the image; is_mirror_ball: the projection of the image,
+    else equirectangular; frame: of a sequence or movie.
     """
 
     color: np.ndarray
@@ -129,8 +130,8 @@ class World:
 def read_world(scene, view_layer=None):
     """The `World` of a scene, or of a view layer that overrides it.
 
-    Nodes that are not understood count as the world's colour in the viewport. A world with non-finite values is black,
-    with a message.
+    Unsupported nodes are replaced by the world's viewport color. A world with non-finite values is black, with a
+    message.
     """
     world = (view_layer and view_layer.world_override) or scene.world
     if world is None:
@@ -161,7 +162,7 @@ def _read_world(world, scene_frame):
 
 
 def _load_frame(image, user, scene_frame):
-    """Load the frame of a sequence or a movie that a node shows in a frame of the scene; returns its number."""
+    """Load the frame of a sequence or movie for a frame of the scene; returns its number, 0 for a still image."""
     if image.source not in {"SEQUENCE", "MOVIE"}:
         return 0
     frame = scene_frame - user.frame_start + 1
@@ -169,7 +170,7 @@ def _load_frame(image, user, scene_frame):
         frame = (frame - 1) % user.frame_duration + 1
     frame = min(max(frame, 0), user.frame_duration) + user.frame_offset
     if frame_cache.get(image.session_uid) != frame or not image.has_data:
-        # Only without a texture does Blender load another frame.
+        # Blender loads another frame only if there is no texture.
         image.gl_free()
         image.gl_load(frame=frame)
         frame_cache.keep(image.session_uid, frame)
@@ -177,7 +178,7 @@ def _load_frame(image, user, scene_frame):
 
 
 def _mapping(vector):
-    """(4, 4) from world directions to a texture's, a `ShaderInput`; None where it is not given by a Mapping node."""
+    """(4, 4) from world directions to those of a texture's `ShaderInput`; None if other nodes compute them."""
     found, output = vector.source()
     if found is None:
         return None if vector.socket.is_linked else np.eye(4)
@@ -186,7 +187,7 @@ def _mapping(vector):
         return np.eye(4) if output.name in {"Generated", "Normal"} else None
     if node.type != "MAPPING":
         return None
-    # Vectors and normals are not translated: their node hides the location, which is found only by identifier.
+    # A Mapping node of type Vector or Normal hides the location, which is only accessible by its identifier.
     inputs = {socket.identifier: ShaderInput(socket, found.groups) for socket in node.inputs}
     location, rotation, scale = (inputs[name].constant() for name in ("Location", "Rotation", "Scale"))
     if location is None or rotation is None or scale is None:

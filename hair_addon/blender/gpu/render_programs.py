@@ -8,15 +8,15 @@ from . import scene_programs, shaders, uniforms
 FILM_FORMAT = "RGBA32F"  # of sums of samples
 
 
-@shaders.kept
+@shaders.cached
 def film_program():
     """The compute program that adds the samples of `picture` to a film: see picture/film.comp."""
     return _film("picture/film.comp", (("picture", "FLOAT_2D"),))
 
 
-@shaders.kept
+@shaders.cached
 def film_depth_program():
-    """The same for data passes: see picture/film_depth.comp."""
+    """The compute program that adds data passes to a film: see picture/film_depth.comp."""
     samplers = (("segments", "UINT_2D"), ("depths", "UINT_2D"))
     return _film("picture/film_depth.comp", samplers, (("VEC4", "view_to_clip"),))
 
@@ -32,16 +32,16 @@ def _film(file, samplers, constants=()):
     return shaders.compile_compute(info, file)
 
 
-@shaders.kept
+@shaders.cached
 def strand_arrival_program():
     """The compute program of light visibility from strands: see light/strand_irradiance.comp."""
     return shaders.compile_compute(scene_programs.strand_samples_info(), "light/strand_irradiance.comp")
 
 
-MOTION_FORMAT = "RGBA32F"  # of how far things move
+MOTION_FORMAT = "RGBA32F"  # of motion vectors
 
 
-@shaders.kept
+@shaders.cached
 def strand_motion_program():
     """The compute program of motion vectors of strands: see picture/strand_motion.comp."""
     names = ("strands_before", "strands_after", "moved_rows", "moved_points")
@@ -51,9 +51,9 @@ def strand_motion_program():
     return shaders.compile_compute(info, "picture/strand_motion.comp")
 
 
-@shaders.kept
+@shaders.cached
 def surface_motion_program():
-    """The same for surfaces: see picture/surface_motion.vert."""
+    """The program of motion vectors of surfaces: see picture/surface_motion.vert."""
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.VIEW.source + uniforms.MOTION.source)
     info.uniform_buf(0, "View", "view")
@@ -67,7 +67,7 @@ def surface_motion_program():
     return shaders.compile_drawing(info, "picture/surface_motion.vert", "picture/surface_motion.frag")
 
 
-@shaders.kept
+@shaders.cached
 def film_view_program():
     """The program that shows the mean of a film: see picture/film_view.frag."""
     info = gpu.types.GPUShaderCreateInfo()

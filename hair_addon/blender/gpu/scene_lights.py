@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A scene's lights for all that they light: the most important one by one, the others as ambient light."""
+"""A scene's lights for all receivers: the most important lights one by one, the others as ambient light."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,14 @@ from ..data.pictures.light_linking import ALL
 from . import uniforms, world_texture
 from .shadows import ShadowMaps
 
-_MAP_SIZE = 512  # texels along a side of each light's map: on a head, 0.8 mm
-_MOST_PLACES = 128  # at which importance is computed
-_PLACES = 16  # on a surface, and strands of hair
+_MAP_SIZE = 512  # texels along each side of a light's map: 0.8 mm on a head
+_MOST_PLACES = 128  # maximum number of places at which importance is computed
+_PLACES = 16  # places on a surface, or sampled strands of hair
 
 
 @dataclass(frozen=True)
 class Receiver:
-    """What is lit: session_uids of its instancer, or 0, and of itself; (P, 3) places [m] on it."""
+    """A lit object: session UIDs of its instancer, or 0, and of the object; (P, 3) places [m] on it."""
 
     owner: tuple
     places: np.ndarray
@@ -27,9 +27,9 @@ class Receiver:
 class SceneLights:
     """The lights of a scene.
 
-    record: `uniforms.LIGHTS`, to which `ShadowMaps.draw` adds its part; links: of each of its lights, as
-    `light_linking.read_links` returns them; rest, rest_links: `uniforms.LIGHT` records of the light that there is no
-    room for, and their links; lamps: those of all lamps, without bright parts of the world.
+    record: `uniforms.LIGHTS`, to which `ShadowMaps.draw` adds its part; links: of each of its lights, from
+    `light_linking.read_links`; rest, rest_links: `uniforms.LIGHT` records of the light beyond the capacity, and their
+    links; lamps: records of all lamps, without bright parts of the world.
     """
 
     record: np.ndarray
@@ -39,7 +39,7 @@ class SceneLights:
     lamps: np.ndarray
 
     def lit(self, receivers):
-        """(R,) `uniforms.LIGHTS` of each `Receiver`: without lights that are not linked to it, and with the others'."""
+        """(R,) `uniforms.LIGHTS`, for each `Receiver`: without unlinked lights, and with `rest` as ambient light."""
         records = np.repeat(self.record[None], len(receivers))
         for record, receiver in zip(records, receivers, strict=True):
             is_linked = np.array([links.has(receiver.owner) for links, _blockers in self.links], bool)
@@ -50,7 +50,7 @@ class SceneLights:
 
     @property
     def are_alike(self):
-        """Whether all receivers have the same light."""
+        """Whether all receivers get the same light."""
         return not len(self.rest) and all(receivers == ALL for receivers, _blockers in self.links)
 
     @property
@@ -59,7 +59,7 @@ class SceneLights:
         return all(pair == (ALL, ALL) for pair in (*self.links, *self.rest_links))
 
     def casters(self, hair, hair_owners, surfaces, surface_owners):
-        """Return the function of a light's index → (hair, surfaces) that cast its shadow; None: all do."""
+        """Return the function of a light's index → (hair, surfaces) that cast its shadow; None if all do."""
         if all(blockers == ALL for _receivers, blockers in self.links):
             return None
 
@@ -74,9 +74,9 @@ class SceneLights:
 
 
 def gather(found, links, world, receivers):
-    """The `SceneLights` of lights and links as of `lights.read_lights`, and of a `World`.
+    """The `SceneLights` of the lights and links of `lights.read_lights`, and of a `World`.
 
-    receivers: of the hair, which decide what is important.
+    receivers: of the hair, by which the importance of lights is computed.
     """
     lobes, sides = world_texture.light_of(world)
     own = found
@@ -104,7 +104,7 @@ def gather(found, links, world, receivers):
 
 
 def _importance(found, links, receivers):
-    """(N,) the most irradiance that reaches the receivers, the mean over the channels."""
+    """(N,) the greatest irradiance of the receivers, averaged over the channels."""
     if not receivers:
         return found["power"][:, :3].mean(axis=1)
     importance = np.zeros(len(found))
@@ -117,17 +117,17 @@ def _importance(found, links, receivers):
 
 
 def places_of_hair(points, to_world):
-    """(P, 3) places [m] among points (S, N, 3) of strands, whose coordinates `to_world` (4, 4) transforms."""
+    """(P, 3) places [m]: a subset of the (S, N, 3) points of strands, transformed by `to_world` (4, 4)."""
     some = points[:: -(-len(points) // _PLACES), :: max((points.shape[1] - 1) // 2, 1)].reshape(-1, 3)
     return some @ to_world[:3, :3].T + to_world[:3, 3]
 
 
 def places_on_surface(vertices, triangles, to_world):
-    """(P, 3) places [m] among the corners of triangles (N,) of vertices (V, 3) that `to_world` (4, 4) transforms."""
+    """(P, 3) places [m]: a subset of the corners (N,) of triangles with (V, 3) vertices, transformed by `to_world`."""
     some = vertices[triangles[:: -(-len(triangles) // _PLACES)]].astype(float)
     return some @ to_world[:3, :3].T + to_world[:3, 3]
 
 
 def new_maps(record, is_wide):
-    """`ShadowMaps` for a `uniforms.LIGHTS` record; is_wide: as there."""
+    """`ShadowMaps` for a `uniforms.LIGHTS` record; is_wide: as in `ShadowMaps`."""
     return ShadowMaps(_MAP_SIZE, max(1, int(record["count"])), is_wide=is_wide)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GPU programs that draw a scene's hair and surfaces, its surroundings and its pictures, and what they read."""
+"""GPU programs that draw a scene's hair, surroundings and pictures, and their inputs."""
 
 import gpu
 
 from . import uniforms
-from .shaders import COLOR, compile_compute, compile_drawing, kept
+from .shaders import COLOR, cached, compile_compute, compile_drawing
 
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
 # See shaders/light/world_visibility.comp.
@@ -31,7 +31,7 @@ def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True
 
 
 def declare_clipped_scene(info, shadow_samplers, is_clipped):
-    """`declare_scene` without the world's lighting; returns the includes that are replaced where planes clip it."""
+    """`declare_scene` without the world's lighting; returns the includes that clipping replaces."""
     structs = uniforms.CLIPPING.source if is_clipped else ""
     declare_scene(info, structs, shadow_samplers, is_lit=False)
     if not is_clipped:
@@ -41,15 +41,16 @@ def declare_clipped_scene(info, shadow_samplers, is_clipped):
 
 
 def has_image_atomics():
-    """Whether image atomics are available: Metal has none that Python can declare."""
+    """Whether image atomics are available: on Metal, Python cannot declare them."""
     return gpu.platform.backend_type_get() in {"OPENGL", "VULKAN"}
 
 
-@kept
+@cached
 def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=(), is_clipped=False):
-    """The program that draws strips of strands: a .frag, the shadow maps that it reads, (output, type), ... of it.
+    """The program that draws strips of strands with a .frag; targets: its (output, type), ...
 
-    samplers: of other textures that it reads; is_clipped: whether clipping planes apply, as in strands/guides.frag.
+    shadow_samplers, samplers: of shadow maps and of other textures; is_clipped: apply clipping planes, as in
+    strands/guides.frag.
     """
     info = gpu.types.GPUShaderCreateInfo()
     replaced = _strip(info, shadow_samplers, is_clipped)
@@ -58,7 +59,7 @@ def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=(), is_c
     return compile_drawing(info, "strands/strip.vert", fragment, targets, replaced)
 
 
-@kept
+@cached
 def strip_segments_program(is_clipped):
     """The program that draws strips of strands as samples of a picture: see visibility/strand_segments.frag."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -78,17 +79,17 @@ def _strip(info, shadow_samplers, is_clipped):
     varying.smooth("FLOAT", "strand_offset_part")
     varying.smooth("FLOAT", "strand_rise")  # of depth, from the axis to the side that faces the viewer
     varying.smooth("FLOAT", "strand_side_place")  # across the strip, from -1 to 1
-    varying.smooth("FLOAT", "strand_place")  # in points that are drawn
+    varying.smooth("FLOAT", "strand_place")  # along the strand, in drawn points
     varying.flat("INT", "strand_index")
     info.vertex_out(varying)
     return replaced
 
 
-RUN_GROUP_SIZE = 64  # runs of segments that one work group of a program that walks along strands takes
+RUN_GROUP_SIZE = 64  # runs of segments per work group of a program that rasterizes strands
 RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/visibility/rasterize_segment.glsl
 
 
-@kept
+@cached
 def segments_program(is_depth, is_round, is_clipped=False):
     """The compute program that draws strands as samples of a picture: see visibility/strand_segments.comp."""
     images, constants = ("depths", "segments", "seen_runs"), ("first_run", "are_tiles_known")
@@ -98,7 +99,7 @@ def segments_program(is_depth, is_round, is_clipped=False):
     )
 
 
-@kept
+@cached
 def strand_shadow_program(is_front):
     """The compute program that draws strands into a deep opacity map: see shadows/strand_shadow.comp."""
     images, samplers = ("fronts", "backs", "counts"), (("hidden_depth", "FLOAT_2D"),)
@@ -124,16 +125,16 @@ def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), 
 
 PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
 PICTURE_GROUP_SIZE = 8  # threads along each side of a work group of a picture's programs
-SAMPLES_OF_THREAD = 8  # of shaders/visibility/strand_samples.glsl
+SAMPLES_OF_THREAD = 8  # SAMPLES_OF_THREAD of shaders/visibility/strand_samples.glsl
 
 
-@kept
+@cached
 def shading_program(file, blocks=(), tables=(), in_parts=False, is_mixed=False):
-    """The compute program that shades strands: a model's .comp, its blocks and its samplers of tables.
+    """The compute program that shades strands with a model's .comp.
 
-    blocks: (instance, class of settings), ...; tables: (sampler, type), ...; in_parts: whether just a part of the light
-    is drawn, by the constants of fibre/drawn_lobes.glsl; is_mixed: whether strands take just their share of it, by
-    the constants of fibre/mixed_looks.glsl.
+    blocks: (instance, class of settings), ...; tables: (sampler, type), ...; in_parts: draw a part of the light,
+    selected by the constants of fibre/drawn_lobes.glsl; is_mixed: draw the share of one of two looks, by the constants
+    of fibre/mixed_looks.glsl.
     """
     structs = [uniforms.settings_block(settings_class, instance) for instance, settings_class in blocks]
     structs_source = "".join(block.source for block in structs)
@@ -157,8 +158,8 @@ def shading_program(file, blocks=(), tables=(), in_parts=False, is_mixed=False):
 def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, is_mixed=False):
     """Info of a program that includes visibility/strand_samples.glsl.
 
-    samplers: (name, type), ... beside the scene's; texture_format: of what it fills; is_mixed: whether it reads that
-    too.
+    samplers: (name, type), ... besides the scene's; texture_format: of the image that it fills; is_mixed: whether it
+    also reads the image.
     """
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
@@ -174,9 +175,9 @@ def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, 
     return info
 
 
-@kept
+@cached
 def environment_program(fragment):
-    """The program that draws a picture of the surroundings."""
+    """The program that draws a picture of the world with a .frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.ENVIRONMENT.source)
     info.uniform_buf(0, "Environment", "environment")
@@ -184,7 +185,7 @@ def environment_program(fragment):
     return compile_drawing(info, "picture/cover.vert", fragment)
 
 
-@kept
+@cached
 def resolve_program():
     """The program that averages blocks of samples_per_side² texels of `picture`."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -193,12 +194,12 @@ def resolve_program():
     return compile_drawing(info, "picture/cover.vert", "picture/resolve.frag")
 
 
-@kept
+@cached
 def accumulate_program():
     """The program that adds a pass to the picture of a viewport: see picture/accumulate.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("INT", "samples_per_side")
-    info.push_constant("IVEC2", "first_place")  # [samples] of the textures in the picture
+    info.push_constant("IVEC2", "first_place")  # origin of the textures in the picture [samples]
     info.push_constant("FLOAT", "weight")
     info.sampler(0, "FLOAT_2D", "picture")
     info.sampler(1, "UINT_2D", "depths")
@@ -207,11 +208,11 @@ def accumulate_program():
     return compile_drawing(info, "picture/cover.vert", "picture/accumulate.frag")
 
 
-@kept
+@cached
 def display_program():
     """The program that shows hair over a viewport: see picture/display.frag."""
     info = gpu.types.GPUShaderCreateInfo()
-    info.push_constant("VEC2", "origin")  # [pixels] of the picture in the framebuffer
+    info.push_constant("VEC2", "origin")  # of the picture in the framebuffer [pixels]
     info.push_constant("FLOAT", "exposure")
     info.push_constant("FLOAT", "opacity")
     info.push_constant("INT", "pass_count")

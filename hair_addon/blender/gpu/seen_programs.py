@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GLSL files → GPU programs that add up how much of the world is seen: images of what is seen, a texel for each place.
+"""GLSL files → GPU programs that sum the visibility of the world into images with a texel for each place.
 
-They are compute programs: graphics cards made for computing draw with few of their processors.
+They are compute programs, as GPUs made for computing have few units for drawing.
 """
 
 import gpu
@@ -14,18 +14,18 @@ IMAGES = (
     "seen_surface",
     "seen_channels",
     "seen_color",
-)  # as VISIBILITY_SAMPLERS
-BYTES = "RGBA8"  # of textures that strands' visibility is kept in
-SUMS = "RGBA16F"  # and of those in which sums are added up
+)  # in the order of VISIBILITY_SAMPLERS
+BYTES = "RGBA8"  # format of textures of strands' visibility
+SUMS = "RGBA16F"  # format of textures of sums
 
 _PUT = {"light/write_visibility_sums.glsl": "light/write_visibility_bytes.glsl"}
 
 
-@shaders.kept
+@shaders.cached
 def visibility_program(texture_format):
-    """The program that adds up how much of the world the texels of `places` see.
+    """The program that sums the visibility of the world from the texels of `places`.
 
-    texture_format: `SUMS`, to which directions are added; else all are added at once, and kept as `BYTES`.
+    texture_format: `SUMS`, to which directions are added one by one; `BYTES`: all are added at once.
     """
     info = _program(texture_format)
     scene_programs.declare_scene(info, is_lit=False)
@@ -37,9 +37,9 @@ def visibility_program(texture_format):
     return shaders.compile_compute(info, "light/world_visibility.comp")
 
 
-@shaders.kept
+@shaders.cached
 def bytes_program():
-    """The program that keeps what strands see in fewer bytes."""
+    """The program that converts strands' visibility from `SUMS` to `BYTES`."""
     info = _program(BYTES)
     for slot, name in enumerate(scene_programs.VISIBILITY_SAMPLERS):
         info.sampler(slot, "FLOAT_2D", name)

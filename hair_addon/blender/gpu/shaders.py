@@ -14,16 +14,15 @@ from ...core.errors import HairError
 from ..host.caches import Cache
 
 FOLDER = Path(__file__).resolve().parents[3] / "shaders"
-STYLES = Path(styling.__file__).parent  # .strand files, which C++ reads too
+STYLES = Path(styling.__file__).parent  # .strand files, which C++ includes too
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 
 
 def expand(name, replaced=None, texts=None):
-    """(text, lines): the file with every #include put in its place once.
+    """(text, lines): the text of a file with every #include expanded once, and each line's (file, number).
 
-    replaced: {file: the one that is included in its place, or None}; texts: {file: its text} of files that are none;
-    lines: each line's (file, number).
+    replaced: {file: the file to include instead, or None for nothing}; texts: {file: text} of generated files.
     """
     text, lines, seen, replaced, texts = [], [], set(), replaced or {}, texts or {}
 
@@ -51,14 +50,14 @@ def _read(file):
     return path.read_text(encoding="utf-8")
 
 
-program_cache = Cache()  # (function decorated by `kept`, its arguments) → program
-kept = program_cache.keeping  # decorates what makes a program: it is compiled once, and kept until Python ends
+program_cache = Cache()  # (function decorated by `cached`, its arguments) → program
+cached = program_cache.keeping  # decorates a function that compiles a program: the program is cached until Python ends
 
 
 def compile_one(makers):
-    """Compile the first program that is not yet compiled; whether there was one. Raises `HairError`.
+    """Compile the first program that is not yet compiled; returns whether there was one. Raises `HairError`.
 
-    makers: functions decorated by `kept`, each with its arguments in a tuple.
+    makers: functions decorated by `cached`, each with its arguments in a tuple.
     """
     for make, arguments in makers:
         known = len(program_cache)
@@ -69,16 +68,16 @@ def compile_one(makers):
 
 
 def are_compiled(makers):
-    """Whether all of the programs of `compile_one` are."""
+    """Whether all programs are compiled; makers: as for `compile_one`."""
     return all(program_cache.get((make.__wrapped__, arguments)) is not None for make, arguments in makers)
 
 
-COLOR = (("color", "VEC4"),)  # what a fragment shader leaves where nothing else is said
+COLOR = (("color", "VEC4"),)  # default (output, type) of fragment shaders
 complaint_cache = Cache()  # files of a program → their compile error
 
 
 def compile_drawing(info, vertex, fragment, targets=COLOR, replaced=None):
-    """The program of a vertex and a fragment shader, the latter with some of its includes replaced as `expand` says.
+    """The program of a vertex and a fragment shader; replaced: as for `expand`, of the fragment shader's includes.
 
     targets: (output, type), ... of the fragment shader. Raises `HairError`.
     """
@@ -92,14 +91,14 @@ def compile_drawing(info, vertex, fragment, targets=COLOR, replaced=None):
 
 
 def compile_compute(info, file, replaced=None, texts=None):
-    """The compute program of a file, some of its includes replaced as `expand` says. Raises `HairError`."""
+    """The compute program of a file; replaced, texts: as for `expand`. Raises `HairError`."""
     text, lines = expand(file, replaced, texts)
     info.compute_source(text)
     return _create(info, (file,), [], lines)
 
 
 def _create(info, files, vertex_lines, lines):
-    """Raises `HairError`, the first time with the driver's log, later at once."""
+    """Create a program. Raises `HairError` from the driver's log; a failed program is not compiled again."""
     known = complaint_cache.get(files)
     if known is not None:
         raise HairError(known)
@@ -107,36 +106,36 @@ def _create(info, files, vertex_lines, lines):
         return gpu.shader.create_from_info(info)
     except Exception as error:
         where = complaint(_console_of(gpu.shader.create_from_info, info), vertex_lines, lines) or str(error)
-        said = f"The shader {files[-1]} does not compile on this graphics driver: {where}"
-        raise HairError(complaint_cache.keep(files, said)) from error
+        sentence = f"The shader {files[-1]} does not compile on this graphics driver: {where}"
+        raise HairError(complaint_cache.keep(files, sentence)) from error
 
 
 def _console_of(failing, *arguments):
-    """Capture the console output of a failing call: Blender prints compiler errors only there."""
+    """Return the console output of a failing call, as Blender only prints compiler errors."""
     with tempfile.TemporaryFile() as file:
-        kept = {descriptor: os.dup(descriptor) for descriptor in (1, 2)}
+        consoles = {descriptor: os.dup(descriptor) for descriptor in (1, 2)}
         try:
-            for descriptor in kept:
+            for descriptor in consoles:
                 os.dup2(file.fileno(), descriptor)
-            with suppress(Exception):  # raised once already, and explained now
+            with suppress(Exception):  # the same error as before
                 failing(*arguments)
         finally:
-            for descriptor, console in kept.items():
+            for descriptor, console in consoles.items():
                 os.dup2(console, descriptor)
                 os.close(console)
         file.seek(0)
         return file.read().decode(errors="replace")
 
 
-# "VertShader:" or "vertex:", by the backend; then "python_shader.glsl:12:3: Error: …", in lines of our text.
+# "VertShader:" or "vertex:", by the backend; then "python_shader.glsl:12:3: Error: …" with a line of our text.
 _STAGE = re.compile(r"ERROR\s+\S+\s+(vert|frag)", re.IGNORECASE)
 _COMPLAINT = re.compile(r"python_shader\.glsl:(\d+)(?::\d+)?:\s*(.*)")
 
 
 def complaint(log, vertex_lines, fragment_lines):
-    """The first complaint of a compiler's log, as "file:line: what": the author's file and line. None if there is none.
+    """The first error in a compiler's log as "file:line: message", with the source file's line; None if there is none.
 
-    vertex_lines, fragment_lines: as `expand` returns them.
+    vertex_lines, fragment_lines: from `expand`.
     """
     lines = fragment_lines
     for line in log.splitlines():

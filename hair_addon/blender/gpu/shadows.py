@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Deep opacity maps [Yuksel08]: for each light, front and back depth of hair, its layers, and the depth of surfaces."""
+"""Deep opacity maps [Yuksel08]: for each light, front and back depth of hair, its layers, and depths of surfaces."""
 
 from dataclasses import replace
 
@@ -10,36 +10,36 @@ from . import drawing, scene_programs, shadow_programs, surface_textures, unifor
 
 SUN = 0  # LIGHT_SUN of shaders/light/lights.glsl
 
-_NEAREST = 0.01  # minimum distance of a light, as a part of the hair's diameter
-_WIDEST = np.radians(80.0)  # between the axis of a map and its border
+_NEAREST = 0.01  # minimum distance of a light, as a fraction of the hair's diameter
+_WIDEST = np.radians(80.0)  # maximum angle between the axis of a map and its border
 _FAR = 2.0  # FAR of shaders/shadows/opacity.glsl
-_NO_SURFACE = (_FAR, -1.0, 0.0, 0.0)  # its depth, and a color that there is none of
-_NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it; of a back that is nowhere, 0
+_NO_SURFACE = (_FAR, -1.0, 0.0, 0.0)  # depth, and an invalid color
+_NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() without hair; backs without hair are 0
 
-# Texels by which shadows of surfaces are blurred, at least and as a part of a map at most; and how far, as a part of
-# the hair's diameter, a surface is taken to be from the hair that it shades.
+# Blur of surfaces' shadows: minimum [texels] and maximum [fraction of a map]; and the assumed distance of a surface
+# from the hair that it shades, as a fraction of the hair's diameter.
 _LEAST_BLUR, _MOST_BLUR = 0.7, 1 / 64
 _SHADE_DISTANCE = 0.15
-_LEAST_WIDE = 1e-4  # [m] radius of what a wide map holds
+_LEAST_WIDE = 1e-4  # minimum radius [m] of a wide map
 _ALL = drawing.Steps()
 
-# Strands at rest are drawn with so few points that they are shorter by this part at most: bends that are left out are
+# Strands at rest are drawn with fewer points, which shorten them by at most this fraction: the bends that are lost are
 # smaller than a texel.
 _LENGTHENING = 0.005
 
-# While hair moves, the sphere that maps are aimed at stays until it has to be larger, and is then larger by one factor,
-# or until it may be smaller by the other: maps whose texels move with every edit flicker.
+# While hair moves, the sphere that maps are aimed at stays until hair does not fit, and is then enlarged by the first
+# factor, or until it is too large by the second factor: maps whose texels move with every edit flicker.
 _SPARE, _LOOSEST = 1.1, 1.4
 
-_AIMED = ("world_to_shadow", "near", "extent")  # of a light, by `_aim`
-_SHADED_BY = ("kind", "position", "axis", "near", "extent", "radius")  # of a light, what maps of surfaces follow from
+_AIMED = ("world_to_shadow", "near", "extent")  # members of a light that `_aim` writes
+_SHADED_BY = ("kind", "position", "axis", "near", "extent", "radius")  # members of a light that affect surfaces' maps
 
 
 class ShadowMaps:
     """Shadow textures of the first lights, reused until something moves.
 
-    size: texels along a side of each map; layer_count: of lights that have one; in_compute: whether compute programs
-    draw the strands, None: where they can; is_wide: whether each light has a map of the surfaces around the hair too.
+    size: texels along each side of a map; layer_count: number of lights with a map; in_compute: draw strands by compute
+    programs, None: if supported; is_wide: whether each light also has a map of the surfaces around the hair.
     """
 
     def __init__(self, size, layer_count, in_compute=None, is_wide=False):
@@ -48,17 +48,17 @@ class ShadowMaps:
         self._hair_layers = _array(size, layer_count, "RGBA16F")
         self._surface_moments = _array(size, 2 * layer_count if is_wide else layer_count, "RGBA32F")
         self._in_compute = scene_programs.has_image_atomics() if in_compute is None else in_compute
-        self._sphere = None  # that maps were aimed at last
-        self._views = {}  # index of a light not near hair → (what it was aimed by, view, what `_aim` wrote)
-        self._surfaces = {}  # layer → what its surfaces were drawn with
-        self._hidden = {}  # layer → texture of the depth that they hide strands behind
-        # Target of the drawing before it is filtered into a map.
-        self._surface_depth = _array(size, 1, "RG32F")  # and their color
+        self._sphere = None  # that maps were last aimed at
+        self._views = {}  # index of a light outside of the hair → (inputs of `_aim`, view, members that it wrote)
+        self._surfaces = {}  # layer → inputs that its surfaces were drawn with
+        self._hidden = {}  # layer → texture of the depth behind which surfaces hide strands
+        # Targets of drawing, which are then filtered into a map.
+        self._surface_depth = _array(size, 1, "RG32F")  # depth and color of surfaces
         self._half_blurred = _array(size, 1, "RGBA32F")
         self._fronts, self._backs = (gpu.types.GPUTexture((size, size), format="R32UI") for _ in range(2))
         self._row_ends = gpu.types.GPUTexture((size, size), format="RG32F")
         self._counts = gpu.types.GPUTexture((4 * size, size), format="R32UI") if self._in_compute else None
-        self._is_empty = False  # whether nothing is in the images that strands are walked into
+        self._is_empty = False  # whether the images that strands are rasterized into are cleared
         self._depth = gpu.types.GPUTexture((size, size), format="DEPTH_COMPONENT32F")
         self._drawing_depth = gpu.types.GPUFrameBuffer(
             color_slots=_slot(self._surface_depth, 0), depth_slot=self._depth
@@ -74,9 +74,9 @@ class ShadowMaps:
         """Draw the maps and write each light's part in them into its record.
 
         lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: [SurfaceOnGPU];
-        steps: what is drawn of each hair for all of it; casters: a light's index → (hair, surfaces) that cast its
-        shadow, None: all; is_steady: whether maps stay aimed where they are as long as hair fits; chosen: index of the
-        only light whose map is drawn, None: of all.
+        steps: level of detail of each hair; casters: a light's index → (hair, surfaces) that cast its shadow, None:
+        all; is_steady: keep the aim of maps as long as hair fits; chosen: index of the only light whose map is drawn,
+        None: all.
         """
         lights["light"]["shadow_layer"] = lights["light"]["wide_layer"] = -1
         if not hair:
@@ -91,13 +91,13 @@ class ShadowMaps:
                 view["light_index"] = index
                 views[index] = view
         if views:
-            light_block = uniforms.uniform_buffer(lights)  # each map reads its own light alone
+            light_block = uniforms.uniform_buffer(lights)  # each map only reads its own light
             for index, view in views.items():
                 cast = (hair, surfaces) if casters is None else casters(index)
                 self._draw_light(index, view, lights, light_block, *cast, steps, is_steady)
 
     def _aimed(self, index, light, hair, loose):
-        """What `_aim` returns and writes, kept while the light and the sphere stay."""
+        """`_aim`, cached while the light and the sphere stay the same."""
         aimed_by = (
             light["position"].tobytes(),
             light["axis"].tobytes(),
@@ -126,7 +126,7 @@ class ShadowMaps:
     def draw_wide(self, lights, surfaces, sphere, casters=None):
         """Draw the maps of surfaces around the hair and write each light's part in them into its record.
 
-        sphere: (centre, radius) that maps hold as far as a light sees it; the rest as for `draw`.
+        sphere: (center, radius) that maps cover as far as possible; the rest as for `draw`.
         """
         for index in range(min(int(lights["count"]), self.layer_count)):
             light = lights["light"][index]
@@ -142,7 +142,7 @@ class ShadowMaps:
             self._are_surfaces_new(self.layer_count + index, view, seen_from, chosen)
 
     def _hiding_depth(self, layer, view, lights, surfaces):
-        """Draw surfaces into a map, unless they are there; returns the depth behind which they hide strands."""
+        """Draw surfaces into a map, if changed; returns the texture of the depth behind which they hide strands."""
         hidden = self._hidden.get(layer)
         if not self._are_surfaces_new(layer, view, lights, surfaces):
             return hidden
@@ -152,7 +152,7 @@ class ShadowMaps:
         return hidden
 
     def _are_surfaces_new(self, layer, view, lights, surfaces):
-        """Draw surfaces into a layer, by the light that a view looks from, unless they are there; whether it did."""
+        """Draw surfaces into a layer from the light of a view, if changed; returns whether they were drawn."""
         light = lights["light"][int(view["light_index"])]
         drawn_with = view.tobytes(), *(light[name].tobytes() for name in _SHADED_BY), tuple(surfaces)
         if self._surfaces.get(layer) == drawn_with:
@@ -168,7 +168,7 @@ class ShadowMaps:
         return True
 
     def _walk(self, layer, placed, lights, hidden):
-        """Draw a map of strands by compute programs: integer sums are independent of the order."""
+        """Draw a map of strands by compute programs, with integer sums that do not depend on the order."""
         samplers = {"hair_front": self._hair_front, **hidden}
         images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
         if not self._is_empty:
@@ -190,7 +190,7 @@ class ShadowMaps:
         self._backs.clear(format="UINT", value=(0,))
 
     def _draw_strips(self, layer, placed, lights, hidden):
-        """Draw the same map with triangle strips."""
+        """Draw a map of strands as triangle strips."""
         self._clear_ends()
         end = scene_programs.strip_program(
             "shadows/shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden)
@@ -216,7 +216,7 @@ class ShadowMaps:
         self._filter(shadow_programs.fill_program(), self._hair_front, layer, **ends, row_ends=self._row_ends)
 
     def _blur(self, layer, deviation):
-        """Fill a layer of the surfaces' moments from their raw depth, blurred by a deviation in texels."""
+        """Fill a layer of the surfaces' moments from their raw depth, blurred by a deviation [texels]."""
         program = shadow_programs.moments_program()
         passes = (
             (self._half_blurred, 0, self._surface_depth, (1, 0)),
@@ -231,7 +231,7 @@ class ShadowMaps:
             self._filter(program, target, target_layer, surface_depth=source)
 
     def _filter(self, program, target, layer=None, images=None, **sources):
-        """Write all of a texture, or of its layer, with a program that reads others: nothing needs to be cleared."""
+        """Write a whole texture, or a layer of it, with a program; sources: {sampler: texture}."""
         with drawing.bound(program, {}, sources):
             for name, image in ({"filtered": target} | (images or {})).items():
                 program.image(name, image)
@@ -245,7 +245,7 @@ class ShadowMaps:
 
 
 def _steady(sphere, before):
-    """The sphere (centre, radius) that maps are aimed at for what is in one; before: that of the last time."""
+    """The sphere (center, radius) to aim maps at for hair within `sphere`; before: the previous sphere."""
     apart = float(np.linalg.norm(sphere[0] - before[0]))
     if apart + sphere[1] <= before[1] * (1.0 + 1e-6) and before[1] <= _LOOSEST * sphere[1]:
         return before
@@ -257,9 +257,9 @@ def _slot(texture, layer):
 
 
 def _record(strands, view, to_world, steps, is_steady):
-    """`drawing.strand_record` of strands that cover as much with fewer points, which cut curls short.
+    """`drawing.strand_record` of strands, thickened to compensate for the length that fewer points lose.
 
-    Strands at rest are drawn with as few as show them.
+    Strands at rest are drawn with the fewest points that show them.
     """
     if steps.point_count is None and not is_steady:
         steps = replace(steps, point_count=strands.points_that_show(_LENGTHENING))
@@ -278,10 +278,10 @@ def _array(size, layer_count, texture_format):
 
 
 def _aim(light, hair, loose, size):
-    """The view of a light that holds the hair, also written into the light.
+    """The view of a light that contains the hair, also written into the light; None without an axis.
 
-    loose: (centre, radius) of a sphere around the hair; lights in it take a tight one. Of a light in both, or next to
-    them, the view holds what is up to `_WIDEST` off its axis; None without an axis.
+    loose: (center, radius) of a sphere around the hair; lights inside of it use a tight sphere. The view of a light in
+    or next to both contains everything up to `_WIDEST` off its axis.
     """
     position = light["position"][:3].astype(np.float64)
     is_sun = light["kind"] == SUN
@@ -290,7 +290,7 @@ def _aim(light, hair, loose, size):
     is_inside = is_near and _is_inside(position, centre, radius)
     axis = light["axis"][:3].astype(np.float64) if is_sun else centre - position
     distance = float(np.linalg.norm(axis))
-    if is_inside and light["axis"][:3].any():  # where a spot or an area light shines
+    if is_inside and light["axis"][:3].any():  # the direction of a spot or area light
         axis = light["axis"][:3].astype(np.float64)
     length = float(np.linalg.norm(axis))
     if length == 0.0:
@@ -307,9 +307,9 @@ def _aim(light, hair, loose, size):
 
 
 def _aim_wide(light, centre, radius, size):
-    """The view of a light that holds a sphere, also written into the light; of a light in it, a smaller sphere.
+    """The view of a light that contains a sphere, also written into the light; a smaller sphere if the light is inside.
 
-    None of a light in the sphere's middle.
+    None for a light at the sphere's center.
     """
     position, is_sun = light["position"][:3].astype(np.float64), light["kind"] == SUN
     axis = light["axis"][:3].astype(np.float64) if is_sun else centre - position
@@ -336,7 +336,7 @@ def _blur_of(light, size):
     """Standard deviation [texels] of the blur of surface shadows by a light's size."""
     is_sun = light["kind"] == SUN
     angle = light["radius"] / (1.0 if is_sun else light["near"] + 0.5 * light["extent"])
-    # A disk's deviation along an axis is half its radius.
+    # The standard deviation of a disk along an axis is half its radius.
     return float(np.clip(0.5 * angle * _SHADE_DISTANCE * size, _LEAST_BLUR, _MOST_BLUR * size))
 
 
@@ -352,12 +352,12 @@ def _look_at(eye, forward):
 
 
 def _orthographic(radius):
-    """(4, 4) view to clip of a cube around a sphere two radii ahead; objects in front of it still cast shadows."""
+    """(4, 4) view to clip of a cube around a sphere two radii ahead, with depth range for casters in front of it."""
     return np.array([[1 / radius, 0, 0, 0], [0, 1 / radius, 0, 0], [0, 0, -0.1 / radius, -0.8], [0, 0, 0, 1.0]])
 
 
 def _perspective(radius, distance):
-    """(4, 4) view to clip of a cone around a sphere, `_WIDEST` at most; objects in front of it still cast shadows."""
+    """(4, 4) view to clip of a cone around a sphere, at most `_WIDEST`, with depth range for casters in front of it."""
     sine = min(radius / max(distance, radius), np.sin(_WIDEST))
     cotangent = np.sqrt(1.0 - sine**2) / sine
     near, far = _NEAREST * 2.0 * radius, distance + 4.0 * radius

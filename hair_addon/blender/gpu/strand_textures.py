@@ -15,68 +15,68 @@ import numpy as np
 from ...core import geometry
 from . import driver_textures, shaders
 
-# Widest row of the strand texture; every driver takes 16384 texels.
+# Maximum width of textures; every driver supports 16384 texels.
 TEXTURE_WIDTH = 16384
 
-# Work groups along an axis: every driver takes as many.
+# Maximum work groups along an axis; every driver supports as many.
 MOST_GROUPS = 65535
 
 _SAMPLED = 500  # strands whose lengths are compared
 
-_AT_ONCE = 400  # strands of which all points are gone through at once
+_AT_ONCE = 400  # strands processed at once
 
-_MOVE_GROUP_SIZE = 64  # texels that one work group of `_move_program` brings to their places
+_MOVE_GROUP_SIZE = 64  # texels per work group of `_move_program`
 
 
 @dataclass(frozen=True)
 class Moved:
-    """What the last `move_strands` did: where the strands that it moved were before."""
+    """Former points of the strands that the last `move_strands` moved."""
 
-    points: gpu.types.GPUTexture  # of each moved strand a texel that means nothing, and its texels
-    row_strands: int  # of that texture
-    rows: gpu.types.GPUTexture  # of each of all strands: which of the moved it is, counted from one; 0: none
-    turn: int  # how many such changes there were
+    points: gpu.types.GPUTexture  # for each moved strand an unused texel, and its packed texels
+    row_strands: int  # strands per row of that texture
+    rows: gpu.types.GPUTexture  # for each strand its index among the moved strands, counted from one; 0: not moved
+    turn: int  # number of changes so far
 
 
 @dataclass(frozen=True)
 class StrandsOnGPU:
     """Points and radii of strands in textures, with the strip that draws them."""
 
-    texture: gpu.types.GPUTexture  # of points, as core/geometry/packed_strands.py has them
-    radii_texture: gpu.types.GPUTexture  # of one strand, where all have the same
-    radius_strands: int  # whose radii are in it
-    radius_unit: float  # that they are in it by
+    texture: gpu.types.GPUTexture  # of points, in the format of core/geometry/packed_strands.py
+    radii_texture: gpu.types.GPUTexture  # of a single strand, if all have the same radii
+    radius_strands: int  # number of strands in `radii_texture`
+    radius_unit: float  # unit of the radii in it
     batch: gpu.types.GPUBatch
     strand_count: int
     point_count: int
     row_strands: int
-    randoms: gpu.types.GPUTexture  # a number in [0, 1] a strand, `row_strands` a row
-    wetness: gpu.types.GPUTexture | None  # the same, None where strands do not differ
-    wetness_here: np.ndarray | None  # (S,)
+    randoms: gpu.types.GPUTexture  # a number in [0, 1] per strand, `row_strands` per row
+    wetness: gpu.types.GPUTexture | None  # in the same layout; None if strands do not differ
+    wetness_here: np.ndarray | None  # (S,) on the CPU
     points: np.ndarray  # (S, P, 3) as uploaded, for computations on the CPU
     radii: np.ndarray  # (S, P)
     bounds: np.ndarray  # (2, 3): least and greatest coordinates
     mean_length: float  # of strands, in the coordinate system of the points
     mean_radius: float
     greatest_radius: float
-    randoms_here: np.ndarray | None = None  # (S,), None where all strands are average
-    moved: Moved | None = None  # None where all points are as uploaded
-    is_made: bool = False  # whether the GPU has made or carried them
-    has_points: bool = True  # whether `points` are where strands are, which they are not while the GPU alone knows it
-    lengthenings: dict = field(default_factory=dict)  # {number of points: how much longer strands are with all}
+    randoms_here: np.ndarray | None = None  # (S,) on the CPU; None if all strands are average
+    moved: Moved | None = None  # None if all points are as uploaded
+    is_made: bool = False  # whether the GPU has computed or carried the strands
+    has_points: bool = True  # whether `points` are current, and not only the texture
+    lengthenings: dict = field(default_factory=dict)  # {number of points: length with all points / with that number}
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
-        """All that it holds."""
+        """All textures."""
         own = [self.texture, self.radii_texture, self.randoms]
         own += [] if self.wetness is None else [self.wetness]
         return own + ([] if self.moved is None else [self.moved.points, self.moved.rows])
 
     @cached_property
     def ball(self) -> tuple[np.ndarray, float]:
-        """A centre (3,), and the greatest distance of a point from it: read from all points, for who needs it.
+        """A center (3,), and the greatest distance of all points from it.
 
-        That of a corner of the bounds where points are known to the GPU alone.
+        The distance of the corners of the bounds if only the GPU has the current points.
         """
         centre = 0.5 * self.bounds.sum(axis=0, dtype=np.float64)
         if not self.has_points:
@@ -84,7 +84,7 @@ class StrandsOnGPU:
         return centre, _farthest(self.points, centre)
 
     def lengthening(self, point_count: int) -> float:
-        """How much longer strands are than with as many points, evenly chosen of all: of some strands."""
+        """Length with all points divided by the length with `point_count` evenly chosen points, for some strands."""
         if point_count not in self.lengthenings:
             chosen = np.arange(point_count) * (self.point_count - 1) // (point_count - 1)
             some = self.points[:: -(-self.strand_count // _SAMPLED)]
@@ -93,9 +93,9 @@ class StrandsOnGPU:
         return self.lengthenings[point_count]
 
     def points_that_show(self, part: float) -> int:
-        """How few of the points, evenly chosen, show the strands: with all, they are longer by at most this part.
+        """The least number of evenly chosen points with which strands are shorter by at most this fraction.
 
-        All of them where points are known to the GPU alone.
+        All points if only the GPU has the current points.
         """
         pieces, enough = self.point_count - 1, self.point_count
         steps = [step for step in range(2, pieces + 1) if pieces % step == 0] if self.has_points else []
@@ -109,8 +109,8 @@ class StrandsOnGPU:
 def upload_strands(points, radii, randoms=None, wetness=None):
     """(S, P, 3) points and (S, P) radii, float32, in one coordinate system → `StrandsOnGPU`.
 
-    randoms: (S,) numbers in [0, 1] by which strands may differ; without them all are average; wetness: (S,) in [0, 1],
-    None where strands do not differ in it.
+    randoms: (S,) numbers in [0, 1] for variation, None: all strands are average; wetness: (S,) in [0, 1], None if
+    strands do not differ.
     """
     strand_count, point_count, _xyz = points.shape
     row_strands = row_strands_of(point_count)
@@ -118,7 +118,7 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     random_texture = numbers_texture(np.full(strand_count, 0.5) if randoms is None else randoms, row_strands)
     wetness_texture = None if wetness is None else numbers_texture(wetness, row_strands)
     strip = bare_vertices(vertex_count(strand_count, point_count))
-    # Strand by strand first: NumPy is ten times faster along the long axis of a flat array.
+    # Reduced over strands first: NumPy is ten times faster along the long axis of a flat array.
     flat = points.reshape(strand_count, -1)
     bounds = np.stack([flat.min(axis=0).reshape(-1, 3).min(axis=0), flat.max(axis=0).reshape(-1, 3).max(axis=0)])
     # A sample of the strands is enough for the level of detail.
@@ -149,7 +149,7 @@ def _total_length(points):
 
 
 def _farthest(points, centre):
-    """Greatest distance of points (..., P, 3) from a centre (3,)."""
+    """Greatest distance of points (..., P, 3) from a center (3,)."""
     flat, here, most = points.reshape(-1, points.shape[-2], 3), centre.astype(np.float32), 0.0
     for first in range(0, len(flat), _AT_ONCE):
         some = flat[first : first + _AT_ONCE] - here
@@ -159,19 +159,19 @@ def _farthest(points, centre):
 
 
 def numbers_texture(values, row_strands):
-    """A number a strand, `row_strands` a row; values: (S,)."""
+    """A texture with one number per strand, `row_strands` per row; values: (S,)."""
     numbers = np.zeros((-(-len(values) // row_strands), row_strands), np.float32)
     numbers.ravel()[: len(values)] = values
     return driver_textures.made(numbers.shape[::-1], "R32F", numbers)
 
 
 def row_strands_of(point_count, others=0):
-    """Whole strands in a row of a texture of packed strands, with so many other texels before each."""
+    """Whole strands per row of a texture of packed strands; others: extra texels before each strand."""
     return TEXTURE_WIDTH // (others + geometry.packed_strands.texel_count(point_count))
 
 
 def packed_texture(points, row_strands):
-    """(S, P, 3) places in a texture, each row of it `row_strands` whole strands."""
+    """A texture of packed (S, P, 3) points, `row_strands` whole strands per row."""
     strand_count, point_count, _xyz = points.shape
     texel_count, row_count = geometry.packed_strands.texel_count(point_count), -(-strand_count // row_strands)
     texels = np.empty((row_count * row_strands, texel_count, 2), np.float32)
@@ -182,7 +182,7 @@ def packed_texture(points, row_strands):
 
 _TEXEL_BYTES = {"RG32F": 8, "R32F": 4, "R16": 2, "RGBA32F": 16}
 _MOST_OF_R16 = 65535  # steps from 0 to 1
-_SEEN_BYTES = 20  # of a point in the visibility textures
+_SEEN_BYTES = 20  # per point in the visibility textures
 
 
 def bytes_of(textures):
@@ -197,7 +197,7 @@ def seen_bytes(strands):
 
 
 def with_radii(strands, radii):
-    """`StrandsOnGPU` with other radii (S, P) float32, all else as it is."""
+    """`StrandsOnGPU` with other (S, P) float32 radii."""
     texture, strand_count, unit = _radii_texture(radii, strands.row_strands)
     some = radii[:: -(-len(radii) // 1000)]
     return replace(
@@ -212,12 +212,12 @@ def with_radii(strands, radii):
 
 
 def _radii_texture(radii, row_strands):
-    """(texture, strands in it, unit): radii (S, P) in two bytes each where strands differ, else of one for all."""
+    """(texture, number of strands, unit): (S, P) radii in two bytes each; a single strand if all are equal."""
     strand_count, point_count = radii.shape
     if (radii == radii[:1]).all():
         return _texture("R32F", point_count, np.ascontiguousarray(radii[:1], np.float32)), 1, 1.0
     greatest = float(radii.max())
-    # Infinite ones are kept as they are.
+    # Infinite radii stay infinite.
     texture_format, unit = ("R16", greatest) if np.isfinite(greatest) and greatest > 0.0 else ("R32F", 1.0)
     texels = np.zeros((-(-strand_count // row_strands) * row_strands, point_count), np.float32)
     np.divide(radii, unit, out=texels[:strand_count])
@@ -227,9 +227,9 @@ def _radii_texture(radii, row_strands):
 
 
 def _to_steps(numbers):
-    """Make numbers in [0, 1], in place, such that the nearest ones of 16 bits come of them whatever the driver does.
+    """Adjust numbers in [0, 1], in place, so that every driver converts them to the nearest 16-bit numbers.
 
-    Blender's Vulkan cuts them off where OpenGL rounds: a quarter of a step more is the same step for either.
+    Blender's Vulkan truncates and OpenGL rounds: a quarter of a step is added, which gives the same step in both.
     """
     numbers *= np.float32(_MOST_OF_R16)
     np.rint(numbers, out=numbers)
@@ -244,20 +244,20 @@ def _texture(texture_format, width, texels):
 
 
 def like(texture):
-    """A texture of the same size for other strands, with nothing in it."""
+    """An undefined texture of the same size for other strands."""
     return driver_textures.made((texture.width, texture.height), "RG32F")
 
 
 def seen_points(point_count):
-    """Texels of a strand in the visibility textures: SEEN_STEP of shaders/strands/strip.glsl, and the tip."""
+    """Texels per strand in visibility textures: every SEEN_STEP points (shaders/strands/strip.glsl), and the tip."""
     return -(-(point_count - 1) // 4) + 1
 
 
 def move_strands(strands, moved, points):
-    """Move some of the strands on the GPU, and return the `StrandsOnGPU` in place of these; uploads no others.
+    """Move some of the strands on the GPU, upload only these, and return the new `StrandsOnGPU`.
 
-    Their arrays on this side are moved too. strands: `StrandsOnGPU`; moved: (M,) distinct indices; points: (M, P, 3)
-    float32. Bounds only grow: they are exact again after the next `upload_strands`.
+    The arrays on the CPU are changed too. moved: (M,) distinct indices; points: (M, P, 3) float32. Bounds only grow
+    until the next `upload_strands`.
     """
     strands.points[moved] = points
     flat = points.reshape(-1, 3)
@@ -286,16 +286,16 @@ def move_strands(strands, moved, points):
     return replace(strands, moved=Moved(before, row_strands, rows, turn + 1), lengthenings={}, is_made=False)
 
 
-def keep_strands(strands, kept, count, row_kept, listed=None):
-    """Copy the texels of `StrandsOnGPU`, behind another one of each strand, to a texture of `row_kept` strands a row.
+def keep_strands(strands, target, count, row_kept, listed=None):
+    """Copy the texels of strands, preceded by one extra texel each, to a texture with `row_kept` strands per row.
 
-    count: of strands; listed: a texture like it, where the other texel is the index of the strand; None: all strands.
+    count: of strands; listed: a texture in this layout whose extra texels are indices of strands; None: all strands.
     """
     program = _keep_program()
     program.bind()
     program.uniform_sampler("strands", strands.texture)
     program.uniform_sampler("listed", strands.texture if listed is None else listed)
-    program.image("kept_strands", kept)
+    program.image("kept_strands", target)
     numbers = {"kept_count": count, "row_kept": row_kept, "is_list": int(listed is not None)}
     _dispatch(program, numbers, strands, count)
 
@@ -303,7 +303,7 @@ def keep_strands(strands, kept, count, row_kept, listed=None):
 def run_for_each(program, count, group_size):
     """Run a bound compute program for each of `count` strands, segments or texels, `group_size` in a work group.
 
-    Work groups beyond `MOST_GROUPS` stand in further rows, along y, of which the last may have some without work.
+    Work groups beyond `MOST_GROUPS` are dispatched in further rows along y; some of the last row may be idle.
     """
     groups = -(-count // group_size)
     rows = -(-groups // MOST_GROUPS)
@@ -311,7 +311,7 @@ def run_for_each(program, count, group_size):
 
 
 def _dispatch(program, numbers, strands, count):
-    """Run a bound program on each texel of so many strands."""
+    """Run a bound program on each texel of `count` strands."""
     texel_count = geometry.packed_strands.texel_count(strands.point_count)
     for name, value in (numbers | {"texel_count": texel_count, "row_strands": strands.row_strands}).items():
         program.uniform_int(name, value)
@@ -323,9 +323,9 @@ def _no_rows(strands):
     return numbers_texture(np.zeros(strands.strand_count), strands.row_strands)
 
 
-@shaders.kept
+@shaders.cached
 def _move_program():
-    """The compute program that brings the points of some strands into the texture of all."""
+    """The compute program that writes the points of some strands into the texture of all."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_MOVE_GROUP_SIZE)
     info.sampler(0, "FLOAT_2D", "moved_strands")
@@ -336,9 +336,9 @@ def _move_program():
     return shaders.compile_compute(info, "strands/write_strands.comp")
 
 
-@shaders.kept
+@shaders.cached
 def _keep_program():
-    """The compute program that keeps where strands are. Metal cannot read images of this format that it writes."""
+    """The compute program that copies strands. Metal cannot read from images of this format that it writes."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_MOVE_GROUP_SIZE)
     for slot, name in enumerate(("strands", "listed")):
@@ -350,7 +350,7 @@ def _keep_program():
 
 
 def vertex_count(strand_count, drawn_points):
-    """Vertices of a strip through strands: two a point, and one repeated at either end so that strands do not join."""
+    """Vertices of a strip through strands: two per point, and one repeated at either end to separate strands."""
     return strand_count * (2 * drawn_points + 2)
 
 

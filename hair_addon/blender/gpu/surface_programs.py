@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GLSL files → GPU programs that draw surfaces, and what they read."""
+"""GLSL files → GPU programs that draw surfaces, and their inputs."""
 
 import gpu
 
 from . import scene_programs, uniforms
-from .shaders import compile_compute, compile_drawing, kept
+from .shaders import cached, compile_compute, compile_drawing
 
-SEEN_SAMPLERS = ("visibility_x_y", "visibility_z")  # of VISIBILITY_SAMPLERS, what surfaces read
+SEEN_SAMPLERS = ("visibility_x_y", "visibility_z")  # those of VISIBILITY_SAMPLERS that surfaces read
 CORNER_SAMPLERS = ("places", "normals", "corners")  # of a `SurfaceOnGPU`
 SURFACE_IMAGES = ("color_image", "roughness_image", "normal_image")  # of a `SurfaceMaterial`
 _MATERIAL_SAMPLERS = (*SURFACE_IMAGES, "surface_albedo")
 
 
-@kept
+@cached
 def number_program():
     """The program that draws a surface as samples of a picture: see visibility/triangle_index.vert."""
     info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("number_varying")
@@ -27,12 +27,12 @@ def number_program():
     )
 
 
-SIDE = 4  # samples along each side of what a thread takes: of shaders/surfaces/surface.comp
+SIDE = 4  # samples along each side of a thread's block: SIDE of shaders/surfaces/surface.comp
 
 
-@kept
+@cached
 def shading_program():
-    """The compute program that shades a surface in the samples where it is nearest: see surfaces/surface.comp."""
+    """The compute program that shades the samples where a surface is nearest: see surfaces/surface.comp."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     for slot, name in enumerate(("segments", "depths"), start=_declare_material(info)):
@@ -44,7 +44,7 @@ def shading_program():
     return compile_compute(info, "surfaces/surface.comp")
 
 
-@kept
+@cached
 def clear_program():
     """The program that draws a clear surface: see surfaces/clear_surface.frag."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -53,20 +53,20 @@ def clear_program():
     return compile_drawing(info, "surfaces/lit_surface.vert", "surfaces/clear_surface.frag")
 
 
-@kept
+@cached
 def arrival_program(fragment):
-    """The program of how much light reaches surfaces, by a .frag."""
+    """The program that measures the light on surfaces with a .frag."""
     info = gpu.types.GPUShaderCreateInfo()
     _declare_lit(info)
     info.vertex_out(_lit_varying())
     return compile_drawing(info, "surfaces/lit_surface.vert", fragment)
 
 
-@kept
+@cached
 def depth_program(fragment="shadows/shadow_surface.frag", is_clipped=False):
-    """The program that draws a surface into a shadow map, or one that only hides.
+    """The program that draws a surface into a shadow map, or as an occluder.
 
-    is_clipped: whether planes cut something off, as surfaces/occluding_surface.frag knows.
+    is_clipped: apply clipping planes, as in surfaces/occluding_surface.frag.
     """
     info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
     replaced = scene_programs.declare_clipped_scene(info, (), is_clipped)
@@ -77,7 +77,7 @@ def depth_program(fragment="shadows/shadow_surface.frag", is_clipped=False):
 
 
 def _declare_material(info):
-    """Declare the inputs of programs that shade; returns the first slot of samplers that is left."""
+    """Declare the inputs of shading programs; returns the first free sampler slot."""
     info.uniform_buf(2, "Surface", "surface")
     return _declare_lit(info, uniforms.SURFACE.source, _MATERIAL_SAMPLERS)
 

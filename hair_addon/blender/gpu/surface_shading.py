@@ -10,15 +10,16 @@ from ...core.shading.tables import surface_albedo
 from ..host.caches import Cache
 from . import drawing, scene_programs, surface_programs, uniforms, windows
 
-texture_cache = Cache()  # of the textures that all surfaces are drawn with
+texture_cache = Cache()  # textures shared by all surfaces
 
 
 def shade(surface, parts, first_triangle, view, lights, samplers, buffer, picture, has_over):
-    """Shade a `SurfaceOnGPU` in those samples of a picture that show it.
+    """Shade the samples of a picture in which a `SurfaceOnGPU` is nearest.
 
-    parts: (first corner, number of corners, `SurfaceMaterial`), ...; first_triangle: of it in the numbers of a
-    `VisibilityBuffer`; view, lights: records of `uniforms`; samplers: {sampler: texture} of shadows and of the world's
-    visibility; picture: the texture to fill; has_over: whether it holds what is drawn over surfaces.
+    parts: (first corner, number of corners, `SurfaceMaterial`), ...; first_triangle: the surface's first triangle in
+    the numbers of a `VisibilityBuffer`; view, lights: records of `uniforms`; samplers: {sampler: texture} of shadows
+    and of the world's visibility; picture: the texture to fill; has_over: whether it already contains what is drawn
+    over surfaces.
     """
     placed, program = surface.placed(view), surface_programs.shading_program()
     blocks = {"view": uniforms.uniform_buffer(placed), "lights": uniforms.uniform_buffer(lights)}
@@ -32,7 +33,7 @@ def shade(surface, parts, first_triangle, view, lights, samplers, buffer, pictur
         constants |= {"part_triangle": first // 3, "triangle_count": count // 3}
         constants |= {"window_left": left, "window_bottom": bottom}
         with drawing.bound(program, blocks, samplers | _of_material(blocks, material)):
-            # The first thread may begin before the window.
+            # One thread more, as the first may begin before the window.
             threads = [length // surface_programs.SIDE + 2 for length in size]
             constants["row_stride"] = stride_over(-(-threads[1] // scene_programs.PICTURE_GROUP_SIZE))
             program.image("picture", picture)
@@ -42,9 +43,9 @@ def shade(surface, parts, first_triangle, view, lights, samplers, buffer, pictur
 
 
 def stride_over(count):
-    """The least step from the golden section of a number of rows on that comes to each row once, around and around.
+    """The least stride, from the golden section of `count` on, that visits each of `count` rows once, wrapping around.
 
-    Any rows that it comes to one after the other are spread over all.
+    Consecutively visited rows are spread over all rows.
     """
     stride = math.ceil(0.618 * count)
     while math.gcd(stride, count) > 1:
@@ -62,7 +63,7 @@ def draw_clear(surface, parts, view, lights, samplers):
 
 
 def _of_material(blocks, material):
-    """{sampler: texture} of a material, whose block is put among others."""
+    """{sampler: texture} of a material; adds its block to `blocks`."""
     images = {name: _texture(getattr(material, name)) for name in surface_programs.SURFACE_IMAGES}
     blocks["surface"] = uniforms.uniform_buffer(_record(material, images))
     images = {name: _white() if texture is None else texture for name, texture in images.items()}
@@ -70,16 +71,16 @@ def _of_material(blocks, material):
 
 
 def _texture(image_map):
-    """Blender's own texture of an image, which it may replace at any time: None of one that cannot be read."""
+    """Blender's texture of an image, which Blender may replace at any time; None if it cannot be read."""
     if image_map is None:
         return None
     try:
         texture = gpu.texture.from_image(image_map.image)
-    except RuntimeError:  # its file is gone since the scene was read
+    except RuntimeError:  # the file was removed after the scene was read
         return None
     texture.extend_mode(image_map.extension)
     texture.filter_mode(image_map.is_smooth)
-    texture.anisotropic_filter(False)  # software drivers blur by it
+    texture.anisotropic_filter(False)  # blurs with software drivers
     return texture
 
 

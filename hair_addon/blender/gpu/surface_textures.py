@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces on the GPU: places of vertices in a texture, and what belongs to corners of triangles, which stays.
+"""Surfaces on the GPU: positions of vertices in a texture, and constant data of triangle corners.
 
-A pose uploads the places of vertices, twelve bytes each. An object that moves as a whole uploads nothing.
+A pose uploads the positions of vertices, twelve bytes each. An object that moves rigidly uploads nothing.
 """
 
 from dataclasses import dataclass
@@ -18,24 +18,24 @@ from ..host.caches import Cache
 from . import drawing, surface_programs, uniforms
 from .strand_textures import TEXTURE_WIDTH, bare_vertices
 
-_ROW_VERTICES = TEXTURE_WIDTH // 3  # at most; each is three texels
-_ROW_CORNERS = TEXTURE_WIDTH - 1  # at most
+_ROW_VERTICES = TEXTURE_WIDTH // 3  # maximum per row; each is three texels
+_ROW_CORNERS = TEXTURE_WIDTH - 1  # maximum per row
 
-surface_cache = Cache(capacity=64)  # session_uid of a mesh object → `SurfaceOnGPU` that was drawn of it last
+surface_cache = Cache(capacity=64)  # session_uid of a mesh object → its last drawn `SurfaceOnGPU`
 
 
 @dataclass(frozen=True, eq=False)
 class _Corners:
-    """What stays of a surface while it moves; made by `_corners`."""
+    """The data of a surface that does not change while it moves."""
 
-    vertices: np.ndarray  # (3 F,) int32, of each corner
+    vertices: np.ndarray  # (3 F,) int32 vertex of each corner
     has_vertex_normals: bool  # whether normals are of vertices, not of corners
     uvs: np.ndarray | None  # (3 F, 2), None: zero
-    colors: tuple  # (number of corners, packed color) of one material after the other
+    colors: tuple  # (number of corners, packed color) of each material, in the corners' order
     vertex_count: int
 
     def is_same(self, other):
-        """Whether other corners are drawn alike."""
+        """Whether other corners are drawn the same way."""
         mine, its = ((c.has_vertex_normals, c.colors, c.vertex_count, c.uvs is None) for c in (self, other))
         return mine == its and all(
             a is b or np.array_equal(a, b) for a, b in ((self.vertices, other.vertices), (self.uvs, other.uvs))
@@ -43,19 +43,19 @@ class _Corners:
 
     @cached_property
     def triangles(self):
-        """The batch of indexed triangles without attributes: a shader reads places by the index of a vertex."""
+        """The batch of indexed triangles without attributes: a shader reads positions by vertex index."""
         vertices = gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), self.vertex_count)
         indices = gpu.types.GPUIndexBuf(type="TRIS", seq=np.ascontiguousarray(self.vertices.reshape(-1, 3), np.int32))
         return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
 
     @cached_property
     def bare(self):
-        """The batch of corners without attributes: a shader reads `texture` by the index of a corner."""
+        """The batch of corners without attributes: a shader reads `texture` by corner index."""
         return bare_vertices(len(self.vertices), "TRIS")
 
     @cached_property
     def texture(self):
-        """Each corner's vertex, in two numbers of sixteen bits, and its UV: shaders/surfaces/surface_corner.glsl."""
+        """Each corner's vertex, as two 16-bit numbers, and its UV: shaders/surfaces/surface_corner.glsl."""
         count = len(self.vertices)
         width = min(count, _ROW_CORNERS)
         texels = np.zeros((beside_powers(-(-count // width)) * width, 4), np.float32)
@@ -72,8 +72,8 @@ class _Corners:
 class SurfaceOnGPU:
     """Triangles of a surface, placed by a matrix."""
 
-    places: gpu.types.GPUTexture  # of vertices, in the object's coordinates
-    normals: gpu.types.GPUTexture  # in the same; any texture where there are none
+    places: gpu.types.GPUTexture  # positions of vertices in the object's coordinates
+    normals: gpu.types.GPUTexture  # in the object's coordinates; any texture without normals
     corners: _Corners
     to_world: np.ndarray  # (4, 4)
     vertices: np.ndarray  # (V, 3) float32, as uploaded
@@ -85,22 +85,22 @@ class SurfaceOnGPU:
 
     @property
     def row_vertices(self) -> int:
-        """Whole vertices in a row of textures that have a texel for each."""
+        """Vertices per row of textures with a texel for each."""
         return _row_of(self.vertex_count)
 
     @property
     def shape(self) -> tuple[int, int]:
-        """How many vertices and corners it has."""
+        """(number of vertices, number of corners)."""
         return self.vertex_count, len(self.corners.vertices)
 
     @cached_property
     def fingerprint(self) -> tuple:
-        """Of the places of its vertices in the world, for motion vectors."""
+        """A fingerprint of the positions of vertices in the world, for motion vectors."""
         return self.shape, geometry.fingerprint.fingerprint(self.vertices), self.to_world.tobytes()
 
     @property
     def samplers(self) -> dict:
-        """{sampler: texture} of a program that draws it lit."""
+        """{sampler: texture} for a program that draws the lit surface."""
         return {"places": self.places, "normals": self.normals, "corners": self.corners.texture}
 
     @property
@@ -109,11 +109,11 @@ class SurfaceOnGPU:
 
     @cached_property
     def bounds(self) -> np.ndarray:
-        """(2, 3) least and greatest coordinates of its vertices."""
+        """(2, 3) least and greatest coordinates of all vertices."""
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     def bounds_of(self, first: int, count: int) -> np.ndarray:
-        """(2, 3) least and greatest coordinates of some of the corners."""
+        """(2, 3) least and greatest coordinates of a range of corners."""
         if (first, count) not in self._bounds:
             places = self.vertices[self.corners.vertices[first : first + count]]
             self._bounds[first, count] = np.stack([places.min(axis=0), places.max(axis=0)])
@@ -124,7 +124,7 @@ class SurfaceOnGPU:
         return {}
 
     def placed(self, view: np.ndarray) -> np.ndarray:
-        """A copy of a `uniforms.VIEW` record that places it."""
+        """A copy of a `uniforms.VIEW` record with the surface's transform and layout."""
         record = view.copy()
         record["object_to_world"] = self.to_world.T
         record["row_strands"] = self.row_vertices
@@ -135,12 +135,12 @@ class SurfaceOnGPU:
 def upload_surface(
     vertices, triangles, normals=None, has_vertex_normals=True, uvs=None, colors=(), to_world=None, known=None
 ):
-    """(V, 3) float32 places and (3 F,) vertices of triangles → `SurfaceOnGPU`. Raises `HairError`.
+    """(V, 3) float32 vertices and (3 F,) vertex indices of triangles → `SurfaceOnGPU`. Raises `HairError`.
 
-    normals: (V, 3) of vertices, or without has_vertex_normals (3 F, 3) of corners, unit, None of what is drawn as depth
-    alone: in the coordinates of places, which to_world (4, 4) transforms, None: those of the world. uvs: (3 F, 2) or
-    None; colors: (number of corners, linear RGB) of one part after the other as they light hair; black without. known:
-    what was drawn of the same object before, None: nothing. What is equal is not uploaded again.
+    normals: unit, (V, 3) of vertices, or without has_vertex_normals (3 F, 3) of corners, in the coordinates of
+    vertices; None if only depth is drawn; to_world: (4, 4), None: vertices are in world space; uvs: (3 F, 2) or None;
+    colors: (number of corners, linear RGB) of each part, with which it lights hair, black by default; known: the last
+    `SurfaceOnGPU` of the object, or None. Unchanged data is not uploaded again.
     """
     packed = tuple(packed_colors([color for _count, color in colors]).tolist()) if colors else (0.0,)
     counts = [count for count, _color in colors] if colors else [len(triangles)]
@@ -161,18 +161,18 @@ def upload_surface(
 
 
 def packed_colors(colors):
-    """(N, 3) linear RGB → (N,) float32: square roots in eight bits each, as whole numbers that floats hold exactly."""
+    """(N, 3) linear RGB → (N,) float32: square roots in eight bits each, as integers that are exact in floats."""
     roots = np.rint(255.0 * np.sqrt(np.clip(colors, 0.0, 1.0)))
     return (roots @ np.array([65536.0, 256.0, 1.0])).astype(np.float32)
 
 
 def _row_of(count):
-    """How many of so many vectors are in a row of a texture: of a few, a third."""
+    """Number of vectors per row of a texture of `count` vectors: a third of a small number."""
     return min(int(beside_powers(-(-count // 3))), _ROW_VERTICES)
 
 
 def _texture_of(vectors, known):
-    """(N, 3) float32 in a texture of three texels each; known: (vectors, texture) of before, or None."""
+    """A texture of (N, 3) float32 vectors, three texels each; known: (vectors, texture) to reuse if equal, or None."""
     if known is not None and known[0] is not None and np.array_equal(vectors, known[0]):
         return known[1]
     row = _row_of(len(vectors))
@@ -186,13 +186,13 @@ def _texture_of(vectors, known):
     return texture
 
 
-_COLORED = "shadows/shadow_surface.frag"  # the only one that a material's color matters to
+_COLORED = "shadows/shadow_surface.frag"  # the only shader that reads a material's color
 
 
 def draw_depth(surface, view, lights, fragment=_COLORED, clip_planes=None):
-    """Draw a `SurfaceOnGPU` into a shadow map's first pass, or where it only hides: surfaces/occluding_surface.frag.
+    """Draw a `SurfaceOnGPU` into a shadow map's first pass, or as an occluder: surfaces/occluding_surface.frag.
 
-    clip_planes: (6, 4) that cut off what only hides, None for none.
+    clip_planes: (6, 4) that clip an occluder, None for none.
     """
     program = surface_programs.depth_program(fragment, clip_planes is not None)
     placed, light_block = surface.placed(view), uniforms.uniform_buffer(lights)
@@ -215,7 +215,7 @@ def draw_lit(surface, program, view, lights, samplers):
 
 
 def draw_numbers(surface, view, lights, first_triangle):
-    """Draw numbers of a `SurfaceOnGPU`'s triangles into a visibility buffer, those before it being `first_triangle`."""
+    """Draw the numbers of a `SurfaceOnGPU`'s triangles, from `first_triangle` on, into a visibility buffer."""
     program = surface_programs.number_program()
     blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "lights": uniforms.uniform_buffer(lights)}
     with drawing.bound(program, blocks, surface.samplers):

@@ -25,13 +25,13 @@ _TYPES = {
 class Block:
     """A GLSL struct: `source` declares it, `dtype` is the NumPy record of its std140 layout.
 
-    What lies between members is a member of the record too, so that copies of it have the same bytes.
+    Padding between members is a member of the record too, so that copies of a record have the same bytes.
     """
 
     def __init__(self, type_name, members):
         """members: {name: GLSL type}, or {name: (Block, count)} and {name: ("vec4", count)} for arrays."""
         fields, lines, end = [], [], 0
-        # A float behind a vec3 is in its fourth word in std140, and behind that in the Metal Shading Language.
+        # A float after a vec3 is in the vec3's fourth word in std140, but after it in the Metal Shading Language.
         for name, kind in sorted(members.items(), key=lambda member: member[1] == "vec3"):
             if isinstance(kind, tuple):
                 element, count = kind
@@ -49,12 +49,12 @@ class Block:
         self.dtype = np.dtype([*fields, *_gap(end, 16)])
 
     def record(self):
-        """A zeroed record to be filled by member name."""
+        """A zeroed record."""
         return np.zeros((), self.dtype)
 
 
 def _gap(end, alignment):
-    """[(name, type)] of the bytes from an end to the next multiple of an alignment; none where there are none."""
+    """[(name, type)] of the padding from an end to the next multiple of an alignment; empty without padding."""
     return [(f"unused_{end}", np.dtype((np.uint8, (-end % alignment,))))] if end % alignment else []
 
 
@@ -67,34 +67,34 @@ VIEW = Block(
         "object_to_world": "mat4",
         "object_to_clip": "mat4",
         "eye": "vec4",  # the viewer's place, or in a parallel projection the unit direction towards the viewer
-        "hair_forward": "vec4",  # what one strand passes on of the light that meets it
+        "hair_forward": "vec4",  # fraction of incident light that one strand passes on
         "hair_reflectance": "vec4",  # of infinitely many strands
         "is_perspective": "int",
-        "is_mirrored": "int",  # whether a picture shows left as right: triangles turn their other side to the front
+        "is_mirrored": "int",  # whether a picture is mirrored: triangles show their other side
         "point_count": "int",
-        "drawn_points": "int",  # of each strand's points, evenly chosen: at least two
+        "drawn_points": "int",  # evenly chosen points per strand: at least two
         "strand_count": "int",
-        "drawn_strands": "int",  # of all, thickened in proportion
-        "first_strand": "int",  # of the turns in which strands are drawn
-        "part_size": "int",  # strands: turns go from one such part of the strands to the next
-        "part_stride": "int",  # and so much further in each when they come back to it
-        "first_segment": "int",  # of this hair, among those of all hair in a picture
+        "drawn_strands": "int",  # a subset, thickened in proportion
+        "first_strand": "int",  # in drawing order
+        "part_size": "int",  # strands per part: drawing order visits one part after the other
+        "part_stride": "int",  # step within a part at each of its visits
+        "first_segment": "int",  # of this hair, among the segments of all hair in a picture
         "thickness": "float",
-        "seen_points": "int",  # of each strand's points, those of the visibility textures
-        "seen_opacity": "float",  # of a strand, for which they hold
+        "seen_points": "int",  # points per strand in the visibility textures
+        "seen_opacity": "float",  # opacity of a strand for which visibility was computed
         "row_strands": "int",
-        "has_vertex_normals": "int",  # of a surface, whether its normals are of vertices, not of corners
-        "radius_strands": "int",  # whose radii are stored: one for all, or each
-        "radius_unit": "float",  # that they are stored in
+        "has_vertex_normals": "int",  # whether a surface's normals are of vertices, not of corners
+        "radius_strands": "int",  # number of strands with stored radii: one for all, or each
+        "radius_unit": "float",  # of stored radii
         "object_scale": "float",
         "pixels_per_unit": "float",  # at distance one, in a perspective
-        "least_half_width": "float",  # there as well
-        "depth_rise": "float",  # of a sample's side towards the viewer, at distance one
+        "least_half_width": "float",  # at distance one
+        "depth_rise": "float",  # change of depth over a sample's width towards the viewer, at distance one
         "surface_color": "float",  # of a surface in shadow maps, packed
         "light_index": "int",  # the light that a shadow pass looks from
-        "sample_offset": "float",  # how far samples of thin strands lie off their centers, as a part of it
-        "coverage_turn": "float",  # by which a pass takes other samples of thin strands
-        "first_column": "int",  # of the picture's samples, where what is drawn is a tile of it
+        "sample_offset": "float",  # jitter of thin strands' samples, as a fraction of a sample
+        "coverage_turn": "float",  # selects other samples of thin strands in each pass
+        "first_column": "int",  # of the picture's samples, if a tile of it is drawn
         "first_row": "int",
     },
 )
@@ -110,12 +110,12 @@ LIGHT = Block(
         "blend": "float",
         "shadow_layer": "int",  # of the shadow maps, -1 without
         "casts_shadow": "int",
-        "radius": "float",  # [m]; of a sun, the tangent of its angular radius
-        "extent": "float",  # diameter of the hair [m], which the layers of a shadow are parts of
-        "near": "float",  # depth [m] of the hair's near side, which depths are counted from
+        "radius": "float",  # [m]; for a sun, the tangent of its angular radius
+        "extent": "float",  # diameter of the hair [m], the unit of the layers of a shadow
+        "near": "float",  # depth [m] of the hair's near side, the origin of depths
         "world_to_wide": "mat4",  # of the map of surfaces around the hair
         "wide_layer": "int",  # of the shadow maps, -1 without
-        "wide_extent": "float",  # as `extent` and `near`, of what that map holds
+        "wide_extent": "float",  # `extent` and `near` of that map
         "wide_near": "float",
     },
 )
@@ -125,20 +125,20 @@ LIGHTS = Block(
         "light": (LIGHT, LIGHT_CAPACITY),
         "world": ("vec4", 6),  # mean radiance of the world's sides, in the order of `sphere.SIDES`
         "count": "int",
-        "grid_corner": "vec4",  # of the grid of light [m]
-        "grid_scale": "vec4",  # one over its sides [1/m]: 0 without
+        "grid_corner": "vec4",  # of the light grid [m]
+        "grid_scale": "vec4",  # reciprocals of its sides [1/m]; 0 without a grid
     },
 )
 
 SURFACE = Block(
     "Surface",
     {
-        "color": "vec4",  # linear RGB where it has no image
+        "color": "vec4",  # linear RGB, without an image
         "image_rows": ("vec4", 6),  # from (u, v, 1) to coordinates of the images: two each of color, roughness, normal
         "roughness_channels": "vec4",  # weights of the image's RGBA
         "roughness": "float",
         "metallic": "float",
-        "reflectance": "float",  # at normal incidence, of all but metal
+        "reflectance": "float",  # of non-metals at normal incidence
         "normal_strength": "float",
         "has_color_image": "int",
         "is_color_opaque": "int",  # whether the image's alpha does not darken its color
@@ -150,11 +150,11 @@ SURFACE = Block(
 MOTION = Block(
     "Motion",
     {
-        "before_to_clip": "mat4",  # of what strands or surfaces have their places in, a frame before
+        "before_to_clip": "mat4",  # from the coordinates of strands or surfaces, one frame before
         "now_to_clip": "mat4",
         "after_to_clip": "mat4",
         "size": "vec4",  # width and height of the whole picture [pixels]
-        "moved_row_strands": "int",  # of the texture of combed strands' points before, 0 without
+        "moved_row_strands": "int",  # strands per row of the texture of former points, 0 without
     },
 )
 
@@ -162,13 +162,13 @@ MAKING = Block(
     "Making",
     {
         "axes": "mat4",  # from the coordinates of roots and guides to those of the strands
-        "axes_scale": "float",  # the greatest by which they lengthen anything
-        "limits": "vec4",  # as `limited_part` of shaders/strands/guide_interpolation.glsl
+        "axes_scale": "float",  # greatest stretch by `axes`
+        "limits": "vec4",  # of `limited_part` in shaders/strands/guide_interpolation.glsl
         "keep_length": "float",
         "strand_count": "int",
         "guide_count": "int",
         "point_count": "int",
-        "row_guides": "int",  # whole guides or strands in a row of each texture
+        "row_guides": "int",  # guides or strands per row of each texture
         "row_normals": "int",
         "row_segments": "int",
         "row_bindings": "int",
@@ -176,7 +176,7 @@ MAKING = Block(
     },
 )
 
-MOST_STEPS = 64  # of the styles of one hair that the GPU applies
+MOST_STEPS = 64  # maximum number of steps that the GPU applies to one hair
 
 STEP = Block(
     "Step",
@@ -193,22 +193,22 @@ STEP = Block(
 STYLING = Block(
     "Styling",
     {
-        "axes": "mat4",  # from the coordinates of strands to the surface's own
-        "to_drawn": "mat4",  # from the coordinates of strands to those that are drawn
+        "axes": "mat4",  # from the coordinates of strands to the surface's local coordinates
+        "to_drawn": "mat4",  # from the coordinates of strands to those of drawn strands
         "strand_count": "int",
-        "point_count": "int",  # a constant of the program too: but loops to a constant take drivers longer to compile
-        "first_strand": "int",  # where the first of these is in the image
-        "row_strands": "int",  # whole strands in a row of each texture
+        "point_count": "int",  # also a constant of the program, but loops to a constant compile more slowly
+        "first_strand": "int",  # index of the first strand in the image
+        "row_strands": "int",  # strands per row of each texture
         "row_packed": "int",
         "row_known": "int",
         "row_centres": "int",
         "row_locks": "int",
-        "known_texels": "int",  # of a strand
-        "level_count": "int",  # of clump centres, those of guides among them
-        "centre_count": "int",  # of all levels, those of guides left out
-        "are_centres": "int",  # whether centres are styled
+        "known_texels": "int",  # per strand
+        "level_count": "int",  # of clump centers, including the level of guides
+        "centre_count": "int",  # in all levels except that of guides
+        "are_centres": "int",  # whether center strands are styled
         "step_count": "int",
-        "hand": "float",  # -1 where those own axes are mirrored, 1 elsewhere
+        "hand": "float",  # -1 if `axes` are mirrored, else 1
         "steps": (STEP, MOST_STEPS),
     },
 )
@@ -216,28 +216,28 @@ STYLING = Block(
 HISTORY = Block(
     "History",
     {
-        "now_to_before": "mat4",  # clip space of a view → that of the view before
+        "now_to_before": "mat4",  # clip space of a view → clip space of the previous view
         "size": "vec4",  # width and height of the picture [pixels]
         "samples_per_side": "int",
-        "first_column": "int",  # of the picture's samples, where those that were drawn are a tile of it
+        "first_column": "int",  # of the picture's samples, if a tile of it was drawn
         "first_row": "int",
-        "has_hair_motion": "int",  # whether it has moved, and not only the view: by the texture of motion vectors
+        "has_hair_motion": "int",  # whether hair has moved by the texture of motion vectors, and not only the view
         "has_surface_motion": "int",
-        "is_still": "int",  # whether nothing has moved but lights: what is in a pixel was there before
-        "has_lit_surfaces": "int",  # whether surfaces, or shadows on them, are in the picture beside hair
-        "most_passes": "float",  # that the picture before may be worth
+        "is_still": "int",  # whether only lights have moved: pixels show the same geometry as before
+        "has_lit_surfaces": "int",  # whether the picture includes surfaces, or shadows on them
+        "most_passes": "float",  # maximum weight of the previous picture, in passes
     },
 )
 
-CLIPPING = Block("Clipping", {"planes": ("vec4", 6)})  # a place p of the world is left where each (p, 1) is not below
+CLIPPING = Block("Clipping", {"planes": ("vec4", 6)})  # world points p with dot(plane, (p, 1)) < 0 are clipped
 
 ENVIRONMENT = Block(
     "Environment",
     {
-        "to_image": "mat4",  # from world directions to the picture's
+        "to_image": "mat4",  # from world directions to directions of the image
         "clip_to_world": "mat4",
-        "color": "vec4",  # by which the picture is multiplied
-        "size": "vec4",  # width and height of what is drawn [pixels]
+        "color": "vec4",  # factor of the image
+        "size": "vec4",  # width and height of the target [pixels]
         "is_mirror_ball": "int",
         "taps": "int",  # samples along each side of a texel
     },
@@ -254,16 +254,16 @@ def _glsl_type(default, details):
 
 @cache
 def settings_block(settings_class, instance="settings"):
-    """The struct of a class of settings, called after its instance: `settings` is a `Settings`.
+    """The `Block` of a class of settings, named after its instance: `settings` is a `Settings`.
 
-    An enumeration is the index of its choice; free text has no place.
+    An enumeration becomes the index of its choice; free text is left out.
     """
     kinds = {name: _glsl_type(default, details) for name, default, details in declared(settings_class)}
     return Block(instance.capitalize(), {name: kind for name, kind in kinds.items() if kind})
 
 
 def fill(settings):
-    """The record of `settings_block` that holds these settings."""
+    """The record of `settings_block` with these settings."""
     record = settings_block(type(settings)).record()
     for name, _default, details in declared(type(settings)):
         if name in record.dtype.names:
@@ -279,7 +279,7 @@ def uniform_buffer(record):
 
 
 def clipping_blocks(planes):
-    """{instance: GPUUniformBuf} of programs that are clipped by planes, (6, 4); none where these are None."""
+    """{instance: GPUUniformBuf} for programs that are clipped by (6, 4) planes; empty for None."""
     if planes is None:
         return {}
     record = CLIPPING.record()
@@ -288,6 +288,6 @@ def clipping_blocks(planes):
 
 
 def bytes_of(record):
-    """A Buffer with the bytes of a record: it has no raw kind, and unsigned bytes are copied as they are."""
+    """A Buffer with the bytes of a record: unsigned bytes are copied unchanged, and there is no raw type."""
     data = record.tobytes()
     return gpu.types.Buffer("UBYTE", len(data), data)

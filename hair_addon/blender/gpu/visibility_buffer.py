@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Visibility buffer of a picture: the nearest strand segment of each sample, its depth, and its light.
+"""Visibility buffer of a picture: the nearest strand segment of each sample, its depth and its light.
 
 The depth complexity of hair is high, so only visible samples are shaded, once each, by a compute program [Burns13].
 If the graphics driver supports it, a compute program also finds the nearest segments.
@@ -18,7 +18,7 @@ from .strand_textures import StrandsOnGPU, seen_points
 
 NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
 
-# With fewer segments, it takes longer to find out what is hidden than to draw it.
+# With fewer segments, occlusion culling takes longer than drawing hidden segments.
 _FEW_SEGMENTS = 1 << 20
 
 
@@ -33,7 +33,7 @@ class _Placed:
     first: int
     lights: gpu.types.GPUUniformBuf
     window: tuple  # of `windows`
-    is_round: bool  # whether any strand is so wide that its bends and ends are seen
+    is_round: bool  # whether any strand is so wide that its bends and ends are visible
 
     @property
     def segment_count(self):
@@ -48,52 +48,52 @@ _NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
 def _are_clears_slow():
-    """Whether some drivers take much longer to clear a texture than a program takes to fill it."""
+    """Whether clearing a texture may take much longer than filling it with a program, as with some OpenGL drivers."""
     return gpu.platform.backend_type_get() == "OPENGL"
 
 
 class VisibilityBuffer:
-    """Textures of width × height samples: surfaces are drawn first, then hair, which they hide.
+    """Textures of width × height samples: surfaces are drawn first, then hair, which surfaces occlude.
 
-    color: linear light, premultiplied; segments: of strands, what is nearest, and beyond `NO_SEGMENT` of the triangles
-    of surfaces that were drawn into `numbered`; surface_depth: of surfaces, from 0 to 1; depths: of hair where there is
-    any, the bits of floats from 0 to 1; elsewhere of surfaces, or 1.
+    color: linear light, premultiplied; segments: the nearest segment of strands, or beyond `NO_SEGMENT` the nearest
+    triangle of surfaces that were drawn into `numbered`; surface_depth: depth of surfaces from 0 to 1; depths: bits of
+    floats from 0 to 1, of the nearest hair, else of surfaces, else 1.
     """
 
     def __init__(self, width, height, is_coarse=False):
-        """is_coarse: whether two by two samples of a surface may be shaded once."""
+        """is_coarse: whether two by two samples of a surface may be shaded together."""
         self.size, self.is_coarse = (width, height), is_coarse
         self.color = gpu.types.GPUTexture(self.size, format=scene_programs.PICTURE_FORMAT)
         self.depths = gpu.types.GPUTexture(self.size, format="R32UI")
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
         tiles = tuple(-(-length // visibility_programs.TILE) for length in self.size)
-        self._farthest = gpu.types.GPUTexture(tiles, format="R32UI")  # of the depths in each
-        self._seen_runs = None  # a texel for each run of segments that is walked along
+        self._farthest = gpu.types.GPUTexture(tiles, format="R32UI")  # farthest depth in each tile
+        self._seen_runs = None  # a texel for each run of segments
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
         self._clip_planes = None  # of `find_hair`
-        self._has_strips = False  # whether `depths` are of strips alone
+        self._has_strips = False  # whether `depths` only contains strips
         # (format, background) → (framebuffer, texture, framebuffer of `behind_hair`, depth) of additional passes
         self._parts = {}
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
         self._hiding = gpu.types.GPUFrameBuffer(depth_slot=self.surface_depth)
         self._numbered = gpu.types.GPUFrameBuffer(color_slots=self.segments, depth_slot=self.surface_depth)
-        self._is_color_stale = self._is_numbered = False  # whether `color` is to be cleared, `segments` to be kept
+        self._is_color_stale = self._is_numbered = False  # whether to clear `color`, and to keep `segments`
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
     def surfaces(self, background=_NOTHING):
-        """The framebuffer that surfaces are drawn into, bound and cleared: a context manager."""
+        """A context with the framebuffer of surfaces bound and cleared."""
         self._is_color_stale = self._is_numbered = False
         return drawing.cleared(self._surfaces, background)
 
     def hiding(self):
-        """The same of depths alone, where surfaces only hide hair: `color` is transparent behind it."""
+        """A context with the framebuffer of surfaces that only occlude hair: only depths, `color` stays transparent."""
         self._is_color_stale, self._is_numbered = True, False
         return drawing.cleared(self._hiding, _NOTHING)
 
     @contextmanager
     def numbered(self):
-        """The framebuffer that numbers of triangles are drawn into, where surfaces are shaded after `find_hair`."""
+        """A context with the framebuffer of triangle numbers, for surfaces that are shaded after `find_hair`."""
         self._is_color_stale, self._is_numbered = False, True  # `color` is filled later
         if not _are_clears_slow():
             self.segments.clear(format="UINT", value=(NO_SEGMENT,))
@@ -117,9 +117,9 @@ class VisibilityBuffer:
 
     @contextmanager
     def behind_hair(self, picture, color):
-        """The framebuffer of a picture, `color` or `part`, filled with a color, and of `surface_depth`, bound.
+        """A context with the framebuffer of a picture, `color` or `part`, filled with a color, and `surface_depth`.
 
-        Something is to be drawn into it: else `fill` is for it.
+        Something must be drawn into it; otherwise use `fill`.
         """
         is_part = picture is not self.color
         framebuffer = self._part(scene_programs.PICTURE_FORMAT, _NOTHING)[2] if is_part else self._surfaces
@@ -128,8 +128,8 @@ class VisibilityBuffer:
             yield
 
     def put_hair_first(self):
-        """Set `surface_depth` to zero where hair is nearest: nothing is drawn there. And empty samples of surfaces."""
-        self.nearest_depths()  # which are read from it
+        """Set `surface_depth` to zero where hair is nearest, to draw nothing there, and blank samples of surfaces."""
+        self.nearest_depths()  # reads `surface_depth`
         with drawing.gpu_state("NONE", depth_writes=False):
             drawing.draw_cover(visibility_programs.surface_blank_program(), {}, {"segments": self.segments})
         program = visibility_programs.hair_first_program()
@@ -142,7 +142,7 @@ class VisibilityBuffer:
                     drawing.cover(program)
 
     def add_hair(self, hair, lights, view, in_compute=None, clip_planes=None):
-        """Find the hair in front of the surfaces and shade it: arguments as for `find_hair`."""
+        """Find the hair in front of surfaces and shade it; arguments as for `find_hair`."""
         self.find_hair(hair, lights, view, in_compute, clip_planes)
         self.shade_hair()
 
@@ -152,12 +152,11 @@ class VisibilityBuffer:
             self._shade(placed, self.color)
 
     def find_hair(self, hair, lights, view, in_compute=None, clip_planes=None):
-        """Fill `segments` and `depths` with the hair that is nearest, in front of the surfaces. Raises `HairError`.
+        """Fill `segments` and `depths` with the nearest hair in front of surfaces. Raises `HairError`.
 
-        hair: [(StrandsOnGPU, Shading, object to world, {sampler: texture} of the scene, Steps), ...];
-        lights, view: records of `uniforms`, lights one of all hair or (H,) of each; in_compute: whether a compute
-        program finds the nearest strands, None: where it can; clip_planes: (6, 4) of `uniforms.CLIPPING` that cut hair
-        off, None for none.
+        hair: [(StrandsOnGPU, Shading, object to world, {sampler: texture} of the scene, Steps), ...]; lights, view:
+        records of `uniforms`, lights one for all hair or (H,) for each; in_compute: find the nearest strands by a
+        compute program, None: if supported; clip_planes: (6, 4) of `uniforms.CLIPPING`, None for none.
         """
         self._clip_planes = clip_planes
         self._hair = self._placed(hair, lights, view)
@@ -179,7 +178,7 @@ class VisibilityBuffer:
             self._is_color_stale = False
 
     def _placed(self, hair, lights, view):
-        """[_Placed] of arguments of `find_hair`."""
+        """[_Placed] from the arguments of `find_hair`."""
         found, first = [], 0
         light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
         for index, (strands, shading, to_world, samplers, steps) in enumerate(hair):
@@ -196,25 +195,25 @@ class VisibilityBuffer:
         return found
 
     def relight(self, hair, lights, view, picture):
-        """Fill a picture with the light of the samples in which `find_hair` found hair, in other light.
+        """Fill a picture with the samples of hair from `find_hair`, shaded with other lights.
 
-        hair, lights, view: as for `find_hair`, of the same strands from the same view. `color` is kept.
+        hair, lights, view: as for `find_hair`, with the same strands and view. `color` is not changed.
         """
         for placed in self._placed(hair, lights, view):
             self._shade(placed, picture)
 
     @property
     def segment_ranges(self):
-        """[(first, count)] of the segments of each hair that was found last."""
+        """[(first, count)] of the segments of each hair in the last `find_hair`."""
         return [(placed.first, placed.segment_count) for placed in self._hair]
 
     def surfaces_of_part(self, texture_format=scene_programs.PICTURE_FORMAT, background=_NOTHING):
-        """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`, `part`."""
+        """`surfaces` for additional passes: `part_of_light`, `part_by`, `part`."""
         return drawing.cleared(self._part(texture_format, background)[0], background)
 
     def _part(self, texture_format, background):
-        # Each background has a texture of its own: a software driver now and then loses the clearing of one that
-        # compute programs have filled, if nothing is drawn into it.
+        # Each background has its own texture: a software driver sometimes loses the clearing of a texture that compute
+        # programs have filled, if nothing is drawn into it.
         if (texture_format, background) not in self._parts:
             # A framebuffer does not own its textures.
             texture = gpu.types.GPUTexture(self.size, format=texture_format)
@@ -229,9 +228,9 @@ class VisibilityBuffer:
         return self._part(texture_format, background)[1]
 
     def part_by(self, program, texture_format=scene_programs.PICTURE_FORMAT, inputs=None):
-        """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest.
+        """The texture of `surfaces_of_part`, filled by a program where the last added hair is nearest.
 
-        inputs: of each hair ({instance: record}, {sampler: texture}) that the program reads beside the scene.
+        inputs: for each hair ({instance: record}, {sampler: texture}) of the program besides the scene's.
         """
         texture = self._parts[texture_format, _NOTHING][1]
         for placed, (records, textures) in zip(self._hair, inputs or [({}, {})] * len(self._hair), strict=True):
@@ -240,9 +239,9 @@ class VisibilityBuffer:
         return texture
 
     def part_of_light(self, lobes, world):
-        """A texture of a part of the light of the hair that was added last, premultiplied.
+        """A texture of a part of the light of the last added hair, premultiplied.
 
-        lobes: (4,) how much of R, TT, TRT and all else that comes from lights; world: how much of the world's.
+        lobes: (4,) factors of R, TT, TRT and all other light from lamps; world: factor of the world's light.
         """
         with self.surfaces_of_part():
             pass
@@ -252,14 +251,14 @@ class VisibilityBuffer:
         return texture
 
     def hair_at(self, x, y):
-        """Which of the hair that was added last is nearest in a sample, counted from 0; None where there is none."""
-        with self._strips.bind():  # a framebuffer that was never bound has no size
+        """Index of the last added hair that is nearest in a sample, or None."""
+        with self._strips.bind():  # a framebuffer has no size before it is bound
             segment = int(self._strips.read_color(x, y, 1, 1, 1, 0, "UINT")[0][0][0])
         within = [placed.first <= segment < placed.first + placed.segment_count for placed in self._hair]
         return within.index(True) if any(within) else None
 
     def hair_near(self, x, y, reach):
-        """Which of the hair is seen nearest to a sample, as far as `reach` samples away; as `hair_at`."""
+        """Index of the hair visible nearest to a sample, at most `reach` samples away, or None."""
         left, bottom = max(x - reach, 0), max(y - reach, 0)
         width, height = min(x + reach + 1, self.size[0]) - left, min(y + reach + 1, self.size[1]) - bottom
         if width <= 0 or height <= 0:
@@ -277,7 +276,7 @@ class VisibilityBuffer:
         return int(found[nearest]) if np.isfinite(away[nearest]) else None
 
     def _find(self):
-        """Find the nearest segments by a compute program: first depths, then indices."""
+        """Find the nearest segments by compute programs: first depths, then indices."""
         self._copy_depths(is_start=True)
         self._provide_runs(sum(placed.run_count for placed in self._hair))
         self._is_color_stale = self._has_strips = False
@@ -290,7 +289,7 @@ class VisibilityBuffer:
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=True)
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=False)
             return
-        # A few strands hide most of the others.
+        # A few strands occlude most of the others.
         self._walk(all_blocks, drawing.WALK_FIRST, is_depth=True)
         self._find_farthest()
         self._walk(all_blocks, drawing.WALK_OTHERS, is_depth=True, are_tiles_known=True)
@@ -298,13 +297,13 @@ class VisibilityBuffer:
         self._walk(all_blocks, drawing.WALK_ALL, is_depth=False, are_tiles_known=True)
 
     def _provide_runs(self, count):
-        """Make the texture of runs larger where it has fewer texels."""
+        """Provide a texture of at least `count` runs."""
         rows = -(-count // visibility_programs.RUNS_IN_ROW)
         if self._seen_runs is None or self._seen_runs.height < rows:
             self._seen_runs = gpu.types.GPUTexture((visibility_programs.RUNS_IN_ROW, max(rows, 1)), format="R32UI")
 
     def _find_farthest(self):
-        """Fill the tiles with the farthest of their depths."""
+        """Fill each tile with its farthest depth."""
         program = visibility_programs.farthest_depths_program()
         with drawing.bound(program, {}, {"depths": self.depths}):
             program.image("farthest_depths", self._farthest)
@@ -320,16 +319,16 @@ class VisibilityBuffer:
             drawing.walk_strands(placed.strands, program, placed.record, blocks, samplers, images, constants, part)
 
     def nearest_depths(self):
-        """`depths` with those of surfaces where there is no hair."""
+        """`depths` of hair, and of surfaces elsewhere."""
         if self._has_strips:
-            self._copy_depths()  # which the strips were drawn into too
+            self._copy_depths()  # strips are drawn into `surface_depth` too
             self._has_strips = False
         return self.depths
 
     def _copy_depths(self, is_start=False):
-        """Fill `depths` with those of surfaces; is_start: and clear all else that is to be cleared.
+        """Fill `depths` with depths of surfaces; is_start: also clear the other textures that must be cleared.
 
-        On some graphics cards the driver takes longer to clear textures than the program.
+        With some drivers clearing textures takes longer than this program.
         """
         program = visibility_programs.surface_depths_program()
         with drawing.bound(program, {}, {"surface_depth": self.surface_depth}):
@@ -340,7 +339,7 @@ class VisibilityBuffer:
             drawing.dispatch_over(program, self.size)
 
     def _draw_strips(self):
-        """The nearest segments, as strips of triangles that the graphics driver draws."""
+        """Find the nearest segments by drawing triangle strips."""
         program = scene_programs.strip_segments_program(self._clip_planes is not None)
         with self._strips.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
             for placed in self._hair:
@@ -348,7 +347,7 @@ class VisibilityBuffer:
         self._has_strips = True
 
     def _shade(self, placed, picture, parts=None):
-        """Fill the samples in which a strand of a hair is nearest with its light, or with parts of it.
+        """Fill the samples in which a hair is nearest with its light, or with parts of its light.
 
         parts: constants of fibre/drawn_lobes.glsl.
         """
@@ -371,7 +370,7 @@ class VisibilityBuffer:
             self._fill(placed, program, picture, shading.blocks, textures, record)
 
     def _fill(self, placed, program, picture, blocks, textures, record=None):
-        """Run a program on the samples in which a strand of a hair is nearest; record: in place of the hair's own."""
+        """Run a program on the samples in which a hair is nearest; record: replaces the hair's record."""
         left, bottom, *size = placed.window
         if not all(size):
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GLSL files → GPU programs that prepare a visibility buffer for the strands that are drawn into it."""
+"""GLSL files → GPU programs that prepare a visibility buffer."""
 
 import gpu
 
@@ -10,7 +10,7 @@ LEAST_BEND = 1.0  # [samples]: LEAST_BEND of shaders/visibility/rasterize_segmen
 TILE = 8  # samples along each side of a tile: TILE of shaders/visibility/tile.glsl
 
 
-@shaders.kept
+@shaders.cached
 def farthest_depths_program():
     """The compute program that finds the farthest depth in each tile: see visibility/farthest_depths.comp."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -20,16 +20,16 @@ def farthest_depths_program():
     return shaders.compile_compute(info, "visibility/farthest_depths.comp")
 
 
-@shaders.kept
+@shaders.cached
 def hair_first_program():
-    """The program of depths that leave surfaces behind hair out: see surfaces/hair_in_front.frag."""
+    """The program that excludes surfaces behind hair by depth: see surfaces/hair_in_front.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.sampler(0, "UINT_2D", "segments")
     info.depth_write("ANY")
     return shaders.compile_drawing(info, "picture/cover.vert", "surfaces/hair_in_front.frag")
 
 
-@shaders.kept
+@shaders.cached
 def fill_program():
     """The compute program that fills a picture with a color: see picture/fill.comp."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -39,25 +39,25 @@ def fill_program():
     return shaders.compile_compute(info, "picture/fill.comp")
 
 
-@shaders.kept
+@shaders.cached
 def no_triangle_program():
-    """The program that empties a visibility buffer's samples: see visibility/clear_samples.frag."""
+    """The program that clears a visibility buffer's samples: see visibility/clear_samples.frag."""
     return shaders.compile_drawing(
         gpu.types.GPUShaderCreateInfo(), "picture/cover.vert", "visibility/clear_samples.frag", (("segment", "UINT"),)
     )
 
 
-@shaders.kept
+@shaders.cached
 def surface_blank_program():
-    """The program that empties samples of surfaces: see surfaces/surface_blank.frag."""
+    """The program that blanks samples of surfaces: see surfaces/surface_blank.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.sampler(0, "UINT_2D", "segments")
     return shaders.compile_drawing(info, "picture/cover.vert", "surfaces/surface_blank.frag")
 
 
-@shaders.kept
+@shaders.cached
 def surface_depths_program():
-    """The compute program that converts depth to integers, and clears all else: see visibility/surface_depths.comp."""
+    """The compute program that converts depths to integers, and clears images: see visibility/surface_depths.comp."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     info.sampler(0, "FLOAT_2D", "surface_depth")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world's image on the GPU: as background, and decomposed into lights."""
+"""The world's image on the GPU: as a background, and decomposed into lights."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from ...core.imaging import environment
 from ..host.caches import Cache
 from . import drawing, scene_programs, uniforms
 
-_HEIGHT = 64  # of the picture that is taken apart
+_HEIGHT = 64  # pixels of the picture that is decomposed
 _MOST_TAPS = 32
 
 light_cache = Cache(capacity=1)  # World.key → _ImageLight
@@ -20,38 +20,38 @@ light_cache = Cache(capacity=1)  # World.key → _ImageLight
 
 @dataclass
 class _ImageLight:
-    """Light of a world's image, and of which pixels it was made."""
+    """Light of a world's image, and the pixels it was computed from."""
 
-    light: tuple  # what `environment.split` returns
+    light: tuple  # the result of `environment.split`
     pixels: str  # their fingerprint
-    is_checked: bool = True  # whether they are those of the image, as far as Blender has said
+    is_checked: bool = True  # whether Blender has reported no change of the image since
 
 
 def light_of(world):
     """([`environment.Lobe`, ...], (6, 3) mean radiance of the sides) of a `lights.World`."""
     if world.image is None:
         return [], np.broadcast_to(world.color, (6, 3))
-    kept = light_cache.get(world.key)
-    # Blender does not report changes of an image by a script: until it is saved it may change at any time.
-    if kept is None or not kept.is_checked or world.image.is_dirty:
+    known = light_cache.get(world.key)
+    # Blender does not report changes of an image by a script: an unsaved image may change at any time.
+    if known is None or not known.is_checked or world.image.is_dirty:
         pixels = _pixel_fingerprint(world.image)
-        if kept is None or kept.pixels != pixels:
-            kept = light_cache.keep(world.key, _ImageLight(environment.split(_unrolled(world)), pixels))
-        kept.is_checked = True
-    return kept.light
+        if known is None or known.pixels != pixels:
+            known = light_cache.keep(world.key, _ImageLight(environment.split(_unrolled(world)), pixels))
+        known.is_checked = True
+    return known.light
 
 
 def picture_of(world):
-    """(H, W, 3) radiance of a `lights.World`, in pictures as core/imaging/environment.py has them."""
+    """(H, W, 3) radiance of a `lights.World`, in the projection of core/imaging/environment.py."""
     if world.image is None:
         return np.asarray(world.color, float).reshape(1, 1, 3)
     return _unrolled(world)
 
 
 def check_image():
-    """Compare the pixels of the world's image on the next read: they may have changed."""
-    for kept in light_cache.values():
-        kept.is_checked = False
+    """Compare the pixels of the world's image on the next read, as they may have changed."""
+    for known in light_cache.values():
+        known.is_checked = False
 
 
 def _pixel_fingerprint(image):
@@ -61,7 +61,7 @@ def _pixel_fingerprint(image):
 
 
 def draw_background(world, view, width, height):
-    """Fill the bound framebuffer with the world as a view of this size [pixels] sees it."""
+    """Fill the bound framebuffer with the world in a view of this size [pixels]."""
     record = _record(world, width, height)
     record["clip_to_world"] = np.linalg.inv(view["world_to_clip"].astype(np.float64))
     with drawing.gpu_state("NONE", depth_writes=False):
@@ -69,7 +69,7 @@ def draw_background(world, view, width, height):
 
 
 def _unrolled(world):
-    """(H, W, 3) radiance, as `environment.split` takes it."""
+    """(H, W, 3) radiance for `environment.split`."""
     width, height = 2 * _HEIGHT, _HEIGHT
     record = _record(world, width, height)
     record["taps"] = np.clip(-(-max(world.image.size) // width), 2, _MOST_TAPS)

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of cards and tubes: Principled, for Cycles, EEVEE and what exports it.
+"""Materials of cards and tubes: Principled BSDFs for Cycles, EEVEE and exporters.
 
-Cards are layers of a cloud of strands. Each scatters a part of the light, its albedo a. A part t of that goes on
-forward, as most of the light that crosses a fibre does, and the rest half back and half through. By Kubelka and Munk's
-relation (1 - R)² / (2 R) = K / S, with K = 1 - a and S = (1 - t) a / 2, a stack of layers reflects R if [Kubelka31]
+Cards are layers of a cloud of strands. Each layer scatters a fraction of the light, its albedo a. A fraction t of that
+continues forward, like most light that crosses a fiber; the rest goes half back and half through. By the relation of
+Kubelka and Munk, (1 - R)² / (2 R) = K / S with K = 1 - a and S = (1 - t) a / 2, a stack of layers reflects R if
+[Kubelka31]
 
     a = R / (R + (1 - t) (1 - R)² / 4)
 
-The textures have the color R of a head of hair. Engines that let no light through a surface show R itself: exporters
-find a plain shader, Cycles and EEVEE shaders of their own. EEVEE takes transmission from what the picture shows behind
-a surface, not from the layers that are there, so t = 0. Light reaches one layer there, and does not go on to the next:
-each layer scatters more than all of its light, for those that it stands for.
+The textures have the color R of a head of hair. Engines without transmission show R itself: exporters find a plain
+shader, Cycles and EEVEE have their own shaders. EEVEE takes transmission from the picture behind a surface instead of
+the layers behind it, so t = 0. Light only reaches the first layer there: each layer scatters more than all of its
+light, to represent the layers behind it.
 """
 
 import bpy
@@ -19,18 +20,19 @@ from ...core.shading import appearance
 from ..data.made.made_meshes import UV_MAP
 
 _ANISOTROPY = 0.8  # highlights run across strands
-# Part of the scattered light that goes on forward. Before a sun, cards in Cycles had 0.1 to 0.17 of the red light of
-# blond, auburn and brown strands with 0, 0.5 to 0.8 with 0.75 to 0.85; beside or behind a sun then 0.9 to 1.4.
+# Fraction of the scattered light that continues forward. With backlight from a sun, cards in Cycles had 0.1 to 0.17 of
+# the red light of blond, auburn and brown strands with 0, and 0.5 to 0.8 with 0.75 to 0.85; with light from the side or
+# the front 0.9 to 1.4.
 _FORWARD = 0.8
-_SPECULAR = 0.5  # half of a surface's: a texel has strands of many directions
-# In EEVEE: factors of a layer's albedo, of what light from behind adds to that, and of a surface's highlights, which
-# are not stretched across strands there. Of the red, green and blue of auburn strands in Cycles, cards have, with light
-# from the front, one side and behind, (0.93 0.66 0.61), (1.16 0.91 0.93), (0.50 0.32 0.41); with 1, 0 and 0.5 half.
+_SPECULAR = 0.5  # half of a surface's: a texel contains strands of many directions
+# In EEVEE: factors of a layer's albedo, of additional light from behind, and of a surface's highlights, which are not
+# stretched across strands. Relative to red, green and blue of auburn strands in Cycles, cards have with light from the
+# front, the side and behind (0.93 0.66 0.61), (1.16 0.91 0.93), (0.50 0.32 0.41); with 1, 0 and 0.5 half as much.
 _LAYERED, _BEHIND, _UNSTRETCHED = 1.7, 0.4, 1.2
 
 
 def new_material(name, look, images=None):
-    """A material of hair with a look; images: {map: image} of cards, None for a plain color."""
+    """A new material of hair with a look; images: {map: image} of cards, None for a plain color."""
     material = bpy.data.materials.new(name)
     color = (*appearance.mean_color(look), 1.0)
     material.diffuse_color = color
@@ -75,9 +77,9 @@ def _new_shader(tree, look, color, target, height):
 
 
 def _new_images(tree, images):
-    """The nodes of textures, of the normals in them and of the direction across strands.
+    """Create nodes of textures, of the normals in them and of the tangent across strands.
 
-    Textures that no shader here shows have nodes too: Blender saves and appends them with the material.
+    Textures that no shader uses have nodes too, so that Blender saves and appends them with the material.
     """
     nodes = {}
     for row, kind in enumerate(kind for kind in images if kind not in ("color", "normal")):
@@ -95,7 +97,7 @@ def _new_images(tree, images):
 
 
 def _let_through(tree, shader, albedo, nodes):
-    """Let a shader for EEVEE stand for layers behind it, and let light from behind through."""
+    """Let a shader for EEVEE represent the layers behind it, and transmit light from behind."""
     place = shader.location
     layered, behind, covered = (tree.nodes.new("ShaderNodeVectorMath") for _ in range(3))
     through, total = tree.nodes.new("ShaderNodeBsdfTranslucent"), tree.nodes.new("ShaderNodeAddShader")
@@ -118,7 +120,7 @@ def _let_through(tree, shader, albedo, nodes):
 
 
 def _albedo(tree, color, forward, height):
-    """R / (R + (1 - t) (1 - R)² / 4) of a color's socket R."""
+    """The socket of R / (R + (1 - t) (1 - R)² / 4) for a color's socket R."""
     missing, square, total, albedo = (tree.nodes.new("ShaderNodeVectorMath") for _ in range(4))
     for column, node in enumerate((missing, square, total, albedo)):
         node.location = (-740.0 + 160.0 * column, height)

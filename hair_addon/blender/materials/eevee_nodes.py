@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shader nodes of hair for EEVEE, which does not support hair's own: light scattered around strands, and a highlight.
+"""Shader nodes of hair for EEVEE, which does not support hair BSDFs: light scattered around strands, and a highlight.
 
-EEVEE gives strips of hair the normals of cylinders, so that a glossy surface has the highlight of a fibre; one that is
-as diffuse as translucent shows light from all sides alike, as light that hair scatters. Colors are fitted to Cycles'
-light of the sample head with dark, brown and blond hair, by suns in front, beside and behind and by a grey world.
+EEVEE gives strips of hair the normals of cylinders, so that a glossy surface has the highlight of a fiber. A surface
+that is equally diffuse and translucent shows light from all sides alike, like light scattered by hair. Colors are
+fitted to renders of the sample head with dark, brown and blond hair in Cycles, with suns in front, at the side and
+behind, and with a gray world.
 """
 
 import math
@@ -14,26 +15,26 @@ from ...core.shading import appearance
 from ...core.shading.fibre.pigment import color_from_falloff
 from ...core.shading.fibre.principled import beta_r_from_roughness
 
-_PREFIX = "EEVEE "  # of the names of our nodes, by which they are found again
+_PREFIX = "EEVEE "  # of the names of our nodes, which identifies them
 
-# Of ln(colour) with sqrt(sigma_a), relative to a groom's in diffuse light: lamps light strands that are seen.
+# Decrease of ln(color) with sqrt(sigma_a), relative to a groom's in diffuse light: lamps light visible strands.
 _FALLOFF = 0.63
 _GAIN = 0.62  # of either side
-_SURFACE = 0.01  # what reflections send around a strand that absorbs all light inside
-_GLOSS = 0.05  # reflectance of the highlight, of fibres as reflective as those of Principled Hair
+_SURFACE = 0.01  # light reflected around a strand that absorbs all light inside
+_GLOSS = 0.05  # reflectance of the highlight, for fibers as reflective as those of Principled Hair
 
-# Name: (type, {property: value}, place from the hair node).
+# Name: (type, {property: value}, location relative to the hair node).
 _NODES = {
     "Color": ("ShaderNodeVectorMath", {"operation": "MULTIPLY_ADD"}, (200, -160)),
     # EEVEE multiplies light by the color of a translucent surface where it enters and where it leaves.
     "Entering": ("ShaderNodeVectorMath", {"operation": "POWER"}, (380, -160)),
     "Through": ("ShaderNodeBsdfTranslucent", {}, (560, -160)),
     "Back": ("ShaderNodeBsdfDiffuse", {}, (560, -300)),
-    # Not mixed: EEVEE multiplies a translucent surface's share twice, too.
+    # Added, not mixed: EEVEE would also apply a translucent surface's share twice.
     "Around": ("ShaderNodeAddShader", {}, (740, -160)),
     "Highlight": ("ShaderNodeBsdfAnisotropic", {}, (740, -300)),
     "Sum": ("ShaderNodeAddShader", {}, (920, -160)),
-    # Without it EEVEE takes translucent hair to be as thick as its bounds are wide, and finds shadows beyond.
+    # Otherwise EEVEE assumes that translucent hair is as thick as its bounds, and samples shadows beyond it.
     "Strand": ("ShaderNodeHairInfo", {}, (920, -300)),
     "Output": ("ShaderNodeOutputMaterial", {"target": "EEVEE"}, (1100, -160)),
 }
@@ -52,14 +53,14 @@ _LINKS = (
 
 
 def falloff_of(look):
-    """Decrease of ln(colour) with the square root of the absorption, of strands that vary."""
+    """Decrease of ln(color) with the square root of the absorption, for varied strands."""
     return _FALLOFF * appearance.kajiya_kay_strand_settings(look).falloff
 
 
 def write(tree, hair_node, look, varied_color=None):
-    """Add or update the nodes for an `Appearance`, unless an artist has made others for EEVEE.
+    """Add or update the nodes for an `Appearance`, unless an artist has added an output for EEVEE.
 
-    varied_color: output of e^(-falloff √sigma_a), None of even hair.
+    varied_color: output of e^(-falloff √sigma_a), None for even hair.
     """
     nodes = _ours(tree)
     if _has_others(tree):
@@ -82,7 +83,7 @@ def write(tree, hair_node, look, varied_color=None):
     color[1].default_value, color[2].default_value = (_GAIN,) * 3, (_SURFACE,) * 3
     nodes["Entering"].inputs[1].default_value = (0.5, 0.5, 0.5)
     nodes["Highlight"].inputs["Color"].default_value = (gloss, gloss, gloss, 1.0)
-    # The lobe of a fibre in half angles is as wide as GGX's of slopes √2 times its deviation, its roughness squared.
+    # A fiber's lobe in half angles is as wide as GGX with slopes of √2 times its deviation; roughness = √slope.
     slope = math.sqrt(2.0) * beta_r_from_roughness((1.0 - strands.coat) * strands.roughness)
     nodes["Highlight"].inputs["Roughness"].default_value = min(math.sqrt(slope), 1.0)
 

@@ -21,12 +21,12 @@ def evaluate_shading(target):
 
 
 def are_guides_shown(guides):
-    """Whether viewports show guides that are not selected: where the artist wants it, and while they have no hair."""
+    """Whether viewports show guides that are not selected: if set, or while they have no hair."""
     return guides.vellus.show_guides or not any(hair.users for hair in curves.followers(guides))
 
 
 def evaluate_guides(guides):
-    """Let Blender draw guides that are shown, so that they can be clicked on, and draw nothing of others."""
+    """Let Blender draw guides that are shown, so that they can be selected by clicking, and hide others."""
     guides.vellus.is_shading_stale = False
     curves_objects.draw_natively(guides, are_guides_shown(guides))
 
@@ -36,13 +36,13 @@ def follow_guides(view_layer):
     drawn = {True: "TEXTURED", False: "BOUNDS"}
     for shown in view_layer.objects:
         if shown is not None and shown.type == "CURVES" and shown.data.vellus.kind == "GUIDES":
-            # Another display type was set by the user.
+            # Other display types were set by the user.
             if shown.display_type == drawn[not are_guides_shown(shown.data)]:
                 evaluate_guides(shown.data)
 
 
 def apply_look(target, look):
-    """Give hair an `Appearance`, but for its mode: how to draw is no part of a look. Raises `HairError`."""
+    """Apply an `Appearance` to hair, except its mode, which is not part of a look. Raises `HairError`."""
     curves.require_editable(target)
     group = target.vellus.appearance
     setting_properties.assign(group, replace(look, mode=group.mode))
@@ -50,7 +50,7 @@ def apply_look(target, look):
 
 
 def show_shaded(hair, is_drawn):
-    """Let Vellus draw hair datablocks in viewports, or Blender. Raises `HairError`."""
+    """Let Vellus or Blender draw hair datablocks in viewports. Raises `HairError`."""
     for target in hair:
         curves.require_editable(target)
     for target in hair:

@@ -15,10 +15,10 @@ _OURS = "is_vellus_hair"  # the custom property of materials created by Vellus
 
 
 def write_hair_material(curves):
-    """Give Curves a Principled Hair material of their appearance; an artist's own material is left alone.
+    """Give Curves a Principled Hair material of their appearance; an artist's material is left alone.
 
-    Linked Curves keep what they are linked with: undo neither brings back what is assigned to them nor takes it away,
-    so that they would be left with a material that is gone, which ends Blender.
+    Linked Curves keep their materials: undo does not restore assignments to linked data, so that they would keep a
+    deleted material, which crashes Blender.
     """
     if curves.library is not None:
         return
@@ -38,7 +38,7 @@ def write_hair_material(curves):
         if node is not None:  # otherwise the user has edited it
             look = properties.look_of(curves.vellus)
             if not appearance.strand_settings(look).is_even:
-                curves_door.write_randoms(curves)  # hair of before this attribute
+                curves_door.write_randoms(curves)  # older hair lacks this attribute
             if _has_places(curves):
                 _fill(node, material, properties.dry_look_of(curves.vellus))
                 wettest = wet_nodes.write(material.node_tree, node, shared_wetness.of_hair(curves.vellus))
@@ -55,7 +55,7 @@ def _has_places(curves):
 
 
 def _fill_first_slot(curves, material):
-    """Fill the first slot, which renderers use; a removed material leaves it empty."""
+    """Assign a material to the first slot, which renderers use; a removed material leaves it empty."""
     if len(curves.materials):
         curves.materials[0] = material
     else:
@@ -63,7 +63,7 @@ def _fill_first_slot(curves, material):
 
 
 def _shows_another_look(material, curves):
-    """Whether a material is that of other hair too, as Blender has it after a duplication, and they look different."""
+    """Whether other hair with a different look uses the same material, as after a duplication."""
     look = _values(curves)
     others = (c for c in bpy.data.hair_curves if c != curves and c.vellus.kind == "HAIR")
     return any(material in {*c.materials} and _values(c) != look for c in others)
@@ -93,9 +93,9 @@ def _hair_node(tree):
 
 def _fill(node, material, look):
     color = (*appearance.mean_color(look), 1.0)
-    # By identifier: a socket that the node's parametrization disables cannot be looked up by name.
+    # By identifier: sockets that the node's parametrization disables cannot be looked up by name.
     sockets = {socket.identifier: socket for socket in node.inputs}
-    # Shown by what does not support hair, as Blender's own viewport shading.
+    # The color is for renderers without hair, such as Blender's viewport shading.
     for name, value in {**appearance.principled_sockets(look), "Color": color}.items():
         sockets[name].default_value = value
     material.diffuse_color = color

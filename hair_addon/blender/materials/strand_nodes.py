@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shader nodes that vary the absorption between and along strands: `strand_variation` in Cycles.
 
-The strand's number comes from the attribute that the viewport reads too; where the strand's points are evenly spaced,
-Hair Info's intercept is the viewport's position.
+The strand's random number comes from the same attribute as in the viewport; for strands with evenly spaced points, Hair
+Info's intercept is the viewport's position along the strand.
 """
 
 import math
 
 from ...core.shading.fibre.pigment import LEAST_LIGHT
 
-_PREFIX = "Vellus "  # of the names of our nodes, by which they are found again
+_PREFIX = "Vellus "  # of the names of our nodes, which identifies them
 
 # Name: (type, {property: value}, place in the frame).
 _NODES = {
@@ -54,7 +54,7 @@ _LINKS = (
 
 
 def write(tree, hair_node, variation, falloff):
-    """Let the absorption of a Principled Hair node vary; returns the output of a colour of this falloff, for EEVEE."""
+    """Vary the absorption of a Principled Hair node; returns the output of a color with this falloff, for EEVEE."""
     nodes = _ours(tree)
     if set(nodes) != set(_NODES):
         remove(tree)
@@ -71,7 +71,7 @@ def write(tree, hair_node, variation, falloff):
 
 
 def remove(tree):
-    """Take away the nodes of `write`: strands are alike again."""
+    """Remove the nodes of `write`: strands have the same color again."""
     for node in _ours(tree).values():
         tree.nodes.remove(node)
 
@@ -138,5 +138,5 @@ def _output(node, key):
 
 
 def _by_identifier(sockets, key):
-    """A socket by its index or its identifier: a disabled one cannot be looked up by name."""
+    """A socket by its index or its identifier: disabled sockets cannot be looked up by name."""
     return sockets[key] if isinstance(key, int) else next(socket for socket in sockets if socket.identifier == key)

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shader nodes of hair that is wet in places: a second hair node, mixed with the first by the wetness of each strand.
 
-The mix is the viewport's: `appearance.wet_share` of the attribute that it reads too.
+The mix is the same as in the viewport: `appearance.wet_share` of the same attribute.
 """
 
-_PREFIX = "Wet Places "  # of the names of our nodes, by which they are found again
+_PREFIX = "Wet Places "  # of the names of our nodes, which identifies them
 
 _HAIR = "Hair"  # the node of the wettest look
 
-# Name: (type, {property: value}, place from the driest hair node, label).
+# Name: (type, {property: value}, location relative to the driest hair node, label).
 _NODES = {
     "Wetness": ("ShaderNodeAttribute", {"attribute_name": "wetness"}, (0, 230), "Wetness"),
     "Share": ("ShaderNodeMapRange", {"interpolation_type": "LINEAR", "clamp": True}, (200, 230), "Share"),
@@ -18,9 +18,9 @@ _NODES = {
 
 
 def write(tree, hair_node, wetness_range):
-    """Mix a Principled Hair node of the driest look with one of the wettest, which is returned.
+    """Mix a Principled Hair node of the driest look with a node of the wettest look, which is returned.
 
-    wetness_range: of both.
+    wetness_range: wetness of the two looks.
     """
     nodes = _ours(tree)
     if set(nodes) != set(_NODES):
@@ -32,7 +32,7 @@ def write(tree, hair_node, wetness_range):
 
 
 def remove(tree, hair_node):
-    """Take away the nodes of `write`: all strands have the look of `hair_node`."""
+    """Remove the nodes of `write`: all strands have the look of `hair_node`."""
     nodes = _ours(tree)
     if "Mix" in nodes:
         _relink(tree, nodes["Mix"].outputs[0], hair_node.outputs["BSDF"])
@@ -41,7 +41,7 @@ def remove(tree, hair_node):
 
 
 def is_ours(node):
-    """Whether a node is one of `write`."""
+    """Whether a node was added by `write`."""
     return node.name.startswith(_PREFIX)
 
 
@@ -71,6 +71,6 @@ def _factor(attribute_node):
 
 
 def _relink(tree, before, after):
-    """Link all that an output goes to, but our own nodes, to another output."""
+    """Move an output's links, except those to our nodes, to another output."""
     for target in [link.to_socket for link in before.links if not is_ours(link.to_node)]:
         tree.links.new(after, target)

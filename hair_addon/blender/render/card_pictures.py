@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which strand each sample of a texture shows, of strands laid flat: drawn as hair is, from above."""
+"""The visible strand in each sample of a texture, for strands laid flat and drawn from above like hair."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,14 @@ from ..gpu import drawing, strand_textures, uniforms
 from ..gpu.visibility_buffer import NO_SEGMENT, VisibilityBuffer
 from . import offscreen
 
-PER_SIDE = 2  # samples of a texel in each pass
+PER_SIDE = 2  # samples along each side of a texel in each pass
 PASSES = 4
-_MOST_SAMPLES = 2**24  # of a strip
+_MOST_SAMPLES = 2**24  # maximum samples in a strip
 
 
 @dataclass(frozen=True)
 class _Opaque:
-    """In place of a `Shading`: strands are found, and not shaded."""
+    """Replaces a `Shading`: strands are found, but not shaded."""
 
     opacity: float = 1.0
     forward: tuple = (0.0, 0.0, 0.0)
@@ -25,7 +25,7 @@ class _Opaque:
 
 
 class CardPicture:
-    """`PlacedStrands` drawn into strips of a square texture of `size` texels a side."""
+    """`PlacedStrands` drawn into strips of a square texture; size: texels along each side."""
 
     def __init__(self, strands, size):
         offscreen.start_gpu()
@@ -44,7 +44,7 @@ class CardPicture:
         return [range(row, min(row + self._strip, self._size)) for row in range(0, self._size, self._strip)]
 
     def segments(self, rows, turn):
-        """((rows · PER_SIDE, size · PER_SIDE) segment that each sample of a pass shows, (2,) shift of the samples)."""
+        """((rows · PER_SIDE, size · PER_SIDE) visible segment in each sample of a pass, (2,) jitter of the samples)."""
         tile = (0, rows.start * PER_SIDE, self._side, len(rows) * PER_SIDE)
         with drawing.ALONE:
             buffer = VisibilityBuffer(*tile[2:])

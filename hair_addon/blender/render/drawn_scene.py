@@ -22,42 +22,41 @@ from ..gpu.shadows import ShadowMaps
 from ..host.notices import can_be_drawn
 from . import hair_cache, hair_places, made_strands, read_strands
 
-# The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke of the
-# comb.
+# The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke.
 _SHADOW_STEPS = drawing.Steps(strand_count=50_000)
-_WIDE = 10.0  # radii of the hair, that surfaces cast shadows within
+_WIDE = 10.0  # radius within which surfaces cast shadows, in radii of the hair
 _DRAFT_STEPS = drawing.Steps(point_count=21, strand_count=10_000)
 
 
 @dataclass(frozen=True)
 class DrawnScene:
-    """Read once by `read`, drawn from any number of views until something moves."""
+    """A scene on the GPU: read once by `read`, and drawn from any number of views until something moves."""
 
     hair: list  # (StrandsOnGPU, Shading, object to world, part in viewports)
-    surfaces: list  # that are seen: (SurfaceOnGPU, parts of a `DrawnMesh`, None of a holdout)
-    lights: np.ndarray  # uniforms.LIGHTS: of all, as far as they are drawn one by one
+    surfaces: list  # visible solid surfaces: (SurfaceOnGPU, parts of a `DrawnMesh`, None for a holdout)
+    lights: np.ndarray  # uniforms.LIGHTS shared by all receivers
     world: light_door.World
     shadow_maps: ShadowMaps | None  # None in a viewport without hair
-    hair_visibility: list  # {sampler: texture} of the world's light on each of the hair
+    hair_visibility: list  # {sampler: texture} of the world's visibility from each hair
     surface_visibility: list  # of `surfaces`, then of `clear`
-    # session_uid of the object that a click on each hair selects; in a render `drawn_meshes.owner_of` it.
+    # session_uid of the object that a click on each hair selects; in a render `drawn_meshes.owner_of` the hair.
     owners: tuple = ()
     selected: tuple = ()  # whether that object is selected
-    instances: tuple = ()  # of hair, as `hair_places.read_instances` found them
+    instances: tuple = ()  # of hair, from `hair_places.read_instances`
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
-    clear: tuple = ()  # as `surfaces`, of those that hide nothing
-    blockers: tuple = ()  # `Blocker`s: surfaces that stop light, seen or not
+    clear: tuple = ()  # visible clear surfaces, like `surfaces`
+    blockers: tuple = ()  # `Blocker`s: surfaces that block light, visible or not
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
     renewal: ambient_visibility.Renewal | None = None  # of the visibility textures, while hair moves
-    hair_lights: np.ndarray | None = None  # uniforms.LIGHTS of each of the hair; None: of all
-    surface_lights: np.ndarray | None = None  # the same of `surfaces`, then of `clear`
+    hair_lights: np.ndarray | None = None  # uniforms.LIGHTS of each hair; None: `lights` for all
+    surface_lights: np.ndarray | None = None  # the same for `surfaces`, then for `clear`
 
 
 @dataclass(frozen=True, eq=False)
 class Blocker:
-    """A surface that stops light. owner: of its `scene_lights.Receiver`; mesh: (corner positions, their normals,
-    `triangle_materials`) in a render; is_seen: whether a camera sees it.
+    """A surface that blocks light. owner: as of a `scene_lights.Receiver`; mesh: (corner positions, their normals,
+    `triangle_materials`) in a render; is_seen: visible to cameras.
     """
 
     surface: surface_textures.SurfaceOnGPU
@@ -80,22 +79,22 @@ def read(
     is_hair_only=True,
     former=None,
 ):
-    """Bring a scene to the GPU and draw its shadow maps.
+    """Upload a scene to the GPU and draw its shadow maps; returns the `DrawnScene`.
 
-    viewport: the 3-D viewport whose visibility counts, None for a render; refused: called with the datablock and the
-    `HairError` of hair that cannot be drawn, which otherwise is raised; before: the `DrawnScene` from before hair
-    changed, and nothing else; is_draft: hair is about to change again, and shadows may be coarse; is_hair_only: whether
-    Blender draws the rest of a viewport; former: the `DrawnScene` of the frame before of an animation that plays.
+    viewport: the 3D viewport whose visibility settings apply, None for a render; refused: called with the datablock and
+    the `HairError` of hair that cannot be drawn, None: the error is raised; before: the previous `DrawnScene` if only
+    hair has changed since; is_draft: hair is about to change again, and shadows may be coarse; is_hair_only: whether
+    Blender draws the rest of a viewport; former: the `DrawnScene` of the previous frame during playback.
     """
-    # Where only the geometry of hair has changed, instances are where they were.
+    # If only the geometry of hair has changed, instances are unchanged.
     instances = hair_places.read_instances(depsgraph, viewport) if before is None else before.instances
     hair, places = _read_hair(hair_places.hair_places(view_layer, viewport, instances), viewport, refused)
     if viewport is not None and is_hair_only and not hair:
-        # Scenes without hair have no cost.
+        # Scenes without hair cost nothing.
         return _EMPTY
     is_shaded = viewport is None or not is_hair_only
     if before is None or before.shadow_maps is None:
-        has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # by which hair's shadow falls on them
+        has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # for the shadow of hair on surfaces
         meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
         if is_shaded:
             meshes = drawn_meshes.told_apart(meshes)
@@ -109,8 +108,8 @@ def read(
     if lamps is None:
         found = light_door.read_lights(depsgraph, for_render=viewport is None)
         lamps = scene_lights.gather(*found, world, hair_receivers)
-    # Where no graphics card makes hair that plays, each frame is as at rest. Hair that only its object moves is as if
-    # it was made, and stays so when it comes to rest.
+    # Without a GPU, frames of playback are drawn like still frames. Hair that is only moved by its object is handled
+    # like hair made on the GPU, also once it is at rest.
     has_played = former is not None or (before is not None and before.renewal is not None)
     are_made = _are_made(hair) or (has_played and bool(hair) and made_strands.are_wanted())
     last = before or (former if are_made else None)
@@ -141,7 +140,7 @@ def read(
 
 
 def _are_made(hair):
-    """Whether the GPU made or carried all hair: there it costs little to draw shadows of as much as at rest."""
+    """Whether the GPU made or carried all hair, which makes full shadows cheap while hair moves."""
     return bool(hair) and all(strands.is_made for strands, *_ in hair)
 
 
@@ -151,15 +150,12 @@ def _fit(maps, lamps, is_wide):
 
 
 def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
-    """A `DrawnScene` with `SceneLights`: as all that is in it is lit by them, with their shadow maps.
-
-    are_made: whether a graphics card makes or carries hair, or would.
-    """
+    """A `DrawnScene` lit by `SceneLights`, with their shadow maps; are_made: whether a GPU makes or carries hair."""
     placed, solid = _placed(drawn.hair), _blocking(drawn)
     hair_owners = [receiver.owner for receiver in hair_receivers]
     steps = _DRAFT_STEPS if is_draft and not are_made else _SHADOW_STEPS
     casters = lamps.casters(placed, hair_owners, solid, [blocker.owner for blocker in drawn.blockers])
-    # Where strands are made, what is drawn at rest is what was drawn while they moved.
+    # If the GPU makes strands, shadows are the same at rest as in motion.
     maps.draw(lamps.record, placed, solid, steps, casters, is_steady=is_draft or are_made)
     if maps.is_wide and (sphere := _sphere_around_hair(drawn)) is not None:
         maps.draw_wide(lamps.record, solid, sphere, casters)
@@ -170,7 +166,7 @@ def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
 
 
 def _sphere_around_hair(drawn):
-    """(centre, radius) of a sphere around all surfaces, or those near hair; None where maps of hair hold them all."""
+    """(center, radius) of a sphere around all surfaces, or those near hair; None if maps of hair contain them all."""
     surfaces = {*_blocking(drawn), *_receiving(drawn)}
     if not surfaces:
         return None
@@ -188,7 +184,7 @@ def _sphere_around_hair(drawn):
 
 
 def _hair_receivers(hair, owners):
-    """[`Receiver`] of hair; owners: session_uids of the instancer, or another time its own, and its own."""
+    """[`Receiver`] of hair; owners: (session UID of the instancer, or of the object, session UID of the object)."""
     return [
         scene_lights.Receiver(owner, scene_lights.places_of_hair(strands.points, to_world))
         for (strands, _shading, to_world, *_), owner in zip(hair, owners, strict=True)
@@ -196,11 +192,11 @@ def _hair_receivers(hair, owners):
 
 
 def read_render(depsgraph, known, refused, noted, progress=no_progress):
-    """The same for a render, whose depsgraph may be at another time than the file: evaluated hair is read.
+    """`read` for a render, whose depsgraph may be at another time than the file: evaluated hair is read.
 
-    refused: called with the datablock and the `HairError` of hair that cannot be drawn, and is left out; noted: the
-    same of hair some strands of which are; known: {session_uid: (points, radii, random numbers, StrandsOnGPU)} of what
-    was drawn a moment before, changed: what stands still is not uploaded again.
+    refused: called with the datablock and the `HairError` of hair that is left out; noted: the same for hair of which
+    some strands are left out; known: {session_uid: (arrays of the strands, StrandsOnGPU)} of the previous motion step,
+    updated here: unchanged hair is not uploaded again.
     """
     unlit = read_unlit(depsgraph, known, refused, noted, part_of(progress, 0.0, 0.5))
     progress("Reading lights", 0.5)
@@ -214,7 +210,7 @@ def read_render(depsgraph, known, refused, noted, progress=no_progress):
 
 
 def read_unlit(depsgraph, known, refused, noted, progress=no_progress):
-    """The same without lighting, for motion vectors."""
+    """`read_render` without lighting, for motion vectors."""
     count = sum(_is_hair(instance.object) for instance in depsgraph.object_instances)
     progress("Reading hair", 0.0)
     found = []
@@ -235,7 +231,7 @@ _SHOWN = ("surfaces", "clear", "receivers", "surface_owners", "blockers")
 def _upload(meshes, is_shaded, has_paths):
     """{name of `_SHOWN`: value} of `DrawnMesh`es.
 
-    is_shaded: whether they are seen as we shade; has_paths: whether paths of light will meet them.
+    is_shaded: whether Vellus shades surfaces; has_paths: whether light paths will be traced against them.
     """
     uploaded, blockers = {False: [], True: []}, []
     for mesh in meshes:
@@ -245,8 +241,8 @@ def _upload(meshes, is_shaded, has_paths):
             receiver = scene_lights.Receiver(mesh.owner[1::-1], places)
             uploaded[is_clear].append(((surface, mesh.parts), receiver, mesh.owner))
         if mesh.casts_shadow and not is_clear:
-            met = (mesh.positions, mesh.corner_normals, mesh.triangle_materials) if has_paths else None
-            blockers.append(Blocker(surface, mesh.owner[1::-1], met, mesh.is_seen))
+            traced = (mesh.positions, mesh.corner_normals, mesh.triangle_materials) if has_paths else None
+            blockers.append(Blocker(surface, mesh.owner[1::-1], traced, mesh.is_seen))
     solid, clear = uploaded.values()
     return {
         "surfaces": [surface for surface, _receiver, _owner in solid],
@@ -258,7 +254,7 @@ def _upload(meshes, is_shaded, has_paths):
 
 
 def _on_gpu(mesh):
-    """The `SurfaceOnGPU` of a `DrawnMesh`: of what was drawn of its object before, what is the same stays."""
+    """The `SurfaceOnGPU` of a `DrawnMesh`; unchanged data of the object's last `SurfaceOnGPU` is reused."""
     key, cache = (mesh.owner[0], mesh.is_clear), surface_textures.surface_cache
     return cache.keep(
         key,
@@ -280,7 +276,7 @@ def _placed(hair):
 
 
 def _blocking(drawn):
-    """[`SurfaceOnGPU`] that stop light."""
+    """[`SurfaceOnGPU`] that block light."""
     return [blocker.surface for blocker in drawn.blockers]
 
 
@@ -290,14 +286,14 @@ def _receiving(drawn):
 
 
 def visibility(drawn):
-    """(of hair, of surfaces) of a `DrawnScene`: how much of the world is seen from each place."""
+    """Visibility of the world in a `DrawnScene`: (textures of hair, textures of surfaces)."""
     opacities = [shading.opacity for _, shading, *_ in drawn.hair]
     forwards = [shading.forward for _, shading, *_ in drawn.hair]
     return ambient_visibility.measure(_placed(drawn.hair), _blocking(drawn), opacities, _receiving(drawn), forwards)
 
 
 def _renewed(renewal, seen, drawn):
-    """What `visibility` returns, with one step of a `Renewal`; seen: before it."""
+    """`visibility` by one step of a `Renewal`; seen: the visibility before."""
     through = [(shading.opacity, shading.forward) for _, shading, *_ in drawn.hair]
     return renewal.step(seen, _placed(drawn.hair), _blocking(drawn), through, _receiving(drawn))
 
@@ -326,7 +322,7 @@ def _read_rendered_hair(depsgraph, known, refused, noted):
             if uid not in known or not all(map(np.array_equal, read.arrays, known[uid])):
                 known[uid] = (*read.arrays, strand_textures.upload_strands(*read.arrays))
             strands = known[uid][-1]
-            shading = hair_cache.shading_of(original.evaluated_get(depsgraph), strands)  # its settings may be keyed
+            shading = hair_cache.shading_of(original.evaluated_get(depsgraph), strands)  # settings may be keyed
         except HairError as error:
             refused(original, error)
             continue
@@ -334,7 +330,7 @@ def _read_rendered_hair(depsgraph, known, refused, noted):
 
 
 def _read_hair(places, viewport, refused):
-    """(hair of a `DrawnScene`, the `HairPlace` of each): of those places whose hair can be drawn."""
+    """(hair of a `DrawnScene`, the `HairPlace` of each) for all places whose hair can be drawn."""
     hair, drawn_places = [], []
     for place in places:
         datablock = place.hair_object.data
@@ -357,7 +353,7 @@ def _read_hair(places, viewport, refused):
 
 
 def _have_same_places(drawn, other):
-    """Whether the visibility textures of a `DrawnScene` have a texel for each place of another's hair and surfaces."""
+    """Whether the visibility textures of a `DrawnScene` fit the hair and surfaces of another."""
     sizes, others = ([(one[0].strand_count, one[0].point_count) for one in many.hair] for many in (drawn, other))
     corners, other_corners = ([surface.vertex_count for surface in _receiving(many)] for many in (drawn, other))
     return sizes == others and corners == other_corners

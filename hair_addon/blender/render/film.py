@@ -9,13 +9,13 @@ from ..gpu import drawing, render_programs, surface_programs
 from ..gpu.visibility_buffer import VisibilityBuffer
 from . import motion_vectors, scene_drawing
 
-_MOST_SAMPLES = 4096  # along a tile's side: its textures take 340 MB, 870 with all passes
+_MOST_SAMPLES = 4096  # along a tile's side: textures take 340 MB, 870 MB with all passes
 
-BORDER = surface_programs.SIDE - 1  # of tiles [samples]: all that share light with one that is seen are in its tile
+BORDER = surface_programs.SIDE - 1  # around tiles [samples]: samples that share light are in the same tile
 
 FAR = 1e10  # distance of the background, as in Cycles
 
-# (names of channels, kind) of passes, as Blender calls them; all others are RGB.
+# (names of channels, type) of passes in Blender's terms; all others are RGB.
 _CHANNELS = {
     "Combined": ("RGBA", "COLOR"),
     "Depth": ("Z", "VALUE"),
@@ -23,8 +23,7 @@ _CHANNELS = {
     "Vector": ("XYZW", "VECTOR"),
 }
 
-# How much of R, TT, TRT and all else that comes from lights is in each of the passes of hair's light, and how much of
-# the world's.
+# Passes of hair's light: factors of (R, TT, TRT, all other light from lamps), and of the world's light.
 LOBES = {
     "Hair R": ((1.0, 0.0, 0.0, 0.0), 0.0),
     "Hair TT": ((0.0, 1.0, 0.0, 0.0), 0.0),
@@ -35,16 +34,16 @@ LOBES = {
 
 
 def channels_of(name):
-    """(names of its channels, its kind) of a pass, as Blender calls them."""
+    """(names of channels, type) of a pass in Blender's terms."""
     return _CHANNELS.get(name, ("RGB", "COLOR"))
 
 
 class Film:
     """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
 
-    border: how many samples more there are around it; passes: names of those that are wanted, "Combined", "Depth",
-    "Hair Mask", "Hair Shadow", "Shadow", "Vector" or of `LOBES`; is_transparent: whether the background is left empty;
-    filter_width: of `picture.filter_weights` [pixels]. motion: `motion.Motion` of a film with the pass "Vector".
+    border: extra samples around the tile; passes: names out of "Combined", "Depth", "Hair Mask", "Hair Shadow",
+    "Shadow", "Vector" and `LOBES`; is_transparent: leave the background empty; filter_width: of
+    `pixel_sampling.filter_weights` [pixels]. The attribute `motion` is the `Motion` for the pass "Vector".
     """
 
     def __init__(self, size, per_side, passes, is_transparent, filter_width=0.0, border=BORDER):
@@ -70,11 +69,11 @@ class Film:
             self._depth.clear(format="FLOAT", value=(0.0, FAR, 0.0, 0.0))
 
     def add_pass(self, drawn, world_to_view, view_to_clip, size, turn, place=(0, 0), lens=None):
-        """Draw a `DrawnScene` once.
+        """Draw a `DrawnScene` once; returns the `uniforms.VIEW` record of the pass.
 
-        world_to_view, view_to_clip: (4, 4); size: (width, height) of the whole picture [pixels]; turn: which of all
-        passes over it this is; place: (left, bottom) of the tile in it [pixels]; lens: a `Lens`, through another point
-        of which each pass looks, None: all in focus. Returns the `uniforms.VIEW` record of the pass.
+        world_to_view, view_to_clip: (4, 4); size: (width, height) of the whole picture [pixels]; turn: index among all
+        passes over it; place: (left, bottom) of the tile in it [pixels]; lens: a `Lens`, of which each pass samples
+        another point, None: all in focus.
         """
         if lens is not None:
             world_to_view = lens.world_to_view(world_to_view, turn)
@@ -102,7 +101,7 @@ class Film:
 
     @property
     def sample_count(self):
-        """Of a pixel, so far."""
+        """Number of samples per pixel so far."""
         return self.pass_count * self._per_side**2
 
     def _picture(self, name, drawn, view):
@@ -127,11 +126,11 @@ class Film:
 
     @property
     def light(self):
-        """(texture, weight) of all passes' light: the weighted sum of their samples, and the sum of the weights."""
+        """(texture, weight): the weighted sum of all passes' samples of "Combined", and the sum of weights."""
         return self._sums["Combined"], self._weight_sum
 
     def show(self, picture=None):
-        """Lay the mean of the samples over the viewport that is bound, or another picture of this size."""
+        """Draw the mean of the samples, or another picture of this size, over the bound viewport."""
         program = render_programs.film_view_program()
         x, y, _width, _height = gpu.state.viewport_get()
         with (
@@ -143,7 +142,7 @@ class Film:
             drawing.cover(program)
 
     def read(self):
-        """{pass: (height, width, channels) float32}, first row at the bottom: means over the samples, least depths."""
+        """{pass: (height, width, channels) float32}, bottom row first: means over the samples, least depths."""
         found = {name: self._read(texture) / self._weight_sum for name, texture in self._sums.items()}
         if self._depth is not None:
             mask, depth, covered, _none = np.split(self._read(self._depth), 4, axis=-1)
@@ -157,13 +156,13 @@ class Film:
 
 
 def _weights_texture(weights):
-    """Two rows of weights, for x and for y."""
+    """A texture with two rows of weights, for x and for y."""
     texels = np.array(weights, np.float32)
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
     return gpu.types.GPUTexture(texels.shape[::-1], format="R32F", data=data)
 
 
 def largest_tile(per_side, filter_width):
-    """Longest side [pixels] of a tile that the graphics driver supports, by the samples along a pixel's side."""
+    """Longest side [pixels] of a tile that the graphics driver supports; per_side: samples along a pixel's side."""
     most = min(gpu.capabilities.max_texture_size_get(), _MOST_SAMPLES)
     return max((most - 2 * (pixel_sampling.filter_margin(per_side, filter_width) + BORDER)) // per_side, 1)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cache of hair on the GPU, by session UID: invalidated by changes, filled on drawing.
 
-It holds no reference to Blender's data, so undo, deletion and new files cannot leave dangling ones. Points, radii,
-random numbers, wetness and roots are read and replaced together.
+It holds no references to Blender's data, which undo, deletion or new files could invalidate. Points, radii, random
+numbers, wetness and roots are read and replaced together.
 """
 
 from concurrent.futures import Future
@@ -26,26 +26,26 @@ from ..settings import preferences, properties, shared_wetness
 from . import made_strands, read_strands, refused_strands
 from .refused_strands import Refused
 
-# Tables of this many settings are kept: one groom and the last few positions of a slider.
+# Number of cached tables: those of one groom, and of the last few positions of a slider.
 _SHADING_CAPACITY = 8
 
 
 @dataclass
-class _KeptStrands:
-    """A snapshot of a datablock's strands, at rest, and their GPU data."""
+class _CachedStrands:
+    """A snapshot of a datablock's strands at rest, and their GPU data."""
 
     points: np.ndarray  # (S, P, 3) float32 in local coordinates
     radii: np.ndarray  # (S, P) float32
     randoms: np.ndarray  # (S,) float32
-    wetness: np.ndarray | None  # (S,) float32, None where strands do not differ
-    places: tuple | None  # roots as `stored_roots.places` returns them, None for none
+    wetness: np.ndarray | None  # (S,) float32, None if strands do not differ
+    places: tuple | None  # roots from `stored_roots.places`, or None
     rooted_on: tuple  # (session_uid of the surface, its topology)
-    may_float: bool  # whether strands may begin apart from it
-    note: HairError | None = None  # what is left out of the strands of the datablock
-    growing: Future | None = None  # of these points, which other threads may be computing; None where they are read
-    on_gpu: strand_textures.StrandsOnGPU | None = None  # where `pose` carried them
-    pose: posed_strands.Pose | None = None  # None where no surface carries them
-    moved: list = field(default_factory=list)  # [(M,) indices of strands] that moved since then
+    may_float: bool  # whether strands may begin off the surface
+    note: HairError | None = None  # strands of the datablock that are left out
+    growing: Future | None = None  # of the points, if other threads compute them; None if they were read
+    on_gpu: strand_textures.StrandsOnGPU | None = None  # deformed by `pose`
+    pose: posed_strands.Pose | None = None  # None without a surface
+    moved: list = field(default_factory=list)  # [(M,) indices of strands] that have moved since the upload
     making: made_strands.Making = field(default_factory=made_strands.Making)
 
     def __post_init__(self):
@@ -55,8 +55,8 @@ class _KeptStrands:
             require_count("wetness", len(self.wetness), len(self.points))
 
 
-strand_cache = Cache()  # session_uid of Curves → _KeptStrands or Refused
-pose_cache = Cache()  # session_uid of an object that strands grow on → Pose
+strand_cache = Cache()  # session_uid of Curves → _CachedStrands or Refused
+pose_cache = Cache()  # session_uid of a surface → Pose
 shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
 
 
@@ -64,7 +64,7 @@ shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
 def hair_on_gpu(datablock, is_viewport=True):
     """(`StrandsOnGPU`, `Shading`) of a hair Curves datablock. Raises `HairError`.
 
-    is_viewport: whether hair may be shown without its styles while it is combed.
+    is_viewport: whether hair may be drawn without its styles while it is combed.
     """
     bound = bindings.of(datablock)
     if is_viewport or bound is None or bound.straight is None:
@@ -75,7 +75,7 @@ def hair_on_gpu(datablock, is_viewport=True):
 
 
 def _upload_styled(datablock, bound):
-    """`StrandsOnGPU` of bound hair with its styles, kept nowhere."""
+    """`StrandsOnGPU` of bound hair with its styles, not cached."""
     bound.catch_up()
     styled = _read(datablock, bound, bound)
     return strand_textures.upload_strands(
@@ -84,55 +84,55 @@ def _upload_styled(datablock, bound):
 
 
 def strands_on_gpu(datablock):
-    """`StrandsOnGPU` of any Curves datablock, where its surface carries them; uploaded as far as they have changed.
+    """`StrandsOnGPU` of any Curves datablock, deformed with its surface; only changes are uploaded.
 
-    None where the datablock was refused. Raises `HairError`.
+    None if the datablock was refused. Raises `HairError`.
     """
-    kept = strand_cache.get(datablock.session_uid)
-    if isinstance(kept, Refused):
+    cached = strand_cache.get(datablock.session_uid)
+    if isinstance(cached, Refused):
         return None
-    if kept is None or (kept.growing is not None and kept.growing.result() is not kept.points):
-        kept = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
+    if cached is None or (cached.growing is not None and cached.growing.result() is not cached.points):
+        cached = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
     pose = _pose_of(datablock.surface)
-    is_elsewhere = kept.on_gpu is None or kept.pose is not pose
-    is_due = kept.making.due is not None
+    is_elsewhere = cached.on_gpu is None or cached.pose is not pose
+    is_due = cached.making.due is not None
     if is_due or is_elsewhere:
         is_behind = _is_behind(datablock)
-        if kept.on_gpu is not None and kept.making.bring(kept, pose, is_behind):
-            return kept.on_gpu
+        if cached.on_gpu is not None and cached.making.bring(cached, pose, is_behind):
+            return cached.on_gpu
         if is_due or is_behind:
-            kept = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
-    moved, kept.moved = kept.moved, []
+            cached = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
+    moved, cached.moved = cached.moved, []
     if moved or is_elsewhere:
-        kept.making.carrier = None  # what it carries is not what is uploaded
-    if kept.on_gpu is None or is_elsewhere or (moved and not kept.on_gpu.has_points):
-        points = _carried(kept, pose)
-        kept.on_gpu = strand_textures.upload_strands(points, kept.radii, kept.randoms, kept.wetness)
-        kept.pose = pose
+        cached.making.carrier = None  # its strands at rest are outdated
+    if cached.on_gpu is None or is_elsewhere or (moved and not cached.on_gpu.has_points):
+        points = _carried(cached, pose)
+        cached.on_gpu = strand_textures.upload_strands(points, cached.radii, cached.randoms, cached.wetness)
+        cached.pose = pose
     elif moved:
         chosen = np.unique(np.concatenate(moved))
-        require_indices("strands", chosen, len(kept.points))
-        kept.on_gpu = strand_textures.move_strands(kept.on_gpu, chosen, _carried(kept, pose, chosen))
-    elif not kept.on_gpu.has_points and kept.making.carrier is None and not _is_behind(datablock):
-        kept.on_gpu = replace(kept.on_gpu, points=kept.points, has_points=True)  # which have followed meanwhile
-    return kept.on_gpu
+        require_indices("strands", chosen, len(cached.points))
+        cached.on_gpu = strand_textures.move_strands(cached.on_gpu, chosen, _carried(cached, pose, chosen))
+    elif not cached.on_gpu.has_points and cached.making.carrier is None and not _is_behind(datablock):
+        cached.on_gpu = replace(cached.on_gpu, points=cached.points, has_points=True)  # computed meanwhile
+    return cached.on_gpu
 
 
 def _is_behind(datablock):
-    """Whether what is shown was made on the GPU alone."""
+    """Whether only the GPU has the current strands of a datablock."""
     bound = bindings.of(datablock)
     return bound is not None and bound.shown.is_behind
 
 
-def _carried(kept, pose, chosen=slice(None)):
-    """Points (M, P, 3) of some kept strands where a pose carries them; at rest where nothing deforms the surface."""
+def _carried(cached, pose, chosen=slice(None)):
+    """Points (M, P, 3) of chosen strands, deformed by a pose; at rest if the surface is not deformed."""
     if pose is None or not pose.is_deformed:
-        return kept.points[chosen]
-    return pose.carry(kept.points, kept.rooted_on[1], kept.places, chosen, kept.may_float)
+        return cached.points[chosen]
+    return pose.carry(cached.points, cached.rooted_on[1], cached.places, chosen, cached.may_float)
 
 
 def _pose_of(surface_object):
-    """The `Pose` of what strands grow on, None where that is nothing. Raises `HairError`."""
+    """The `Pose` of a surface, None without a surface. Raises `HairError`."""
     if surface_object is None:
         return None
     depsgraph = bpy.context.evaluated_depsgraph_get
@@ -140,89 +140,89 @@ def _pose_of(surface_object):
 
 
 def drawn_bytes(datablock):
-    """Memory that viewports use on the GPU for a hair Curves datablock [bytes]; None while nothing draws it."""
-    kept = _strands_of(datablock.session_uid)
-    if kept is None or kept.on_gpu is None:
+    """GPU memory that viewports use for a hair Curves datablock [bytes]; None if it is not drawn."""
+    cached = _strands_of(datablock.session_uid)
+    if cached is None or cached.on_gpu is None:
         return None
-    textures = [*kept.on_gpu.textures, *kept.making.textures]
-    return strand_textures.bytes_of(textures) + strand_textures.seen_bytes(kept.on_gpu)
+    textures = [*cached.on_gpu.textures, *cached.making.textures]
+    return strand_textures.bytes_of(textures) + strand_textures.seen_bytes(cached.on_gpu)
 
 
 def note_of(datablock):
-    """What viewports draw of a Curves datablock in part or not at all, as a `HairError`; None where it is all drawn."""
-    kept = strand_cache.get(datablock.session_uid)
-    return refused_strands.error_of(kept) or getattr(kept, "note", None)
+    """The `HairError` about strands of a Curves datablock that viewports do not draw, or None."""
+    cached = strand_cache.get(datablock.session_uid)
+    return refused_strands.error_of(cached) or getattr(cached, "note", None)
 
 
 def refuse(datablock, error):
-    """Do not draw a datablock again until it changes; report the reason once."""
+    """Do not draw a datablock until it changes, and report the reason once."""
     strand_cache.keep(datablock.session_uid, refused_strands.refused(error))
 
 
 def move(session_uid, moved, bound):
-    """Strands of `BoundHair` have moved: with the next redraw they alone are uploaded, which waits for their points.
+    """Note that strands of `BoundHair` have moved: the next redraw waits for their points, and only uploads these.
 
-    moved: (M,) indices of them.
+    moved: (M,) indices of strands.
     """
-    kept = _strands_of(session_uid)
-    if kept is not None:
-        kept.growing = bound.growing
-        kept.moved.append(moved)
+    cached = _strands_of(session_uid)
+    if cached is not None:
+        cached.growing = bound.growing
+        cached.moved.append(moved)
 
 
 def follow_where_drawn(session_uid, bound):
-    """Guides of `BoundHair` have moved, or their weights: with the next redraw the GPU makes all strands."""
-    kept = _strands_of(session_uid)
-    if kept is not None:
-        kept.making.due = bound
+    """Note that guides of `BoundHair` or their weights have changed: the GPU makes all strands with the next redraw."""
+    cached = _strands_of(session_uid)
+    if cached is not None:
+        cached.making.due = bound
 
 
 def may_make(session_uid):
-    """Whether the GPU makes what viewports show of hair while its guides are combed: as `choose_makers` found."""
-    kept = _strands_of(session_uid)
-    return kept is not None and kept.making.is_chosen and not kept.moved
+    """Whether the GPU makes the strands in viewports while guides are combed, as decided by `choose_makers`."""
+    cached = _strands_of(session_uid)
+    return cached is not None and cached.making.is_chosen and not cached.moved
 
 
 def may_restyle(session_uid, bound, styles):
-    """Whether the GPU makes what viewports show of bound hair with other styles."""
-    kept = _strands_of(session_uid)
+    """Whether the GPU makes the strands in viewports after a change of bound hair's styles."""
+    cached = _strands_of(session_uid)
     if not may_make(session_uid) or bound.straight is not None:
         return False
-    return kept.making.can_style(styles) and kept.making.is_prepared(bound, styles)
+    return cached.making.can_style(styles) and cached.making.is_prepared(bound, styles)
 
 
 def prepare_makers():
-    """Compile one of the programs that edits of what viewports draw need; whether there was one left."""
+    """Compile one of the programs for edits of hair in viewports; returns whether one was missing."""
     for datablock in bpy.data.hair_curves:
-        kept, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
-        if kept is not None and bound is not None and kept.making.prepare(bound.shown):
+        cached, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
+        if cached is not None and bound is not None and cached.making.prepare(bound.shown):
             return True
     return False
 
 
 def choose_makers():
-    """Find out which of the hair that a viewport draws the GPU may make, and is to."""
+    """Decide for which hair in viewports the GPU makes or carries strands."""
     is_wanted = made_strands.are_wanted()
     for datablock in bpy.data.hair_curves:
-        kept, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
-        if kept is not None and kept.on_gpu is not None:
-            is_bound = bound is not None and bound.free is None and kept.points is bound.shown.points
-            kept.making.choose(is_wanted, bound.shown if is_bound else None)
+        cached, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
+        if cached is not None and cached.on_gpu is not None:
+            is_bound = bound is not None and bound.free is None and cached.points is bound.shown.points
+            cached.making.choose(is_wanted, bound.shown if is_bound else None)
 
 
 def _strands_of(session_uid):
-    """The `_KeptStrands` of a datablock, None where there are none or they were refused."""
-    kept = strand_cache.get(session_uid)
-    return None if isinstance(kept, Refused) else kept
+    """The `_CachedStrands` of a datablock; None if there are none or they were refused."""
+    cached = strand_cache.get(session_uid)
+    return None if isinstance(cached, Refused) else cached
 
 
 def is_pose_seen(surface_object):
-    """Whether a viewport has drawn strands on a surface since that moved."""
+    """Whether a viewport has drawn strands on a surface since the surface moved."""
     return pose_cache.get(surface_object.session_uid) is not None
 
 
 def invalidate_pose(surface_object):
-    """A surface may carry its strands to another place: with the next redraw they are uploaded there."""
+    """Note that a surface may be deformed: the next redraw updates its strands."""
     pose_cache.invalidate(surface_object.session_uid)
     for datablock in bpy.data.hair_curves:
         # A surface that could not be read may have been repaired.
@@ -233,8 +233,8 @@ def invalidate_pose(surface_object):
 def invalidate_unless_same(datablock):
     """Drop the cache of a datablock that Blender reports as changed, if it did change.
 
-    Blender reports Curves whose surface moved, or that have another property. What waits to be written is no change,
-    nor is what we have just written.
+    Blender also reports Curves if their surface moved or a property changed. Strands that are waiting to be written, or
+    were just written, are no change.
     """
     uid, bound = datablock.session_uid, bindings.of(datablock)
     if bound is not None:
@@ -243,28 +243,28 @@ def invalidate_unless_same(datablock):
         if not bound.is_written:
             return
         if bound.is_report_due:
-            kept = _strands_of(uid)
-            if kept is None or kept.points is not bound.shown.points:
+            cached = _strands_of(uid)
+            if cached is None or cached.points is not bound.shown.points:
                 strand_cache.invalidate(uid)
             return
         if not _are_points(datablock, bound.points):
             bindings.invalidate(datablock)
             strand_cache.invalidate(uid)
             return
-    kept = _strands_of(uid)
-    if kept is None or not _is_same(datablock, kept, bound):
+    cached = _strands_of(uid)
+    if cached is None or not _is_same(datablock, cached, bound):
         strand_cache.invalidate(uid)
 
 
-def _is_same(datablock, kept, bound):
-    """Whether kept strands are those of a datablock, and its surface would carry them as it did."""
+def _is_same(datablock, cached, bound):
+    """Whether cached strands equal those of a datablock and are rooted at the same places."""
     return (
-        (kept.points is bound.shown.points if bound is not None else _are_points(datablock, kept.points))
-        and np.array_equal(kept.radii.ravel(), curves.read_radii(datablock))
-        and np.array_equal(kept.randoms, curves.read_randoms(datablock))
-        and made_strands.are_equal(kept.wetness, curves.read_wetness(datablock))
-        and kept.rooted_on == _rooted_on(datablock, datablock.vellus.topology)
-        and (bound is not None or _are_places(kept.places, stored_roots.slid_places(datablock)))
+        (cached.points is bound.shown.points if bound is not None else _are_points(datablock, cached.points))
+        and np.array_equal(cached.radii.ravel(), curves.read_radii(datablock))
+        and np.array_equal(cached.randoms, curves.read_randoms(datablock))
+        and made_strands.are_equal(cached.wetness, curves.read_wetness(datablock))
+        and cached.rooted_on == _rooted_on(datablock, datablock.vellus.topology)
+        and (bound is not None or _are_places(cached.places, stored_roots.slid_places(datablock)))
     )
 
 
@@ -273,7 +273,7 @@ def _rooted_on(datablock, topology):
 
 
 def _are_places(places, others):
-    """Whether roots are unchanged: hair may update the roots of guides."""
+    """Whether roots are unchanged, as binding hair may update the roots of guides."""
     if places is None or others is None:
         return places is others
     return all(map(np.array_equal, places, others))
@@ -291,9 +291,9 @@ def _read_shown(datablock):
 
 
 def _read(datablock, bound, shown):
-    """`_KeptStrands` of a datablock as it is now, or of what it is bound by.
+    """The current `_CachedStrands` of a datablock, or of its binding.
 
-    shown: the `BoundHair` whose points are read, which may be without the styles of `bound`.
+    shown: the `BoundHair` whose points are used, which may lack the styles of `bound`.
     """
     if bound is None:
         read = _shown_strands(datablock)
@@ -301,19 +301,19 @@ def _read(datablock, bound, shown):
         if places is not None and read.is_sound is not None:
             places = tuple(values[read.is_sound] for values in places)
         rooted = places, _rooted_on(datablock, datablock.vellus.topology), stored_roots.may_float(datablock)
-        return _KeptStrands(*read.arrays, *rooted, read.note)
+        return _CachedStrands(*read.arrays, *rooted, read.note)
     if bound.is_written or bound.has_moved_only:
         randoms, wetness = curves.read_randoms(datablock), curves.read_wetness(datablock)
     else:
         (_identities, randoms), wetness = bound.binding.identities, bound.styles.wetness
-    # Roots too are those of the binding: the datablock may store those of earlier strands.
+    # Roots are taken from the binding too: the datablock may store the roots of earlier strands.
     places, rooted_on = bound.surface.places(bound.binding.roots), _rooted_on(datablock, bound.surface.topology)
     radii = np.tile(bound.radii, (len(shown.points), 1))
-    return _KeptStrands(shown.points, radii, randoms, wetness, places, rooted_on, False, growing=shown.growing)
+    return _CachedStrands(shown.points, radii, randoms, wetness, places, rooted_on, False, growing=shown.growing)
 
 
 def _shown_strands(datablock):
-    """`ReadStrands` of a datablock, where dynamics has moved them if they are guides that it moves."""
+    """`ReadStrands` of a datablock; at their simulated points for simulated guides."""
     read = read_strands.read(datablock)
     simulated = simulated_guides.point_cache.get(datablock.session_uid)
     if simulated is None or len(simulated) != len(read.points):
@@ -323,9 +323,9 @@ def _shown_strands(datablock):
 
 
 def shading_of(datablock, strands=None):
-    """`Shading` of a hair Curves datablock: its model, ready to draw. Raises `HairError`.
+    """The `Shading` of a hair Curves datablock, or a `MixedShading` if strands differ in wetness. Raises `HairError`.
 
-    strands: its `StrandsOnGPU`; where these differ in wetness, a `MixedShading`.
+    strands: its `StrandsOnGPU`.
     """
     state = datablock.vellus
     wettest = _shading_of_look(state, properties.look_of(state))
@@ -340,28 +340,28 @@ def _shading_of_look(state, look):
     variation = appearance.strand_settings(look)
     if state.model == "KAJIYA_KAY":
         if variation.is_even:
-            return _kept_shading((appearance.kajiya_kay_settings(look),), hair_shading.kajiya_kay_shading)
-        return _kept_shading(
+            return _cached_shading((appearance.kajiya_kay_settings(look),), hair_shading.kajiya_kay_shading)
+        return _cached_shading(
             (appearance.kajiya_kay_strand_settings(look), variation), hair_shading.kajiya_kay_strand_shading
         )
     settings = properties.table_settings_of(state, look)
     if variation.is_even and not settings.is_elliptic:
-        return _kept_shading(
+        return _cached_shading(
             (settings,), lambda wanted: hair_shading.marschner_shading(_tables(wanted, state.table_folder))
         )
-    return _kept_shading((settings, variation), _strand_shading)
+    return _cached_shading((settings, variation), _strand_shading)
 
 
 def _strand_shading(settings, variation):
     return hair_shading.marschner_strand_shading(strand_tables.bake(settings, variation, preferences.device()))
 
 
-def _kept_shading(settings, make):
+def _cached_shading(settings, make):
     return shading_cache.get(settings, lambda: make(*settings))
 
 
 def _tables(settings, folder):
-    """The tables of these settings: from the folder while it holds just those, else from the cache, or baked now."""
+    """The tables of these settings: from the folder if its settings match, else from the cache, else baked."""
     path = _usable(folder) if folder else None
     if path is not None and path.is_dir():
         tables = table_exr.read_tables(path)
@@ -374,7 +374,7 @@ def _tables(settings, folder):
 
 
 def _usable(folder):
-    """A folder that a file names, as a `Path`; None where nothing is read from: that is said, and tables are baked."""
+    """A folder in a file's settings as a `Path`; None, with a message, if nothing may be read from it."""
     try:
         return paths.resolve(folder)
     except HairError as error:
@@ -383,9 +383,9 @@ def _usable(folder):
 
 
 def cache_folder():
-    """The folder of tables that were baked before, for every file of this user; None where we are no extension."""
+    """The user's folder of baked tables, shared by all files; None if Vellus does not run as an extension."""
     if not preferences.is_extension():
         return None  # run from a checkout
-    # Empty if Blender could not create it, with a message on the console.
+    # Empty if Blender could not create the folder, which it reports on the console.
     folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="tables", create=True)
     return Path(folder) if folder else None

@@ -14,8 +14,8 @@ from ..data.pictures.rendered_instances import is_rendered
 class HairPlace:
     """A place where hair is drawn.
 
-    hair_object: the original object with hair Curves; to_world: (4, 4) float64; owner: session_uid of the object that
-    is selected with it, the object itself or its instancer; is_selected: whether that one is.
+    hair_object: the original object with hair Curves; to_world: (4, 4) float64; owner: session_uid of the object to
+    select, which is the object itself or its instancer; is_selected: whether that object is selected.
     """
 
     hair_object: bpy.types.Object
@@ -34,9 +34,9 @@ class _Instance:
 
 
 def hair_places(view_layer, viewport, instances):
-    """[`HairPlace`] of a view layer's visible hair and of instances that `read_instances` has found.
+    """[`HairPlace`] of a view layer's visible hair and of instances from `read_instances`.
 
-    viewport: the 3-D viewport whose visibility counts, None for a render, which leaves out what renders do not show.
+    viewport: the 3D viewport whose visibility settings apply, None for those of renders.
     """
     places = [
         HairPlace(o, np.array(o.matrix_world, np.float64), o.session_uid, o.select_get(view_layer=view_layer))

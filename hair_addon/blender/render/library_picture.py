@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The picture of a groom in an asset library: its hair and its surface in a scene of their own, under three lights."""
+"""The preview of a groom in an asset library: its hair and surface in a separate scene with three lights."""
 
 import math
 import tempfile
@@ -16,11 +16,11 @@ from ..data.made import groom_assets
 from . import offscreen
 
 SIZE = 256  # pixels
-_SAMPLES_PER_SIDE = 3  # of each pixel
+_SAMPLES_PER_SIDE = 3  # along each side of a pixel
 _LENS, _SENSOR = 85.0, 36.0  # [mm]
-_VIEW = Vector((0.48, -0.87, 0.10))  # from the hair to the camera: a face that looks to -Y is seen from its left
+_VIEW = Vector((0.48, -0.87, 0.10))  # from the hair to the camera: shows the left side of a face towards -Y
 _MARGIN = 1.1
-# Direction from the hair, power [W] where hair has a radius of one metre, size by that radius.
+# Direction from the hair, power [W] for hair with a radius of one meter, size in radii.
 _LIGHTS = (
     ((-0.25, -0.85, 0.65), 550.0, 1.5),
     ((-0.60, 0.65, 0.45), 700.0, 2.0),
@@ -31,9 +31,9 @@ _WORLD = (0.030, 0.033, 0.038, 1.0)
 
 
 def draw(hair_object: bpy.types.Object, points: np.ndarray) -> np.ndarray:
-    """(SIZE, SIZE, 4) float32, sRGB, the first row at the bottom: hair, its surface and what is parented to that.
+    """(SIZE, SIZE, 4) float32, sRGB, bottom row first: hair, its surface and meshes parented to the surface.
 
-    points: (N, 3) [m] of the hair in the world. Raises `HairError` where nothing can be drawn.
+    points: (N, 3) [m] of the hair in the world. Raises `HairError` if nothing can be drawn.
     """
     with _studio(hair_object, points) as studio, tempfile.TemporaryDirectory() as folder:
         with bpy.context.temp_override(scene=studio, view_layer=studio.view_layers[0]):
@@ -51,11 +51,11 @@ def draw(hair_object: bpy.types.Object, points: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def _studio(hair_object, points) -> Generator[bpy.types.Scene]:
-    """A scene with the hair, its surface and what else is parented to that, a camera and lights."""
+    """A temporary scene with the hair, its surface, meshes parented to the surface, a camera and lights."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle, radius = Vector((0.5 * (low + high)).tolist()), 0.5 * float(np.linalg.norm(high - low))
     studio = bpy.data.scenes.new("Vellus picture")
-    studio.vellus.multiple_scattering = "DUAL"  # a thumbnail, drawn while its groom is saved
+    studio.vellus.multiple_scattering = "DUAL"  # fast, as the groom is being saved
     made = []
     try:
         surface = hair_object.data.surface

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among strands for a render: `core.shading.light_paths` of a `DrawnScene`, as a camera sees it."""
+"""Light among strands for a render: `core.shading.light_paths` of a `DrawnScene` from a camera."""
 
 from dataclasses import replace
 
@@ -15,23 +15,23 @@ from ..settings import preferences
 from . import seen_strands
 
 _PATHS_A_PIXEL = 2
-_LEAST_PATHS, _MOST_PATHS = 20_000, 300_000  # over the part of the picture that holds the hair
-_SAMPLES_A_PATH = 2  # in which strands are drawn
-_MOST_TIMES = 4  # where that part is mostly empty, or few of its paths find light
+_LEAST_PATHS, _MOST_PATHS = 20_000, 300_000  # over the part of the picture that contains the hair
+_SAMPLES_A_PATH = 2  # samples of the picture per path
+_MOST_TIMES = 4  # maximum factor of paths, if the part is mostly empty or few of its paths reach light
 
 
 def path_count(blender_scene, size):
-    """How many paths a picture of a size (width, height) [pixels] takes, 0 with dual scattering."""
+    """Number of paths for a picture; 0 with dual scattering. size: (width, height) [pixels]."""
     if blender_scene.vellus.multiple_scattering == "DUAL":
         return 0
     return min(max(_PATHS_A_PIXEL * size[0] * size[1], _LEAST_PATHS), _MOST_PATHS)
 
 
 def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_progress):
-    """A `DrawnScene` whose hair is lit by `count` paths through a grid, as a view of these (4, 4) sees it.
+    """A `DrawnScene` whose hair is lit by `count` paths through a grid, for a view with these (4, 4) matrices.
 
-    The same scene for no paths, without hair of any area in view, where lights are linked, and unless all hair is
-    shaded by the energy-conserving model: dual scattering lights all of it then.
+    Returns the scene unchanged, for dual scattering of all hair, if `count` is 0, no hair with an area is in view, any
+    light is linked, or any hair is not shaded by the energy-conserving model.
     """
     if not count or not drawn.hair:
         return drawn
@@ -55,8 +55,8 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     progress(light_paths.gather.FOLLOWING, 0.3)
     most = _MOST_TIMES * count
     starting = -(-len(seen.segments) // _SAMPLES_A_PATH)
-    told = part_of(progress, 0.3, 1.0)
-    sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, starting, seed, device, most, told)
+    tracing = part_of(progress, 0.3, 1.0)
+    sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, starting, seed, device, most, tracing)
     means = [light_paths.voxel_means.shares(of_hair, taken, grid.origin) for of_hair in sums]
     visibility = [
         {**textures, "light_grid": light_grid.upload(of_hair)}
@@ -69,7 +69,7 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
 
 
 def window_of(hair, world_to_view, view_to_clip):
-    """(low, high) corners (2,) in clip space of the part of a picture that holds all hair; None where it is outside."""
+    """(low, high) corners (2,) in clip space of the part of a picture that contains all hair; None if outside."""
     world_to_clip = np.asarray(view_to_clip, float) @ np.asarray(world_to_view, float)
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in hair])
     box = centre + radius * (2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1.0)
@@ -88,7 +88,7 @@ def _strands_of(strands, shading, to_world, first):
     randoms = np.full(count, 0.5) if strands.randoms_here is None else strands.randoms_here
     layers = shading.layers
     is_wettest = np.zeros(count, int)
-    if len(layers) > 1:  # strands between two looks take either, by their share
+    if len(layers) > 1:  # strands between two looks randomly get either, by their share
         shares = appearance.wet_share(strands.wetness_here, *shading.wetness_range)
         is_wettest = (np.random.default_rng(0).random(count) < shares).astype(int)
     fibres = [layer.fibre for layer, _mix in layers]
@@ -98,7 +98,7 @@ def _strands_of(strands, shading, to_world, first):
     ]
 
     def absorption(strand, place):
-        settings, variation = fibres[0]  # water changes no pigment
+        settings, variation = fibres[0]  # water does not change pigments
         if variation is None:
             return np.broadcast_to(np.asarray(settings.sigma_a, float), (*np.broadcast(strand, place).shape, 3))
         return strand_variation.strand_sigma_a(variation, randoms[strand], place)

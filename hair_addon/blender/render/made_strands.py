@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that follow combed guides, and their surface, where they are drawn: nothing is computed on this side.
+"""Strands that follow combed guides and their surface on the GPU, without computing points on the CPU.
 
-Guides are followed so by hair without styles, or with styles that the GPU can apply; other hair takes points that Warp
-computes. Any hair is carried so.
+Following guides requires hair without styles, or with styles that the GPU can apply; Warp computes the points of other
+hair. All hair can be deformed with its surface on the GPU.
 """
 
 from dataclasses import dataclass, replace
@@ -21,9 +21,9 @@ from ..settings import preferences
 
 
 def are_wanted() -> bool:
-    """Whether strands are to be made where they are drawn: as the user chose, or by what is measured once.
+    """Whether the GPU should make strands, as set by the user, or decided by one measurement.
 
-    To be asked while something is drawn.
+    Must be called during drawing.
     """
     chosen = preferences.stroke_device()
     if chosen == "COMPUTE" or not running.has_window():
@@ -33,34 +33,34 @@ def are_wanted() -> bool:
 
 @dataclass
 class Making:
-    """What makes the strands of one hair, and of which guides; and what carries them with their surface."""
+    """The state of making the strands of one hair on the GPU, and of deforming them with their surface."""
 
     maker: strand_maker.StrandMaker | style_maker.StyleMaker | None = None
-    carrier: strand_carrier.StrandCarrier | None = None  # None while what is drawn is at rest, or was uploaded
-    is_chosen: bool = False  # whether it is to make them with the next edit
-    is_to_prepare: bool = False  # whether it would, were all programs compiled
-    may_carry: bool = False  # whether it is to carry them with the next pose
-    is_refused: bool = False  # whether the driver makes no such strands
-    due: BoundHair | None = None  # whose guides were combed: the next redraw makes its strands
+    carrier: strand_carrier.StrandCarrier | None = None  # None while drawn strands are at rest, or were uploaded
+    is_chosen: bool = False  # whether the next edit makes strands
+    is_to_prepare: bool = False  # whether it would if all programs were compiled
+    may_carry: bool = False  # whether the next pose carries strands
+    is_refused: bool = False  # whether the driver does not support it
+    due: BoundHair | None = None  # hair whose guides were combed: the next redraw makes its strands
     _binding: Any = None  # `HairBinding` of the maker
-    _triangles: np.ndarray | None = None  # that the carrier's strands are rooted on
+    _triangles: np.ndarray | None = None  # of the surface that the carrier's strands are rooted on
 
     @property
     def textures(self) -> list:
-        """All that its maker and its carrier hold."""
+        """All textures of the maker and the carrier."""
         return [texture for one in (self.maker, self.carrier) if one is not None for texture in one.textures]
 
     def choose(self, is_wanted: bool, bound: BoundHair | None) -> None:
-        """Choose what it is to do: carry strands, and make those of `BoundHair` with their styles.
+        """Decide whether to carry strands, and to make those of `BoundHair` with their styles.
 
-        It makes none before its programs are compiled, which may take a second: no edit waits for that.
+        Strands are not made before the programs are compiled, which may take a second, so that no edit waits for it.
         """
         self.may_carry = is_wanted and not self.is_refused
         self.is_to_prepare = self.may_carry and bound is not None and self.can_style(bound.styles)
         self.is_chosen = self.is_to_prepare and self.is_prepared(bound, bound.styles)
 
     def prepare(self, bound: BoundHair) -> bool:
-        """Compile one program that edits of `BoundHair` need; whether there was one."""
+        """Compile one missing program for edits of `BoundHair`; returns whether there was one."""
         if not self.is_to_prepare:
             return False
         try:
@@ -72,39 +72,39 @@ class Making:
         return was_missing
 
     def is_prepared(self, bound: BoundHair, styles: StyledHair) -> bool:
-        """Whether all programs are compiled that edits of `BoundHair` with such styles need."""
+        """Whether all programs for edits of `BoundHair` with these styles are compiled."""
         return shaders.are_compiled(_programs_of(bound, styles))
 
     def can_style(self, styles: StyledHair) -> bool:
-        """Whether styles can be applied to strands that are made here: the one place where that is decided."""
+        """Whether the GPU can apply the styles of strands that it makes; decided only here."""
         return styles.styling is None or style_maker.can_style(styles.styling)
 
-    def bring(self, kept: Any, pose: Pose | None, is_behind: bool) -> bool:
-        """Bring the strands that `hair_cache` keeps up to combed guides, and to a pose of their surface.
+    def bring(self, cached: Any, pose: Pose | None, is_behind: bool) -> bool:
+        """Update the cached strands of `hair_cache` for combed guides and for a pose of their surface.
 
-        is_behind: whether they were made for other guides than their points on this side. False where the driver
-        cannot, or it is not to: strands are then to be uploaded.
+        is_behind: whether their points on the CPU are of former guides. Returns False if the driver does not support it
+        or it was not chosen; strands must then be uploaded.
         """
-        if kept.moved:
+        if cached.moved:
             return False
         try:
-            if not self._can_carry(kept, pose, is_behind):
+            if not self._can_carry(cached, pose, is_behind):
                 return False
             if self.due is not None:
-                self._make(kept)
+                self._make(cached)
             if self.carrier is not None:
-                kept.on_gpu = self.carrier.carry(kept.on_gpu, pose.surface.posed if _is_deformed(pose) else None)
+                cached.on_gpu = self.carrier.carry(cached.on_gpu, pose.surface.posed if _is_deformed(pose) else None)
         except HairError:
             self._refuse()
             return False
-        self.due, kept.pose = None, pose
+        self.due, cached.pose = None, pose
         return True
 
     def _refuse(self):
         self.is_refused, self.carrier = True, None
         self.is_chosen = self.is_to_prepare = self.may_carry = False
 
-    def _make(self, kept):
+    def _make(self, cached):
         bound, binding, known = self.due, self.due.binding, self._binding
         before = self.maker if self.maker is not None and known.positions is binding.positions else None
         axes = bound.surface.to_local_axes
@@ -114,34 +114,36 @@ class Making:
                 self.maker = self.maker.weighed(strand_maker.bound_strands(binding))
             self.maker = self.maker.limited(binding.limits.fading, binding.keep_length)
         self._binding = binding
-        if not np.array_equal(kept.radii[0], bound.radii):
-            kept.radii = np.broadcast_to(bound.radii, kept.radii.shape)
-            kept.on_gpu = strand_textures.with_radii(kept.on_gpu, kept.radii)
+        if not np.array_equal(cached.radii[0], bound.radii):
+            cached.radii = np.broadcast_to(bound.radii, cached.radii.shape)
+            cached.on_gpu = strand_textures.with_radii(cached.on_gpu, cached.radii)
         wetness = bound.styles.wetness
-        if not are_equal(kept.wetness, wetness):
-            kept.wetness = wetness
-            texture = None if wetness is None else strand_textures.numbers_texture(wetness, kept.on_gpu.row_strands)
-            kept.on_gpu = replace(kept.on_gpu, wetness=texture, wetness_here=wetness)
-        kept.on_gpu = self.maker.make(kept.on_gpu, _followed(bound), self.carrier and self.carrier.rest)
+        if not are_equal(cached.wetness, wetness):
+            cached.wetness = wetness
+            texture = None if wetness is None else strand_textures.numbers_texture(wetness, cached.on_gpu.row_strands)
+            cached.on_gpu = replace(cached.on_gpu, wetness=texture, wetness_here=wetness)
+        cached.on_gpu = self.maker.make(cached.on_gpu, _followed(bound), self.carrier and self.carrier.rest)
 
-    def _can_carry(self, kept, pose, is_behind):
-        """Whether there is a carrier to a pose, made now if need be; or none is needed."""
-        if not (_is_deformed(pose) or _is_deformed(kept.pose)):
+    def _can_carry(self, cached, pose, is_behind):
+        """Whether a carrier for a pose exists, can be made now, or is not needed."""
+        if not (_is_deformed(pose) or _is_deformed(cached.pose)):
             return True
         surface = None if pose is None else pose.surface
         if self.carrier is not None:
             if surface is not None and self._is_carried_on(surface):
                 return True
-            self.carrier = None  # for the surface has other triangles now
+            self.carrier = None  # the surface has other triangles now
             return False
-        if surface is None or not self.may_carry or (is_behind and self.due is None and _is_deformed(kept.pose)):
+        if surface is None or not self.may_carry or (is_behind and self.due is None and _is_deformed(cached.pose)):
             return False
-        vertices, weights, *slides = pose.rooted(kept.rooted_on[1], kept.places, kept.points[:, 0], kept.may_float)
-        drawn = kept.on_gpu
-        if _is_deformed(kept.pose):
-            rest = strand_textures.packed_texture(kept.points, drawn.row_strands)
+        vertices, weights, *slides = pose.rooted(
+            cached.rooted_on[1], cached.places, cached.points[:, 0], cached.may_float
+        )
+        drawn = cached.on_gpu
+        if _is_deformed(cached.pose):
+            rest = strand_textures.packed_texture(cached.points, drawn.row_strands)
         else:
-            rest, kept.on_gpu = drawn.texture, replace(drawn, texture=strand_textures.like(drawn.texture))
+            rest, cached.on_gpu = drawn.texture, replace(drawn, texture=strand_textures.like(drawn.texture))
         self.carrier = strand_carrier.new_carrier(
             *(rest, drawn.point_count, (vertices, weights), surface.rest, surface.turning(vertices)),
             slides[0] if slides else None,
@@ -159,19 +161,19 @@ def _is_deformed(pose):
 
 
 def are_equal(values: np.ndarray | None, others: np.ndarray | None) -> bool:
-    """Whether two arrays, either of which may be missing, hold the same."""
+    """Whether two arrays, each of which may be None, are equal."""
     if values is None or others is None:
         return values is others
     return np.array_equal(values, others)
 
 
 def _followed(bound):
-    """(G, P, 3): guides as strands follow them, which styles may lean."""
+    """(G, P, 3) guides that strands follow, to which styles may be applied."""
     styling = bound.styles.styling
     return (bound.guides if styling is None else styling.guides(bound.guides)).numpy()
 
 
 def _programs_of(bound, styles):
-    """Programs that make the strands of `BoundHair` with a `StyledHair`."""
+    """Programs that make the strands of `BoundHair` with the styles of a `StyledHair`."""
     slot_count = bound.binding.guide_weights.indices.shape[1]
     return style_maker.programs_of(styles.styling, slot_count, len(bound.radii))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motion vectors of everything drawn, from the previous frame and to the next."""
+"""Motion vectors of everything drawn, from the previous frame and to the next frame."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from ..gpu import drawing, render_programs, uniforms
 class Places:
     """Transforms and points of everything drawn at one time.
 
-    world_to_clip: (4, 4); hair: {owner: (texture of points, (S, P) how many, object to world, how these were moved)};
-    surfaces: {owner: (texture of vertices, how many, their fingerprint, object to world)}. Owners are keys of
-    `_told_apart`.
+    world_to_clip: (4, 4); hair: {owner: (texture of points, (strands, points), object to world, `Moved` or None)};
+    surfaces: {owner: (texture of vertices, (vertices, corners), fingerprint, object to world)}. Owners are keys of
+    `_unique`.
     """
 
     world_to_clip: np.ndarray
@@ -23,19 +23,19 @@ class Places:
     surfaces: dict
 
     def has_still_hair(self, others):
-        """Whether all hair is where it is in other `Places`, whatever the camera does."""
+        """Whether all hair is unmoved relative to other `Places`, regardless of the camera."""
         return self.hair.keys() == others.hair.keys() and all(
             _is_unmoved(place, others.hair[owner]) for owner, place in self.hair.items()
         )
 
     def has_same_strands(self, others):
-        """Whether all hair has as many strands and points as in other `Places`."""
+        """Whether all hair has the same numbers of strands and points as in other `Places`."""
         return self.hair.keys() == others.hair.keys() and all(
             place[1] == others.hair[owner][1] for owner, place in self.hair.items()
         )
 
     def has_still_surfaces(self, others):
-        """The same of surfaces."""
+        """Whether all surfaces are unmoved relative to other `Places`."""
         return self.surfaces.keys() == others.surfaces.keys() and all(
             place[2] == others.surfaces[owner][2] for owner, place in self.surfaces.items()
         )
@@ -46,7 +46,7 @@ def _is_unmoved(hair, other):
 
 
 def _combed(before, now):
-    """The `strand_textures.Moved` that took hair from one place to the other; None where more or less happened."""
+    """The `strand_textures.Moved` from one place of hair to the other; None unless it is the only change."""
     moved = now[3]
     is_next = moved is not None and moved.turn == 1 + (before[3].turn if before[3] else 0)
     return moved if is_next and before[0] is now[0] else None
@@ -62,7 +62,7 @@ class Motion:
     size: tuple
 
     def hair(self, owner):
-        """(record, samplers) of a hair: hair without a counterpart of the same shape has no motion."""
+        """(record, samplers) of a hair; hair without a counterpart of the same shape has no motion."""
         now = self.now.hair[owner]
         before, after = (other.hair.get(owner, now) for other in (self.before, self.after))
         before, after = (place if place[1] == now[1] else now for place in (before, after))
@@ -78,7 +78,7 @@ class Motion:
         return record, {**samplers, "moved_rows": rows, "moved_points": points}
 
     def surface(self, owner):
-        """The same of a surface."""
+        """(record, samplers) of a surface."""
         now = self.now.surfaces[owner]
         before, after = (other.surfaces.get(owner, now) for other in (self.before, self.after))
         before, after = (place if place[1] == now[1] else now for place in (before, after))
@@ -98,34 +98,34 @@ class Motion:
 def draw(drawn, motion, view, buffer, has_surfaces=True):
     """Return a texture of motion vectors [pixels] for the `VisibilityBuffer` that a `DrawnScene` was drawn into.
 
-    has_surfaces: whether those of surfaces are in it.
+    has_surfaces: whether to include motion vectors of surfaces.
     """
-    surfaces = zip(drawn.surfaces, _told_apart(drawn.surface_owners), strict=True) if has_surfaces else ()
+    surfaces = zip(drawn.surfaces, _unique(drawn.surface_owners), strict=True) if has_surfaces else ()
     with buffer.surfaces_of_part(render_programs.MOTION_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for (surface, _parts), owner in surfaces:
             record, samplers = motion.surface(owner)
             blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "motion": uniforms.uniform_buffer(record)}
             with drawing.bound(render_programs.surface_motion_program(), blocks, samplers):
                 surface.corners.triangles.draw(render_programs.surface_motion_program())
-    inputs = [({"motion": record}, samplers) for record, samplers in map(motion.hair, _told_apart(drawn.owners))]
+    inputs = [({"motion": record}, samplers) for record, samplers in map(motion.hair, _unique(drawn.owners))]
     return buffer.part_by(render_programs.strand_motion_program(), render_programs.MOTION_FORMAT, inputs)
 
 
 def places(drawn, world_to_view, view_to_clip):
-    """Return the `Places` of a `DrawnScene`, also one read without lighting."""
+    """Return the `Places` of a `DrawnScene`, which may be read without lighting."""
     hair = {
         owner: (strands.texture, (strands.strand_count, strands.point_count), to_world, strands.moved)
-        for (strands, _shading, to_world, *_), owner in zip(drawn.hair, _told_apart(drawn.owners), strict=True)
+        for (strands, _shading, to_world, *_), owner in zip(drawn.hair, _unique(drawn.owners), strict=True)
     }
     surfaces = {
         owner: (surface.places, surface.shape, surface.fingerprint, surface.to_world)
-        for (surface, _parts), owner in zip(drawn.surfaces, _told_apart(drawn.surface_owners), strict=True)
+        for (surface, _parts), owner in zip(drawn.surfaces, _unique(drawn.surface_owners), strict=True)
     }
     return Places(view_to_clip @ world_to_view, hair, surfaces)
 
 
-def _told_apart(owners):
-    """[(owner, how many of its things come before)]: an object may own several instances."""
+def _unique(owners):
+    """[(owner, index among items with the same owner)]: unique keys, as an object may own several instances."""
     counts = Counter()
     keys = []
     for owner in owners:

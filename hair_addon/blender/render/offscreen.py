@@ -20,17 +20,17 @@ from . import drawn_scene, film, light_paths
 
 
 def draw_picture(settings, drawn=None, lens_passes=None):
-    """(height, width, 4) float32 of the context's scene: scene-linear, premultiplied, first row at the bottom.
+    """(height, width, 4) float32 of the context's scene: scene-linear, premultiplied, bottom row first.
 
-    settings: `PictureSettings`, but `FRAME_FIELDS`; drawn: the `DrawnScene` of the context's scene, None: read it here;
-    lens_passes: with depth of field, through how many points of the lens it looks at least, None: one for each sample.
-    Raises `HairError`.
+    settings: `PictureSettings` without `FRAME_FIELDS`; drawn: the `DrawnScene` of the context's scene, None: read here;
+    lens_passes: with depth of field, the minimum number of points on the lens, None: one for each sample. Raises
+    `HairError`.
     """
     return run_now(drawing_picture(settings, drawn, lens_passes))
 
 
 def drawing_picture(settings, drawn=None, lens_passes=None):
-    """`draw_picture` as work in stages (core/long_work.py), all of which run where the graphics are."""
+    """`draw_picture` as work in stages (core/long_work.py), which must all run in the thread of the GPU context."""
     if max(settings.width, settings.height) > MOST_DRAWN:
         raise HairError(
             f"{settings.width} × {settings.height} pixels exceed {MOST_DRAWN} a side: use fewer, or render a frame."
@@ -40,7 +40,7 @@ def drawing_picture(settings, drawn=None, lens_passes=None):
     depsgraph = scene.present_depsgraph()
     lens = camera_lens.read_lens(context.scene, depsgraph)
     per_side, pass_count = settings.samples_per_side, 1
-    if lens is not None:  # a pass for each of its points
+    if lens is not None:  # one pass per point on the lens
         sample_count = per_side**2
         per_side = pixel_sampling.samples_per_side(sample_count, lens_passes or sample_count)
         pass_count = sample_count // per_side**2
@@ -68,7 +68,7 @@ def drawing_picture(settings, drawn=None, lens_passes=None):
 
 
 def start_gpu():
-    """Initialise the GPU, which Blender does not do in background mode. Raises `HairError` where nobody can draw."""
+    """Initialize the GPU, which Blender does not do in background mode. Raises `HairError` if drawing is impossible."""
     if bpy.app.background:
         try:
             gpu.init()
@@ -86,7 +86,7 @@ def start_gpu():
 def write_picture(pixels, path, blender_scene):
     """Write a picture of `draw_picture` as PNG, through the scene's view transform, or as linear EXR.
 
-    The file appears whole or not at all. Raises `HairError` for a folder that cannot be written or another format.
+    The file is written completely or not at all. Raises `HairError` for other formats, or if it cannot be written.
     """
     path = Path(path)
     formats = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32")}
@@ -106,7 +106,7 @@ def write_picture(pixels, path, blender_scene):
 
 
 def _save(image, path, blender_scene, file_format, color_depth):
-    """Save through a scene's view transform, with image settings of our own for the time it takes."""
+    """Save through a scene's view transform, with temporary image settings."""
     settings = blender_scene.render.image_settings
     # The media type first: the available formats depend on it, and a scene may be set to write a movie.
     wanted = {"media_type": "IMAGE", "file_format": file_format, "color_mode": "RGBA", "color_depth": color_depth}

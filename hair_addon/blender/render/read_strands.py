@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands of Curves as they are drawn: of one point count, without those that have no place."""
+"""Strands of Curves for drawing: with the same point count, without strands that have invalid coordinates."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -17,14 +17,14 @@ from ..host.notices import name_of
 
 @dataclass(frozen=True)
 class ReadStrands:
-    """Strands in local coordinates, none of which is broken."""
+    """Valid strands in local coordinates."""
 
     points: np.ndarray  # (S, P, 3) float32
     radii: np.ndarray  # (S, P) float32
     randoms: np.ndarray  # (S,) float32
-    wetness: np.ndarray | None  # (S,) float32, None where strands do not differ
-    is_sound: np.ndarray | None  # (N,) bool: which of the curves they are, None for all
-    note: HairError | None  # what is left out
+    wetness: np.ndarray | None  # (S,) float32, None if strands do not differ
+    is_sound: np.ndarray | None  # (N,) bool: whether each curve is valid, None if all are
+    note: HairError | None  # about curves that are left out
 
     @property
     def arrays(self) -> tuple[np.ndarray | None, ...]:
@@ -33,10 +33,10 @@ class ReadStrands:
 
 
 def read(datablock: Any) -> ReadStrands:
-    """The strands of Curves, stored or evaluated ones; those with a coordinate that is no place are left out.
+    """Read the strands of stored or evaluated Curves; those with infinite or excessive coordinates are left out.
 
-    That is said once for all strands of Curves. Curves of fewer points than the longest are resampled to as many, and
-    Catmull-Rom splines to the points that strands have. Raises `HairError` where nothing can be drawn.
+    A message about these is printed once per datablock. Curves with fewer points than the longest are resampled, and
+    Catmull-Rom splines to at least the point count of strands. Raises `HairError` if nothing can be drawn.
     """
     counts = curves.point_counts(datablock)
     if not len(counts):
@@ -63,9 +63,9 @@ def read(datablock: Any) -> ReadStrands:
 
 
 def _are_sound(points, counts):
-    """(N,) bool: whether all of a curve can be drawn; None where all curves can be. points: (M, 3), curve by curve."""
+    """(N,) bool: whether all points of a curve are valid; None if all are. points: (M, 3), curve after curve."""
     flat = points.ravel()
-    # The sum of squares tells it in a tenth of the time, where it is not that large itself.
+    # A small sum of squares proves that all points are valid, in a tenth of the time.
     with np.errstate(over="ignore", invalid="ignore"):
         is_small = flat @ flat <= notices.LARGEST
     if is_small:
@@ -81,7 +81,7 @@ def _are_sound(points, counts):
 
 
 def _left_out(datablock, is_sound):
-    """Say once that some strands of Curves are left out. Raises `HairError` where that is all of them."""
+    """Print once that some strands of Curves are left out. Raises `HairError` if all of them are."""
     name = name_of(datablock)
     if not is_sound.any():
         raise HairError('"{name}" is not drawn: all of its strands have non-finite coordinates.', name=name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is kept in place of strands that cannot be drawn, so that no redraw tries again before they change."""
+"""A cached marker for strands that cannot be drawn, so that redraws do not try again before they change."""
 
 import sys
 from dataclasses import dataclass
@@ -9,17 +9,17 @@ from ...core.errors import HairError
 
 @dataclass(frozen=True)
 class Refused:
-    """Strands that are not drawn, and why."""
+    """Strands that are not drawn, and the reason."""
 
     error: HairError
 
 
 def refused(error: HairError) -> Refused:
-    """Say once why strands are not drawn."""
+    """Print why strands are not drawn, and return the marker."""
     print(f"Vellus: {error}", file=sys.stderr)
     return Refused(error)
 
 
-def error_of(kept: object) -> HairError | None:
-    """Why what `hair_cache.strand_cache` keeps is not drawn; None where it is."""
-    return kept.error if isinstance(kept, Refused) else None
+def error_of(cached: object) -> HairError | None:
+    """The error of a value in `hair_cache.strand_cache`, or None."""
+    return cached.error if isinstance(cached, Refused) else None

@@ -14,9 +14,9 @@ from ..gpu import (
 
 
 def draw_hiding(drawn, view, clip_planes=None):
-    """Draw the depth of all surfaces, and nothing of their light, into the bound framebuffer.
+    """Draw only the depth of all surfaces into the bound framebuffer.
 
-    clip_planes: (6, 4) of `uniforms.CLIPPING` that cut them off, None for none.
+    clip_planes: (6, 4) of `uniforms.CLIPPING` that clip surfaces, None for none.
     """
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for surface, _parts in drawn.surfaces:
@@ -24,9 +24,9 @@ def draw_hiding(drawn, view, clip_planes=None):
 
 
 def draw(drawn, view, buffer, is_transparent):
-    """Fill a `VisibilityBuffer` as a render shows a scene: with the background unless it is to be left empty.
+    """Fill a `VisibilityBuffer` with a render of a scene; is_transparent: without the background.
 
-    What is nearest is found before anything is shaded, so that each sample is shaded once.
+    The nearest strand or surface is found before shading, so that each sample is shaded once.
     """
     with buffer.numbered():
         _number_surfaces(drawn, view)
@@ -36,7 +36,7 @@ def draw(drawn, view, buffer, is_transparent):
 
 
 def _number_surfaces(drawn, view):
-    """Draw numbers of the triangles of all surfaces, one after the other, into the bound framebuffer."""
+    """Draw the numbers of all surfaces' triangles, counted consecutively, into the bound framebuffer."""
     first_triangle = 0
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for surface, _parts in drawn.surfaces:
@@ -47,7 +47,7 @@ def _number_surfaces(drawn, view):
 def draw_hair(drawn, view, buffer, is_viewport=False, clip_planes=None):
     """Draw all hair in front of the surfaces of a `VisibilityBuffer`.
 
-    view: a `uniforms.VIEW` record; is_viewport: only as much of it as is seen from there, and as the artist wants;
+    view: a `uniforms.VIEW` record; is_viewport: use the viewport's level of detail and fraction of strands;
     clip_planes: as for `draw_hiding`.
     """
     hair = _hair_in_view(drawn, view, is_viewport)
@@ -55,9 +55,9 @@ def draw_hair(drawn, view, buffer, is_viewport=False, clip_planes=None):
 
 
 def relight_viewport(drawn, view, buffer, is_shadowed=False):
-    """Return a texture of what a `VisibilityBuffer` has in its samples, as a viewport lays it over Blender's drawing.
+    """Return a texture of a `VisibilityBuffer`'s samples, shaded again with a `DrawnScene`'s lights, for viewports.
 
-    In the light of a `DrawnScene`; view: record that it was drawn with; is_shadowed: with the shadow of hair.
+    view: the record that the buffer was drawn with; is_shadowed: include the shadow of hair.
     """
     with buffer.surfaces_of_part():
         if is_shadowed:
@@ -66,7 +66,7 @@ def relight_viewport(drawn, view, buffer, is_shadowed=False):
 
 
 def relight(drawn, view, buffer, is_transparent):
-    """The same as a render shows it: with surfaces, and with the background unless it is to be left empty."""
+    """`relight_viewport` for a render: with surfaces; is_transparent: without the background."""
     picture = buffer.part()
     _shade_behind_hair(drawn, view, buffer, picture, is_transparent)
     return _relight_hair(drawn, view, buffer, picture)
@@ -78,7 +78,7 @@ def _relight_hair(drawn, view, buffer, picture, is_viewport=False):
 
 
 def find_hair(drawn, view, buffer, chosen=None, clip_planes=None):
-    """Find the nearest strands of hair for a `VisibilityBuffer` as a viewport shows them, and shade none.
+    """Find the nearest strands in a viewport for a `VisibilityBuffer`, without shading.
 
     chosen: indices of the hair, None for all; clip_planes: as for `draw_hiding`.
     """
@@ -88,7 +88,7 @@ def find_hair(drawn, view, buffer, chosen=None, clip_planes=None):
 
 
 def _hair_lights(drawn):
-    """`uniforms.LIGHTS` of all hair, or of each."""
+    """`uniforms.LIGHTS` for all hair, or for each hair."""
     return drawn.lights if drawn.hair_lights is None else drawn.hair_lights
 
 
@@ -101,7 +101,7 @@ def _hair_in_view(drawn, view, is_viewport):
 
 
 def _shade_behind_hair(drawn, view, buffer, picture, is_transparent):
-    """Fill a picture of a `VisibilityBuffer` with all but hair, each surface where it is nearest."""
+    """Fill a picture of a `VisibilityBuffer` with everything but hair."""
     background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
     has_image = drawn.world.image is not None and not is_transparent
     has_over = bool(drawn.clear) or any(parts is None for _surface, parts in drawn.surfaces)
@@ -119,14 +119,14 @@ def _shade_behind_hair(drawn, view, buffer, picture, is_transparent):
 
 
 def draw_arrival(drawn, view, buffer):
-    """Return a texture of light visibility for the content of a `VisibilityBuffer`, to which hair was added last."""
+    """Return a texture of light visibility for the content of a `VisibilityBuffer`, after its hair was added."""
     with buffer.surfaces_of_part(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         _draw_by_lights(drawn, view, "light/surface_irradiance.frag", are_holdouts_left_out=True)
     return buffer.part_by(render_programs.strand_arrival_program())
 
 
 def draw_hair_shadow(drawn, view, buffer):
-    """Return a texture of the part of the light on surfaces that hair lets through; 1 where there is no surface."""
+    """Return a texture of the fraction of light on surfaces that hair lets through; 1 without a surface."""
     white = (1.0, 1.0, 1.0, 1.0)
     with buffer.surfaces_of_part(background=white), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         _draw_by_lights(drawn, view, "shadows/hair_shadow.frag")
@@ -134,13 +134,13 @@ def draw_hair_shadow(drawn, view, buffer):
 
 
 def draw_viewport_shadow(drawn, view):
-    """As `draw_hiding`, and as black over what Blender draws, whose alpha is the part of the light that hair stops."""
+    """Like `draw_hiding`, with black over Blender's drawing, whose alpha is the fraction of light that hair blocks."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         _draw_by_lights(drawn, view, "shadows/hair_shadow_view.frag")
 
 
 def _draw_by_lights(drawn, view, fragment, are_holdouts_left_out=False):
-    """Draw how much of the light reaches surfaces; are_holdouts_left_out: leave the picture empty where they are."""
+    """Draw the fraction of light that reaches surfaces; are_holdouts_left_out: leave the picture empty at holdouts."""
     _see_through_hair(drawn, view)
     program = surface_programs.arrival_program(fragment)
     for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
@@ -151,7 +151,7 @@ def _draw_by_lights(drawn, view, fragment, are_holdouts_left_out=False):
 
 
 def _light_of(drawn, solid):
-    """(`uniforms.LIGHTS` records, {sampler: texture} dictionaries) of each surface that is solid, or of each clear."""
+    """(`uniforms.LIGHTS` records, {sampler: texture} dictionaries) of all solid, or all clear surfaces."""
     count = len(drawn.surfaces)
     of_all = [drawn.lights] * len(drawn.surface_visibility) if drawn.surface_lights is None else drawn.surface_lights
     chosen = slice(count) if solid else slice(count, None)
@@ -163,7 +163,7 @@ def _light_of(drawn, solid):
 
 
 def _see_through_hair(drawn, view):
-    """The hair's shadow on a surface takes the colour of the hair with most strands: one colour a draw call."""
+    """Write the hair with most strands into a view record, as a draw call has a single color of hair's shadow."""
     if drawn.hair:
         shading = drawn.hair[ambient_visibility.densest([strands for strands, *_ in drawn.hair])][1]
         view["hair_forward"][:3], view["seen_opacity"] = shading.forward, shading.opacity
@@ -171,29 +171,29 @@ def _see_through_hair(drawn, view):
 
 
 def _shade_surfaces(drawn, view, buffer, picture):
-    """Shade all surfaces but holdouts where they are nearest, below those that are clear."""
+    """Shade all surfaces except holdouts where they are nearest, below clear surfaces."""
     first_triangle = 0
     for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
         if parts is not None:
-            given = view, lights, samplers, buffer, picture, bool(drawn.clear)
-            surface_shading.shade(surface, parts, first_triangle, *given)
+            arguments = view, lights, samplers, buffer, picture, bool(drawn.clear)
+            surface_shading.shade(surface, parts, first_triangle, *arguments)
         first_triangle += surface.triangle_count
 
 
-# By how much of the depth range surfaces are drawn nearer when they are drawn again: more than rounding, so that none
-# hides itself.
+# Fraction of the depth range by which surfaces are drawn nearer when they are drawn again: more than rounding, so that
+# a surface does not occlude itself.
 _NEARER = 1e-5
 
 
 def _nearer(view):
-    """A view that sees all in the same places, but a little nearer."""
+    """A view record in which everything is slightly nearer."""
     record = view.copy()
     record["world_to_clip"][:, 2] -= _NEARER * record["world_to_clip"][:, 3]  # transposed
     return record
 
 
 def _draw_over_surfaces(drawn, view):
-    """Draw holdouts into the bound framebuffer, and then over all surfaces those that are clear."""
+    """Draw holdouts into the bound framebuffer, and then clear surfaces over all surfaces."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for (surface, parts), lights in zip(drawn.surfaces, _light_of(drawn, solid=True)[0], strict=True):
             if parts is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The strands that a camera sees, and what is drawn of them by dual scattering: where paths of light start."""
+"""The strands visible from a camera, with their light by dual scattering: the starts of light paths."""
 
 import numpy as np
 
@@ -8,14 +8,14 @@ from ..gpu import drawing
 from ..gpu.visibility_buffer import VisibilityBuffer
 from . import scene_drawing
 
-_MOST_SAMPLES = 4096  # along a side
+_MOST_SAMPLES = 4096  # along each side
 
 
 def find(drawn, grid, camera, window, count, turn):
-    """`seen_rays.Seen` of a `DrawnScene` in a window of a camera's picture, at about `count` places.
+    """`seen_rays.Seen` of a `DrawnScene` in a window of a camera's picture, for about `count` samples.
 
     grid: `StrandGrid` of the scene's hair; camera: (4, 4) world to view and view to clip; window: (low, high) corners
-    (2,) in clip space; turn: which of several for the same picture.
+    (2,) in clip space; turn: index among passes of the same picture.
     """
     whole, tile = _samples(camera[1], window, count)
     view = drawing.pass_record(*camera, whole, turn, tile)

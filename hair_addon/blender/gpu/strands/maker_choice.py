@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether strands are made where they are drawn: measured once, the first time that this could be done.
+"""Whether the GPU makes strands where they are drawn, decided by one measurement on first use.
 
-The other way computes points for the host and uploads them. Where a processor draws, an upload is a copy, and a compute
-program takes longer than Warp does; on graphics cards it is the other way round.
+Otherwise Warp computes points, and they are uploaded. With software rendering an upload is a copy, and a compute
+program is slower than Warp; on GPUs it is the other way round.
 """
 
 import time
@@ -18,13 +18,13 @@ _STRANDS, _GUIDES, _POINTS, _SLOTS = 4096, 64, 41, 8
 _RUNS = 3
 
 
-@shaders.kept
+@shaders.cached
 def times() -> tuple[float, float]:
-    """Seconds in which the GPU makes some strands, and in which as many are uploaded; infinite where it cannot."""
+    """Seconds in which the GPU makes some strands, infinite if it cannot, and in which as many are uploaded."""
     try:
         maker = _maker()
     except HairError:
-        return np.inf, 0.0  # the driver lacks something, and nobody has to know
+        return np.inf, 0.0  # unsupported by the driver, which needs no message
     points = np.zeros((_STRANDS, _POINTS, 3), np.float32)
     radii = np.zeros(points.shape[:2], np.float32)
     strands = [strand_textures.upload_strands(points, radii)]
@@ -39,7 +39,7 @@ def times() -> tuple[float, float]:
 
 
 def is_faster() -> bool:
-    """Whether the GPU makes strands in half the time that their upload takes, which is a part of the other way."""
+    """Whether the GPU makes strands in half the time of their upload, which is only a part of the alternative."""
     makes, uploads = times()
     return makes < 0.5 * uploads
 
@@ -50,7 +50,7 @@ def can_make() -> bool:
 
 
 def _maker():
-    """Of strands that all follow other guides, as neighbours do on a surface."""
+    """A maker of strands that follow different guides, like neighbors on a surface."""
     slots = (np.arange(_STRANDS)[:, None] * _GUIDES // _STRANDS + np.arange(_SLOTS)) % _GUIDES
     up = np.tile(np.float32([0.0, 0.0, 1.0]), (_STRANDS, 1))
     weights = np.full(slots.shape, 1.0 / _SLOTS, np.float32)
@@ -61,13 +61,13 @@ def _maker():
 
 
 def _seconds(work, strands):
-    """Least time of some runs, each to its end on the GPU, after one that warms up."""
+    """Least time of some runs, each completed on the GPU, after a warm-up run."""
     found = []
     for _ in range(1 + _RUNS):
         started = time.perf_counter()
         work()
         end = gpu.types.GPUFrameBuffer(color_slots=strands[0].texture)
         with end.bind():
-            end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # what is read has to be there
+            end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # reading waits for completion
         found.append(time.perf_counter() - started)
     return min(found[1:])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The box around strands that only the GPU knows: boxes of each, joined there, of which six numbers come back.
+"""Bounding boxes of strands that are only on the GPU: boxes of single strands are joined there, six numbers are read.
 
-Compute programs of every backend can do it: neither atomics nor memory that a work group shares is needed.
+Compute programs of every backend support it: neither atomics nor shared memory is needed.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from .. import driver_textures, shaders
 from ..strand_textures import TEXTURE_WIDTH
 
 _GROUP_SIZE = 64
-_PASSES = 3  # each joins as many boxes to one as the others: the cube root of their number
+_PASSES = 3  # each joins the same number of boxes into one: the cube root of the strand count
 
 # Texels of a box: least and greatest coordinates.
 _BOX = 2
@@ -22,18 +22,18 @@ _BOX = 2
 
 @dataclass(frozen=True)
 class StrandBounds:
-    """Textures that boxes are joined in, from one of each strand to one of all; made by `new_bounds`."""
+    """Textures of bounding boxes, from one per strand to one for all; made by `new_bounds`."""
 
-    levels: tuple  # of (texture, how many boxes)
-    share: int  # boxes that become one
+    levels: tuple  # of (texture, number of boxes)
+    share: int  # number of boxes that are joined into one
 
     @property
     def boxes(self) -> gpu.types.GPUTexture:
-        """Where the box of each strand is written: two texels, in rows of as many as fit."""
+        """Texture of the box of each strand: two texels each, with as many per row as fit."""
         return self.levels[0][0]
 
     def read(self) -> np.ndarray:
-        """(2, 3) float32, the least and the greatest coordinates; waits until the strands are made."""
+        """(2, 3) float32 least and greatest coordinates; waits until the strands are made."""
         program = _join_program()
         program.bind()
         program.uniform_int("share", self.share)
@@ -48,7 +48,7 @@ class StrandBounds:
 
 
 def new_bounds(strand_count: int) -> StrandBounds:
-    """`StrandBounds` of so many strands. Raises `HairError` where the driver lacks something."""
+    """Return `StrandBounds` for a number of strands. Raises `HairError` if the driver does not support it."""
     _join_program()
     share = max(2, int(np.ceil(strand_count ** (1.0 / _PASSES))))
     counts = [strand_count]
@@ -62,7 +62,7 @@ def _boxes_texture(count):
     return driver_textures.made((in_row * _BOX, -(-count // in_row)), "RGBA32F")
 
 
-@shaders.kept
+@shaders.cached
 def _join_program():
     """The compute program that joins boxes."""
     info = gpu.types.GPUShaderCreateInfo()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands carried with their surface where they are drawn: core/geometry/surface_deform.py as a compute program.
+"""Deforms strands with their surface on the GPU: core/geometry/surface_deform.py as a compute program.
 
-Strands at rest and their roots are uploaded once, or made there; a pose of the surface uploads the places of the
-vertices around roots.
+Strands at rest and their roots are uploaded once, or made on the GPU; a pose of the surface only uploads the positions
+of vertices around roots.
 """
 
 from dataclasses import dataclass
@@ -25,24 +25,24 @@ _GROUP_SIZE = 64
 
 @dataclass(frozen=True)
 class StrandCarrier:
-    """Strands at rest and where they are rooted; made by `new_carrier`."""
+    """Strands at rest and their roots; made by `new_carrier`."""
 
-    rest: gpu.types.GPUTexture  # as `StrandsOnGPU.texture`
-    roots: gpu.types.GPUTexture  # shaders/strands/carry_strands.comp
+    rest: gpu.types.GPUTexture  # in the format of `StrandsOnGPU.texture`
+    roots: gpu.types.GPUTexture  # see shaders/strands/carry_strands.comp
     vertices: np.ndarray  # (V, 3) of the surface at rest
     turner: vertex_turner.VertexTurner  # of the vertices around roots
     changes: StrandChanges
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
-        """All that it holds."""
+        """All textures."""
         return [self.rest, self.roots, *self.turner.textures, *self.changes.textures]
 
     def carry(self, strands: StrandsOnGPU, posed: np.ndarray | None) -> StrandsOnGPU:
-        """Carry all strands from their rest; the `StrandsOnGPU` after it.
+        """Deform all strands from rest; returns the new `StrandsOnGPU`.
 
-        strands: of the same roots, whose texture is changed: another one than `rest`; posed: (V, 3) float32, finite,
-        where the surface's vertices are now, None: at rest. Raises `HairError` where counts do not match.
+        strands: with the same roots; their texture, which must not be `rest`, is changed; posed: (V, 3) float32 finite
+        current vertices of the surface, None: at rest. Raises `HairError` if counts do not match.
         """
         turned = self.turner.turn(posed)
         self.changes.keep(strands)
@@ -74,15 +74,15 @@ def new_carrier(
 ) -> StrandCarrier:
     """The `StrandCarrier` of S strands.
 
-    rest: their texture; places: (S, 3) int32 vertices around each root and (S, 3) float32 barycentric coordinates;
-    vertices: (V, 3) float32 of the surface at rest; turning: of the vertices around roots; slides: (S, 3) from where
-    strands begin to these places at rest, None where they begin there. Raises `HairError` where counts or indices do
-    not match, or the driver lacks something.
+    rest: texture of the strands; places: (S, 3) int32 vertices around each root and (S, 3) float32 barycentric
+    coordinates; vertices: (V, 3) float32 of the surface at rest; turning: of the vertices around roots; slides: (S, 3)
+    offsets from first points to roots at rest, None if strands begin at their roots. Raises `HairError` if counts or
+    indices do not match, or the driver does not support it.
     """
     corners, barycentric = places
     require_count("barycentric coordinates", len(barycentric), len(corners))
     require_indices("vertices", corners, len(vertices))
-    _carry_program()  # first: where there is none, nothing is uploaded
+    _carry_program()  # first: if it is not supported, nothing is uploaded
     turner = vertex_turner.new_turner(turning, vertices)
     found = np.searchsorted(turning.vertices, corners)
     require_indices("vertices", found, len(turning.vertices))
@@ -98,9 +98,9 @@ def new_carrier(
     return StrandCarrier(rest, roots, vertices, turner, new_changes(len(corners), point_count))
 
 
-@shaders.kept
+@shaders.cached
 def _carry_program():
-    """The compute program that carries strands."""
+    """The compute program that deforms strands with their surface."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_GROUP_SIZE)
     for slot, name in enumerate(("rest", "roots", "vertices")):

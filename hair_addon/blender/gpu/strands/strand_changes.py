@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of all strands when a program has changed them: where they were before, and the box around them."""
+"""Data of strands after a program has changed them: their former points, and their bounding box."""
 
 from dataclasses import dataclass, replace
 
@@ -11,48 +11,48 @@ from .. import driver_textures
 from ..strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, keep_strands, numbers_texture, row_strands_of
 from . import strand_bounds
 
-# Points of strands up to which it is kept where they were, for motion vectors: 64 MiB.
+# Maximum number of points whose former positions are stored for motion vectors: 64 MiB.
 MOST_MOVED = 8 << 20
 
 
 @dataclass(frozen=True)
 class StrandChanges:
-    """Textures of what a program changes beside the strands; made by `new_changes`."""
+    """Textures that a program changes besides the strands; made by `new_changes`."""
 
-    moved: gpu.types.GPUTexture  # where strands were, as `Moved` has it; a texel where that is not kept
-    row_moved: int  # strands in a row of it, 0 where it is not kept
+    moved: gpu.types.GPUTexture  # former points, as `Moved.points`; a single texel if they are not stored
+    row_moved: int  # strands per row of it, 0 if they are not stored
     moved_rows: gpu.types.GPUTexture
     bounds: strand_bounds.StrandBounds
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
-        """All that it holds."""
+        """All textures."""
         return [self.moved, self.moved_rows, *(boxes for boxes, _count in self.bounds.levels)]
 
     def keep(self, strands: StrandsOnGPU) -> None:
-        """Keep where strands are that a program is about to change."""
+        """Store the points of strands that a program is about to change."""
         if self.row_moved:
             keep_strands(strands, self.moved, strands.strand_count, self.row_moved)
 
     def bind(self, program: gpu.types.GPUShader) -> None:
-        """Bind `boxes` of a program that is bound."""
+        """Bind the image `boxes` of a bound program."""
         program.image("boxes", self.bounds.boxes)
 
     def changed(self, strands: StrandsOnGPU) -> StrandsOnGPU:
-        """`StrandsOnGPU` after the program, with exact bounds: waits until it has run, and six numbers come back."""
+        """The `StrandsOnGPU` after the program, with exact bounds; waits until the program has run."""
         before = strands.moved.turn if strands.moved else 0
         if self.row_moved:
             moved = Moved(self.moved, self.row_moved, self.moved_rows, before + 1)
         else:
-            # It is not known where strands were: as if there had been more changes than one.
+            # Former points are unknown: counted like more than one change.
             moved = Moved(self.moved, 1, self.moved_rows, before + 2)
         return replace(strands, moved=moved, bounds=self.bounds.read(), is_made=True, has_points=False)
 
 
 def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -> StrandChanges:
-    """`StrandChanges` of strands of as many points each; keeps_moved: whether to keep where they were before.
+    """Return `StrandChanges` for strands with `point_count` points; keeps_moved: store their former points.
 
-    Raises `HairError` where the driver lacks something.
+    Raises `HairError` if the driver does not support it.
     """
     bounds = strand_bounds.new_bounds(strand_count)
     if keeps_moved and strand_count * point_count <= MOST_MOVED:
@@ -63,13 +63,13 @@ def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -
 
 
 def declare_put(info: gpu.types.GPUShaderCreateInfo, first_slot: int) -> None:
-    """Declare what shaders/strands/write_packed_strand.glsl writes, from an image slot on."""
+    """Declare the images of shaders/strands/write_packed_strand.glsl, from an image slot on."""
     for slot, (name, texture_format) in enumerate((("strands", "RG32F"), ("boxes", "RGBA32F")), start=first_slot):
         info.image(slot, texture_format, "FLOAT_2D", name, qualifiers={"WRITE"})
 
 
 def rows_texture(values: np.ndarray, channels: int) -> tuple[gpu.types.GPUTexture, int]:
-    """(texture, whole rows of values in a row of it) of (N, channels T) float32, T texels each."""
+    """(texture, rows of values per row of texels) of (N, channels T) float32 values, T texels each."""
     texels = values.shape[1] // channels
     in_row = min(TEXTURE_WIDTH // texels, len(values))
     height = -(-len(values) // in_row)
@@ -79,6 +79,6 @@ def rows_texture(values: np.ndarray, channels: int) -> tuple[gpu.types.GPUTextur
 
 
 def empty_rows(count: int, texels: int, texture_format: str = "RGBA32F") -> tuple[gpu.types.GPUTexture, int]:
-    """The same without values."""
+    """`rows_texture` for `count` rows with undefined values."""
     in_row = min(TEXTURE_WIDTH // texels, count)
     return driver_textures.made((in_row * texels, -(-count // in_row)), texture_format), in_row

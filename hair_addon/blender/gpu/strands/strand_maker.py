@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands made of their guides by compute programs, in the texture that they are drawn from.
+"""Strands interpolated from their guides by compute programs, in the texture from which they are drawn.
 
-What a strand follows is uploaded once. An edit of guides uploads these alone, and nothing is read back.
-core/interpolation has the mathematics; shaders/strands/interpolate_strands.comp is its twin.
+Bindings of strands are uploaded once. An edit of guides only uploads the guides, and only bounds are read back.
+core/interpolation documents the mathematics; shaders/strands/interpolate_strands.comp implements the same.
 """
 
 from dataclasses import dataclass, replace
@@ -21,30 +21,30 @@ _GROUP_SIZE = 64
 
 @dataclass(frozen=True)
 class StrandMaker:
-    """`BoundStrands` on the GPU, all of them but their guides' points; made by `new_maker`."""
+    """`BoundStrands` on the GPU, without the points of guides; made by `new_maker`."""
 
-    bindings: gpu.types.GPUTexture  # of each strand its root, its normal, and its guides with their weights
+    bindings: gpu.types.GPUTexture  # for each strand its root, its normal, and its guides with weights
     guide_normals: gpu.types.GPUTexture
-    segments: gpu.types.GPUTexture  # of guides, in their frames; then what their weights are limited by
-    changes: StrandChanges | None  # None where strands are made for styles
+    segments: gpu.types.GPUTexture  # of guides, in their frames; followed by the limits of their weights
+    changes: StrandChanges | None  # None if strands are made for styles
     record: np.ndarray  # uniforms.MAKING
     block: gpu.types.GPUUniformBuf
-    slot_count: int  # guides of a strand
+    slot_count: int  # guides per strand
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
-        """All that it holds."""
+        """All textures."""
         own = [self.bindings, self.guide_normals, self.segments]
         return own + ([] if self.changes is None else self.changes.textures)
 
     def make(
         self, strands: StrandsOnGPU, guide_points: np.ndarray, rest: gpu.types.GPUTexture | None = None
     ) -> StrandsOnGPU:
-        """Make all strands for guides (G, P, 3) float32, in the coordinates of roots; the `StrandsOnGPU` after it.
+        """Make all strands for guides (G, P, 3) float32, in the coordinates of roots; returns the new `StrandsOnGPU`.
 
-        strands: of the same roots, whose texture is changed; their arrays on this side are as before, but for their
-        bounds: six numbers that come back; rest: where strands are to be made in place of what is drawn, to be carried
-        from there. Raises `HairError` where counts do not match.
+        strands: with the same roots; their texture is changed, and of the arrays on the CPU only the bounds; rest: a
+        texture to fill instead, with strands at rest that are deformed later. Raises `HairError` if counts do not
+        match.
         """
         self.require_fitting(strands)
         if rest is None:
@@ -54,16 +54,16 @@ class StrandMaker:
         return self.changes.changed(strands) if rest is None else strands
 
     def require_fitting(self, strands: StrandsOnGPU) -> None:
-        """Raise `HairError` unless there are as many strands and points."""
+        """Raise `HairError` unless the numbers of strands and points match."""
         require_count("strands", strands.strand_count, int(self.record["strand_count"]))
         require_count("points of a strand", strands.point_count, int(self.record["point_count"]))
 
     def fill(self, texture: gpu.types.GPUTexture) -> None:
-        """Make all strands in a texture like that of `StrandsOnGPU`, for the guides of the last `put_guides`."""
+        """Make all strands in a texture like `StrandsOnGPU.texture`, for the guides of the last `put_guides`."""
         self.fill_some(texture, 0, int(self.record["strand_count"]))
 
     def fill_some(self, texture: gpu.types.GPUTexture, first: int, count: int) -> None:
-        """The same of some strands one after the other, the first at the start of the texture."""
+        """`fill` for some consecutive strands, the first at the start of the texture."""
         program = _strands_program(self.slot_count, self.changes is None)
         program.bind()
         program.uniform_block("making", self.block)
@@ -78,13 +78,13 @@ class StrandMaker:
         gpu.shader.unbind()
 
     def limited(self, fading: tuple[float, float, float, float], keep_length: float) -> "StrandMaker":
-        """The same with other `BoundStrands.fading` and `keep_length`: nothing is uploaded but a record."""
+        """A maker with other `BoundStrands.fading` and `keep_length`: only a record is uploaded."""
         record = self.record.copy()
         record["limits"], record["keep_length"] = fading, keep_length
         return replace(self, record=record, block=uniforms.uniform_buffer(record))
 
     def weighed(self, bound: "BoundStrands") -> "StrandMaker":
-        """The same with other guides or weights of the same strands. Raises `HairError` as `new_maker`."""
+        """A maker with other guides or weights of the same strands. Raises `HairError` like `new_maker`."""
         require_count("strands", len(bound.roots), int(self.record["strand_count"]))
         require_count("guides", len(bound.guide_normals), int(self.record["guide_count"]))
         record, slot_count = self.record.copy(), bound.indices.shape[1]
@@ -94,7 +94,7 @@ class StrandMaker:
         return replace(self, bindings=bindings, record=record, block=block, slot_count=slot_count)
 
     def put_guides(self, guide_points: np.ndarray) -> None:
-        """Upload guides, as `make` does."""
+        """Upload guides (G, P, 3) and compute their segments."""
         require_count("guides", len(guide_points), int(self.record["guide_count"]))
         require_count("points of a guide", guide_points.shape[1], int(self.record["point_count"]))
         values = np.ascontiguousarray(guide_points, np.float32).reshape(len(guide_points), -1)
@@ -111,13 +111,13 @@ class StrandMaker:
 
 @dataclass(frozen=True)
 class BoundStrands:
-    """S strands and whom they follow of G guides, as arrays of this side: what `HairBinding` has on a Warp device."""
+    """S strands and their bindings to G guides, as arrays on the CPU: the contents of `HairBinding`."""
 
     roots: np.ndarray  # (S, 3) float32 [m]
     normals: np.ndarray  # (S, 3) float32, unit
     guide_normals: np.ndarray  # (G, 3) float32, unit
     indices: np.ndarray  # (S, k) int32, -1 for none
-    weights: np.ndarray  # (S, k) float32, before guides that differ are left out
+    weights: np.ndarray  # (S, k) float32, before guides that differ too much are left out
     fading: tuple[float, float, float, float]  # `Limits.fading`
     keep_length: float
 
@@ -130,16 +130,15 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
 
 
 def programs_of(slot_count: int, is_plain: bool) -> list[tuple]:
-    """Programs of a `StrandMaker`, for `shaders.compile_one`; is_plain: as in `new_maker`."""
+    """Programs of a `StrandMaker`, for `shaders.compile_one`; is_plain: as for `new_maker`."""
     return [(_segments_program, ()), (_strands_program, (slot_count, is_plain))]
 
 
 def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain: bool = False) -> StrandMaker:
-    """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
+    """The `StrandMaker` of `BoundStrands`, without styles; guides and strands have `point_count` points.
 
-    axes: (3, 3), from the coordinates of roots and guides to those of the strands; is_plain: whether strands are made
-    in single precision, for styles. Raises `HairError` where counts or indices do not match, or the driver lacks
-    something.
+    axes: (3, 3), from the coordinates of roots and guides to those of the strands; is_plain: make strands in single
+    precision, for styles. Raises `HairError` if counts or indices do not match, or the driver does not support it.
     """
     bindings = _binding_rows(bound)
     record = uniforms.MAKING.record()
@@ -150,7 +149,7 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain:
     record["strand_count"], record["guide_count"], record["point_count"] = strand_count, guide_count, point_count
     record["row_guides"] = TEXTURE_WIDTH // (3 * point_count)
     record["row_strands"] = TEXTURE_WIDTH // point_count if is_plain else row_strands_of(point_count)
-    # Programs first: where there are none, nothing is uploaded.
+    # Programs first: if they are not supported, nothing is uploaded.
     slot_count = bound.indices.shape[1]
     _segments_program(), _strands_program(slot_count, is_plain)
     bindings_texture, record["row_bindings"] = rows_texture(bindings, 4)
@@ -162,7 +161,7 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain:
 
 
 def _binding_rows(bound):
-    """(S, 4 T) float32, T texels of each strand: see shaders/strands/interpolate_strands.comp."""
+    """(S, 4 T) float32, T texels per strand: see shaders/strands/interpolate_strands.comp."""
     strand_count, slot_count = bound.indices.shape
     require_count("strands", len(bound.roots), strand_count)
     require_count("normals", len(bound.normals), strand_count)
@@ -187,17 +186,17 @@ def _declared(samplers):
     return info
 
 
-@shaders.kept
+@shaders.cached
 def _segments_program():
-    """The compute program that brings guides into the frames of their roots."""
+    """The compute program that transforms guides into the frames of their roots."""
     info = _declared(("guide_points", "guide_normals"))
     info.image(0, "RGBA32F", "FLOAT_2D", "segments", qualifiers={"WRITE"})
     return shaders.compile_compute(info, "strands/guide_segments.comp")
 
 
-@shaders.kept
+@shaders.cached
 def _strands_program(slot_count, is_plain):
-    """The compute program that makes strands of so many guides each; is_plain: as in `new_maker`."""
+    """The compute program that makes strands of `slot_count` guides each; is_plain: as for `new_maker`."""
     info = _declared(("bindings", "guide_normals", "segments"))
     info.define("SLOTS", str(slot_count))
     for name in ("first_strand", "some_count"):

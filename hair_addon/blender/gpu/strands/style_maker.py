@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles applied to strands in the texture that they are drawn from, after strand_maker.py has made them there.
+"""Applies styles to strands on the GPU, in the texture from which they are drawn, after strand_maker.py has made them.
 
-The program of a stack is the one that core/styling runs, as the same rows of numbers: a slider uploads these alone.
-Centre strands of clumps are made and styled first, level by level, in a texture of their own.
-The texts of steps are those of core/styling.
+The program of a stack is the same rows of numbers that core/styling runs: a slider only uploads these. Center strands
+of clumps are made and styled first, level by level, in their own texture. The sources of steps are shared with
+core/styling.
 """
 
 from dataclasses import dataclass, replace
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
     from ....core.styling.stack import Styling
     from ....core.styling.steps import StrandData
 
-MOST_POINTS = 128  # of a strand: what a thread keeps of it is 32 or 48 bytes a point
+MOST_POINTS = 128  # per strand: a thread needs 32 or 48 bytes per point
 
-# Strands that are made and styled together, as in between they take 16 bytes a point: 43 MB of 41 points.
+# Maximum number of strands that are made and styled together: they need 16 bytes per point, 43 MB with 41 points.
 MOST_AT_ONCE = 1 << 16
 
 _GROUP_SIZE = 64
 
 
 def can_style(styling: "Styling") -> bool:
-    """Whether the GPU can apply these styles; other stacks are applied by Warp."""
+    """Whether the GPU can apply these styles; Warp applies other stacks."""
     return len(styling.program) <= uniforms.MOST_STEPS and 2 <= styling.point_count <= MOST_POINTS
 
 
@@ -43,12 +43,12 @@ def can_style(styling: "Styling") -> bool:
 class _Pass:
     """Strands that are styled together: all of the hair, or the centres of one level of a clump tree."""
 
-    known: gpu.types.GPUTexture  # of each strand its normal, identity, clump centres and masks
+    known: gpu.types.GPUTexture  # for each strand its normal, identity, clump centers and masks
     record: np.ndarray  # uniforms.STYLING
     block: gpu.types.GPUUniformBuf
 
     def put_masks(self, data: "StrandData") -> None:
-        """Upload what is known of the strands anew; `put_steps` is due after it."""
+        """Upload the data of strands again; must be followed by `put_steps`."""
         self.known, self.record["row_known"], self.record["known_texels"] = _known(data)
 
     def put_steps(self, program: Program) -> None:
@@ -65,8 +65,8 @@ class StyleMaker:
     styling: "Styling"
     maker: StrandMaker
     centre_maker: StrandMaker | None  # None without clumps
-    centres: gpu.types.GPUTexture | None  # (K, P) points of centre strands, and the arc lengths
-    locks: gpu.types.GPUTexture  # of each clump centre, and of each guide, its normal and identity
+    centres: gpu.types.GPUTexture | None  # (K, P) points of center strands, and arc lengths
+    locks: gpu.types.GPUTexture  # for each clump center, and each guide, its normal and identity
     levels: list[_Pass]
     hair: _Pass
     changes: StrandChanges
@@ -75,7 +75,7 @@ class StyleMaker:
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
-        """All that it holds."""
+        """All textures."""
         own = [self.locks, self.plain, self.hair.known, *(level.known for level in self.levels)]
         if self.centre_maker is not None:
             own += [self.centres, *self.centre_maker.textures]
@@ -84,7 +84,7 @@ class StyleMaker:
     def make(
         self, strands: StrandsOnGPU, guide_points: np.ndarray, rest: gpu.types.GPUTexture | None = None
     ) -> StrandsOnGPU:
-        """Make all strands with their styles; as `StrandMaker.make`, for guides as `Styling.guides` gives them."""
+        """Make all strands with their styles, like `StrandMaker.make`, for guides from `Styling.guides`."""
         self.maker.require_fitting(strands)
         if self._guide_points is None or not np.array_equal(self._guide_points, guide_points):
             self.maker.put_guides(guide_points)
@@ -119,9 +119,9 @@ class StyleMaker:
         gpu.shader.unbind()
 
     def rebound(self, binding: HairBinding, styling: "Styling") -> "StyleMaker | None":
-        """The same for other weights or limits of the same strands and clumps; None where these are others.
+        """A maker with other weights or limits of the same strands and clumps; None if strands or clumps differ.
 
-        Raises `HairError` as `new_style_maker`.
+        Raises `HairError` like `new_style_maker`.
         """
         if not can_style(styling) or not _are_alike(styling, self.styling):
             return None
@@ -139,14 +139,14 @@ class StyleMaker:
         return replace(self, binding=binding, styling=styling, maker=maker, centre_maker=centre_maker)
 
     def _parts(self, styling):
-        """[(pass, what is known of its strands, their program)]."""
+        """[(pass, data of its strands, their program)]."""
         levels = [(own, level.data, level.steps) for own, level in zip(self.levels, styling.levels, strict=True)]
         return [(self.hair, styling.data, styling.program), *levels]
 
     def restyle(self, styling: "Styling") -> bool:
-        """Take other settings of the same styles: numbers alone are uploaded, and masks that were painted.
+        """Use other settings of the same styles: only numbers and changed masks are uploaded.
 
-        False where more has changed.
+        Returns False, without effect, if anything else has changed.
         """
         if styling is self.styling:
             return True
@@ -163,7 +163,7 @@ class StyleMaker:
 
 
 def programs_of(styling: "Styling | None", slot_count: int, point_count: int) -> list[tuple]:
-    """Programs that `maker_of` and the makers need, for `shaders.compile_one`; slot_count: guides of a strand."""
+    """Programs of `maker_of` and of the makers, for `shaders.compile_one`; slot_count: guides per strand."""
     if styling is None or not len(styling.program):
         return strand_maker.programs_of(slot_count, is_plain=False)
     plain = strand_maker.programs_of(slot_count, is_plain=True)
@@ -177,11 +177,11 @@ def maker_of(
     axes: np.ndarray,
     before: StrandMaker | StyleMaker | None = None,
 ) -> StrandMaker | StyleMaker:
-    """What makes the strands of bound hair, with styles or without: the one before where that still does.
+    """The maker of the strands of bound hair, with or without styles; the maker before, if it can be reused.
 
-    before: for strands at the same places. point_count and axes: as in `new_maker`. Raises `HairError` as it does.
+    before: for strands at the same places. point_count, axes: as for `new_maker`. Raises `HairError` like it.
     """
-    if styling is None or not len(styling.program):  # styles of guides alone are in these
+    if styling is None or not len(styling.program):  # styles of guides are applied to these already
         if isinstance(before, StrandMaker):
             return before
         return strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, axes)
@@ -194,13 +194,13 @@ def maker_of(
 
 
 def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) -> StyleMaker:
-    """The `StyleMaker` of bound hair and its styles, of which `can_style` holds.
+    """The `StyleMaker` of bound hair and its styles, for which `can_style` must hold.
 
-    axes: (3, 3), from the coordinates of roots and guides to those that are drawn. Raises
-    `HairError` as `new_maker`.
+    axes: (3, 3), from the coordinates of roots and guides to those of drawn strands. Raises `HairError` like
+    `new_maker`.
     """
     point_count = styling.point_count
-    _styles_program(point_count, _kinds_of(styling.program))  # first: where there is none, nothing is uploaded
+    _styles_program(point_count, _kinds_of(styling.program))  # first: if it is not supported, nothing is uploaded
     maker = strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, np.eye(3), is_plain=True)
     strand_count = len(styling.data.normals)
     changes = strand_changes.new_changes(strand_count, point_count)
@@ -245,13 +245,13 @@ def _put_steps(record, program):
 
 
 def _kinds_of(program):
-    """The kinds of a program's steps, as a program is compiled for them."""
+    """The kinds of a program's steps, for which the GPU program is compiled."""
     present = set(program.choices[:, 0].tolist())
     return tuple(name for name, kind in kinds.STEP_KINDS.items() if kind in present)
 
 
 def _known(data: "StrandData"):
-    """(texture, strands in a row of it, texels of a strand): see shaders/strands/style_strands.comp."""
+    """(texture, strands per row, texels per strand): see shaders/strands/style_strands.comp."""
     columns = [data.normals.numpy(), _halves(data.identities.numpy()), data.members.numpy().T, data.masks.numpy().T]
     rows = np.concatenate(columns, axis=1, dtype=np.float32)
     rows = np.pad(rows, ((0, 0), (0, -rows.shape[1] % 4)))
@@ -260,20 +260,20 @@ def _known(data: "StrandData"):
 
 
 def _locks(data):
-    """(texture, centres in a row of it): normal and identity in two texels of each."""
+    """(texture, centers per row): normal and identity of each in two texels."""
     identities = _halves(data.centre_identities.numpy())
     rows = np.concatenate([data.centre_normals.numpy(), identities, np.zeros((len(identities), 3))], axis=1)
     return strand_changes.rows_texture(rows.astype(np.float32), 4)
 
 
 def _halves(identities):
-    """(N, 2): high and low 16 bits of (N,) int32, which single precision holds exactly."""
+    """(N, 2): high and low 16 bits of (N,) int32, which are exact in single precision."""
     bits = identities.astype(np.int32).view(np.uint32)
     return np.stack([bits >> np.uint32(16), bits & np.uint32(0xFFFF)], axis=1)
 
 
 def _centres_of(styling):
-    """`BoundStrands` of the clump centres of all levels, one after the other: all by the same settings."""
+    """`BoundStrands` of the clump centers of all levels, level after level, which share their settings."""
     parts = [strand_maker.bound_strands(level.binding) for level in styling.levels]
     arrays = {
         name: np.concatenate([getattr(part, name) for part in parts])
@@ -283,7 +283,7 @@ def _centres_of(styling):
 
 
 def _are_alike(styling, other):
-    """Whether two stacks on the same strands differ in their numbers, masks and what clumps follow alone."""
+    """Whether two stacks on the same strands differ only in their numbers, masks and bindings of clumps."""
     return (
         styling.tree_levels == other.tree_levels
         and styling.point_count == other.point_count
@@ -292,16 +292,16 @@ def _are_alike(styling, other):
     )
 
 
-@shaders.kept
+@shaders.cached
 def _styles_program(point_count, step_kinds):
-    """The compute program that applies steps of some kinds to strands of so many points."""
+    """The compute program that applies steps of some kinds to strands with `point_count` points."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_GROUP_SIZE)
     info.typedef_source(uniforms.STEP.source + uniforms.STYLING.source)
     info.uniform_buf(0, "Styling", "styling")
     for slot, name in enumerate(("known", "locks")):
         info.sampler(slot, "FLOAT_2D", name)
-    both = {"NO_RESTRICT", "READ", "WRITE"}  # centres are read from the image that others are written to
+    both = {"NO_RESTRICT", "READ", "WRITE"}  # centers are read from the image that other centers are written to
     for slot, name in enumerate(("plain_strands", "centres")):
         info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=both)
     strand_changes.declare_put(info, first_slot=2)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Turns of a surface at its vertices, where strands are drawn: core/geometry/vertex_turns.py as a compute program.
+"""Rotations of a surface at its vertices on the GPU: core/geometry/vertex_turns.py as a compute program.
 
-A pose uploads the places of vertices around roots, twelve bytes each, and nothing else.
+A pose only uploads the positions of vertices around roots, twelve bytes each.
 """
 
 from dataclasses import dataclass
@@ -21,34 +21,34 @@ if TYPE_CHECKING:
 
 _GROUP_SIZE = 64
 _VERTEX_TEXELS = 3
-_LARGEST_INDEX = 1 << 24  # that is exact in single precision
+_LARGEST_INDEX = 1 << 24  # exact in single precision
 
 
 @dataclass(frozen=True)
 class VertexTurner:
     """A `Turning` on the GPU; made by `new_turner`."""
 
-    turned: gpu.types.GPUTexture  # of each vertex where it is, and its axes: shaders/strands/carry_strands.comp
-    rings: gpu.types.GPUTexture  # of each vertex its place among those that are uploaded, and its faces in `around`
+    turned: gpu.types.GPUTexture  # for each vertex its position and axes: shaders/strands/carry_strands.comp
+    rings: gpu.types.GPUTexture  # for each vertex its index among uploaded vertices, and its range of `around`
     around: gpu.types.GPUTexture  # indices of faces
-    faces: gpu.types.GPUTexture  # shaders/strands/vertex_rotations.comp
-    rest: gpu.types.GPUTexture  # places of vertices at rest
-    smooth_rest: gpu.types.GPUTexture  # the same on the smooth surface that they turn from; `rest` where none is
-    needed: np.ndarray | slice  # (N,) vertices whose places are uploaded
+    faces: gpu.types.GPUTexture  # see shaders/strands/vertex_rotations.comp
+    rest: gpu.types.GPUTexture  # positions of vertices at rest
+    smooth_rest: gpu.types.GPUTexture  # positions on the smooth surface at rest; `rest` without one
+    needed: np.ndarray | slice  # (N,) vertices whose positions are uploaded
     vertex_count: int  # of the mesh
     turned_count: int
-    values: np.ndarray  # (rows, row) float32, which places are gathered in before they are uploaded
+    values: np.ndarray  # (rows, row) float32, a buffer for uploads of positions
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
-        """All that it holds."""
+        """All textures."""
         rest = [self.rest] if self.smooth_rest is self.rest else [self.rest, self.smooth_rest]
         return [self.turned, self.rings, self.around, self.faces, *rest]
 
     def turn(self, posed: np.ndarray | None) -> gpu.types.GPUTexture:
-        """`turned` where the mesh's vertices are at (V, 3) float32, finite; None: at rest.
+        """Compute `turned` for finite (V, 3) float32 vertices of the mesh; None: at rest.
 
-        Raises `HairError` where there are not as many.
+        Raises `HairError` if their number does not match.
         """
         now, smooth_rest = self.rest, self.rest
         if posed is not None:
@@ -68,10 +68,10 @@ class VertexTurner:
 
 
 def new_turner(turning: "Turning", rest: np.ndarray) -> VertexTurner:
-    """The `VertexTurner` of a `Turning`; rest: (V, 3) float32, all vertices where strands are at rest.
+    """The `VertexTurner` of a `Turning`; rest: (V, 3) float32, all vertices at rest.
 
-    They are those of the `Turning` unless that is of a smooth surface. Raises `HairError` where counts do not match, a
-    mesh is too large for a texture, or the driver lacks something.
+    `rest` differs from the vertices of the `Turning` for a smooth surface. Raises `HairError` if counts do not match,
+    the mesh is too large for a texture, or the driver does not support it.
     """
     vertex_count = len(turning.rest)
     require_count("vertices", len(rest), vertex_count)
@@ -80,7 +80,7 @@ def new_turner(turning: "Turning", rest: np.ndarray) -> VertexTurner:
         len(turning.vertices) > MOST_GROUPS * _GROUP_SIZE
     ):
         raise HairError("The surface has too many vertices to turn on the graphics card.")
-    _turn_program()  # first: where there is none, nothing is uploaded
+    _turn_program()  # first: if it is not supported, nothing is uploaded
     places = np.zeros(vertex_count, np.int32)
     places[needed] = np.arange(len(needed))
     rings = np.zeros((len(turning.vertices), 4), np.float32)
@@ -109,22 +109,22 @@ def new_turner(turning: "Turning", rest: np.ndarray) -> VertexTurner:
 
 
 def _gathered(vertices, needed, values):
-    """The texture of (V, 3) vertices, those of them that are needed; values: memory for them."""
+    """The texture of the needed vertices of (V, 3); values: the buffer for the upload."""
     flat = values.reshape(-1)
     if isinstance(needed, slice):
         flat[: vertices.size] = vertices.ravel()
     else:
         places = flat[: 3 * len(needed)].reshape(-1, 3)
-        np.take(vertices, needed, axis=0, out=places, mode="clip")  # checked when it was made; else NumPy makes a copy
+        np.take(vertices, needed, axis=0, out=places, mode="clip")  # other modes copy; indices were checked before
     data = gpu.types.Buffer("FLOAT", values.size, flat)
     texture = gpu.types.GPUTexture((values.shape[1], len(values)), format="R32F", data=data)
     texture.filter_mode(False)
     return texture
 
 
-@shaders.kept
+@shaders.cached
 def _turn_program():
-    """The compute program that turns vertices."""
+    """The compute program that computes rotations at vertices."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_GROUP_SIZE)
     for slot, name in enumerate(("rings", "around", "faces", "now", "rest_places", "smooth_rest")):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair by Vellus in the pictures that Cycles or EEVEE renders of a scene.
+"""Compositing of hair rendered by Vellus over renders by Cycles or EEVEE.
 
-A scene has one render engine, so hair is rendered by another scene, which has the first as its background set: it sees
-all of its objects in the same frames. The compositor lays its picture over the other. Hair is hidden from the first
-scene's engine for as long.
+A scene has a single render engine, so hair is rendered by another scene, the hair scene, which has the first scene as
+its background set, with all of its objects in the same frames. The compositor lays its picture over the other. Hair is
+hidden from the first scene's engine meanwhile.
 """
 
 import bpy
@@ -27,11 +27,11 @@ _OF_RENDER = (
     *("use_motion_blur", "motion_blur_shutter", "motion_blur_position"),
     *("use_simplify", "simplify_subdivision_render"),
 )
-_OWN = {"is_hair_only", "composite_shadow", "has_preview_shadow"}  # of the scene's settings of ours
+_OWN = {"is_hair_only", "composite_shadow", "has_preview_shadow"}  # render settings that are not copied
 
-refused_cache = Cache()  # session_uid of a hair's scene → errors of its renders since the last one began
+refused_cache = Cache()  # session_uid of a hair scene → errors in the current or last render
 
-_COMPOSITED = "vellus_use_compositing"  # custom property of the hair's scene: what the render settings had
+_COMPOSITED = "vellus_use_compositing"  # custom property of the hair scene: the former `use_compositing`
 
 
 def is_on(blender_scene):
@@ -61,18 +61,18 @@ def turn_on(blender_scene):
 
 
 def turn_off(blender_scene):
-    """Leave everything as it was before `turn_on`, but for what the artist has changed since."""
+    """Undo `turn_on`, except for changes by the artist since."""
     hair_scene = blender_scene.vellus.hair_scene
     _leave(blender_scene)
     if hair_scene is not None and _is_ours(hair_scene):
         blender_scene.render.use_compositing = bool(hair_scene[_COMPOSITED])
         if not _users_of(hair_scene):
             _remove(hair_scene)
-    follow_all()  # hair of this scene may be in another that composites it
+    follow_all()  # another scene may contain and composite the same hair
 
 
 def _leave(blender_scene):
-    """Take the nodes away, and show hair to Cycles and EEVEE again."""
+    """Remove the nodes, and show hair to Cycles and EEVEE again."""
     composite_nodes.remove(blender_scene)
     blender_scene.vellus.hair_scene = None
     for hair_object in _hair_objects(blender_scene):
@@ -80,17 +80,17 @@ def _leave(blender_scene):
 
 
 def _is_ours(hair_scene):
-    """Whether a scene was made by `turn_on`, and is not one that an artist has let the setting point to."""
+    """Whether a hair scene was made by `turn_on`, and not chosen by an artist."""
     return hair_scene.library is None and _COMPOSITED in hair_scene
 
 
 def _users_of(hair_scene):
-    """The scenes whose hair a scene renders."""
+    """The scenes whose hair a hair scene renders."""
     return [one for one in bpy.data.scenes if one.vellus.hair_scene == hair_scene]
 
 
 def _remove(hair_scene):
-    """Remove a scene that we have made, which is empty then; with an artist's objects in it, it is the artist's."""
+    """Remove a hair scene, unless an artist has added objects; then it belongs to the artist."""
     if hair_scene.collection.objects or hair_scene.collection.children:
         del hair_scene[_COMPOSITED]
     else:
@@ -98,7 +98,7 @@ def _remove(hair_scene):
 
 
 def suspend():
-    """Let Cycles and EEVEE render hair themselves until `follow_all`: without the add-on nothing renders it."""
+    """Let Cycles and EEVEE render hair until `follow_all`, as nothing else renders it without the add-on."""
     for blender_scene in bpy.data.scenes:
         if blender_scene.vellus.hair_scene is not None and blender_scene.library is None:
             composite_nodes.adjust(blender_scene, False, False)
@@ -113,9 +113,9 @@ def follow_all():
 
 
 def follow(blender_scene):
-    """Bring the scene of the hair, the compositor and the hair's visibility up to date with a scene.
+    """Update the hair scene, the compositor and the hair's visibility from a scene.
 
-    What is up to date is not written.
+    Unchanged values are not written.
     """
     state = blender_scene.vellus
     if state.hair_scene is None:
@@ -128,9 +128,9 @@ def follow(blender_scene):
 
 
 def needs_repair(blender_scene):
-    """Whether a scene's hair is rendered by the hair's scene of another, of which it is a copy, or by a deleted one.
+    """Whether a scene's hair scene belongs to the scene it was copied from, was deleted, or lost its background set.
 
-    Or by its own that has lost its background set. A scene that we have not made is an artist's choice, and is left.
+    A hair scene that was chosen by an artist is left alone.
     """
     if blender_scene.library is not None:
         return False
@@ -141,16 +141,16 @@ def needs_repair(blender_scene):
 
 
 def repair():
-    """Give copies of scenes a hair's scene of their own, and turn off where that was deleted.
+    """Give copies of scenes their own hair scene, and turn compositing off if the hair scene was deleted.
 
-    Not within an update of a depsgraph or beside a render: it creates and removes datablocks.
+    Must not be called during a depsgraph update or a render, as it creates and removes datablocks.
     """
     for blender_scene in list(bpy.data.scenes):
         if needs_repair(blender_scene):
             hair_scene = blender_scene.vellus.hair_scene
             if hair_scene is None:
                 turn_off(blender_scene)
-            elif hair_scene.background_set not in _users_of(hair_scene):  # an artist has set another one, or none
+            elif hair_scene.background_set not in _users_of(hair_scene):  # changed or cleared by an artist
                 hair_scene.background_set = blender_scene
                 follow(blender_scene)
             else:
@@ -159,10 +159,10 @@ def repair():
 
 
 def refuse(hair_scene, sentence):
-    """Keep the error of a scene that was rendered, if it is the hair of another: Blender only prints it."""
+    """Store an error of a render if the scene is a hair scene, as Blender only prints it."""
     if _is_of_another(hair_scene):
-        told = refused_cache.get(hair_scene.original.session_uid, list)
-        told += [] if sentence in told else [sentence]
+        errors = refused_cache.get(hair_scene.original.session_uid, list)
+        errors += [] if sentence in errors else [sentence]
 
 
 def refusals(blender_scene):
@@ -176,10 +176,10 @@ def _is_of_another(blender_scene):
 
 
 def is_in_sequence(blender_scene):
-    """Whether a scene is rendered as the hair of another in an animation, or without a window.
+    """Whether a scene is rendered as a hair scene in an animation, or without a window.
 
-    Blender does not tell the engine of a scene that the compositor has rendered that this is for an animation. Without
-    a window it cannot be known, and nothing has played.
+    In renders for the compositor, Blender does not set the engine's `is_animation`. Without a window it is unknown, and
+    nothing was played.
     """
     if not _is_of_another(blender_scene):
         return False
@@ -189,7 +189,7 @@ def is_in_sequence(blender_scene):
 
 
 def _separate(blender_scene):
-    """Part a copy of a scene from the hair's scene of the original: by one of its own, or none without nodes for it."""
+    """Give a copy of a scene its own hair scene in place of the original's, or none if it has no nodes for it."""
     state = blender_scene.vellus
     of_original, state.hair_scene = state.hair_scene, None
     if composite_nodes.are_of(blender_scene, of_original):
@@ -200,7 +200,7 @@ def _separate(blender_scene):
 
 
 def _bring_up_to_date(blender_scene, hair_scene):
-    """Copy what a scene shares with its hair's scene, and adjust its nodes."""
+    """Copy shared settings of a scene to its hair scene, and adjust the scene's nodes."""
     state = blender_scene.vellus
     is_ours = blender_scene.render.engine == viewport.ENGINE
     _copy(blender_scene, hair_scene, _OF_SCENE)
@@ -230,7 +230,7 @@ def _copy(source, target, names):
 
 
 def _copy_shutter_curve(source, target):
-    """The points of a `CurveMapping` of one curve."""
+    """Copy the points of a `CurveMapping` with a single curve."""
     wanted = _points_of(source)
     if _points_of(target) == wanted:
         return
@@ -249,7 +249,7 @@ def _points_of(mapping):
 
 
 def _copy_cameras(blender_scene, hair_scene):
-    """Markers that change the camera."""
+    """Copy the markers that switch cameras."""
     wanted = [(marker.frame, marker.camera) for marker in blender_scene.timeline_markers if marker.camera is not None]
     if [(marker.frame, marker.camera) for marker in hair_scene.timeline_markers] != wanted:
         hair_scene.timeline_markers.clear()
@@ -258,7 +258,7 @@ def _copy_cameras(blender_scene, hair_scene):
 
 
 def _copy_views(source, target):
-    """Which views a stereo picture has, and the cameras of each."""
+    """Copy the views of a stereo picture, and their camera suffixes."""
     wanted = [(view.name, view.use, view.camera_suffix) for view in source]
     if [(view.name, view.use, view.camera_suffix) for view in target] == wanted:
         return
@@ -270,7 +270,7 @@ def _copy_views(source, target):
 
 
 def _hair_objects(blender_scene):
-    """Objects of hair in a scene, and in collections that it has instances of."""
+    """Objects of hair in a scene, and in collections that are instanced in it."""
     objects = {*blender_scene.objects}
     objects |= {o for other in blender_scene.objects if other.instance_collection for o in _instanced(other)}
     return [o for o in objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"]

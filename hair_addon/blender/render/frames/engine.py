@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The render engine: surfaces and hair by the viewport's drawing code, at any resolution, also without a window."""
+"""The render engine: draws surfaces and hair with the viewport's code, at any resolution, also without a window."""
 
 import contextlib
 
@@ -25,8 +25,8 @@ from .tiled_frame import Frame
 
 NAME = viewport.ENGINE
 
-_CURVE_PARTS = 256  # that a shutter curve is read in, as by Cycles
-# Shares of the bar: of a render with motion vectors what is before its first moment, and of each moment its reading.
+_CURVE_PARTS = 256  # samples of a shutter curve, as in Cycles
+# Shares of the progress bar: of reading neighboring frames for motion vectors, and of reading within each motion step.
 _NEIGHBOURS, _READING = 0.1, 0.25
 _EVALUATING = "Evaluating the scene"
 
@@ -36,7 +36,7 @@ _listener = no_progress  # an additional progress callback of renders, which may
 
 @contextlib.contextmanager
 def listening(progress):
-    """Report renders to progress(step, part) in a context; a render ends without a picture if that raises `Stopped`."""
+    """Report renders to progress(step, part) in a context; a render ends without a picture if it raises `Stopped`."""
     global _listener
     _listener = progress
     try:
@@ -55,13 +55,13 @@ class VellusRenderEngine(bpy.types.RenderEngine):
     bl_use_shading_nodes_custom = False
 
     def update_render_passes(self, scene=None, renderlayer=None):
-        """Tell Blender which passes there will be: sockets of the compositor, layers of a multilayer file."""
+        """Register the passes with Blender, for sockets of the compositor and layers of multilayer files."""
         for name in _passes(renderlayer, scene.render.use_motion_blur):
             channels, kind = film.channels_of(name)
             self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
 
     def view_update(self, context, depsgraph):
-        """Called by Blender after changes, which the handlers process."""
+        """Do nothing: handlers process changes."""
 
     def view_draw(self, context, depsgraph):
         """Draw a viewport with Rendered shading."""
@@ -76,12 +76,12 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         try:
             self._render(depsgraph)
         except Stopped:
-            pass  # by Esc: Blender keeps what it was shown
+            pass  # by Esc: Blender keeps the last picture
         except HairError as error:
             self._refuse(depsgraph.scene, error_text(error))
-        except KeyboardInterrupt:  # a script's
+        except KeyboardInterrupt:  # raised by a script
             self._refuse(depsgraph.scene, interface_text("Canceled: nothing was rendered."))
-        except Exception as error:  # a bug must not produce a black picture as a result
+        except Exception as error:  # a bug must not result in a black picture
             self._refuse(depsgraph.scene, interface_text("Vellus could not render this: {error}", error=error))
             raise
 
@@ -96,7 +96,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         if self.is_animation or composite.is_in_sequence(blender_scene):
             frame_folders.require_baked([scene_time.frame_of(blender_scene)], blender_scene)
         frame_folders.require_readable([scene_time.frame_of(blender_scene)], blender_scene)
-        if bpy.app.background and _listener is no_progress:  # `io.frames` has asked by itself
+        if bpy.app.background and _listener is no_progress:  # `io.frames` checks by itself
             rendered_files.require(blender_scene.original, [scene_time.frame_of(blender_scene)])
         size, window = scene.picture_size(blender_scene.render)
         views = self._views(view_layer)
@@ -109,19 +109,19 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         path_count = -(-light_paths.path_count(blender_scene, size) // len(offsets))
         film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count
         frames = {view: self._frame(depsgraph, view, size, window, film_settings) for view in views}
-        told = FrameProgress(self, frame_progress.share_of(depsgraph), _listener)
+        progress = FrameProgress(self, frame_progress.share_of(depsgraph), _listener)
         before = _NEIGHBOURS if "Vector" in passes else 0.0
-        others = self._others(depsgraph, size, views, part_of(told, 0.0, before)) if before else {}
+        others = self._others(depsgraph, size, views, part_of(progress, 0.0, before)) if before else {}
         world_texture.check_image()
-        told(_EVALUATING, before)
+        progress(_EVALUATING, before)
         known, refused, noted, each = {}, {}, {}, (1.0 - before) / len(offsets)
         for index in scene_time.visit(blender_scene, offsets, self.frame_set):
-            told.moment = interface_text("Motion step {number} of {count}", number=index + 1, count=len(offsets))
+            progress.moment = interface_text("Motion step {number} of {count}", number=index + 1, count=len(offsets))
             begun, end = before + each * index, before + each * (index + 1)
             drawn_from = begun + _READING * each
             with drawing.ALONE:
-                told_here, heard = part_of(told, begun, drawn_from), (refused.__setitem__, noted.__setitem__)
-                drawn = drawn_scene.read_render(depsgraph, known, *heard, told_here)
+                reading, callbacks = part_of(progress, begun, drawn_from), (refused.__setitem__, noted.__setitem__)
+                drawn = drawn_scene.read_render(depsgraph, known, *callbacks, reading)
             for number, (view, frame) in enumerate(frames.items()):
                 with drawing.ALONE:
                     camera = self._camera(depsgraph, view, size)
@@ -131,21 +131,21 @@ class VellusRenderEngine(bpy.types.RenderEngine):
                         now, around = motion_vectors.places(drawn, *camera), others[view]
                         moving = motion_vectors.Motion(around[0], now, around[1], size)
                 first, last = (drawn_from + (end - drawn_from) * (number + n) / len(frames) for n in (0, 1))
-                frame.expose(drawn, *camera, moving, lens, part_of(told, first, last))
+                frame.expose(drawn, *camera, moving, lens, part_of(progress, first, last))
                 if index + 1 == len(offsets) or not bpy.app.background:
                     self._show(view_layer, view, window, frame.arrays())
-            told(_EVALUATING, end)
-        # Last, so that there is a picture of everything else. A command that renders to a file fails: a picture
+            progress(_EVALUATING, end)
+        # Errors come last, after a picture of everything else. A command that renders to a file fails: a picture
         # without some of the hair is not a valid result.
         for error in refused.values():
             self._refuse(blender_scene, error_text(error))
         for note in noted.values():
             composite.refuse(blender_scene, error_text(note))
-            if not bpy.app.background:  # the console has it already
+            if not bpy.app.background:  # already printed to the console
                 self.report({"WARNING"}, error_text(note))
 
     def _views(self, view_layer):
-        """Names of the views of a stereo picture; of other pictures the empty name."""
+        """Names of the views of a stereo picture; the empty name for other pictures."""
         result = self.begin_result(0, 0, 1, 1, layer=view_layer.name)
         names = [view.name for view in result.views]
         self.end_result(result, cancel=True)
@@ -159,14 +159,14 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         return scene.read_camera(depsgraph.scene, depsgraph, *size, camera, eye)
 
     def _camera_object(self, depsgraph, view):
-        """The evaluated camera of a view, None without one. The view is that of the engine from now on."""
+        """Return the evaluated camera of a view, or None, and make it the engine's active view."""
         if view:
             self.active_view_set(view)
         camera = self.camera_override or depsgraph.scene.camera
         return camera and view_cameras.camera_of_view(depsgraph.scene, camera.original, view).evaluated_get(depsgraph)
 
     def _frame(self, depsgraph, view, size, window, settings):
-        """What a view is rendered into."""
+        """The `Frame` or `PanoramicFrame` of a view. Raises `HairError`."""
         self._camera(depsgraph, view, size)  # raises an error if there is none
         camera = self._camera_object(depsgraph, view)
         shift = self.camera_shift_x(camera) if view and camera.type == "CAMERA" else None
@@ -182,15 +182,15 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         return PanoramicFrame(panorama, clip, outside, size, window, *settings)
 
     def _others(self, depsgraph, size, views, progress):
-        """Where everything is a frame before and a frame after: {view: [`motion.Places`]}."""
+        """{view: [`Places`]} of everything one frame before and one frame after."""
         found = {view: [] for view in views}
         progress(_EVALUATING, 0.0)
         for index in scene_time.visit(depsgraph.scene, [-1.0, 1.0], self.frame_set):
             with drawing.ALONE:
-                told = part_of(progress, 0.5 * index, 0.5 * (index + 1))
-                there = drawn_scene.read_unlit(depsgraph, {}, _unheard, _unheard, told)
+                reading = part_of(progress, 0.5 * index, 0.5 * (index + 1))
+                drawn = drawn_scene.read_unlit(depsgraph, {}, _ignore, _ignore, reading)
                 for view, places in found.items():
-                    places.append(motion_vectors.places(there, *self._camera(depsgraph, view, size)))
+                    places.append(motion_vectors.places(drawn, *self._camera(depsgraph, view, size)))
         return found
 
     def _show(self, view_layer, view, window, arrays):
@@ -202,12 +202,12 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         self.end_result(result)
 
 
-def _unheard(_datablock, _error):
-    """Hair that cannot be drawn is reported for the frame itself, not for those around it."""
+def _ignore(_datablock, _error):
+    """Do nothing: hair that cannot be drawn is reported for the frame itself, not for its neighbors."""
 
 
 def _passes(view_layer, is_blurred):
-    """Names of the passes that are switched on. What is blurred already has no motion that could blur it."""
+    """Names of the enabled passes. A frame with motion blur has no motion vectors, which would blur it again."""
     wanted = setting_properties.to_settings(view_layer.vellus, pixel_sampling.PassSettings)
     names = ["Combined"]
     if view_layer.use_pass_z:
@@ -226,7 +226,7 @@ def _passes(view_layer, is_blurred):
 
 
 def _offsets(render, count):
-    """Of the moments that are rendered, from the frame [frames]."""
+    """Times [frames] of the motion steps, relative to the frame."""
     if not render.use_motion_blur or render.motion_blur_shutter <= 0.0:
         return [0.0]
     curve = render.motion_blur_shutter_curve

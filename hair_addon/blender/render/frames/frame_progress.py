@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a rendered frame is: Blender's bar and text, and whether somebody asks to stop."""
+"""Progress of a rendered frame in Blender's bar and text, and requests to stop."""
 
 import time
 
@@ -8,20 +8,20 @@ import bpy
 from ....core.long_work import Progress, Stopped
 from ...settings.translations import status_text
 
-_TURN = 0.002  # [s] in which the window may redraw
-_LEAST = 1e-3  # parts that no bar shows
+_TURN = 0.002  # [s] for the window to redraw
+_LEAST = 1e-3  # fraction that is not visible in a bar
 
 
 class FrameProgress:
-    """A `Progress` of a render engine's view layer, which is a share of the whole bar; it never falls.
+    """A `Progress` of a render engine's view layer within its share of the whole bar; it never decreases.
 
-    listener: is told too, and may raise `Stopped`. Raises it when Esc was pressed.
+    listener: also called, and may raise `Stopped`. Raises `Stopped` after Esc.
     """
 
     def __init__(self, engine: bpy.types.RenderEngine, share: tuple[float, float], listener: Progress) -> None:
         self._engine, self._share, self._listener = engine, share, listener
         self._shown, self._text = -1.0, ""
-        self.moment = ""  # which moment of a blurred frame is rendered, for the text
+        self.moment = ""  # text of the current motion step
 
     def __call__(self, step: str, part: float) -> None:
         first, last = self._share
@@ -40,7 +40,7 @@ class FrameProgress:
 
 
 def share_of(depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
-    """Where a view layer begins and ends in the bar: Blender renders all that are on, one after another."""
+    """(start, end) of a view layer in the bar: Blender renders all enabled view layers one after another."""
     scene, layer = depsgraph.scene, depsgraph.view_layer
     names = [one.name for one in scene.view_layers if one.use]
     is_alone = scene.render.use_single_layer and not bpy.app.background

@@ -10,10 +10,10 @@ from .tiled_frame import Frame
 
 
 class PanoramicFrame:
-    """As `Frame`, of a `Panorama`.
+    """A `Frame` of a `Panorama`.
 
-    clip: (nearest, farthest) distance along each face's axis that is seen [m]; outside: opacity of the black around the
-    circle of a fisheye lens: one, as in Cycles, or zero for a picture that is laid over another.
+    clip: (nearest, farthest) visible distance along each face's axis [m]; outside: opacity of the black around the
+    circle of a fisheye lens: 1 as in Cycles, or 0 for a picture that is laid over another.
     """
 
     def __init__(self, panorama, clip, outside, size, window, sample_count, passes, *settings):
@@ -26,17 +26,17 @@ class PanoramicFrame:
         self._passes = passes
 
     def expose(self, drawn, world_to_view, _view_to_clip, _motion=None, _lens=None, progress=no_progress):
-        """As of `Frame`, without motion vectors and depth of field."""
+        """`Frame.expose` without motion vectors and depth of field."""
         to_clip = _face_projection(self._lookup.half_width, *self._clip)
         for done, (face, frame) in enumerate(self._faces.items()):
             turn = np.eye(4)
             turn[:3, :3] = imaging.panorama.FACES[face]
-            told = part_of(progress, done / len(self._faces), (done + 1) / len(self._faces))
-            frame.expose(drawn, turn @ world_to_view, to_clip, progress=told)
+            drawing_face = part_of(progress, done / len(self._faces), (done + 1) / len(self._faces))
+            frame.expose(drawn, turn @ world_to_view, to_clip, progress=drawing_face)
             frame.free_film()
 
     def arrays(self):
-        """As of `Frame`; depths are distances from the camera."""
+        """`Frame.arrays`; depths are distances from the camera."""
         found = {face: frame.arrays() for face, frame in self._faces.items()}
         return {
             name: self._array(name, {face: arrays[name] for face, arrays in found.items()}) for name in self._passes

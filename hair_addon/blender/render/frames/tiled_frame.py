@@ -8,16 +8,16 @@ from ....core.long_work import no_progress, part_of
 from ...gpu import drawing
 from .. import film, light_paths
 
-_LIGHT = 0.3  # share of a moment in which light among strands is followed, before it is drawn
+_LIGHT = 0.3  # share of tracing light among strands in the progress of a motion step
 _PASS = "Pass {number} of {count}"
 
 
 class Frame:
-    """Arrays {pass: (height, width, channels) float32} of a window of a picture, first row at the bottom.
+    """Arrays {pass: (height, width, channels) float32} of a window of a picture, bottom row first.
 
-    size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of what is rendered;
-    sample_count: of a pixel in each moment; passes, is_transparent, filter_width: of `film.Film`; lens_passes: how many
-    passes a moment has at least, for depth of field; path_count: of paths through the grid of light in each, 0: none.
+    size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of the rendered part;
+    sample_count: per pixel in each motion step; passes, is_transparent, filter_width: of `film.Film`; lens_passes:
+    minimum passes per motion step, for depth of field; path_count: paths through the light grid in each, 0: none.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class Frame:
         return len(self._tiles) * self._turns
 
     def expose(self, drawn, world_to_view, view_to_clip, motion=None, lens=None, progress=no_progress):
-        """Draw a moment; progress is told after each pass, and may raise `Stopped`.
+        """Draw a motion step; progress is called after each pass, and may raise `Stopped`.
 
         drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4); motion: for the pass "Vector"; lens: `Lens`, None: all
         in focus.
@@ -65,7 +65,7 @@ class Frame:
         self._moment_count += 1
 
     def free_film(self):
-        """Free the memory of the graphics card, until the next moment is drawn."""
+        """Free GPU memory until the next motion step is drawn."""
         self._film = None
 
     def _add(self, tile, arrays):
@@ -82,5 +82,5 @@ class Frame:
                 part += values
 
     def arrays(self):
-        """The mean over the moments so far; the nearest depths."""
+        """{pass: array}: means over the motion steps so far, and the nearest depths."""
         return {n: a if n == "Depth" else a / np.float32(self._moment_count) for n, a in self._sums.items()}

@@ -12,19 +12,19 @@ from .. import scene_drawing
 from . import picture_detail
 from .history import History
 
-SAMPLE_COUNT = 32  # of a pixel, in all passes of a picture
+SAMPLE_COUNT = 32  # per pixel, in all passes of a picture
 
 
 def samples_per_side():
-    """Samples per pixel side in each pass: fewer with software rendering, for responsiveness."""
+    """Samples along each side of a pixel in each pass: fewer with software rendering, for responsiveness."""
     return 1 if gpu.platform.device_type_get() == "SOFTWARE" else 2
 
 
 class HairPicture:
-    """The mean of passes, each of which samples other places of the pixels and takes other samples of thin strands.
+    """The mean of passes with different samples of pixels and of thin strands.
 
-    Light is premultiplied with the part of a pixel that hair covers. per_side: samples along each side of a pixel in a
-    pass, by default as many as the machine is fit for; small hair has more.
+    Light is premultiplied by the fraction of a pixel that hair covers. per_side: samples along each side of a pixel in
+    a pass, by default `samples_per_side`; small hair has more.
     """
 
     def __init__(self, size, per_side=None):
@@ -41,7 +41,7 @@ class HairPicture:
 
     @property
     def is_fine(self):
-        """Whether another pass would change nothing that is seen."""
+        """Whether all passes are drawn."""
         return self.pass_count >= self._pass_total
 
     @property
@@ -49,7 +49,7 @@ class HairPicture:
         return -(-SAMPLE_COUNT // self._detail.per_side**2)
 
     def restart(self, is_moved=False):
-        """Start another picture; is_moved: of the same things from elsewhere, or elsewhere."""
+        """Start another picture; is_moved: only the view or objects have moved."""
         if is_moved:
             self._history.turn((self._color, self.pass_count), self.pass_count / self._pass_total)
             self._first_turn += self.pass_count
@@ -70,9 +70,9 @@ class HairPicture:
     ):
         """Draw a `DrawnScene` once more.
 
-        world_to_view, view_to_clip: (4, 4); is_see_through: surfaces do not hide hair; outline: a `HairOutline` that
-        takes part in it until it is fine; is_shadowed: whether it darkens surfaces by the shadow of hair; clip_planes:
-        (6, 4) of `uniforms.CLIPPING` that cut off hair, and surfaces that only hide it; None for none.
+        world_to_view, view_to_clip: (4, 4); is_see_through: surfaces do not occlude hair; outline: a `HairOutline` to
+        which the pass is added until it is complete; is_shadowed: draw the shadow of hair on surfaces; clip_planes:
+        (6, 4) of `uniforms.CLIPPING` for hair and occluding surfaces, None for none.
         """
         camera, turn = (world_to_view, view_to_clip), self._first_turn + self.pass_count
         if self.pass_count == 0:
@@ -104,7 +104,7 @@ class HairPicture:
         self._history.add(drawn, camera, view, samples, light, self.pass_count, part_left, is_shadowed)
 
     def _choose_detail(self, drawn, camera, is_shadowed):
-        """Sample small hair finely, unless shadows on surfaces, which may be anywhere, are in the picture."""
+        """Sample small hair finely, unless the picture includes shadows on surfaces, which may be anywhere."""
         detail = picture_detail.whole(self.size, self.per_side)
         if not is_shadowed:
             detail = picture_detail.of_hair(drawn, camera, self.size, self.per_side)
@@ -120,17 +120,17 @@ class HairPicture:
         program.uniform_sampler("picture", self._pass.color)
         program.uniform_sampler("depths", self._pass.depths)
         program.uniform_sampler("surface_depth", self._pass.surface_depth)
-        # Light is additive; of depths the nearest is kept.
+        # Light is added, and the nearest depth is selected.
         for weight, depth_test in ((1.0, "NONE"), (0.0, "LESS_EQUAL")):
             program.uniform_float("weight", weight)
             with drawing.gpu_state(depth_test, depth_writes=depth_test != "NONE", blend="ADDITIVE_PREMULT"):
                 drawing.cover(program)
 
     def show(self, display_table, exposure, opacity=1.0, depth_test="LESS_EQUAL"):
-        """Lay the picture over the viewport that is bound.
+        """Draw the picture over the bound viewport.
 
-        display_table: texture of a `DisplayTransform`'s table; exposure: what light is multiplied by; depth_test:
-        against what the viewport holds.
+        display_table: texture of a `DisplayTransform`'s table; exposure: factor of light; depth_test: against the
+        viewport's depth.
         """
         program = scene_programs.display_program()
         x, y, _width, _height = gpu.state.viewport_get()
@@ -143,12 +143,12 @@ class HairPicture:
         program.uniform_sampler("passes", self._color if carried is None else carried)
         program.uniform_sampler("depths", self._depth)
         program.uniform_sampler("display_table", display_table)
-        # Its depth is not written: surfaces occlude guides, the hair around them does not.
+        # Depth is not written: surfaces occlude guides, but the hair around them does not.
         with drawing.gpu_state(depth_test, depth_writes=False, blend="ALPHA_PREMULT"):
             drawing.cover(program)
 
     def hair_at(self, x, y):
-        """Which of the hair is seen at a pixel, counted from 0; None where there is none within the pixel."""
+        """Index of the hair visible in a pixel, or None."""
         left, bottom, width, height = self._detail.tile
         if not (left <= x < left + width and bottom <= y < bottom + height):
             return None
@@ -157,22 +157,22 @@ class HairPicture:
         return next((found for place in places if (found := self._pass.hair_at(*place)) is not None), None)
 
     def hair_near(self, x, y, reach):
-        """Which of the hair is seen nearest to the middle of a pixel, as far as `reach` pixels away; as `hair_at`."""
+        """Index of the hair visible nearest to a pixel's center, at most `reach` pixels away, or None."""
         (left, bottom, _width, _height), side = self._detail.tile, self._detail.per_side
         return self._pass.hair_near(side * (x - left) + side // 2, side * (y - bottom) + side // 2, side * reach)
 
     def read(self):
-        """(height, width, 4) float32: premultiplied linear light, first row at the bottom."""
+        """(height, width, 4) float32: premultiplied linear light, bottom row first."""
         pixels = self._sum.read_color(0, 0, *self.size, 4, 0, "FLOAT")
         return np.array(pixels, np.float32).reshape(self.size[1], self.size[0], 4) / self.pass_count
 
     def read_shown(self):
-        """The same of what `show` shows, which may hold some of what was shown before something moved."""
+        """`read` of the picture that `show` draws, which may include the history of former pictures."""
         return self.read() if self._history.picture is None else self._history.read()
 
 
 def table_texture(table):
-    """(N, N, N, 3) float32, the last axis but one running along x → a texture between whose texels colours blend."""
+    """(N, N, N, 3) float32, whose third axis runs along x → a texture with linear interpolation."""
     size = len(table)
     texels = np.ones((size, size, size, 4), np.float32)
     texels[..., :3] = table

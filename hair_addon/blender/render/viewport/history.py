@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a viewport showed before: it takes part in its next pictures, so that few samples flicker less.
+"""The history of a viewport's pictures, which is blended into new pictures to reduce flicker from few samples.
 
-When something moves, the picture that was shown is carried to where its contents are now, and blended with the passes
-of the new one. It counts for less with each pass, and for nothing in the last one: a picture at rest is the mean of its
-own passes. Where the two disagree by more than noise it counts for less from the start [Karis14] [Yang20].
+When something moves, the last picture is reprojected and blended with the passes of the new picture. Its weight
+decreases with each pass, to zero in the last: a picture at rest is the mean of its own passes. Where the two differ by
+more than noise, the weight is lower from the start [Karis14] [Yang20].
 """
 
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ from .. import motion_vectors
 
 _COLOR, _PASSES = "RGBA16F", "R16F"
 
-# Passes that the picture before may be worth: of the same strands, and of others, with which noise would hide a change.
+# Maximum weight of the last picture in passes: of the same strands, and of others, whose noise would hide changes.
 _MOST_PASSES, _MOST_OF_OTHERS = 24.0, 2.0
-_MOST_OF_STILL = 96.0  # where nothing but lights has moved: it is not blurred, and only light may lag
+_MOST_OF_STILL = 96.0  # if only lights have moved: the picture is not blurred, and only light may lag
 
 
 class _Targets:
-    """Textures and their framebuffer, which does not own them."""
+    """Textures and a framebuffer, which does not own them."""
 
     def __init__(self, size, formats, is_smooth):
         self.size = size
@@ -42,7 +42,7 @@ class _Targets:
                 drawing.cover(program)
 
     def draw(self, batch, program, samplers, blocks):
-        """Draw a batch over nothing; blocks: {instance: record}."""
+        """Clear the textures and draw a batch; blocks: {instance: record}."""
         blocks = {name: uniforms.uniform_buffer(record) for name, record in blocks.items()}
         with self._framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
             self._framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0))
@@ -52,14 +52,14 @@ class _Targets:
 
 @dataclass(frozen=True)
 class _Seen:
-    """What a picture was of."""
+    """The content of a picture."""
 
-    looks: tuple  # `Shading`s of all hair: pictures of one history have the same ones
+    looks: tuple  # `Shading`s of all hair, which are the same for all pictures of a history
     places: motion_vectors.Places
     world_to_clip: np.ndarray
 
     def is_still(self, other):
-        """Whether nothing but lights differs from other `_Seen` hair."""
+        """Whether another `_Seen` differs only in lights."""
         return (
             np.array_equal(self.world_to_clip, other.world_to_clip)
             and _are_same(self.looks, other.looks)
@@ -70,38 +70,38 @@ class _Seen:
 
 def _seen(drawn, camera):
     """`_Seen` of a `DrawnScene` from a camera (world to view, view to clip)."""
-    # Of hair that is wet in places, which may be mixed in other ways than before.
+    # Both layers of hair that is wet in places, as their mix may change.
     looks = tuple(layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers)
     return _Seen(looks, motion_vectors.places(drawn, *camera), camera[1] @ camera[0])
 
 
 class History:
-    """What a picture of size (width, height) [pixels] showed before."""
+    """The history of a picture of size (width, height) [pixels]."""
 
     def __init__(self, size):
         self.size = size
-        self._shown = self._before = None  # _Targets: the picture, and how many passes it is worth
+        self._shown = self._before = None  # _Targets: the picture, and its weight in passes
         self._carried = self._blocks = self._block_batch = None
         self._seen = None
         self._is_carried = False
-        self._relit = None  # _Targets: blocks of samples in the light before, and in the light now
+        self._relit = None  # _Targets: blocks of samples with the former lights, and with the current lights
         self._is_relit = False
 
     @property
     def picture(self):
-        """The texture to be shown in place of the passes, or None."""
+        """The texture to show in place of the passes, or None."""
         return self._shown.textures[0] if self._is_carried else None
 
     def read(self):
-        """(height, width, 4) float32 of `picture`, first row at the bottom."""
+        """(height, width, 4) float32 of `picture`, bottom row first."""
         return np.array(self.picture.read(), np.float32).reshape(self.size[1], self.size[0], 4)
 
     def forget(self):
-        """Start without what was shown before."""
+        """Start without a history."""
         self._seen, self._is_carried = None, False
 
     def turn(self, light, part_done):
-        """Keep what is shown, as something has moved; light: as for `add`; part_done: of all passes, those in it."""
+        """Keep the shown picture, as something has moved; light: as for `add`; part_done: fraction of passes done."""
         if self._seen is None or not part_done:
             return
         if self._shown is None:
@@ -118,10 +118,10 @@ class History:
         self._block_batch = strand_textures.bare_vertices(6 * blocks[0] * blocks[1], "TRIS")
 
     def follow_light(self, drawn, camera, buffer, relight):
-        """Find how the light of the last pass changes with a `DrawnScene`, where nothing but lights has moved.
+        """Measure the change of light in the last pass if only lights have moved in a `DrawnScene`.
 
-        camera: its (world to view, view to clip); buffer: `VisibilityBuffer` of that pass; relight: returns a texture
-        of its samples in the light of the scene.
+        camera: (world to view, view to clip); buffer: `VisibilityBuffer` of that pass; relight: a function that returns
+        a texture of its samples with the lights of the scene.
         """
         self._is_relit = self._seen is not None and self._seen.is_still(_seen(drawn, camera))
         if not self._is_relit:
@@ -134,12 +134,12 @@ class History:
         self._relit[1].fill(program, {"picture": relight()}, weight=1.0)
 
     def add(self, drawn, camera, view, samples, light, pass_count, part_left, has_lit_surfaces=False):
-        """Take note of a pass, the pass_count-th of a picture.
+        """Add a pass, the pass_count-th of a picture.
 
-        drawn: the `DrawnScene`; camera: its (world to view, view to clip); view: record of the pass; samples: its
-        `VisibilityBuffer`, and the `picture_detail.Detail` that this has; light: (texture, weight) of the passes so
-        far, their sum and what to divide it by; part_left: of all passes, those that are still to come;
-        has_lit_surfaces: whether surfaces, or shadows on them, are in it.
+        drawn: the `DrawnScene`; camera: (world to view, view to clip); view: record of the pass; samples: its
+        `VisibilityBuffer` and `picture_detail.Detail`; light: (texture, weight), the sum of passes so far and its
+        divisor; part_left: fraction of passes to come; has_lit_surfaces: whether the picture includes surfaces, or
+        shadows on them.
         """
         if pass_count == 1:
             self._turn_to(drawn, camera, view, samples, light, has_lit_surfaces)

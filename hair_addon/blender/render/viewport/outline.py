@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The outline of selected hair in a viewport: its silhouette in the theme's colours, also where it is occluded.
+"""The outline of selected hair in a viewport: its silhouette in the theme's colors, also where it is occluded.
 
-The hair is found once more as if nothing else were there, over the first passes of a viewport's picture. From then on a
-redraw lays a line over the viewport, at a distance from the nearest pixel that the hair covers.
+During the first passes of a viewport's picture the hair is also found without occluders. Redraws then draw a line over
+the viewport, at a distance from the nearest pixel that the hair covers.
 """
 
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ import numpy as np
 from ...gpu import drawing, shaders
 from .. import scene_drawing
 
-# Passes after which the line no longer changes: thin strands are in some samples and not in others.
+# Passes after which the line no longer changes: each pass finds only some samples of thin strands.
 _PASS_COUNT = 4
 
-# Between hair and line, in pixels of a display without scaling: strands less than twice this apart get none between.
+# Distance from hair to the line in unscaled pixels: strands less than twice as far apart have no line between them.
 _GAP = 2.5
 
 # Blender's opacity of the outline of occluded objects.
@@ -27,8 +27,8 @@ _HIDDEN_OPACITY = 0.35
 class OutlineStyle:
     """Style of outlines.
 
-    active_color, selected_color: (3,) display colours; width: of the line [pixels]; scale: pixels of the display for
-    each pixel of the interface; is_see_through: whether lines are as opaque where something hides the hair.
+    active_color, selected_color: (3,) display colors; width: of the line [pixels]; scale: display pixels per interface
+    pixel; is_see_through: whether lines of occluded hair are as opaque as others.
     """
 
     active_color: tuple
@@ -39,7 +39,7 @@ class OutlineStyle:
 
     @property
     def gap(self):
-        """From hair to the line [pixels]."""
+        """Distance from hair to the line [pixels]."""
         return _GAP * self.scale
 
     @property
@@ -49,14 +49,14 @@ class OutlineStyle:
 
 
 class HairOutline:
-    """The outline of some of the hair of a `DrawnScene`, for a picture of size (width, height) [pixels]."""
+    """The outline of some hair of a `DrawnScene`, for a picture of size (width, height) [pixels]."""
 
     def __init__(self, size):
         self.size = size
         self._style, self._channels = None, {}
         self._pass_count = 0
         self._is_changed = True
-        # Sums of passes. Red and green: how much of each pixel the hair covers; blue and alpha: how much of it is seen.
+        # Sums of passes. Red and green: fraction of a pixel that the hair covers; blue and alpha: the visible fraction.
         self._mask, self._mask_target = _picture(size, "RGBA16F")
         self._rows, self._rows_target = _picture(size, "RG16F")
         self._distances, self._distances_target = _picture(size, "RGBA16F")
@@ -73,14 +73,14 @@ class HairOutline:
 
     @property
     def is_fine(self):
-        """Whether another pass would change nothing that is seen."""
+        """Whether all passes are drawn."""
         return self._pass_count >= _PASS_COUNT
 
     def add_pass(self, drawn, view, buffer, detail, clip_planes=None):
-        """Find the hair where nothing hides it in a `VisibilityBuffer`.
+        """Add the hair without occluders, by means of a `VisibilityBuffer`.
 
         view: a `uniforms.VIEW` record; detail: `picture_detail.Detail` of the buffer; clip_planes: (6, 4) of
-        `uniforms.CLIPPING` that cut hair off, None for none.
+        `uniforms.CLIPPING`, None for none.
         """
         with buffer.hiding():
             pass
@@ -108,7 +108,7 @@ class HairOutline:
         self._is_changed = True
 
     def show(self):
-        """Lay the outline over the viewport that is bound."""
+        """Draw the outline over the bound viewport."""
         if self._is_changed:
             self._measure()
             self._is_changed = False
@@ -119,7 +119,7 @@ class HairOutline:
         program.uniform_float("gap", self._style.gap)
         program.uniform_float("half_width", 0.5 * self._style.width)
         program.uniform_float("hidden_opacity", 1.0 if self._style.is_see_through else _HIDDEN_OPACITY)
-        # Blender interprets colours drawn over a viewport as display colours to the power of 2.2.
+        # Blender interprets colors drawn over a viewport as display colors to the power of 2.2.
         program.uniform_float("active_color", np.power(self._style.active_color, 2.2))
         program.uniform_float("selected_color", np.power(self._style.selected_color, 2.2))
         program.uniform_sampler("distances", self._distances)
@@ -127,7 +127,7 @@ class HairOutline:
             drawing.cover(program)
 
     def _measure(self):
-        """Fill the distances by the mask: first along rows, then along columns."""
+        """Fill the distances from the mask: first along rows, then along columns."""
         program = _rows_program()
         with self._rows_target.bind(), drawing.gpu_state("NONE", depth_writes=False):
             program.bind()
@@ -145,13 +145,13 @@ class HairOutline:
 
 
 def _picture(size, texture_format):
-    """(texture, framebuffer) of this size; a framebuffer does not hold its texture."""
+    """(texture, framebuffer) of this size; a framebuffer does not own its texture."""
     texture = gpu.types.GPUTexture(size, format=texture_format)
     return texture, gpu.types.GPUFrameBuffer(color_slots=texture)
 
 
 def _program(fragment, constants, samplers):
-    """A program that runs a fragment shader on every pixel; constants and samplers: {name: type}, in their order."""
+    """A program that runs a fragment shader on every pixel; constants, samplers: {name: type} in order."""
     info = gpu.types.GPUShaderCreateInfo()
     for name, kind in constants.items():
         info.push_constant(kind, name)
@@ -160,24 +160,24 @@ def _program(fragment, constants, samplers):
     return shaders.compile_drawing(info, "picture/cover.vert", fragment)
 
 
-@shaders.kept
+@shaders.cached
 def _mask_program():
     constants = {"channel": "VEC4", "first_place": "IVEC2"}
     constants |= dict.fromkeys(("samples_per_side", "first_segment", "segment_count"), "INT")
     return _program("picture/outline_mask.frag", constants, {"segments": "UINT_2D"})
 
 
-@shaders.kept
+@shaders.cached
 def _rows_program():
     return _program("picture/outline_rows.frag", {"reach": "INT", "pass_count": "INT"}, {"mask": "FLOAT_2D"})
 
 
-@shaders.kept
+@shaders.cached
 def _distance_program():
     return _program("picture/outline_distance.frag", {"reach": "INT"}, {"mask": "FLOAT_2D", "rows": "FLOAT_2D"})
 
 
-@shaders.kept
+@shaders.cached
 def _outline_program():
     constants = {"active_color": "VEC3", "selected_color": "VEC3", "origin": "VEC2"}
     constants |= dict.fromkeys(("gap", "half_width", "hidden_opacity"), "FLOAT")

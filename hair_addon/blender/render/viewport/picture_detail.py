@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How finely a viewport samples its hair: where hair is small in the picture, that part of it has more samples a pixel.
+"""The sampling density of hair in a viewport: small hair has more samples per pixel.
 
-Few samples of small hair are a matter of chance: its light flickers, and the first pass is not as bright as the last.
+With few samples small hair flickers, and the brightness of the first pass differs from the last.
 """
 
 from dataclasses import dataclass
@@ -10,15 +10,15 @@ import numpy as np
 
 from ...gpu import drawing, windows
 
-_MOST_PER_SIDE = 6  # samples along each side of a pixel: about as many as a finished picture has
+_MOST_PER_SIDE = 6  # samples along each side of a pixel: about as many as in a finished picture
 
-# Samples in the part of the picture that holds all hair: with a third of them on hair, light in the mean of a pass is
-# known to half a per cent. At most a part of those of the whole picture, so that near hair takes no longer.
+# Samples in the part of the picture that contains all hair: with a third of them on hair, the mean light of a pass has
+# an error of half a percent. At most a fraction of the whole picture's samples, so that near hair takes no longer.
 _WANTED_SAMPLES = 48_000
 _LARGEST_PART = 1.0 / 4.0
 
-_MARGIN = 6  # pixels around the hair, where it may have been before: picture/history_carry.frag looks that far
-_SIZE_STEP = 16  # pixels: textures are made anew when the size changes
+_MARGIN = 6  # pixels around the hair, where hair may have been before: the search radius of picture/history_carry.frag
+_SIZE_STEP = 16  # pixels: textures are created again when the size changes
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,10 @@ class Detail:
         return tuple(length * self.per_side for length in self.tile[2:])
 
     def pass_record(self, camera, size, turn):
-        """Return `drawing.pass_record` of its samples.
+        """Return the `drawing.pass_record` of the samples.
 
-        camera: (world to view, view to clip), each (4, 4); size: (width, height) of the picture [pixels]; turn: of the
-        pass.
+        camera: (world to view, view to clip), each (4, 4); size: (width, height) of the picture [pixels]; turn: index
+        of the pass.
         """
         whole = tuple(length * self.per_side for length in size)
         return drawing.pass_record(*camera, whole, turn, (*self.corner, *self.buffer_size))
@@ -57,9 +57,9 @@ def whole(size, per_side):
 
 
 def of_hair(drawn, camera, size, per_side):
-    """`Detail` for the hair of a `DrawnScene`: of the whole picture where hair is large in it.
+    """`Detail` for the hair of a `DrawnScene`; of the whole picture if hair is large.
 
-    camera: (world to view, view to clip), each (4, 4); per_side: samples along each side of a pixel, at least.
+    camera: (world to view, view to clip), each (4, 4); per_side: minimum samples along each side of a pixel.
     """
     window = _window(drawn, camera, size)
     area = window[2] * window[3]
@@ -69,7 +69,7 @@ def of_hair(drawn, camera, size, per_side):
 
 
 def _window(drawn, camera, size):
-    """(left, bottom, width, height) [pixels] of the part of a picture that holds all hair."""
+    """(left, bottom, width, height) [pixels] of the part of a picture that contains all hair."""
     view = drawing.pass_record(*camera, size)
     low, high = np.array(size), np.zeros(2, int)
     for strands, _shading, to_world, *_ in drawn.hair:
@@ -80,7 +80,7 @@ def _window(drawn, camera, size):
 
 
 def _tile_around(window, size):
-    """The window with a margin, of a size in whole steps, within the picture."""
+    """The window with a margin, enlarged to a multiple of the size step, within the picture."""
     placed = []
     for start, length, most in zip(window[:2], window[2:], size, strict=True):
         length = min(-(-(length + 2 * _MARGIN) // _SIZE_STEP) * _SIZE_STEP, most)

@@ -8,15 +8,15 @@ from .view_film import ViewFilm
 
 
 def draw(context):
-    """Draw the context's viewport; returns whether another pass would make it finer."""
+    """Draw the context's viewport; returns whether more passes are needed."""
     with drawing.ALONE:
         drawn, camera = viewport.drawn_scene_of(context), viewport.matrices_of(context.region_data)
         lens = _lens(context)
         per_side = 1 if lens is not None else hair_picture.samples_per_side()
         options = per_side, context.scene.render.film_transparent
-        kept = region_pictures.picture_of(context.region, ViewFilm, *options)
-        film = kept.picture
-        if kept.turn_to(drawn, (*map(float, (*camera[0].ravel(), *camera[1].ravel())), lens)):
+        region_picture = region_pictures.picture_of(context.region, ViewFilm, *options)
+        film = region_picture.picture
+        if region_picture.turn_to(drawn, (*map(float, (*camera[0].ravel(), *camera[1].ravel())), lens)):
             film.restart(is_moved=True)
         if not film.is_fine:
             film.add_pass(drawn, *camera, lens)
@@ -25,7 +25,7 @@ def draw(context):
 
 
 def _lens(context):
-    """The `Lens` that a viewport looks through: that of the camera, where it is seen through one."""
+    """The `Lens` of the camera that a viewport looks through, or None."""
     space, region_view = context.space_data, context.region_data
     if region_view.view_perspective != "CAMERA":
         return None

@@ -6,7 +6,7 @@ from .. import scene_drawing
 from . import hair_picture, picture_detail
 from .outline import HairOutline, OutlineStyle
 
-# Blender does not outline sculpted or edited objects, and strokes of the comb should be visible.
+# Blender does not outline objects in Sculpt Mode or Edit Mode, and strokes must be visible.
 _MODES = {"OBJECT", "POSE"}
 
 
@@ -17,10 +17,9 @@ def has_outlines(context):
 
 
 def outlined(context, drawn, is_see_through=False):
-    """What outlines the selected hair of a `DrawnScene`, None without any.
+    """(items of `channels`, style) for `HairOutline.restart` of a `DrawnScene`'s selected hair; None without any.
 
-    Hashable: the items of `channels`, and the style, of `HairOutline.restart`. is_see_through: whether lines are as
-    opaque where something hides the hair.
+    Hashable. is_see_through: whether lines of occluded hair are as opaque as others.
     """
     if not any(drawn.selected) or not has_outlines(context):
         return None
@@ -36,7 +35,7 @@ def outlined(context, drawn, is_see_through=False):
 
 
 def may_be_outlined(context):
-    """Whether hair or something that may have instances of hair is selected, in a viewport with outlines."""
+    """Whether the viewport shows outlines, and hair or an object that may have instances of hair is selected."""
     return has_outlines(context) and any(map(_may_show_hair, context.selected_objects))
 
 
@@ -47,7 +46,7 @@ def _may_show_hair(selected):
 
 
 class LoneOutline:
-    """The outline of hair in a region of size (width, height) whose picture another engine makes."""
+    """The outline of hair in a region of size (width, height) that is rendered by another engine."""
 
     def __init__(self, size):
         self.size = size
@@ -58,11 +57,11 @@ class LoneOutline:
 
     @property
     def is_fine(self):
-        """Whether another pass would change nothing that is seen."""
+        """Whether all passes are drawn."""
         return self._outline.is_fine
 
     def restart(self, channels, style):
-        """What comes now is another outline, or seen from elsewhere: see `HairOutline.restart`."""
+        """Start another outline, or another view of it; arguments as for `HairOutline.restart`."""
         self._outline.restart(channels, style)
         self._pass_count = 0
 
@@ -77,5 +76,5 @@ class LoneOutline:
         self._pass_count += 1
 
     def show(self):
-        """Lay the outline over the viewport that is bound."""
+        """Draw the outline over the bound viewport."""
         self._outline.show()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The picture of a viewport with Rendered shading: a film, and what was shown before something moved."""
+"""The picture of a viewport with Rendered shading: a film and its history."""
 
 import functools
 
@@ -26,11 +26,11 @@ class ViewFilm:
 
     @property
     def is_fine(self):
-        """Whether another pass would change nothing that is seen."""
+        """Whether all passes are drawn."""
         return self._film.pass_count >= self._pass_total
 
     def restart(self, is_moved=False):
-        """Start another picture: as `HairPicture.restart`."""
+        """Start another picture; is_moved: as for `HairPicture.restart`."""
         if is_moved:
             self._history.turn(self._film.light, self._film.pass_count / self._pass_total)
             self._first_turn += self._film.pass_count
@@ -40,7 +40,7 @@ class ViewFilm:
         self._film.clear()
 
     def add_pass(self, drawn, world_to_view, view_to_clip, lens=None):
-        """Draw a `DrawnScene` once more: arguments as for `Film.add_pass`."""
+        """Draw a `DrawnScene` once more; arguments as for `Film.add_pass`."""
         film, camera = self._film, (world_to_view, view_to_clip)
         if film.pass_count == 0:
             relight = functools.partial(scene_drawing.relight, drawn, self._view, film.samples, film.is_transparent)
@@ -51,13 +51,13 @@ class ViewFilm:
         self._history.add(drawn, camera, view, samples, film.light, film.pass_count, part_left, has_lit_surfaces=True)
 
     def show(self):
-        """Lay the picture over the viewport that is bound."""
+        """Draw the picture over the bound viewport."""
         self._film.show(self._history.picture)
 
     def read(self):
-        """(height, width, 4) float32: the mean of the passes so far, first row at the bottom."""
+        """(height, width, 4) float32: the mean of the passes so far, bottom row first."""
         return self._film.read()["Combined"]
 
     def read_shown(self):
-        """The same of what `show` shows, which may hold some of what was shown before something moved."""
+        """`read` of the picture that `show` draws, which may include the history of former pictures."""
         return self.read() if self._history.picture is None else self._history.read()

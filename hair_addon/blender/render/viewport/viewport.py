@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The draw handler: hair and guides in every 3-D viewport, after Blender's own drawing.
+"""The draw handler: hair and guides in every 3D viewport, after Blender's own drawing.
 
-Hair is drawn into a picture of its own and laid over the viewport through the scene's view transform. Surfaces hide it
-in that picture, sample by sample: what the viewport itself holds as depth is up to date only while overlays are drawn.
-While nothing moves the picture is refined, and then only composited.
+Hair is drawn into a separate picture, which is composited over the viewport through the scene's view transform.
+Surfaces occlude hair in that picture, sample by sample, as the viewport's own depth is only up to date while overlays
+are drawn. While nothing moves the picture is refined, and then only composited.
 """
 
 from dataclasses import dataclass
@@ -26,9 +26,8 @@ from .. import drawn_scene, hair_cache
 from . import hair_picture, region_pictures, selected_hair
 from .outline import HairOutline
 
-# Pixels: guides are lines of constant width.
-_PICK_REACH = 5  # pixels, beside which a click meets hair: strands are thinner than a pixel
-_GUIDE_WIDTH = 2.0
+_PICK_REACH = 5  # maximum distance [pixels] of a click from hair, as strands are thinner than a pixel
+_GUIDE_WIDTH = 2.0  # [pixels]: guides are lines of constant width
 
 _handles = []  # of draw handlers
 
@@ -38,17 +37,17 @@ display_table_cache = Cache(capacity=4)  # DisplayTransform → texture
 
 @dataclass
 class _View:
-    """What a viewport draws until something moves."""
+    """The cached scene of a viewport until something moves."""
 
-    shows: tuple  # what it may leave out
+    shows: tuple  # key of the viewport's visibility settings
     drawn: drawn_scene.DrawnScene | None = None
-    outdated: drawn_scene.DrawnScene | None = None  # from before hair changed, and nothing else
-    former: drawn_scene.DrawnScene | None = None  # from before anything changed
-    is_playing: bool = False  # whether it was read while the animation played, or something moved a surface
+    outdated: drawn_scene.DrawnScene | None = None  # the previous scene, if only hair has changed
+    former: drawn_scene.DrawnScene | None = None  # the previous scene
+    is_playing: bool = False  # whether it was read during playback, or while a surface was being moved
 
 
 def register():
-    """Start drawing in every 3-D viewport that there is."""
+    """Start drawing in every 3D viewport."""
     _handles.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", "POST_VIEW"))
 
 
@@ -62,7 +61,7 @@ def unregister():
 
 
 def invalidate(is_hair_only=False):
-    """Something moved: read the scene again with the next redraw. is_hair_only: all but hair is as it was."""
+    """Read the scene again with the next redraw, as something has changed; is_hair_only: only hair has changed."""
     for view in view_cache.values():
         view.former = view.drawn or view.former
         view.outdated = (view.drawn or view.outdated) if is_hair_only else None
@@ -81,7 +80,7 @@ def draw():
 
 def _draw(context):
     try:
-        if context.space_data.shading.type == "RENDERED":  # there the render engine draws hair by itself
+        if context.space_data.shading.type == "RENDERED":  # the render engine draws hair by itself
             _draw_outline(context)
         else:
             _draw_hair(context)
@@ -100,17 +99,17 @@ def _draw_hair(context):
     outlined = selected_hair.outlined(context, drawn, is_see_through=xray is not None)
     is_shadowed = viewport.shading.type == "MATERIAL" and context.scene.vellus.has_preview_shadow
     clip_planes = _clip_planes(context)
-    kept = _picture(drawn, context.region_data, region, xray is not None, outlined, is_shadowed, clip_planes)
-    kept.picture.show(
+    region_picture = _picture(drawn, context.region_data, region, xray is not None, outlined, is_shadowed, clip_planes)
+    region_picture.picture.show(
         _display_table(DisplayTransform.of(context.scene)),
         2.0**context.scene.view_settings.exposure,
         1.0 if xray is None else xray,
         "LESS_EQUAL" if viewport.overlay.show_overlays and xray is None else "ALWAYS",
     )
-    if kept.outline is not None:
-        kept.outline.show()
-    # At rest, the programs that the next edit needs are compiled: one a redraw, as each may take a second.
-    if not kept.picture.is_fine or hair_cache.prepare_makers():
+    if region_picture.outline is not None:
+        region_picture.outline.show()
+    # At rest, programs for the next edit are compiled, one per redraw, as each may take a second.
+    if not region_picture.picture.is_fine or hair_cache.prepare_makers():
         region.tag_redraw()
 
 
@@ -123,9 +122,9 @@ def _draw_outline(context):
     if wanted is None:
         region_pictures.drop_picture(region, selected_hair.LoneOutline)
         return
-    kept = region_pictures.picture_of(region, selected_hair.LoneOutline)
-    outline, matrices = kept.picture, matrices_of(context.region_data)
-    if kept.turn_to(drawn, (wanted, *(tuple(map(float, matrix.ravel())) for matrix in matrices))):
+    region_picture = region_pictures.picture_of(region, selected_hair.LoneOutline)
+    outline, matrices = region_picture.picture, matrices_of(context.region_data)
+    if region_picture.turn_to(drawn, (wanted, *(tuple(map(float, matrix.ravel())) for matrix in matrices))):
         outline.restart(dict(wanted[0]), wanted[1])
     if not outline.is_fine:
         outline.add_pass(drawn, *matrices)
@@ -140,16 +139,16 @@ def is_ours(context):
 
 
 def hair_at(context, x, y):
-    """The hair object that the context's viewport shows at a pixel of its region or a few pixels beside it, or None."""
-    kept = region_pictures.known_picture(context.region, hair_picture.HairPicture)
-    width, height = kept.picture.size if kept else (0, 0)
+    """The hair object in the context's viewport at, or a few pixels from, a pixel of its region; or None."""
+    region_picture = region_pictures.known_picture(context.region, hair_picture.HairPicture)
+    width, height = region_picture.picture.size if region_picture else (0, 0)
     if context.space_data.shading.type == "RENDERED" or not (0 <= x < width and 0 <= y < height):
         return None
     view = view_cache.get(context.space_data.as_pointer())
-    if view is None or kept.drawn is not view.drawn:
+    if view is None or region_picture.drawn is not view.drawn:
         return None  # the picture is outdated and about to be redrawn
-    index = kept.picture.hair_near(x, y, round(_PICK_REACH * context.preferences.system.ui_scale))
-    uid = None if index is None else kept.drawn.owners[index]
+    index = region_picture.picture.hair_near(x, y, round(_PICK_REACH * context.preferences.system.ui_scale))
+    uid = None if index is None else region_picture.drawn.owners[index]
     return next((o for o in context.view_layer.objects if o.session_uid == uid), None)
 
 
@@ -158,10 +157,10 @@ def drawn_scene_of(context):
     viewport = context.space_data
     key, shows = viewport.as_pointer(), (is_ours(context), *_what_shows(viewport))
     view = view_cache.get(key)
-    if view is None or view.shows != shows:  # what one viewport leaves out is no change of the scene
+    if view is None or view.shows != shows:  # visibility settings of a viewport do not change the scene
         view = view_cache.keep(key, _View(shows))
     is_playing = scene_time.is_playing() or paused_hair.is_any()
-    if view.is_playing and not is_playing and view.drawn is not None:  # refined at rest
+    if view.is_playing and not is_playing and view.drawn is not None:  # read again in full detail at rest
         view.outdated, view.drawn = view.drawn, None
     if view.drawn is None:
         before, view.outdated = view.outdated, None
@@ -184,7 +183,7 @@ def drawn_scene_of(context):
 
 
 def _what_shows(viewport):
-    """Key of what a viewport shows, and of what is needed to show it."""
+    """A key of a viewport's settings that affect which objects, and which of their data, are read."""
     return (
         viewport.shading.type == "MATERIAL",
         viewport.local_view is not None,
@@ -202,37 +201,37 @@ def _xray(shading):
 
 
 def _clip_planes(context):
-    """((x, y, z, w), ... of six planes) of Blender's Clipping Region, None without: as it, in two modes of shading.
+    """((x, y, z, w), ... of six planes) of Blender's Clipping Region in Wireframe and Solid shading, or None.
 
-    A place p of the world is left where no dot((x, y, z, w), (p, 1)) is negative.
+    World points p with any dot((x, y, z, w), (p, 1)) < 0 are clipped.
     """
     view = context.region_data
     if not view.use_clip_planes or context.space_data.shading.type not in {"WIREFRAME", "SOLID"}:
         return None
     planes = tuple(map(tuple, view.clip_planes))
-    return (*planes[:4], *[(0.0, 0.0, 0.0, 0.0)] * 2) if view.use_box_clip else planes  # a box of a quad view has four
+    return (*planes[:4], *[(0.0, 0.0, 0.0, 0.0)] * 2) if view.use_box_clip else planes  # quad views clip by four planes
 
 
 def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=False, clip_planes=None):
-    """The `RegionPicture` of a region, of this scene and view: restarted, with another pass, or unchanged.
+    """The `RegionPicture` of a region for this scene and view: restarted, with another pass, or unchanged.
 
-    outlined: as `selected_hair.outlined` returns it; is_shadowed, clip_planes: as for `HairPicture.add_pass`.
+    outlined: from `selected_hair.outlined`; is_shadowed, clip_planes: as for `HairPicture.add_pass`.
     """
-    kept = region_pictures.picture_of(region, hair_picture.HairPicture)
+    region_picture = region_pictures.picture_of(region, hair_picture.HairPicture)
     options = is_see_through, is_shadowed, clip_planes
-    is_moved = kept.seen[:3] == options
+    is_moved = region_picture.seen[:3] == options
     seen = (*options, outlined, *map(tuple, view.view_matrix), *map(tuple, view.window_matrix))
-    if kept.turn_to(drawn, seen):
-        kept.picture.restart(is_moved)
+    if region_picture.turn_to(drawn, seen):
+        region_picture.picture.restart(is_moved)
         if outlined is None:
-            kept.outline = None
+            region_picture.outline = None
         else:
-            kept.outline = kept.outline or HairOutline(kept.picture.size)
-            kept.outline.restart(dict(outlined[0]), outlined[1])
-    if not kept.picture.is_fine:
-        options = is_see_through, kept.outline, is_shadowed, clip_planes
-        kept.picture.add_pass(drawn, *matrices_of(view), *options)
-    return kept
+            region_picture.outline = region_picture.outline or HairOutline(region_picture.picture.size)
+            region_picture.outline.restart(dict(outlined[0]), outlined[1])
+    if not region_picture.picture.is_fine:
+        options = is_see_through, region_picture.outline, is_shadowed, clip_planes
+        region_picture.picture.add_pass(drawn, *matrices_of(view), *options)
+    return region_picture
 
 
 def matrices_of(view):
