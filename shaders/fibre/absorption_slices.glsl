@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Lookup of sigma_a in slices evenly spaced in its square root, and interpolation between them.
 
-// (the slice below, the fraction to the next one in sigma_a)
+// (the slice below, the fraction to the next slice in sigma_a)
 vec2 slice_of(float sigma_a, float low, float high, int slice_count)
 {
   float step_size = max(high - low, 1e-6) / float(slice_count - 1);
@@ -12,7 +12,7 @@ vec2 slice_of(float sigma_a, float low, float high, int slice_count)
   return vec2(below, clamp((sigma_a - root_below * root_below) / distance_to_next, 0.0, 1.0));
 }
 
-// a^(1 - fraction) b^fraction, down to a darkness below which it becomes linear: black may be either end.
+// a^(1 - fraction) b^fraction; linear for very dark values, as either end may be black.
 vec4 geometric_mix(vec4 a, vec4 b, float fraction)
 {
   const float DARKEST = 1.0 / 16384.0;

@@ -4,7 +4,8 @@
 // float fibre_roughness()               longitudinal
 // FibreLobes fibre_lobes(vec2 at)       N, for light from one direction, at coordinates of `n_coordinates`
 // FibreLobes forward_lobes(vec2 at)     N, for light that strands in front have scattered
-// vec3 dual(float row, float theta_i)   what the strands around do, rows as in `dual_scattering.QUANTITIES` and between them
+// vec3 dual(float row, float theta_i)   scattering by the strands around; rows as in `dual_scattering.QUANTITIES`
+//                                       and interpolated
 
 #include "fibre/drawn_lobes.glsl"
 #include "fibre/dual_scattering.glsl"
@@ -23,7 +24,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   return lobe_sum(drawn_lobes * fibre_m(dot(T, L), sin_o, blur), fibre_lobes(at));
 }
 
-// `dual_scattering.radiance`. Widths and shifts are those of the light of all channels.
+// `dual_scattering.radiance`. Widths and shifts are of the light of all channels.
 vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float front, float behind, float blur)
 {
   float sin_i = dot(T, L);
@@ -50,14 +51,14 @@ vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float front, float behind, float blur
   vec2 at = n_coordinates(phi, cos_o, settings.axes);
   float turned = theta_o - through_drift.x;
   vec3 through = lobe_sum(fibre_m(sin_i, sin(turned), through_drift.y + blur), forward_lobes(at));
-  // Light that has turned is so wide that the lobes of this strand hardly matter.
+  // Backscattered light is so wide that the lobes of this strand hardly matter.
   float back_m = shifted_lobe(sin_i, cos_i, sin_o, cos_o, back_drift.x, back_drift.y + blur);
   vec3 returning = back_m / PI * mix(a_b, a_f, back_azimuth(phi));
   return direct * hair_bsdf(T, L, V, blur) +
          drawn_lobes.w * ((onward - direct) * through + backward * returning);
 }
 
-// Uniform light that strands behind send back through a strand: `albedo.returned_from_behind`.
+// Uniform light that strands behind reflect through a strand: `albedo.returned_from_behind`.
 vec3 returned_from_behind(float sin_theta_o, float behind)
 {
   float theta_o = atan(sin_theta_o, sin_from_cos(sin_theta_o));

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Dual scattering [Zinke08]: forward scattering by strands in front, backscattering by strands behind; the fluxes between
-// both by [Kubelka31].
+// Dual scattering [Zinke08]: forward scattering by strands in front, backscattering by strands behind; fluxes between them
+// by [Kubelka31].
 
 #include "fibre/longitudinal.glsl"
 
-// By a strand, and of deep hair: without any loss, fluxes would not fall exponentially.
+// Minimum attenuation by a strand, and maximum reflectance of deep hair: without loss, fluxes would not fall exponentially.
 const float LEAST_ATTENUATION = 1e-3;
 const float MOST_REFLECTANCE = 0.995;
 
-// Least mean cosine: of light from everywhere; and flux: where there is no light.
+// Minimum mean cosine, for light from everywhere; and minimum flux, without light.
 const float LEAST_COSINE = 1e-3;
 const float LEAST_FLUX = 1e-6;
 
-// Part of the light from the half circle behind that goes to its front, over the azimuth |phi| of the front.
+// Fraction of the light from the half circle behind that goes to the front, by the azimuth |phi| of the front.
 float back_azimuth(float phi)
 {
   return 1.0 - phi / PI;
 }
 
-// Unscattered part of light behind a mean of `count` strands.
+// Unscattered fraction of light behind a mean of `count` strands.
 float direct_part(float count)
 {
   return exp(-count);
@@ -32,7 +32,7 @@ void deep_hair(vec3 a_f, vec3 a_b, out vec3 attenuation, out vec3 reflectance)
   reflectance = min(a_b / (lost + attenuation), vec3(MOST_REFLECTANCE));
 }
 
-// Parts of light that a mean of `count` strands of `deep_hair` transmits and reflects.
+// Fractions of light that a mean of `count` strands of `deep_hair` transmits and reflects.
 void layer_parts(float count, vec3 attenuation, vec3 reflectance, out vec3 transmitted_part, out vec3 reflected_part)
 {
   vec3 left = exp(-attenuation * count);
@@ -42,8 +42,8 @@ void layer_parts(float count, vec3 attenuation, vec3 reflectance, out vec3 trans
   reflected_part = reflectance * (vec3(1.0) - left * left) / kept;
 }
 
-// Light at a strand between means of `front` and `behind` others, as parts of what arrives at the first: onward from the
-// front, backward from behind.
+// Light at a strand between means of `front` and `behind` others, as fractions of incident light: onward from the front,
+// backward from behind.
 void fluxes(float front, float behind, vec3 a_f, vec3 a_b, out vec3 onward, out vec3 backward)
 {
   vec3 attenuation, reflectance, through, reflected, beyond, returned;
@@ -67,8 +67,8 @@ float mean_cosine(vec3 width)
   return (1.0 + opposite) / (1.0 - opposite) - variance;
 }
 
-// Shift and variance, in theta_i + theta_o, of light of a flux whose mean sine is `kept` where each event multiplies it by
-// `cosine` and shifts light by `shift`; last: of an event more. `dual_scattering.drifts`.
+// Shift and variance, in theta_i + theta_o, of light with a flux whose mean sine is `kept`, if each event multiplies the
+// mean sine by `cosine` and shifts light by `shift`; last: factor of one more event. `dual_scattering.drifts`.
 vec2 drift(vec3 kept, vec3 flux, float last, float cosine, float shift)
 {
   float m = clamp(last * (total(kept) + LEAST_FLUX) / (total(flux) + LEAST_FLUX), LEAST_COSINE, 1.0);

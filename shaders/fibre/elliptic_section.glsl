@@ -3,8 +3,8 @@
 
 #include "fibre/constants.glsl"
 
-// The section's major axis: a random direction per strand, perpendicular to the fibre. It rotates with the fibre, and has
-// a seam only where a strand runs along that direction.
+// The section's major axis: a random direction per strand, perpendicular to the fibre. It rotates with the fibre, with a
+// seam only where a strand runs along that direction.
 vec3 major_axis(vec3 T, float random)
 {
   float z = 2.0 * random - 1.0;
@@ -14,7 +14,7 @@ vec3 major_axis(vec3 T, float random)
   return across * inversesqrt(max(dot(across, across), 1e-12));
 }
 
-// cos(2 phi_h) = cos(phi_i + phi_o), of azimuths measured from the major axis.
+// cos(2 phi_h) = cos(phi_i + phi_o), with azimuths measured from the major axis.
 float cos_twice_phi_h(vec3 T, vec3 axis, vec3 L, vec3 V)
 {
   vec3 other = cross(T, axis);

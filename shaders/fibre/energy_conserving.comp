@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The energy-conserving Marschner model [DEon11] [Chiang16]: M evaluated, N from baked tables at theta_o.
+// The energy-conserving Marschner model [DEon11] [Chiang16]: M is evaluated, N read from baked tables at theta_o.
 
 #include "fibre/constants.glsl"
 #include "fibre/lobe_sum.glsl"

@@ -25,7 +25,7 @@ FibreLobes forward_lobes(vec2 at)
                       forward_channel(at, sigma_a.b));
 }
 
-// Of the surrounding strands, at the same position along the gradient.
+// For the surrounding strands at the same position along the gradient.
 vec3 dual(float row, float theta_i)
 {
   float step_count = float(textureSize(dual_table, 0).z);

@@ -3,8 +3,8 @@
 
 #include "fibre/constants.glsl"
 
-// Rounding can carry a cosine past one; the root of a negative number is not a number. The product of both factors
-// keeps the digits that 1 - cosine² loses near one.
+// Rounding can make a cosine greater than one, and the root of a negative number is NaN. The product of both factors keeps
+// the digits that 1 - cosine² loses near one.
 float sin_from_cos(float cosine)
 {
   return sqrt(max(0.0, (1.0 - cosine) * (1.0 + cosine)));
@@ -23,8 +23,8 @@ float cos_theta_d(float sin_theta_i, float sin_theta_o)
   return sqrt(max(0.0, 0.5 * (1.0 + cosines + sin_theta_i * sin_theta_o)));
 }
 
-// Even light from below a plane with the normal N, as seen by a fibre's mirror cone, sin(theta_i) = -sin(theta_o), softened
-// as by roughness: the part of the cone, and its moment with the cosine of phi, both as factors of what a fibre returns.
+// Uniform light from below a plane with normal N on a fibre's mirror cone, sin(theta_i) = -sin(theta_o), softened as by
+// roughness: the fraction of the cone, and its moment with the cosine of phi, both as factors of the fibre's response.
 vec2 light_from_below(vec3 T, vec3 V, vec3 N)
 {
   const float SOFTNESS = 0.05;
@@ -44,6 +44,6 @@ float relative_azimuth(vec3 T, vec3 L, vec3 V)
   vec3 v = V - dot(T, V) * T;
   float across = abs(dot(T, cross(l, v)));
   float along = dot(l, v);
-  // An arc cosine would lose half of the digits at 0 and pi, and the drivers' has errors of at least 1e-3.
+  // An arc cosine would lose half of the digits at 0 and pi, and has errors of at least 1e-3 with some drivers.
   return (max(across, abs(along)) < 1e-12) ? 0.0 : atan(across, along);
 }

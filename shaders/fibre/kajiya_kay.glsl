@@ -19,29 +19,29 @@ float kajiya_kay_specular(vec3 T, vec3 L, vec3 V, float exponent)
   return pow(max(0.0, cone), exponent);
 }
 
-// Directional albedo of the highlight under uniform light, the mean over all directions of view: with
-// s = theta_i + theta_o it is pi/2 times the integral of cos(s)^exponent ((pi - |s|) cos(s) + sin|s|), and close to
-// pi²/2 times that of cos(s)^(exponent + 1). Within 0.5 % for an exponent of 10 and more, 5 % for 1.
+// Directional albedo of the highlight under uniform light, averaged over all view directions: with
+// s = theta_i + theta_o it is pi/2 times the integral of cos(s)^exponent ((pi - |s|) cos(s) + sin|s|), approximated by
+// pi²/2 times the integral of cos(s)^(exponent + 1). Within 0.5 % for exponents of 10 and more, 5 % for 1.
 float kajiya_kay_specular_albedo(float exponent)
 {
   return 0.5 * PI * PI * sqrt(2.0 * PI / (exponent + 1.5));
 }
 
-// Response to light that varies as P1 and P2 of sin(theta_i): a diffuse cylinder's, to its sine, and a mirror cone's. Both
-// albedos are those in even light.
+// Response of a diffuse cylinder and a mirror cone to light that varies as P1 and P2 of sin(theta_i); diffuse, specular:
+// albedos in uniform light.
 void kajiya_kay_zonal(vec3 diffuse, vec3 specular, float sin_theta_o, out vec3 zonal_1, out vec3 zonal_2)
 {
   zonal_1 = -sin_theta_o * specular;
   zonal_2 = legendre_2(sin_theta_o) * specular - 0.125 * diffuse;
 }
 
-// Exponent of a highlight of light with an angular variance: the variance of the highlight is close to 1 / exponent.
+// Exponent of a highlight from light with an angular variance: the variance of a highlight is close to 1 / exponent.
 float blurred_exponent(float exponent, float blur)
 {
   return exponent / (1.0 + exponent * blur);
 }
 
-// Exponent of a highlight as wide as the R lobe of a longitudinal roughness.
+// Exponent of a highlight with the width of the R lobe of a longitudinal roughness.
 float highlight_exponent(float roughness)
 {
   return clamp(1.0 / variance_from_roughness(roughness), 1.0, 10000.0);
@@ -53,7 +53,7 @@ float highlight_peak(float reflectance, float exponent)
   return min(reflectance / kajiya_kay_specular_albedo(exponent), 1.0);
 }
 
-// Colour of multiply scattered light in hair [Chiang16].
+// Color of multiply scattered light in hair [Chiang16].
 vec3 color_from_falloff(vec3 sigma_a, float falloff)
 {
   return exp(-falloff * sqrt(sigma_a));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The Kajiya-Kay model [Kajiya89] for strands that differ: colour and highlight follow from absorption and roughness.
+// The Kajiya-Kay model [Kajiya89] for varied strands: color and highlight follow from absorption and roughness.
 
 #include "fibre/drawn_lobes.glsl"
 #include "fibre/kajiya_kay.glsl"
@@ -14,7 +14,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
 {
   float exponent = blurred_exponent(this_exponent(), blur);
   float specular = highlight_peak(settings.reflectance, exponent) * kajiya_kay_specular(T, L, V, exponent);
-  // The integral of sin(T, L) over the sphere is pi², so this diffuse part has the albedo of the colour.
+  // The integral of sin(T, L) over the sphere is pi², so this diffuse part has the albedo of the color.
   vec3 diffuse = color_from_falloff(this_sigma_a(), settings.falloff) * kajiya_kay_diffuse(T, L) / (PI * PI);
   return drawn_lobes.w * diffuse + drawn_lobes.x * vec3(specular);
 }

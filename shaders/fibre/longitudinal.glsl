@@ -18,7 +18,7 @@ float i0e(float x)
   return (0.39894228 + r * (0.01328592 + r * (0.00225319 + r * (-0.00157565 + r * series)))) / sqrt(x);
 }
 
-// M_v, v the variance in theta_i + theta_o.
+// M_v; v: variance in theta_i + theta_o.
 float d_eon_lobe(float sin_i, float cos_i, float sin_o, float cos_o, float v)
 {
   float along = sin_i + sin_o;

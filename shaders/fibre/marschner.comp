@@ -10,7 +10,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
 {
   float sin_theta_i = dot(T, L);
   float sin_theta_o = dot(T, V);
-  // From the directions, not from the table's alpha, which is off by up to 0.014 near grazing.
+  // From the directions, as the table's alpha has errors of up to 0.014 near grazing.
   float cosine = cos_theta_d(sin_theta_i, sin_theta_o);
   vec2 n_at = n_coordinates(relative_azimuth(T, L, V), cosine, settings.axes);
   vec3 m = textureLod(m_table, m_coordinates(sin_theta_i, sin_theta_o, settings.axes), 0.0).rgb;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The same for fibres with an elliptic section, turned differently in each strand.
+// The Marschner model [Marschner03] for varied strands with an elliptic section, rotated differently in each strand.
 
 #include "fibre/elliptic_section.glsl"
 #include "fibre/varied_fibre.glsl"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The shares of two programs in a sample, by the wetness of its strand: first the driest look is drawn, then the wettest
-// is added. Needs the sampler strand_wetness, the image picture and the constants wetness_range and is_wet.
+// The share of a look in a sample, by the wetness of its strand: the driest look is drawn first, then the wettest look is
+// added. Needs the sampler strand_wetness, the image picture and the constants wetness_range and is_wet.
 
 #include "fibre/wet_share.glsl"
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The main function of all shading models: the sum over the scene's lights plus the world's light, for each
-// sample of a picture in which a strand of this hair is nearest.
+// The main function of all shading models: the sum over the scene's lights plus the world's light, for each sample of a
+// picture in which a strand of this hair is nearest. Models define
 //
 // vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float front, float behind, float blur)
 //     light leaving the fibre towards V for unit irradiance from around L outside the hair, with a mean of `front` strands
-//     between and `behind` strands beyond; blur: variance of the light's direction along an axis [rad²]
+//     in front of it and `behind` strands behind it; blur: variance of the light's direction along an axis [rad²]
 // void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
-//     the fibre's response to uniform light: the integral over phi, the same weighted with the cosine of phi, and the
+//     the fibre's response to uniform light: the integral over phi, the integral weighted with the cosine of phi, and the
 //     responses to light that varies as P1 and P2 of sin(theta_i)
 // vec3 returned_from_behind(float sin_theta_o, float behind)
-//     what `behind` strands beyond add to the first
+//     light that `behind` strands add to `returned`
 
 #include "light/strand_irradiance.glsl"
 #include "fibre/drawn_lobes.glsl"
@@ -25,13 +25,13 @@ struct SeenStrand {
   vec3 T;
   vec3 V;
   vec3 root;  // `root_direction`
-  vec3 returned;  // these four of `hair_return`
+  vec3 returned;  // results of `hair_return`
   vec3 towards;
   vec3 zonal_1;
   vec3 zonal_2;
 };
 
-// The strand at the place that `find_place` found.
+// The strand at the result of `find_place`.
 SeenStrand seen_strand()
 {
   SeenStrand strand;
@@ -88,7 +88,7 @@ vec3 strand_light(SeenStrand strand)
     vec3 irradiance = lamp.irradiance * lamp.open;
     // Most strands are in the shadow of the others, with no light to scatter.
     if (is_visible(irradiance * transmitted(lamp.front, view.hair_forward.rgb))) {
-      // Where the light passes beside the surface, that which the strand sees.
+      // If the light misses surfaces, the normal and color of the surfaces visible from the strand.
       vec3 lit_normal = N;
       vec3 lit_color = surface_color;
       if (lamp.is_in_map) {
@@ -107,8 +107,7 @@ vec3 strand_light(SeenStrand strand)
   return radiance;
 }
 
-// The same where paths through a grid have found all light: as much of it is kept as the grid says, and the rest is the
-// grid's.
+// Radiance if paths through a grid have measured all light: a fraction of dual scattering, plus the light of the grid.
 vec3 strand_light_on_grid(SeenStrand strand)
 {
   vec4 among = light_among_strands(drawn_position);

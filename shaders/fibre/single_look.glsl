@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The share of a program in a sample: all. Hair that is wet in places is drawn by two programs, which include
-// fibre/mixed_looks.glsl in place of this file.
+// The share of a look in a sample: all. The two programs for hair that is wet in places include fibre/mixed_looks.glsl in
+// place of this file.
 
 float look_share(int strand)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// For models without multiple scattering: light is attenuated by strands, and keeps its direction.
+// For models without multiple scattering: strands attenuate light without changing its direction.
 
 #include "shadows/opacity.glsl"
 

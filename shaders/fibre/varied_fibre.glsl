@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// N of the absorption where this sample lies: needs the samplers n_slices and return_slices and the block slices.
+// N for the absorption at this sample: needs the samplers n_slices and return_slices and the block slices.
 
 #include "fibre/absorption_slices.glsl"
 #include "fibre/fibre.glsl"
 #include "fibre/lobe_sum.glsl"
 #include "fibre/varied_strand.glsl"
 
-// N_TT, N_TRT, N of the residual and N_R of one channel's absorption.
+// N_TT, N_TRT, N of the residual and N_R for one channel's absorption.
 vec4 channel_lobes(vec2 at, float sigma_a)
 {
   float slice_count = float(textureSize(n_slices, 0).z);
@@ -31,14 +31,14 @@ FibreLobes fibre_lobes(vec2 at)
   return side_by_side(channel_lobes(at, sigma_a.r), channel_lobes(at, sigma_a.g), channel_lobes(at, sigma_a.b));
 }
 
-// A value in [0, 1] as the coordinate of a table whose first and last texel are at its ends.
+// A value in [0, 1] → the coordinate in a table whose first and last texel centers are at 0 and 1.
 float between_ends(float value, float texel_count)
 {
   return (clamp(value, 0.0, 1.0) * (texel_count - 1.0) + 0.5) / texel_count;
 }
 
-// Response to uniform light towards theta_o for one channel's absorption: the integral over phi, and the
-// same weighted with the cosine of phi, then those to P1 and P2 of sin(theta_i). As `albedo.fibre_moments`.
+// Response to uniform light towards theta_o for one channel's absorption: the integral over phi, the integral weighted with
+// the cosine of phi, and the responses to P1 and P2 of sin(theta_i). Same as `albedo.fibre_moments`.
 vec4 channel_return(float u, float sigma_a)
 {
   float along = (sqrt(sigma_a) - slices.low) / max(slices.high - slices.low, 1e-6);

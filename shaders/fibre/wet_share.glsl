@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far a strand is shaded as the wettest, not as the driest: `appearance.wet_share`.
+// The share of the wettest look in a strand, the rest being the driest look: `appearance.wet_share`.
 
 const float LEAST_SHARE = 1.0 / 1024.0;
 

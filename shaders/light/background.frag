@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The environment as the background of the camera.
+// The environment as the background of a camera view.
 
 #include "light/environment.glsl"
 

@@ -3,7 +3,7 @@
 
 #include "fibre/constants.glsl"
 
-// Place of a direction in a picture of longitude, from pi to -pi, and latitude.
+// Coordinates of a direction in an equirectangular image: longitude from pi to -pi, and latitude.
 vec2 equirectangular(vec3 direction)
 {
   float longitude = atan(direction.y, direction.x);
@@ -18,7 +18,7 @@ vec3 equirectangular_direction(vec2 at)
   return vec3(cos(latitude) * cos(longitude), cos(latitude) * sin(longitude), sin(latitude));
 }
 
-// Place of a direction in a picture of a mirror ball that is seen along +y.
+// Coordinates of a direction in an image of a mirror ball that is viewed along +y.
 vec2 mirror_ball(vec3 direction)
 {
   vec3 normal = direction - vec3(0.0, 1.0, 0.0);

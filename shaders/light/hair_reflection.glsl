@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light of a lamp that hair reflects to a surface beside it: shadow maps hold the hair's lit side, which is taken for a matt
-// surface that sends light in turn [Dachsbacher05]. Needs the samplers of shadows/shadow.glsl.
+// Light of a lamp that hair reflects to a surface nearby: shadow maps contain the hair's lit side, which is treated as a
+// matte surface that emits reflected light [Dachsbacher05]. Needs the samplers of shadows/shadow.glsl.
 
 #include "shadows/shadow.glsl"
 
-// Distances across the light at which hair is looked up, least and largest, as parts of the hair's extent; how often they go
-// through this range in half a turn: with five in a turn, places of samples next to each other are even in both.
+// Minimum and maximum distance across the light at which hair is looked up, as fractions of the hair's extent; and how often
+// distances repeat this range in half a turn: with five times per turn, lookups of adjacent samples are even in both.
 const float NEAREST = 0.015;
 const float FARTHEST = 0.45;
 const float TURNS = 2.5;
-const int PLACES = 4;  // of each sample
-// Distance of neighbors that tell the slope of the hair's lit side, as a part of the map; and the largest difference of
-// their depths: beyond it they are of different locks.
+const int PLACES = 4;  // lookups per sample
+// Distance of neighbors for the slope of the hair's lit side, as a fraction of the map; and the largest difference of their
+// depths: beyond it they are in different locks.
 const float SLOPE_REACH = 0.012;
 const float SLOPE_LIMIT = 0.06;
 
-// Places across a light's direction, for distances in meters.
+// Axes across a light's direction, for distances in meters.
 struct Across {
   vec3 right;
   vec3 up;
-  float scale;  // of the map, times the distance to the light's plane
+  float scale;  // of the map, times the distance from the light's plane
   float w;
 };
 
@@ -36,7 +36,7 @@ Across across_of(Light light, vec3 position)
   return across;
 }
 
-// Normal of the hair's lit side at a place of the map with strands at a depth; meters: of the map's size there.
+// Normal of the hair's lit side at a place of the map with strands at depth `front`; meters: size of the map there.
 vec3 lit_side_normal(vec3 place, float front, float extent, float meters, Across across, vec3 L)
 {
   float right = textureLod(hair_front, place + vec3(SLOPE_REACH, 0.0, 0.0), 0.0).r - front;
@@ -46,12 +46,12 @@ vec3 lit_side_normal(vec3 place, float front, float extent, float meters, Across
   return normalize(L + slope.x * across.right + slope.y * across.up);
 }
 
-// Irradiance of a surface with a normal N by light from one place of the map, as a part of the light's on a small ball.
-// turn: the direction of the place from this one, in the map; part: how far it is, from 0 to 1; the rest as below.
+// Irradiance of a surface with normal N by hair at one place of the map, relative to the light's irradiance of a small ball.
+// turn: direction to the place in the map; part: its distance, from 0 to 1; the rest as for `hair_reflection`.
 vec3 reflection_of_place(
     Light light, Across across, vec3 at, float depth, vec3 N, vec3 L, vec2 turn, float part)
 {
-  // As many places at each distance as light that falls with its square needs.
+  // Distances are distributed for light that falls off with their square.
   float range = log(FARTHEST / NEAREST);
   float away = NEAREST * light.extent * exp(range * part);
   vec2 offset = turn * away;
@@ -70,34 +70,33 @@ vec3 reflection_of_place(
     return vec3(0.0);
   }
   float squared = dot(way, way);
-  float weight = 2.0 * range * away * away / squared;  // over the density of the places, and pi
+  float weight = 2.0 * range * away * away / squared;  // divided by the density of places, and by pi
   float count = textureLod(hair_layers, place, 0.0)[layer_of(ends.y - ends.x)];
   return reflected_by_hair(count) * (facing * sent * weight / squared);
 }
 
-// Square of a color's mean over its channels.
+// Square of the mean of a color's channels.
 float squared_mean(vec3 value)
 {
   float mean = dot(value, vec3(1.0 / 3.0));
   return mean * mean;
 }
 
-// Variance of the mean of values with a sum and a sum of `squared_mean`.
+// Variance of the mean of `count` values; sum, squares: sums of the values and of their `squared_mean`.
 float variance_of_mean(vec3 sum, float squares, int count)
 {
   float number = float(count);
   return max(squares - squared_mean(sum) / number, 0.0) / (number * number);
 }
 
-// The same of all hair beside it: of places in four directions and at four distances of their range, which are
-// others in each pass. at, depth: of `shadow_place`; L: towards the light; turn: of `sample_turn`; variance: of the result, in
-// the mean of its channels.
+// The same by all nearby hair: places in four directions and at four distances, which differ in each pass. at, depth: from
+// `shadow_place`; L: towards the light; turn: from `sample_turn`; variance: of the result's mean over its channels.
 vec3 hair_reflection(
     Light light, Across across, vec3 at, float depth, vec3 N, vec3 L, vec2 turn, out float variance)
 {
   variance = 0.0;
   if (view.hair_reflectance.rgb == vec3(0.0)) {
-    return vec3(0.0);  // a model without light between strands
+    return vec3(0.0);  // models without multiple scattering
   }
   float part = TURNS * atan(turn.y, turn.x) / PI;
   vec3 light_there = vec3(0.0);
@@ -109,7 +108,7 @@ vec3 hair_reflection(
     turn = vec2(-turn.y, turn.x);
     part += 1.0 / float(PLACES);
   }
-  // Where hair shades a surface, its lit side is on the other side.
+  // If hair shades a surface, its lit side faces away from the surface.
   float open = exp(-crossed_before_surface(at, depth));
   variance = variance_of_mean(light_there, squares, PLACES) * open * open;
   return light_there * (open / float(PLACES));

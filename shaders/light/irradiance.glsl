@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Irradiance of lights at a point, and its visible part: for render passes.
+// Irradiance of lights at a point, and its visible fraction: for render passes.
 
 #include "shadows/shadow.glsl"
 

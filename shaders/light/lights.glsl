@@ -14,8 +14,8 @@ vec3 to_light(int kind, vec3 light_position, vec3 axis, vec3 position)
   return (kind == LIGHT_SUN) ? -axis : normalize(light_position - position);
 }
 
-// Variance [rad²] of a light's direction along an axis, as of a disk: a quarter of its angular radius squared. radius: of
-// the light, or the tangent of a sun's.
+// Variance [rad²] of a light's direction along an axis, as for a disk: a quarter of its squared angular radius. radius: of
+// the light, or for a sun the tangent of its angular radius.
 float light_blur(int kind, vec3 light_position, float radius, vec3 position)
 {
   vec3 offset = position - light_position;
@@ -23,16 +23,16 @@ float light_blur(int kind, vec3 light_position, float radius, vec3 position)
   return 0.25 * min(squared, 1.0);
 }
 
-// Attenuation of a spot light's beam at an angle: one inside, zero outside the cone, smooth over the part
-// `blend` of the way, in cosines, from the cone to the axis.
+// Attenuation of a spot light at an angle: one inside, zero outside the cone, smooth over the fraction `blend`, in cosines,
+// from the cone to the axis.
 float spot_falloff(float cos_angle, float cos_cone, float blend)
 {
   float inner = mix(cos_cone, 1.0, clamp(blend, 1e-4, 1.0));
   return smoothstep(cos_cone, inner, cos_angle);
 }
 
-// Radiance of an area light towards an angle, one without a spread: it is linear in the tangent, zero outside the cone,
-// and lets the light keep its power. cos_cone: of half the spread, 0 for the half sphere.
+// Radiance of an area light towards an angle, relative to a light without spread: linear in the tangent, zero outside the
+// cone, with the same total power. cos_cone: of half the spread, 0 for the half sphere.
 float area_falloff(float cos_angle, float cos_cone)
 {
   if (cos_cone < 1e-3) {
@@ -43,9 +43,9 @@ float area_falloff(float cos_angle, float cos_cone)
   return max(0.0, tan_cone - tan_angle) / (tan_cone - atan(tan_cone));
 }
 
-// Irradiance of a small ball by a Lambertian disk that sends 1 W/sr along its axis; height: above the disk's plane, beside:
-// from its axis. Through a plane parallel to the disk that is known exactly; what comes in at an angle counts more for a
-// ball, by the mean cosine between the disk's near edge and its far one.
+// Irradiance of a small ball by a Lambertian disk that emits 1 W/sr along its axis; height: above the disk's plane, beside:
+// distance from its axis. The irradiance of a plane parallel to the disk is exact; a ball receives more at an angle, by the
+// mean cosine of the disk's near and far edges.
 float disk_irradiance(float height, float beside, float radius)
 {
   float squared = radius * radius;
@@ -58,8 +58,8 @@ float disk_irradiance(float height, float beside, float radius)
   return flat_part / (0.5 * (cosines.x + cosines.y));
 }
 
-// Irradiance [W/m²] of a small ball at `position`, per its cross section. power: RGB watts, or W/m² of a sun; radius: of
-// the light's disk, which point and spot lights turn to the ball.
+// Irradiance [W/m²] of a small ball at `position`, per its cross section. power: RGB [W], or [W/m²] of a sun; radius: of the
+// light's disk, which faces the ball for point and spot lights.
 vec3 light_irradiance(int kind,
                       vec3 light_position,
                       vec3 axis,
@@ -84,7 +84,7 @@ vec3 light_irradiance(int kind,
     float beside = length(offset - height * axis);
     return power / PI * disk_irradiance(height, beside, radius) * area_falloff(cos_angle, cos_cone);
   }
-  // The mean of cos / distance² over the disk.
+  // Mean of cos / distance² over the disk.
   float edge = sqrt(distance_squared + radius * radius);
   vec3 irradiance = power / (2.0 * PI * edge * (edge + sqrt(distance_squared)));
   return (kind == LIGHT_SPOT) ? irradiance * spot_falloff(cos_angle, cos_cone, blend) : irradiance;

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light of a lamp at the place on a strand that `find_place` found.
+// Light of a lamp on a strand at the result of `find_place`.
 
 #include "light/irradiance.glsl"
 #include "visibility/strand_hit.glsl"
 
 struct LampLight {
   vec3 L;           // towards the lamp
-  vec3 irradiance;  // [W/m²] where nothing is between
-  float open;       // the part of it that passes surfaces
-  float front;      // mean number of strands between
-  float behind;     // mean number of strands beyond
-  bool is_in_map;   // whether the lamp's shadow maps reach the place
-  vec3 at;          // in these maps
+  vec3 irradiance;  // [W/m²] without occlusion
+  float open;       // fraction that passes surfaces
+  float front;      // mean number of strands in front
+  float behind;     // mean number of strands behind
+  bool is_in_map;   // whether the position is in the lamp's shadow maps
+  vec3 at;          // coordinates in these maps
   float depth;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visibility of the lights from a surface, including its own shadow where it faces away. It is at most one: hair sends light
-// to where a light grazes a surface.
+// Visibility of the lights from a surface, including its own shadow where it faces away. Limited to one, as hair reflects
+// light to where a light grazes a surface.
 
 #include "light/irradiance.glsl"
 #include "surfaces/drawn_normal.glsl"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visibility of the world from strands, which was added up one direction after the other, as it is kept.
+// Converts visibility of the world from strands, summed one direction after the other, to bytes.
 
 #include "light/visibility_bytes.glsl"
 #include "light/write_visibility_bytes.glsl"

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a point of a strand sees of the world, in the twenty bytes that visibility textures have for it: its sums over the
-// directions (light/world_visibility.comp) from zero to one, so that a step is as little seen in shade as in light.
+// Visibility of the world from a point of a strand in twenty bytes: the sums over the directions
+// (light/world_visibility.comp) are mapped to [0, 1] so that steps are equally invisible in shade and in light.
 
 struct Seen {
   vec4 x_y;
   vec4 z;
   vec4 surface;
   vec4 channels;
-  vec4 color;  // of what is seen through hair of surfaces
+  vec4 color;  // of surfaces that are visible through hair
 };
 
-const float ZERO_BYTE = 128.0;  // of numbers that may be negative: exactly zero
+const float ZERO_BYTE = 128.0;  // exactly zero, for signed numbers
 
-// Parts of the open world by their square roots, as displays have light; the others as parts of these. P2 is at least -1/2.
+// Visible fractions of the world as square roots, similar to display encodings; the others relative to them. P2 >= -1/2.
 Seen seen_to_bytes(Seen seen)
 {
   float all = max(dot(seen.x_y, vec4(1.0)) + seen.z.x + seen.z.y, 1e-6);
@@ -29,7 +29,7 @@ Seen seen_to_bytes(Seen seen)
   return bytes;
 }
 
-// The sums; of surfaces their direction has the length one, or zero where there are none.
+// The sums; the direction of surfaces has length one, or zero without surfaces.
 Seen seen_from_bytes(Seen bytes)
 {
   Seen seen;

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light of the world, attenuated by hair and surfaces: an ambient cube, each side with its radiance and the
-// visible part of its directions, `sphere.SIDES` as +x -x +y -y and +z -z.
+// Light of the world, attenuated by hair and surfaces: an ambient cube with the radiance of each side and the visible
+// fraction of its directions; `sphere.SIDES` as +x -x +y -y and +z -z.
 
 #include "fibre/fibre.glsl"
 #include "fibre/zonal_light.glsl"
 
-// Part of light that is left for each channel where strands of an opacity would leave a part `seen`.
+// Transmitted fraction of light for each channel, if strands of an opacity would transmit the fraction `seen`.
 vec3 seen_through(float seen, float opacity, vec3 forward)
 {
   return pow(vec3(max(seen, 1e-6)), (vec3(1.0) - forward) / opacity);
 }
 
-// Radiance that arrives from the sides +x +y +z and -x -y -z, a column each. seen: for strands of an opacity; forward: what one passes on.
+// Incident radiance from the sides +x +y +z and -x -y -z, one column each. seen_x_y, seen_z: for strands of an opacity;
+// forward: fraction of light that a strand passes on.
 void world_sides(vec4 seen_x_y, vec2 seen_z, float opacity, vec3 forward, out mat3 plus, out mat3 minus)
 {
   plus[0] = lights.world[0].rgb * seen_through(seen_x_y.x, opacity, forward);
@@ -22,8 +23,8 @@ void world_sides(vec4 seen_x_y, vec2 seen_z, float opacity, vec3 forward, out ma
   minus[2] = lights.world[5].rgb * seen_through(seen_z.y, opacity, forward);
 }
 
-// The same for a strand, of which it is known how much light of each channel arrives from all sides. Each side is between
-// what surfaces alone leave, the same of all channels, and what strands alone leave.
+// The same for a strand; channels: the light of each channel from all sides. Each side is between the light that surfaces
+// alone transmit, equally for all channels, and the light that strands alone transmit.
 void strand_sides(vec4 seen_x_y, vec2 seen_z, float opacity, vec3 forward, vec3 channels, out mat3 plus, out mat3 minus)
 {
   float sides[6];
@@ -55,22 +56,22 @@ float all_seen(vec4 seen_x_y, vec4 seen_z)
   return dot(seen_x_y, vec4(1.0)) + seen_z.x + seen_z.y;
 }
 
-// Mean number of strands behind the light that arrives: `light/world_visibility.comp` sums its exponential in seen_z.
+// Mean number of strands behind a strand, seen along incident light: light/world_visibility.comp sums its exponential.
 float mean_strands_behind(vec4 seen_x_y, vec4 seen_z, float opacity)
 {
   return -log(clamp(seen_z.z / max(all_seen(seen_x_y, seen_z), 1e-6), 1e-4, 1.0)) / opacity;
 }
 
-// Light of the world from the inclinations that a strand scatters to the viewer, relative to that from all sides. The mean
-// of P2 over what is seen is in seen_z; zonal_1, zonal_2: as in `zonal_part`. Light that has come through hair comes from
+// Light of the world from the inclinations that a strand scatters to the viewer, relative to light from all sides. seen_z.w:
+// sum of P2 over visible directions; zonal_1, zonal_2: as for `zonal_part`. Light through hair is assumed to come from
 // everywhere.
 vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, vec3 channels, vec3 T, vec3 zonal_1, vec3 zonal_2)
 {
   float seen = max(all_seen(seen_x_y, seen_z), 1e-6);
-  // Sides weigh directions by squared cosines: of light that is linear in them 3/4 of its first moment.
+  // Sides weight directions by squared cosines, which gives 3/4 of the first moment of light that is linear in direction.
   vec3 uneven = vec3(seen_x_y.x - seen_x_y.y, seen_x_y.z - seen_x_y.w, seen_z.x - seen_z.y) * (4.0 / 3.0);
   vec3 cone = zonal_part(dot(T, uneven) / seen, seen_z.w / seen, zonal_1, zonal_2);
-  // `strand_radiance` weighs sides by the sine.
+  // `strand_radiance` weights sides by the sine.
   vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
   vec3 pairs = vec3(seen_x_y.x + seen_x_y.y, seen_x_y.z + seen_x_y.w, seen_z.x + seen_z.y);
   float weighted = max(dot(sides, pairs) / (2.0 * dot(sides, vec3(1.0))), 1e-6);
@@ -78,7 +79,7 @@ vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, vec3 channels, vec3 T, vec3 zon
   return 1.0 + (cone - 1.0) * min(vec3(seen) / max(channels, vec3(1e-6)), vec3(1.0));
 }
 
-// Irradiance of a surface with the normal N.
+// Irradiance of a surface with normal N.
 vec3 surface_irradiance(mat3 plus, mat3 minus, vec3 N)
 {
   vec3 irradiance = vec3(0.0);
@@ -93,11 +94,11 @@ vec3 surface_irradiance(mat3 plus, mat3 minus, vec3 N)
 // positive if the strand scatters more light backward.
 vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 towards)
 {
-  // A fibre receives light in proportion to the sine between tangent and direction.
+  // A fibre receives light in proportion to the sine of the angle between tangent and direction.
   vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
   float sin_theta_o = dot(T, V);
-  // sin(T, side) cos(phi) of each side, times the cosine of the mirror cone: V across the strand. Of light that is linear
-  // in the direction sides have 3/4 of its change.
+  // sin(T, side) cos(phi) of each side, times the cosine of the mirror cone: V across the strand. Sides have 3/4 of the
+  // change of light that is linear in direction.
   vec3 across = (V - sin_theta_o * T) * (4.0 / 3.0);
   vec3 even = (plus + minus) * sides;
   vec3 uneven = (plus - minus) * across;
@@ -105,21 +106,21 @@ vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 
   return even / (2.0 * dot(sides, vec3(1.0))) * returned * part;
 }
 
-// Normal of the surfaces that a strand sees. hidden: the sum of the directions in which they are.
+// Normal of the surfaces around a strand. hidden: sum of the directions towards surfaces.
 vec3 surface_normal_of(vec3 hidden)
 {
   return -hidden * inversesqrt(max(dot(hidden, hidden), 1e-8));
 }
 
-// Light of the world that white surfaces with the normal N send to a strand, as a part of even light around it. seen: their
-// part of all directions; through_hair: the same for strands of an opacity, twice through the hair before them.
+// Light of the world that white surfaces with normal N reflect to a strand, relative to uniform light. seen: the surfaces'
+// fraction of all directions; through_hair: the same, attenuated twice by the hair in front, for strands of an opacity.
 vec3 surface_light(mat3 plus, mat3 minus, vec3 N, float seen, float through_hair, float opacity, vec3 forward)
 {
   vec3 part = seen_through(min(through_hair / max(seen, 1e-6), 1.0), opacity, forward) * seen;
   return surface_irradiance(plus, minus, N) / PI * min(2.0 * part, vec3(1.0));
 }
 
-// The moment `towards` of a strand with its share of what strands behind send back: the integral of
+// The moment `towards` of a strand, including light reflected by strands behind: the integral of
 // (1 - |phi| / pi) / pi × cos(phi).
 vec3 with_back(vec3 towards, vec3 back)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visibility of the world: a texel per point, the sum over the directions of the opacity maps.
+// Visibility of the world: one texel per point, the sum over the directions of the opacity maps.
 
 #include "shadows/shadow.glsl"
 #include "strands/packed_strand.glsl"
@@ -7,7 +7,7 @@
 #include "surfaces/vertex_position.glsl"
 #include "light/write_visibility_sums.glsl"
 
-// A place of a strand whose first texel is given; of a surface, of the vertex of that texel.
+// World position of a strand's point, or of a surface's vertex; first: its first texel.
 vec3 place_of(ivec2 first, int point)
 {
   point = clamp(point, 0, view.point_count - 1);
@@ -31,7 +31,7 @@ void main()
   vec3 T = along * inversesqrt(max(dot(along, along), 1e-20));
   vec3 root = place_of(first, 1) - place_of(first, 0);
   vec3 R = root * inversesqrt(max(dot(root, root), 1e-20));
-  // Of surfaces there is something else, or nothing.
+  // Surfaces have no radii.
   bool is_shared = view.radius_strands == 1;
   ivec2 texel = is_shared ? ivec2(point, 0) : ivec2(strand * view.point_count + point, cell.y);
   float radius = is_strand ? texelFetch(strand_radii, texel, 0).r * view.radius_unit * view.object_scale : 0.0;
@@ -45,8 +45,8 @@ void main()
     Light light = lights.light[index];
     vec3 at;
     float depth;
-    float weight = light.power.x;  // the direction's part of the sphere, six times
-    float open = weight;  // past surfaces
+    float weight = light.power.x;  // six times the direction's fraction of the sphere
+    float open = weight;  // fraction that passes surfaces
     float past_hair = 1.0;
     float left = 1.0;
     float beyond = 0.0;
@@ -72,10 +72,10 @@ void main()
     vec3 plus = share * vec3(lessThan(light.axis.xyz, vec3(0.0)));  // lights shine along their axis
     vec3 minus = share * vec3(greaterThan(light.axis.xyz, vec3(0.0)));
     sums.x_y += vec4(plus.x, minus.x, plus.y, minus.y);
-    // Strands: through the hair behind them, and by P2 of sin(theta_i). Points of surfaces: over all directions without
-    // hair, and with it.
+    // For strands: attenuated by the hair behind them, and weighted by P2 of sin(theta_i). For surfaces: all directions
+    // without and with hair.
     vec2 others = is_strand ? seen * vec2(left, legendre_2(dot(T, light.axis.xyz))) : open * vec2(1.0, past_hair);
-    // Surfaces stop all channels alike, strands do not. And the surfaces, without the hair before them.
+    // Surfaces block all channels equally, strands do not. Alpha: surfaces, without the hair in front of them.
     sums.channels += vec4(open * past_hair_channels, beyond);
     sums.z += vec4(plus.z, minus.z, others);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// In place of light/write_visibility_sums.glsl: what a place sees in all directions, in bytes. Needs the images seen_x_y and the others.
+// Writes the visibility of all directions as bytes, in place of light/write_visibility_sums.glsl. Needs the images seen_*.
 
 void put_seen(ivec2 cell, Seen sums)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a place sees, added to what it saw in directions before these: needs the images seen_x_y and the others.
+// Adds visibility to the sums of the directions before: needs the images seen_*.
 
 void put_seen(ivec2 cell, Seen sums)
 {

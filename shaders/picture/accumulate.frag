@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Adds a pass, with several samples per pixel, to the sum of passes: mean light, and the depth of the nearest sample.
 
-// By which the shadow on a surface is nearer than the surface, as a part of its distance.
+// How much nearer than a surface its shadow is drawn, as a fraction of its distance.
 const float SHADOW_BIAS = 1e-3;
 
-// Depth of a sample; hair covers all of it, and the shadow of hair, which is black, a part.
+// Depth of a sample: alpha is one for hair, and less for the black shadow of hair on a surface.
 float depth_of(ivec2 sample_place, float alpha)
 {
   if (alpha == 1.0) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Hair over a viewport, after the view transform: light through the scene's colour management.
+// Hair over a viewport, after the view transform: applies the scene's color management.
 
 #include "picture/display_transform.glsl"
 
-// Depth of the hair in a pixel. What is carried from an earlier picture may have none there: it takes that of the nearest
-// hair around it, or else is in front, as our own surfaces have already hidden it.
+// Depth of the hair in a pixel. Hair from an earlier picture may have no depth there: it gets the depth of adjacent hair, or
+// else is in front, as surfaces in our picture occlude it already.
 float depth_at(ivec2 pixel)
 {
   float depth = texelFetch(depths, pixel, 0).r;
@@ -25,7 +25,7 @@ void main()
   float side = float(textureSize(display_table, 0).x);
   vec3 at = display_place(exposure * light.rgb / light.a);
   vec3 display = textureLod(display_table, (at * (side - 1.0) + 0.5) / side, 0.0).rgb;
-  // Blender interprets colours drawn over a viewport as display colours to the power of 2.2, for any display encoding.
+  // Blender interprets colors drawn over a viewport as display colors to the power of 2.2, for any display encoding.
   color = vec4(pow(display, vec3(2.2)), 1.0) * (opacity * min(light.a / float(pass_count), 1.0));
   gl_FragDepth = depth_at(pixel);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fills a picture with a color: some graphics drivers take a hundred times as long to clear a texture.
+// Fills a picture with a color, as some graphics drivers take a hundred times as long to clear a texture.
 
 void main()
 {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Data passes: the weight of samples in which hair is nearest, the least distance along the view axis, and the weight of
-// samples that are not background.
+// samples other than background.
 
 #include "picture/film_filter.glsl"
 #include "visibility/sample_values.glsl"
 
-// clip: the transform of a point on the axis to clip space, its last two rows and columns, row by row.
+// clip: last two rows and columns of the view-to-clip matrix, row by row.
 float distance_at(float depth, vec4 clip)
 {
   float ndc = 2.0 * depth - 1.0;

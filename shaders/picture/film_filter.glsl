@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The samples around a pixel and their weights: needs the sampler filter_weights, a row for each axis, and the constants
-// samples_per_side, margin, and border, which is of samples around all margins.
+// samples_per_side, margin, and border, the number of samples around the margins.
 
 ivec2 sample_place(ivec2 pixel, ivec2 tap)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Mean and standard deviation of each block of pixels; of an even one that is zero.
+// Mean and standard deviation of each block of pixels; exactly zero for a uniform block.
 
 #include "picture/history_blocks.glsl"
 
@@ -11,7 +11,7 @@ void main()
   vec4 squares = vec4(0.0);
   for (int y = corner.y; y < end.y; y++) {
     for (int x = corner.x; x < end.x; x++) {
-      // A single glint is no change.
+      // A single bright sample is not a change.
       vec4 light = clamp(texelFetch(picture, ivec2(x, y), 0) / weight, -100.0, 100.0);
       sum += light;
       squares += light * light;
@@ -21,6 +21,6 @@ void main()
   float count = extent.x * extent.y;
   mean = sum / count;
   deviation = sqrt(max(squares / count - mean * mean, vec4(0.0)));
-  // Less is rounding, not noise.
+  // Smaller deviations are rounding, not noise.
   deviation *= step(1e-3 * abs(mean) + 1e-6, deviation);
 }

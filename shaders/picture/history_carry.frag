@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The previous picture of a viewport, moved to where its contents are now [Karis14], and how many passes it is worth.
-// Clamping each pixel to its neighbours would remove thin strands, which are in few samples of a pass. Means of
-// blocks are compared instead: they may differ as far as noise allows.
+// Reprojects the previous picture of a viewport [Karis14], and computes its weight in passes. Clamping each pixel to its
+// neighbors would remove thin strands, which are in few samples of a pass. Means of blocks are compared instead: they may
+// differ as far as noise allows.
 
 #include "picture/history_blocks.glsl"
 #include "visibility/sample_values.glsl"
 
-const float MOST_OF_BACKGROUND = 1.0;  // where no hair and no surface is near: it has no noise, and may have been hidden
-const float MOST_OF_LIT_SURFACE = 24.0;  // where only lights move: shadows on surfaces go with them, and leave a trail
-const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as strands hide each other in other ways
+// Maximum weights in passes.
+const float MOST_OF_BACKGROUND = 1.0;  // without hair and surfaces nearby: no noise, and possibly uncovered just now
+const float MOST_OF_LIT_SURFACE = 24.0;  // if only lights move: shadows move over surfaces, and would leave a trail
+const float SLOW = 4.0;  // pixels per frame: at higher speed the weight decreases, as occlusion between strands changes
 
-// Standard errors by which the means of two blocks may differ.
+// Number of standard errors by which the means of two blocks may differ.
 const float TOLERANCE = 2.0;
-const float MOST_GAIN = 8.0;  // of what is lit: more light comes to all strands alike, also to dark ones
-const float TOLERANCE_OF_LIGHT = 3.0;  // where nothing but lights has moved
+const float MOST_GAIN = 8.0;  // of lit samples: more light than that is added to all strands alike, also to dark strands
+const float TOLERANCE_OF_LIGHT = 3.0;  // if only lights have moved
 
-// Where the textures of samples begin in the picture. Beside them there is no hair.
+// Origin of the textures of samples in the picture. There is no hair outside of them.
 ivec2 first_place()
 {
   return ivec2(history.first_column, history.first_row);
@@ -31,8 +32,8 @@ void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
   }
 }
 
-// Where in the previous picture the nearest of what is in a pixel or beside it was [pixels]: silhouettes move with what
-// they are of. is_background: there is nothing.
+// Position [pixels] in the previous picture of the nearest geometry in or beside a pixel, so that silhouettes move with their
+// objects. is_background: there is no geometry.
 vec2 place_before(ivec2 pixel, out bool is_background)
 {
   int side = history.samples_per_side;
@@ -48,7 +49,7 @@ vec2 place_before(ivec2 pixel, out bool is_background)
   look(corner + ivec2(-1, 0), nearest_place, nearest);
   look(corner + ivec2(0, side), nearest_place, nearest);
   look(corner + ivec2(0, -1), nearest_place, nearest);
-  // A thin strand is in few samples: before the background, look for it a little further.
+  // A thin strand is in few samples: in front of the background, the search radius is larger.
   if (nearest == 1.0) {
     for (int turn = 0; turn < 4; turn++) {
       int sign = (turn & 2) - 1;
@@ -66,9 +67,9 @@ vec2 place_before(ivec2 pixel, out bool is_background)
   return (clip.w > 0.0) ? (0.5 * clip.xy / clip.w + 0.5) * history.size.xy : vec2(-1.0);
 }
 
-// The previous picture at a place [pixels], by Catmull and Rom's cubics: bilinear filtering would blur it more in each
-// frame. Five bilinear samples; the corners' weights are small. Beside bright strands it may be below zero: that is cut
-// off where it is shown, as frame by frame it would add up to more light.
+// The previous picture at a position [pixels], by Catmull-Rom interpolation, as bilinear filtering would blur it more with
+// each frame. Uses five bilinear samples, as the corners' weights are small. Values beside bright strands may be negative:
+// they are only clamped for display, as clamping in each frame would accumulate light.
 vec4 previous_at(vec2 place)
 {
   vec2 middle = floor(place - 0.5) + 0.5;
@@ -91,8 +92,8 @@ vec4 previous_at(vec2 place)
   return total / weight;
 }
 
-// Mean light of a picture and its coverage, of the samples around a place, before and now: of the same samples, so that
-// which strands they are on is no noise of the change [Schied18].
+// Mean light and coverage of the samples around a position, before and now. The samples are the same, so that their choice
+// of strands is not noise in the change [Schied18].
 void light_around(vec2 place, out vec4 earlier, out vec3 later)
 {
   ivec2 blocks = textureSize(light_now, 0);
@@ -106,7 +107,7 @@ void light_around(vec2 place, out vec4 earlier, out vec3 later)
   }
 }
 
-// Whether hair is in the samples of a pixel or around it, up to four pixels away: a thin strand is in few of them.
+// Whether hair is in samples of a pixel or up to four pixels away, as a thin strand is in few samples.
 bool is_near_hair(ivec2 pixel)
 {
   int side = history.samples_per_side;
@@ -138,7 +139,7 @@ void main()
   vec2 there = block_place(place, blocks);
   vec4 mean_before = textureLod(before_mean, there, 0.0);
   vec4 deviation = textureLod(now_deviation, here, 0.0);
-  if (!is_background) {  // where hair has gone, its own noise is no reason to keep some of it
+  if (!is_background) {  // after hair has moved away, its former noise must not keep it in the picture
     deviation = max(deviation, textureLod(before_deviation, there, 0.0));
   }
   vec4 light = previous_at(place);
@@ -154,14 +155,14 @@ void main()
     mean_before.rgb = gain * mean_before.rgb + more * mean_before.a;
   }
   if (is_hair_alone) {
-    // How much of a block hair covers is noise, and only its light may have changed.
+    // Coverage of a block by hair is noise; only light may have changed.
     mean *= mean_before.a / max(mean.a, 0.25 * mean_before.a + 1e-4);
     tolerance = TOLERANCE_OF_LIGHT;
   }
   // Half floats resolve a thousandth.
   vec4 bound = (tolerance / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
   vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
-  // In proportion: what is black beside a bright edge remains so.
+  // Scaled in proportion, so that black beside a bright edge stays black.
   vec4 factor = clamp(allowed / max(mean_before, vec4(1e-6)), vec4(0.0), vec4(2.0));
   light *= is_hair_alone ? vec4(factor.rgb, 1.0) : factor;
   vec4 excess = abs(mean_before - mean) / bound;

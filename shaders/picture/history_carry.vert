@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Each block of the picture as two triangles. Those without noise, in them and beside them, have no area: what was shown
-// before would not make them steadier.
+// Each block of the picture as two triangles. Blocks without noise in and beside them have no area, as the history would not
+// reduce flicker.
 
 #include "picture/history_blocks.glsl"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a viewport shows while its picture is refined: the mean of the passes so far, and what is carried from the view
-// before, which counts as some passes at first and as none in the end.
+// The shown picture of a viewport during refinement: the mean of the passes so far, blended with the reprojected history,
+// whose weight in passes decreases to zero.
 
-const float MOST_LIGHT = 6e4;  // of half floats
+const float MOST_LIGHT = 6e4;  // within the range of half floats
 
 void main()
 {
@@ -10,6 +10,6 @@ void main()
   float worth = part_left * texelFetch(carried_passes, pixel, 0).r;
   passes = pass_count + worth;
   vec4 light = mix(texelFetch(sums, pixel, 0) / weight, texelFetch(carried, pixel, 0), worth / passes);
-  // What is not finite would stay, and spread.
+  // Infinite values would stay in the history and spread.
   color = clamp(light, -MOST_LIGHT, MOST_LIGHT);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Motion vectors [pixels] with Cycles' conventions: to the position in the previous frame, and from that in the next.
+// Motion vectors [pixels] as in Cycles: to the position in the previous frame, and from the position in the next frame.
 
 vec2 picture_place(vec4 clip, vec2 size)
 {

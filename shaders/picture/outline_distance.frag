@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The distance [pixels] from each pixel to the nearest hair: active hair in red, other selected hair in green. In blue and
-// alpha, the visible part of that hair around the pixel.
+// The distance [pixels] from each pixel to the nearest hair: active hair in red, other selected hair in green. Blue and
+// alpha: the visible fraction of that hair around the pixel.
 
 #include "picture/outline.glsl"
 

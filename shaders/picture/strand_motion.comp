@@ -4,14 +4,14 @@
 #include "picture/motion.glsl"
 #include "visibility/strand_hit.glsl"
 
-// Which of the combed strands this one is, counted from one; 0: it was not combed.
+// Index of a strand among combed strands, counted from one; 0: not combed.
 int moved_row(int strand)
 {
   ivec2 texel = ivec2(strand % view.row_strands, strand / view.row_strands);
   return (motion.moved_row_strands > 0) ? int(texelFetch(moved_rows, texel, 0).r) : 0;
 }
 
-// A place between a point of a strand and the next.
+// Position between a point of a strand and the next.
 vec3 place_between(sampler2D texels, ivec2 first, int point, float t)
 {
   vec4 head = packed_head(texels, first);

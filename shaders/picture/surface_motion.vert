@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A vertex of a surface, where it is, was a frame before, and will be a frame after: each in the object's own coordinates.
+// A vertex of a surface in this frame, the previous frame and the next frame, each in the object's local coordinates.
 
 #include "surfaces/vertex_position.glsl"
 

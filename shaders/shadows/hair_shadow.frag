@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Part of a surface's light that hair lets through: irradiance past surfaces and hair, relative to that past surfaces.
+// Fraction of a surface's light that hair lets through: irradiance past surfaces and hair, relative to past surfaces only.
 
 #include "shadows/hair_shadow.glsl"
 

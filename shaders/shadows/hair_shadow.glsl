@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Part of the irradiance of a matt surface that hair lets through.
+// Fraction of the irradiance of a matte surface that hair lets through.
 
 #include "light/irradiance.glsl"
 #include "shadows/surface_visibility.glsl"
 #include "light/world.glsl"
 
-// The same as `surface_visibility` with one look at the maps, which casts hard shadows.
+// `surface_visibility` with a single lookup in the maps, which results in hard shadows.
 void hard_visibility(Light light, vec3 N, vec3 forward, out float past_surfaces, out vec3 past_hair)
 {
   past_surfaces = max(dot(N, to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position)), 0.0);
@@ -23,7 +23,7 @@ vec3 part_past_hair(bool is_soft)
   mat3 minus;
   world_sides(corner_seen_x_y, corner_seen_z.xy, view.seen_opacity, view.hair_forward.rgb, plus, minus);
   vec3 past_hair = surface_irradiance(plus, minus, N);
-  // Of the world's light about as much as of all directions that surfaces leave open.
+  // The fraction of the world's light is approximated by that of all directions past surfaces.
   float part = corner_seen_z.w / max(corner_seen_z.z, 1e-6);
   vec3 past_surfaces = past_hair / seen_through(part, view.seen_opacity, view.hair_forward.rgb);
   vec2 turn = sample_turn(picture_place(ivec2(gl_FragCoord.xy)));
@@ -43,6 +43,6 @@ vec3 part_past_hair(bool is_soft)
     past_surfaces += irradiance * of_surfaces;
     past_hair += irradiance * of_hair;
   }
-  // Where no light arrives there is none to stop.
+  // Without light there is no shadow.
   return mix(vec3(1.0), min(part_of(past_hair, past_surfaces), vec3(1.0)), vec3(greaterThan(past_surfaces, vec3(1e-12))));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The shadow of hair over a surface that Blender draws: black, which leaves as much of it as hair leaves of its light.
+// The shadow of hair over a surface that Blender draws: black, whose alpha is the fraction of light that hair blocks.
 
 #include "shadows/hair_shadow.glsl"
 

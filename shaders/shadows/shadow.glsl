@@ -3,17 +3,17 @@
 
 #include "shadows/opacity.glsl"
 
-// Range around a strand, as a part of the map, in which it is read what is behind it.
+// Range around a strand, as a fraction of the map, in which surfaces behind it are looked up.
 const float BEYOND_REACH = 0.01;
 
-// The bias of a strand that grows in a direction: against the light it grows on the far side of its surface.
+// The bias of a strand by the direction of its root: strands that grow away from the light are on the far side of a surface.
 float strand_bias(vec3 root_direction, vec3 L)
 {
   return SURFACE_BIAS * clamp(4.0 * dot(root_direction, L), -1.0, 1.0);
 }
 
-// Place of a point in a light's maps, and its depth; false where the maps do not reach: they hold the hair and what is
-// near it.
+// Coordinates of a position in a light's maps, and its depth; false outside of the maps, which contain the hair and its
+// surroundings.
 bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
 {
   at = vec3(0.0);
@@ -26,28 +26,28 @@ bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
   return clip.w > 0.0 && at.xy == clamp(at.xy, vec2(0.0), vec2(1.0));
 }
 
-// Visibility of the light past surfaces: the upper bound of the part with a greater depth [Donnelly06].
+// Visibility of the light past surfaces: the upper bound of the fraction with a greater depth [Donnelly06].
 float lit_part(vec3 at, float depth, float bias)
 {
   vec2 moments = textureLod(surface_moments, at, 0.0).rg;
-  // Surfaces are no farther in the maps either: they would be in their own shadow.
+  // Depths are limited like those in the maps: otherwise surfaces would be in their own shadow.
   float warped = warped_depth(min(depth, FAR_SURFACE) - bias);
   float behind = warped - moments.x;
   float rounding = 0.3 * SURFACE_BIAS * WARP * warped;
   float variance = max(moments.y, rounding * rounding);
-  // Where one surface is behind another, the bound is not tight: its tail is cut off.
+  // With a surface behind another, the bound is not tight: its tail is cut off.
   float part = clamp((variance / (variance + behind * behind) - 0.05) / 0.95, 0.0, 1.0);
   return (behind <= 0.0) ? 1.0 : part;
 }
 
-// Part of the shadow of surfaces that is left towards the border of a light's maps, beyond which there is none.
+// Fade of the shadow of surfaces towards the border of a light's maps.
 float inside_part(vec2 at)
 {
   vec2 inside = min(at, vec2(1.0) - at);
   return smoothstep(0.0, 0.06, min(inside.x, inside.y));
 }
 
-// Visibility of the light past surfaces around the hair, by a map of these alone.
+// Visibility of the light past surfaces around the hair, from a map of these only.
 float wide_lit_part(Light light, vec3 position)
 {
   if (light.wide_layer < 0) {
@@ -60,8 +60,8 @@ float wide_lit_part(Light light, vec3 position)
   return (clip.w > 0.0) ? mix(1.0, lit_part(at, depth, SURFACE_BIAS), inside_part(at.xy)) : 1.0;
 }
 
-// What a strand adds to the counts of a map at its own axis, the mean over the places of the axis within a texel:
-// interpolation weighs what the strand covers, a part of one texel's width or more than one.
+// Count of a strand itself in a map at its axis, averaged over positions of the axis within a texel: interpolation weights
+// the strand's coverage, which is a fraction of a texel's width or more than one.
 float own_count(Light light, vec3 position, float radius)
 {
   mat4 m = light.world_to_shadow;
@@ -71,19 +71,19 @@ float own_count(Light light, vec3 position, float radius)
   return min(covered, 1.0) * (width - 0.25 * width * width);
 }
 
-// Mean number of strands that the light has crossed; behind: and of those that are left to it, as far as the surface. own:
-// what is to be left out.
+// Mean number of strands that the light has crossed; behind: number of strands behind, up to the surface; own: count of the
+// strand itself, to be left out.
 float crossed_strands(vec3 at, float depth, float own, out float behind)
 {
   vec2 ends = textureLod(hair_front, at, 0.0).rg;
   vec4 counts = textureLod(hair_layers, at, 0.0);
   float front = strands_in_front(counts, max(0.0, depth - ends.x), ends.y - ends.x, own);
   behind = max(0.0, counts[layer_of(ends.y - ends.x)] - own - front);
-  // Where surfaces hide all strands there is no front.
+  // If surfaces occlude all strands there is no front depth.
   return mix(front, max(0.0, counts.w - own), smoothstep(1.0, 1.5, ends.x));
 }
 
-// The same for a point of a surface: strands that surfaces hide are not in front of those that the light meets.
+// The same for a point of a surface: strands that are occluded by surfaces are not in front of lit surfaces.
 float crossed_before_surface(vec3 at, float depth)
 {
   vec2 ends = textureLod(hair_front, at, 0.0).rg;
@@ -92,15 +92,15 @@ float crossed_before_surface(vec3 at, float depth)
   return front * (1.0 - smoothstep(1.0, 1.5, ends.x));
 }
 
-// A color that `surface_textures.packed_colors` has packed.
+// Inverse of `surface_textures.packed_colors`.
 vec3 unpacked_color(float packed_value)
 {
   vec3 root = mod(floor(packed_value / vec3(65536.0, 256.0, 1.0)), 256.0) / 255.0;
   return root * root;
 }
 
-// Part of the places around a strand along a light with a surface behind the strand, and that surface's normal and color.
-// L: towards the light; color: times its fourth component, the part of the places where there is any.
+// Fraction of the places around a strand, seen from a light, with a surface behind the strand, and that surface's normal and
+// color. L: towards the light; color: premultiplied by its fourth component, the fraction of places with a surface.
 float surface_beyond(Light light, vec3 at, float depth, vec3 L, out vec3 normal, out vec4 color)
 {
   color = vec4(0.0);
@@ -114,7 +114,7 @@ float surface_beyond(Light light, vec3 at, float depth, vec3 L, out vec3 normal,
     float surface = textureLod(surface_moments, place, 0.0).b;
     ivec3 texel = ivec3(clamp(ivec2(place.xy * vec2(size)), ivec2(0), size - 1), int(place.z));
     float packed_value = texelFetch(surface_moments, texel, 0).a;
-    // Below zero where there is no surface.
+    // Negative without a surface.
     color += (packed_value >= 0.0) ? 0.25 * vec4(unpacked_color(packed_value), 1.0) : vec4(0.0);
     float is_found = step(surface, 0.75 * FAR);
     found += 0.25 * is_found;
@@ -125,12 +125,12 @@ float surface_beyond(Light light, vec3 at, float depth, vec3 L, out vec3 normal,
   vec3 right = vec3(light.world_to_shadow[0][0], light.world_to_shadow[1][0], light.world_to_shadow[2][0]);
   vec3 up = vec3(light.world_to_shadow[0][1], light.world_to_shadow[1][1], light.world_to_shadow[2][1]);
   normal = normalize(slope.x * normalize(right) + slope.y * normalize(up) + L);
-  // Where the surface slopes, some of it is in front of a strand that is above it: the mean is where the strand is. Of a
-  // surface in front of the strand this side is in the shadow.
+  // A sloping surface is partly in front of a strand above it, so the mean depth is compared. The strand's side of a surface
+  // in front of the strand is in shadow.
   return found * step(depth, total / max(found, 0.25) + SURFACE_BIAS);
 }
 
-// Part of light that `count` strands send back, as `layer_parts` has it.
+// Fraction of light that `count` strands reflect, as in `layer_parts`.
 vec3 reflected_by_hair(float count)
 {
   vec3 reflectance = view.hair_reflectance.rgb;
@@ -138,20 +138,20 @@ vec3 reflected_by_hair(float count)
   return reflectance * (vec3(1.0) - left) / (vec3(1.0) - reflectance * reflectance * left);
 }
 
-// Light of a surface of a color, relative to that which it reflects at once: hair above it, of `count` strands, sends a
-// part of it back to the surface, again and again.
+// Light of a colored surface relative to its first reflection: `count` strands above it reflect light back to the surface
+// repeatedly.
 vec3 between_hair_and_surface(vec3 color, float count)
 {
   return vec3(1.0) / (vec3(1.0) - color * reflected_by_hair(count));
 }
 
-// Light that surfaces reflect to a strand, as a part of even light around it, for unit irradiance of the light: through the
-// rest of the hair, off diffuse surfaces, and through the hair again, along 1.66 times the shortest way [Elsasser42]. N: their
-// normal; color: theirs; part: of all directions, in which they are.
+// Light that surfaces reflect to a strand, relative to uniform light, for unit irradiance of the light: through the rest of
+// the hair, off diffuse surfaces, and through the hair again, along 1.66 times the shortest path [Elsasser42]. N, color: of
+// the surfaces; part: their fraction of all directions.
 vec3 surface_bounce(vec3 N, vec3 color, float part, vec3 L, vec3 T, float front, float behind)
 {
   float cosine = max(dot(N, L), 0.0);
-  // Strands are as wide as the sine between tangent and direction, pi / 4 in the mean over all directions.
+  // The width of strands is the sine of the angle between tangent and direction, pi / 4 averaged over all directions.
   float back = 1.66 * cosine * 0.25 * PI / max(sin_from_cos(dot(T, L)), 0.1);
   vec3 way = transmitted(front + behind * (1.0 + back), view.hair_forward.rgb);
   way *= between_hair_and_surface(color, front + behind);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cumulative opacity per layer from the counts of shadows/strand_shadow.comp, which leaves nothing in the pictures for the next map:
-// drivers take longer to clear them.
+// Cumulative opacity per layer from the counts of shadows/strand_shadow.comp. Also clears the images for the next map, which
+// takes drivers longer.
 
 #include "shadows/opacity.glsl"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// After shadows/shadow_rows.comp: texels without strands get the nearest front and the last back around them, so that
-// interpolation of both is valid.
+// After shadows/shadow_rows.comp: texels without strands get the nearest front and the farthest back around them, so that
+// both can be interpolated.
 
 #include "shadows/opacity.glsl"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// First pass of a deep opacity map drawn as strips: the depth of the strands that the light meets first, or last.
+// First pass of a deep opacity map drawn as strips: the depth of the nearest, or farthest, strands from the light.
 
 #include "shadows/opacity.glsl"
 
@@ -7,7 +7,7 @@ void main()
 {
   Light light = lights.light[view.light_index];
   float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, light.near, light.extent, drawn_position);
-  // What surfaces hide has no part in the layers' depths.
+  // Strands occluded by surfaces do not affect the layers' depths.
   if (depth > texelFetch(hidden_depth, ivec2(gl_FragCoord.xy), 0).r) {
     discard;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Depth behind which strands are hidden by surfaces: the greatest around a texel, in which a surface may be inclined.
+// Depth behind which surfaces occlude strands: the greatest around a texel, as surfaces may be inclined.
 
 #include "shadows/opacity.glsl"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Second pass of a deep opacity map: each strand adds its coverage to its own layer and all deeper ones.
+// Second pass of a deep opacity map: each strand adds its coverage to its layer and all deeper layers.
 
 #include "shadows/opacity.glsl"
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Means around a texel, along one axis, of the depth of surfaces, warped, its variance [Donnelly06], and the mean of the
-// depth itself: the wider, the softer the shadow. The slope of a surface is no variance: it would let light through. Beside
-// them is the texel's own color, packed, of which there is no mean.
+// Blurs along one axis the warped depth of surfaces, its variance [Donnelly06], and the depth itself: a wider blur gives
+// softer shadows. The slope of a surface does not count as variance, as it would let light through. The fourth component is
+// the texel's packed color, without blur.
 
 #include "shadows/opacity.glsl"
 
-// Of the variance that a step in the middle leaves beside its slope, the whole.
+// Variance of a step in the middle, relative to its variance without slope.
 const float STEP = 1.0 / (1.0 - 2.0 / PI);
 
 ivec2 here;
@@ -17,8 +17,9 @@ vec3 values_at(int tap)
   return (is_depth != 0) ? vec3(warped_depth(values.r), 0.0, values.r) : values;
 }
 
-// What the curve of the warp adds to the mean of two places on either side of one at this depth. A slope has none: a surface
-// that light grazes would shade itself. Where the three are not in line, a surface is in front of another.
+// What the curvature of the warp adds to the mean of two texels on either side of a texel at this depth. It is removed for a
+// plane, which would otherwise shade itself in grazing light. If the three are not collinear, a surface is in front of
+// another.
 float curve_of_warp(float depth, float before, float after)
 {
   float mean = 0.5 * (before + after);
@@ -35,12 +36,12 @@ void main()
   }
   vec3 middle = values_at(0);
   vec3 total = vec3(0.0, middle.yz);
-  float squares = 0.0;  // of differences to the middle, which keep their digits
+  float squares = 0.0;  // of differences from the middle, to keep precision
   float slope = 0.0;
   float curve = 0.0;
   float weights = 1.0;
   float reach = 0.0;
-  // A Gaussian from tap to tap: the ratio of one weight to the one before falls by the same factor each time.
+  // Incremental Gaussian: the ratio of consecutive weights decreases by a constant factor.
   float weight = 1.0;
   float ratio = exp(-0.5 / (deviation * deviation));
   float factor = ratio * ratio;

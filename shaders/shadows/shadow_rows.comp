@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Between the first pass of a shadow map and the second: the nearest front and the last back of a texel and those beside it.
+// Between the first and second pass of a shadow map: the nearest front and the farthest back of each texel and its neighbors
+// in the row.
 
 #include "shadows/opacity.glsl"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The depth and the color of the surfaces that a light meets first.
+// The depth and color of the surfaces nearest to a light.
 
 #include "shadows/opacity.glsl"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Strands in a deep opacity map: first the depths of the nearest and of the last (IS_FRONT), then the opacity of each layer
-// between.
+// Rasterizes strands into a deep opacity map: first the nearest and farthest depths (IS_FRONT), then the counts of each layer
+// in between.
 
 #include "shadows/opacity.glsl"
 #include "visibility/segment.glsl"
@@ -26,7 +26,7 @@ bool is_left_out(int run)
 
 void end_run(int run) {}
 
-// What is hidden by surfaces alone is not known of a whole part.
+// Occlusion by surfaces is tested per sample only.
 bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
 {
   return false;

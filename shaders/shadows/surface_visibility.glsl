@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light of a lamp on a surface, past other surfaces and through hair. What passes between strands casts a shadow as soft as
-// the lamp is wide; what strands pass on leaves the hair in all directions and is spread over the surface by its distance.
-// Needs the samplers of shadows/shadow.glsl.
+// Light of a lamp on a surface, past other surfaces and through hair. Light between strands casts shadows whose softness
+// follows from the lamp's size; light through strands leaves the hair in all directions and is spread over the surface by
+// its distance. Needs the samplers of shadows/shadow.glsl.
 
 #include "light/hair_reflection.glsl"
 
 const int TAP_COUNT = 4;
-// Distances of hair from the surface, as parts of the hair's extent: where it is looked for first, and the largest.
+// Distance of hair from the surface, as a fraction of the hair's extent: the first guess, and the maximum.
 const float FIRST_DISTANCE = 0.06;
 const float LARGEST_DISTANCE = 0.25;
-// Of surfaces that face away from the light more than this, hair sends it to none.
+// Surfaces that face away from the light more than this get no light through hair.
 const float LEAST_COSINE = -0.3;
 
-// Noise from 0 to 1 that is even in any few samples next to each other: interleaved gradient noise [Jimenez14].
+// Noise from 0 to 1 that is evenly distributed over any few adjacent samples: interleaved gradient noise [Jimenez14].
 float gradient_noise(vec2 place)
 {
   return fract(52.9829189 * fract(dot(place, vec2(0.06711056, 0.00583715))));
 }
 
-// Mean of the positive cosines between a normal and the directions to a disk; cosine: to its middle; sine: of its angular
+// Mean of the positive cosines between a normal and the directions to a disk; cosine: to its center; sine: of its angular
 // radius.
 float disk_cosine(float cosine, float sine)
 {
@@ -26,7 +26,7 @@ float disk_cosine(float cosine, float sine)
   return (cosine >= sine) ? cosine : 0.25 * above * above / max(sine, 1e-4);
 }
 
-// Noise from 0 to 1 without any order, of a part of the picture.
+// White noise from 0 to 1 for a block of the picture.
 float part_noise(ivec2 part)
 {
   uint bits = uint(part.x) * 1597334677u ^ uint(part.y) * 3812015801u;
@@ -34,28 +34,28 @@ float part_noise(ivec2 part)
   return float(bits >> 8u) / 16777216.0;
 }
 
-// The place of a sample in the whole picture.
+// Position of a sample in the whole picture.
 ivec2 picture_place(ivec2 place)
 {
   return place + ivec2(view.first_column, view.first_row);
 }
 
-// A direction for the samples of a place in the picture, another one in each pass: parts of 4 × 4 samples have even noise,
-// moved at random from part to part, as noise that is even everywhere leaves stripes where passes have several samples.
+// A direction for lookups at a position in the picture, which differs in each pass: blocks of 4 × 4 samples have evenly
+// distributed noise, offset randomly for each block, as a single pattern would leave stripes with several samples per pass.
 vec2 sample_turn(ivec2 place)
 {
   float angle = 2.0 * PI * fract(gradient_noise(vec2(place & 3)) + part_noise(place >> 2) + view.coverage_turn);
   return vec2(cos(angle), sin(angle));
 }
 
-// Irradiance of a surface, as parts of that of a small ball.
+// Irradiance of a surface, relative to a small ball.
 struct SurfaceVisibility {
-  float past_surfaces;  // alone
-  vec3 past_hair;  // and surfaces
-  float variance;  // of `past_hair`, by where it is looked for hair, in the mean of its channels
+  float past_surfaces;  // past surfaces only
+  vec3 past_hair;  // past surfaces and hair
+  float variance;  // of the mean of `past_hair`, by the choice of lookups
 };
 
-// N: the surface's normal; forward: what a strand passes on; turn: of `sample_turn`.
+// N: the surface's normal; forward: fraction that a strand passes on; turn: from `sample_turn`.
 SurfaceVisibility surface_visibility(Light light, vec3 position, vec3 N, vec3 forward, vec2 turn)
 {
   SurfaceVisibility seen;
@@ -83,8 +83,8 @@ SurfaceVisibility surface_visibility(Light light, vec3 position, vec3 N, vec3 fo
   float texel = 1.0 / float(textureSize(hair_front, 0).x);
   vec2 aside = turn;
   float away = FIRST_DISTANCE;
-  // The maps of surfaces are blurred already. Beside the place they would be those of another depth.
-  // Behind the hair its maps keep surfaces no farther than there: the mean around that bend is nearer than the surface.
+  // The maps of surfaces are blurred already, and lookups beside the position would be at other depths.
+  // The hair's maps limit the depth of surfaces behind the hair: the mean around that limit is nearer than the surface.
   float far = (light.wide_layer < 0) ? 0.0 : smoothstep(FAR_SURFACE - 0.2, FAR_SURFACE - 0.1, depth);
   float lit = mix(wide, lit_part(at, depth, SURFACE_BIAS), inside_part(at.xy) * (1.0 - far));
   vec3 sum = vec3(0.0);
@@ -99,12 +99,12 @@ SurfaceVisibility surface_visibility(Light light, vec3 position, vec3 N, vec3 fo
       vec3 near = at + vec3(aside * (sqrt(part) * max(tangent * reach, texel)), 0.0);
       found += direct * lit * exp(-crossed_before_surface(near, depth));
     }
-    // Half of the light of an even sheet of hair arrives from within 45 degrees.
+    // Half of the light of a uniform sheet of hair arrives within 45 degrees.
     float spread = sqrt(part / (1.0 - part));
     vec2 offset = aside * (spread * reach);
     vec2 ends = textureLod(hair_front, at + vec3(offset, 0.0), 0.0).rg;
     if (ends.x < min(depth, 1.0)) {
-      // Its direction, per the cosine between that and the light's.
+      // Cosine of the direction to the hair, relative to the cosine between that direction and the light's.
       float scattered = max(dot(N, L + spread * (aside.x * across.right + aside.y * across.up)), 0.0);
       scattered *= lit_part(at + vec3(0.5 * offset, 0.0), depth - 0.5 * away, SURFACE_BIAS);
       float count = crossed_before_surface(at + vec3(offset, 0.0), depth);

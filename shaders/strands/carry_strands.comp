@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Carries strands from where they are at rest with their surface: core/geometry/surface_deform.py on any GPU.
-// The box of each strand is left for what is around all.
+// Deforms strands with their surface: core/geometry/surface_deform.py on any GPU. Also writes the bounding box of each
+// strand.
 
 #include "strands/packed_strand.glsl"
 #include "strands/surface_rotation.glsl"
 
-// Texels of a strand in `roots`: the vertices around it, its barycentric coordinates, and where it begins at rest with
-// whether that is apart from its place there; of a vertex in `vertices`, which strands/vertex_rotations.comp has written: where it
-// is now and whether it has moved, and where its turn takes the x and the y axis. is_posed: 0 where all is at rest.
+// Texels of a strand in `roots`: the vertices around its root, barycentric coordinates, and its first point at rest with a
+// flag whether that differs from the root. Texels of a vertex in `vertices`, by strands/vertex_rotations.comp: its position
+// with a flag whether it has moved, and its rotated x and y axes. is_posed: 0 if the surface is at rest.
 const int ROOT_TEXELS = 3;
 const int VERTEX_TEXELS = 3;
 
@@ -39,9 +39,9 @@ void main()
   ivec2 here = packed_first(strand, 0, point_count, row_strands);
   vec4 head = packed_head(rest, here);
   vec4 carried = head;
-  bool is_carried = change > 0.0 || (is_posed == 1 && from.w > 0.0);  // undeformed parts do not change, bit for bit
+  bool is_carried = change > 0.0 || (is_posed == 1 && from.w > 0.0);  // undeformed parts stay exactly the same
   if (is_carried) {
-    // A turn leaves every offset within the diagonal of what it was within.
+    // A rotated offset is within the diagonal of its former range.
     carried = vec4(to + turn * (head.xyz - from.xyz), 1.7321 * head.w);
   }
   imageStore(strands, here, vec4(carried.xy, 0.0, 0.0));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A strand between its guides: core/interpolation/guide_weights.py and interpolation.py  [Report12] section 2.4.
+// A strand between its guides: core/interpolation/guide_weights.py and interpolation.py, [Report12] section 2.4.
 
 // Tangent and bitangent of a unit normal [Duff17].
 void root_frame(vec3 normal, out vec3 tangent, out vec3 bitangent)
@@ -11,8 +11,8 @@ void root_frame(vec3 normal, out vec3 tangent, out vec3 bitangent)
   bitangent = vec3(b, side + normal.y * normal.y * a, -normal.y);
 }
 
-// Cosine and sine of the turn from a guide's frame to the strand's, by the least rotation between their normals.
-// Opposite normals have no least rotation: any will do.
+// Cosine and sine of the turn from a guide's frame to the strand's, by the least rotation between their normals. For
+// opposite normals any rotation is valid.
 vec2 frame_turn(vec3 guide_normal, vec3 tangent, vec3 bitangent, vec3 normal)
 {
   vec3 guide_tangent;
@@ -25,32 +25,32 @@ vec2 frame_turn(vec3 guide_normal, vec3 tangent, vec3 bitangent, vec3 normal)
   return (size > 0.0) ? turn / size : vec2(0.0);
 }
 
-// A vector of a guide's frame in the strand's.
+// A vector in a guide's frame → the strand's frame.
 vec3 turned_by(vec2 turn, vec3 along)
 {
   return vec3(turn.x * along.x - turn.y * along.y, turn.y * along.x + turn.x * along.y, along.z);
 }
 
-// 0 up to the first value, 1 from a range further on, a smooth step between.
+// Smoothstep from 0 at `first` to 1 after a range; per_range: 1 / the range.
 float faded(float first, float per_range, float value)
 {
   float x = clamp((value - first) * per_range, 0.0, 1.0);
   return x * x * (3.0 - 2.0 * x);
 }
 
-// Part of a guide's weight that is left where its directions and the logarithm of its length differ from the nearest
-// guide's. facing: least cosine between their directions; apart: difference of logarithms; limits: the cosine at which
-// nothing is left, 1 / the range of cosines over which it fades, and the same of logarithms, over the last half of which
-// it does.
+// Remaining fraction of a guide's weight by how much its directions and the logarithm of its length differ from the nearest
+// guide's. facing: least cosine between their directions; apart: difference of logarithms; limits: the cosine at which the
+// weight is zero, 1 / the range of cosines over which it fades, the difference of logarithms at which it is zero, and
+// 1 / the range over which it fades, the last half of that difference.
 float limited_part(float facing, float apart, vec4 limits)
 {
   return faded(limits.x, limits.y, facing) * (1.0 - faded(0.5 * limits.z, limits.w, apart));
 }
 
-// Eq. 10's segment, stretched to the mean length of the guides'. keep_length: how far, 0 to 1.
+// The segment of Eq. 10, stretched by `keep_length`, 0 to 1, towards the mean length of the guides' segments.
 vec3 stretched(vec3 segment, float mean_length, float keep_length)
 {
-  // Where guides cancel, a direction is rounding: a thousandth of the length counts as the least.
+  // If guides cancel out, the direction is rounding: the length counts as at least a thousandth of the mean.
   float found = max(length(segment), max(1e-3 * mean_length, 1e-30));
   return segment * (1.0 + keep_length * (mean_length / found - 1.0));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Guides as strands follow them: their segments in the frames of their roots, and what their weights are limited by.
+// Prepares guides: their segments in the frames of their roots, and the values that limit their weights.
 
 #include "strands/guide_interpolation.glsl"
 #include "strands/strip.glsl"

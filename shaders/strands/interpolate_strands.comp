@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Makes strands of their guides in the texture that they are drawn from, or that styles take them from:
+// Interpolates strands from their guides into the texture that is drawn, or that styles read:
 // core/interpolation/interpolation.py on any GPU.
 
 #include "strands/guide_interpolation.glsl"
 #include "strands/write_packed_strand.glsl"
 #include "strands/strip.glsl"
 
-// Texels of a strand in `bindings`: root, normal, and guides with their weights, two a texel.
+// Texels of a strand in `bindings`: root, normal, and guides with their weights, two per texel.
 const int BINDING_TEXELS = 2 + (SLOTS + 1) / 2;
 
 void main()
@@ -56,7 +56,7 @@ void main()
     }
     total += share[slot];
   }
-  // No strand is longer than its guides' mean, but for rounding.
+  // No strand is longer than its guides' mean, except by rounding.
   float range = 0.0;
   for (int slot = 0; slot < SLOTS; slot++) {
     share[slot] /= total;
@@ -65,7 +65,7 @@ void main()
   }
   range *= 1.001 * making.axes_scale;
 
-  // From the surface's frame to the coordinates that are drawn.
+  // From the surface's frame to the coordinates of drawn strands.
   tangent = (making.axes * vec4(tangent, 0.0)).xyz;
   bitangent = (making.axes * vec4(bitangent, 0.0)).xyz;
   normal = (making.axes * vec4(normal, 0.0)).xyz;

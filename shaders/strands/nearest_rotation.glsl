@@ -3,8 +3,8 @@
 // core/geometry/nearest_rotation.py in single precision.
 
 const int ROTATION_STEPS = 16;
-const float LAST_CHANGE = 1.0e-4;  // after which what is left is its square
-const float FLAT_VOLUME = 1.0e-6;  // of a matrix of size one that may as well be flat: rounding decides its sign
+const float LAST_CHANGE = 1.0e-4;  // convergence is quadratic: the remaining error is its square
+const float FLAT_VOLUME = 1.0e-6;  // of a matrix of size one that counts as flat: rounding decides the sign
 
 float matrix_size(mat3 given)
 {
@@ -16,8 +16,8 @@ mat3 unturned()
   return mat3(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0));
 }
 
-// U V^T of U S V^T: mirrored where the matrix mirrors. A flat one has the rotation, and not the mirror, that is as near;
-// what is zero, or a line, is not turned if no rotation is nearer than others.
+// U V^T of U S V^T: mirrored if the matrix mirrors. For a flat matrix the rotation is chosen over the equally near mirrored
+// one; for a zero matrix or a line, the identity if no rotation is nearest.
 mat3 nearest_rotation(mat3 given)
 {
   float size = matrix_size(given);
@@ -26,8 +26,8 @@ mat3 nearest_rotation(mat3 given)
   }
   mat3 found = given * (1.0 / size);
   for (int turn = 0; turn < ROTATION_STEPS; turn++) {
-    // The inverse, transposed, is that of the cofactors by the volume. The size of a volume that rounds does not matter:
-    // the next steps correct it.
+    // The inverse transpose is the cofactors divided by the volume. Errors of a volume near zero do not matter, as the next
+    // steps correct them.
     mat3 cofactors = mat3(cross(found[1], found[2]), cross(found[2], found[0]), cross(found[0], found[1]));
     float volume = dot(found[0], cofactors[0]);
     volume = (abs(volume) < FLAT_VOLUME) ? max(abs(volume), 1.0e-12) : volume;

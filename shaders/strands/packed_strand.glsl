@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Strands in eight bytes a point: core/geometry/packed_strands.py, which says how.
+// Strands in eight bytes per point: core/geometry/packed_strands.py documents the format.
 
 #include "strands/strip.glsl"
 
 const float PACKED_MOST = 524287.0;  // steps from the root to the end of a strand's range
-const int HEAD_TEXELS = 2;  // of a strand, before its points: its root, then its range
+const int HEAD_TEXELS = 2;  // before the points of a strand: its root and its range
 
 uint normal_bits(uint value)
 {
@@ -17,11 +17,11 @@ uint packed_bits(float number)
   return (bits & 0x1FFFFFFFu) | ((bits >> 31u) << 29u);
 }
 
-// An offset from the root, of which no coordinate is beyond the range.
+// Pack an offset from the root whose coordinates are within the range.
 vec2 packed_offset(vec3 offset, float range)
 {
   vec3 steps = (range > 1e-30) ? offset * (PACKED_MOST / range) : vec3(0.0);
-  // Half a step is added, as integers are cut off.
+  // Half a step is added, as conversion truncates.
   uvec3 place = uvec3(clamp(steps, -PACKED_MOST, PACKED_MOST) + (PACKED_MOST + 1.5));
   uint low = (place.x << 10u) | (place.z & 1023u);
   uint high = (place.y << 10u) | (place.z >> 10u);
@@ -36,19 +36,19 @@ vec3 unpacked_offset(vec2 texel, float range)
   return (vec3(place) - (PACKED_MOST + 1.0)) * (range / PACKED_MOST);
 }
 
-// The first texel of a strand whose texture holds `others` texels before those of each strand.
+// First texel of a strand in a texture with `others` extra texels before each strand.
 ivec2 packed_first(int strand, int others, int point_count, int row_strands)
 {
   return strand_texel(strand, others, others + HEAD_TEXELS + point_count - 1, row_strands);
 }
 
-// Root and range of the strand with a first texel.
+// Root and range of a strand; first: its first texel.
 vec4 packed_head(sampler2D texels, ivec2 first)
 {
   return vec4(texelFetch(texels, first, 0).xy, texelFetch(texels, first + ivec2(1, 0), 0).xy);
 }
 
-// A point of the strand with a first texel and its head.
+// Position of a strand's point; first: the strand's first texel, head: by `packed_head`.
 vec3 packed_place(sampler2D texels, ivec2 first, vec4 head, int point)
 {
   vec2 texel = texelFetch(texels, first + ivec2(HEAD_TEXELS - 1 + point, 0), 0).xy;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Keeps where strands are that are about to change, for motion vectors: all of them, or those of a list.
+// Copies strands that are about to change, for motion vectors: all strands, or those in a list.
 
 #include "strands/strip.glsl"
 
@@ -12,7 +12,7 @@ void main()
     return;
   }
   int texel = place - kept * texel_count;
-  // Each strand has one texel more: the first is its index where there is a list.
+  // Each copied strand has an extra first texel: its index, if there is a list.
   ivec2 there = strand_texel(kept, 0, texel_count + 1, row_kept);
   int strand = (is_list != 0) ? int(texelFetch(listed, there, 0).x) : kept;
   ivec2 here = strand_texel(strand, texel, texel_count, row_strands);

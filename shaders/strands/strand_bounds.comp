@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Joins boxes, `share` neighbors to one: what is around strands that only the GPU knows.
+// Joins bounding boxes, `share` neighbors into one, for strands whose points are only on the GPU.
 
 #include "strands/strip.glsl"
 

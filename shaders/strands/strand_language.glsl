@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The language of .strand files in GLSL, one strand a thread; core/styling/strand_language.h has it in C++ and says
-// what its words mean. Needs POINTS, the block `styling` and the image `centres`.
+// The language of .strand files in GLSL, one strand per thread; core/styling/strand_language.h defines it in C++ and
+// documents it. Needs POINTS, the block `styling` and the image `centres`.
 //
-// xyz and w of a segment are its direction and its length. Next segments are in the other half of the array.
+// A segment is its direction in xyz and its length in w. Next segments are in the other half of the array.
 
 #include "strands/strip.glsl"
 
@@ -48,12 +48,12 @@ float spare[15];
 vec3 root;
 vec3 normal;  // of the surface at the root
 int identity;
-int point_count;  // POINTS: but loops to a constant take drivers longer to compile
-float hand;  // -1 where the surface's own axes are mirrored
+int point_count;  // POINTS; a variable, as drivers take longer to compile loops to a constant
+float hand;  // -1 if the surface's axes are mirrored
 float total;  // of all lengths
 float per_total;
 
-// The present step.
+// The current step.
 Step row_now;
 int kind;
 int seed;
@@ -66,8 +66,8 @@ float from;
 bool is_flipped;
 float least;
 float slope;
-// The clump centre of the strand: its normal is the reference of frames, which every strand of a clump shares. A strand
-// without a centre stands for itself.
+// The clump center of the strand, whose normal is the reference of the frames shared by all strands of a clump. A strand
+// without a center is its own.
 int centre;
 vec3 centre_normal;
 int lock;  // its identity

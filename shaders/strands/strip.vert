@@ -16,7 +16,7 @@ void main()
   vec4 here = strand_point(strand, first, head, point);
   vec3 along = packed_place(strands, first, head, min(point + 1, view.point_count - 1)) -
                packed_place(strands, first, head, max(point - 1, 0));
-  // A strand that folds back on itself has no tangent there; any unit vector is valid.
+  // A strand has no tangent where it folds back on itself; any unit vector is valid.
   along = (dot(along, along) > 0.0) ? along : vec3(0.0, 0.0, 1.0);
 
   strand_index = strand;
@@ -38,7 +38,7 @@ void main()
   vec3 beside = strip_side(normalize(tangent), normalize(to_view));
   vec3 offset = beside * (side * half_width);
   if (drawn_point == 0 || drawn_point == view.drawn_points - 1) {
-    // As far beyond the end as half a disk covers, which a strand ends with.
+    // A strand ends in half a disk: the strip is extended by a rectangle of the same area.
     float beyond = (drawn_point == 0) ? -FOURTH_OF_PI : FOURTH_OF_PI;
     offset += cross(normalize(to_view), beside) * (beyond * true_half_width);
   }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program of styles on strands where they are drawn: core/styling/steps.cpp on any GPU, one strand a thread.
+// Applies a program of styles to strands on the GPU: core/styling/steps.cpp on any GPU, one strand per thread.
 //
-// all.strand holds the kinds of its steps, and HAS_TRIM and the like say which these are.
+// all.strand contains the kinds of steps; HAS_TRIM and the like select those of the program.
 
 #include "strands/write_packed_strand.glsl"
 #include "strands/strip.glsl"
 #include "strands/strand_language.glsl"
 #include "all.strand"
 
-// Numbers of a strand in `known`: its normal, its identity in two parts, its clump centre of each level, its masks.
+// Numbers of a strand in `known`: its normal, its identity in two parts, its clump center in each level, its masks.
 const int KNOWN_LEVELS = 5;
 
 float known_number(ivec2 first, int number)
@@ -21,7 +21,7 @@ int whole(float high, float low)
   return int((uint(high) << 16u) | uint(low));
 }
 
-// Directions and lengths of the segments between points. A segment without length goes on as the one before.
+// Reads directions and lengths of the segments between points. A segment without length has the direction before it.
 void read_strand(ivec2 first)
 {
   half_now = 0;
@@ -41,7 +41,7 @@ void read_strand(ivec2 first)
   }
 }
 
-// The clump centre that a step counts the strand to.
+// Sets the clump center of the strand in a step.
 void take_centre(ivec2 first)
 {
   centre = row_now.first_centre;
@@ -75,7 +75,7 @@ void take_profile()
   slope = 1.0 / power(least, 1.0 - exponent);
 }
 
-// A point from the root on, in the coordinates that are drawn. A strand that no style has touched keeps its points.
+// Offset of a point from the root, in the coordinates of drawn strands. A strand that no style has changed keeps its points.
 vec3 drawn_offset(ivec2 first, int i, vec3 from_root, bool is_touched)
 {
   vec3 offset = is_touched ? from_root : imageLoad(plain_strands, first + ivec2(i, 0)).xyz - root;
@@ -101,7 +101,7 @@ void write_strand(int strand, ivec2 first, bool is_touched)
   end_strand(strand);
 }
 
-// Points of a centre strand, with their arc lengths.
+// Writes the points of a center strand, with their arc lengths.
 void write_centre(ivec2 first, bool is_touched)
 {
   vec3 from_root = vec3(0.0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a surface turns at a root: core/geometry/surface_deform.py.
+// Rotation of a surface at a root: core/geometry/surface_deform.py.
 
 vec3 unit_or(vec3 direction, vec3 otherwise)
 {
@@ -7,7 +7,7 @@ vec3 unit_or(vec3 direction, vec3 otherwise)
   return (size > 0.0) ? direction / max(size, 1.0e-37) : otherwise;
 }
 
-// The rotation of which these are the first two axes, between vertices: made orthonormal again.
+// The rotation with these first two axes, which are interpolated between vertices and made orthonormal again.
 mat3 surface_turn(vec3 x_axis, vec3 y_axis)
 {
   vec3 x = unit_or(x_axis, vec3(1.0, 0.0, 0.0));

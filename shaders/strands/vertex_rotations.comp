@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Turns a surface at its vertices, of which only the places are uploaded: core/geometry/vertex_turns.py on any GPU.
+// Rotations of a surface at its vertices, from their positions only: core/geometry/vertex_turns.py on any GPU.
 
 #include "strands/nearest_rotation.glsl"
 #include "surfaces/vertex_position.glsl"
 
-// Texels of a face in `faces`: columns of the inverse of its edges and normal at rest, each with one of its vertices;
-// of a vertex in `turned`: see strands/carry_strands.comp. A vertex in `rings` has its place, and where its faces begin and end
+// Texels of a face in `faces`: columns of the inverse of its edges and normal at rest, each with one of its vertices. Texels
+// of a vertex in `turned`: see strands/carry_strands.comp. A vertex in `rings`: its index, and the start and end of its faces
 // in `around`.
 const int FACE_TEXELS = 3;
 const int TURNED_TEXELS = 3;
@@ -43,7 +43,7 @@ void main()
                 are_apart(last, vertex_place(smooth_rest, int(column_2.w)));
     vec3 along = second - first;
     vec3 across = last - first;
-    // Squares of short edges would be zero.
+    // Scaled, as squares of short edges would be zero.
     float reach = max(max(greatest(along), greatest(across)), 1.0e-30);
     vec3 normal = cross(along / reach, across / reach);
     float size = length(normal);

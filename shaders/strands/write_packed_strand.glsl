@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A strand as it is drawn, eight bytes a point, and the box around it: needs the images strands and boxes.
+// Writes a strand for drawing, eight bytes per point, and its bounding box: needs the images strands and boxes.
 
 #include "strands/packed_strand.glsl"
 
@@ -9,7 +9,7 @@ float put_range;
 vec3 put_least;
 vec3 put_greatest;
 
-// range: what no coordinate of an offset exceeds; row_strands: whole strands in a row of the texture.
+// range: maximum of any offset's coordinates; row_strands: whole strands per row of the texture.
 void begin_strand(int strand, vec3 root, float range, int point_count, int row_strands)
 {
   put_first = packed_first(strand, 0, point_count, row_strands);

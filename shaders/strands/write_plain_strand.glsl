@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// In place of strands/write_packed_strand.glsl: a strand in single precision, for the styles that come after. Needs the image
+// Writes a strand in single precision for subsequent styles, in place of strands/write_packed_strand.glsl. Needs the image
 // strands.
 
 #include "strands/strip.glsl"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Brings the points of some strands into the texture of all: changes by combing.
+// Writes the points of combed strands into the texture of all strands.
 
 #include "strands/strip.glsl"
 
@@ -12,7 +12,7 @@ void main()
     return;
   }
   int texel = place - moved * texel_count;
-  // Each strand has one texel more: the first is its index.
+  // Each moved strand has an extra first texel: its index.
   ivec2 there = strand_texel(moved, 0, texel_count + 1, moved_row_strands);
   int strand = int(texelFetch(moved_strands, there, 0).x);
   ivec2 here = strand_texel(strand, texel, texel_count, row_strands);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a clear surface reflects, and as alpha the part that it does not let through.
+// The reflections of a clear surface; alpha: the fraction of light behind it that it blocks.
 
 #include "surfaces/surface_light.glsl"
 #include "surfaces/drawn_point.glsl"

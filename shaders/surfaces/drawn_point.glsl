@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The point of a surface that is drawn as triangles.
+// The point of a surface drawn as triangles.
 
 #include "surfaces/drawn_normal.glsl"
 #include "surfaces/surface_point.glsl"

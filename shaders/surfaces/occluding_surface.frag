@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A surface drawn by Blender: here it only occludes the hair behind it.
+// A surface drawn by Blender, which only occludes the hair behind it here.
 
 #include "visibility/unclipped.glsl"
 

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shades surfaces where one of their triangles is nearest. Each thread takes four by four samples. With coarse shading, where
-// light has little noise, one of two by two samples of the same part of a surface is shaded for all, another one in each pass.
+// Shades samples in which a triangle of the surface is nearest, four by four per thread. With coarse shading, if light has
+// little noise, one of two by two samples of the same part of a surface is shaded for all, alternating with each pass.
 
 #include "surfaces/surface_light.glsl"
 #include "visibility/surface_hit.glsl"
 #include "visibility/sample_values.glsl"
 
-const int SIDE = 4;  // samples along each side of what a thread takes
+const int SIDE = 4;  // samples along each side of a thread's block
 
-// How far a sample may be off the plane of another one, as a part of the steps of depth, and by rounding.
+// Maximum distance of a sample from the plane of another, as a fraction of the depth steps, and by rounding.
 const float OFF_PLANE = 0.5;
 const float ROUNDING = 2e-7;
-// Part of alpha squared that the change of normals within a block may add to it.
+// Fraction of alpha squared that the change of normals within a block may add.
 const float EVEN = 0.25;
-// Variance of light, by that squared, which is left to the mean over blocks and passes.
+// Variance relative to squared light that the mean over blocks and passes may reduce.
 const float NOISE = 2e-3;
 
-// The triangle of this surface in a sample. Other surfaces, hair and empty samples give numbers beyond its triangles.
+// The triangle of this surface in a sample. Other surfaces, hair and empty samples result in numbers beyond its triangles.
 uint triangle_at(ivec2 place)
 {
   return texelFetch(segments, place, 0).r - (NO_SEGMENT + 1u + uint(first_triangle));
@@ -33,8 +33,8 @@ float depth_of_sample(ivec2 place)
   return uintBitsToFloat(texelFetch(depths, place, 0).r);
 }
 
-// Whether a sample of a triangle shows the same part of a surface as another one does: it lies in the plane of that one's
-// triangle, and normals have no edge between them.
+// Whether a sample shows the same part of a surface as another: it lies in the plane of the other's triangle, and normals
+// have no edge between them.
 bool is_alike(ivec2 place, uint triangle, ivec2 other, uint other_triangle, vec2 depth_steps)
 {
   float expected = depth_of_sample(other) + dot(vec2(place - other), depth_steps);
@@ -43,28 +43,28 @@ bool is_alike(ivec2 place, uint triangle, ivec2 other, uint other_triangle, vec2
   return is_smooth && abs(depth_of_sample(place) - expected) <= off;
 }
 
-// The sample's own light below what is drawn over it.
+// The light of a sample, composited below clear surfaces and holdouts.
 vec4 below_what_is_over(vec3 light, ivec2 place)
 {
   vec4 over = (has_over != 0) ? imageLoad(picture, place) : vec4(0.0);
   return vec4(min(light * (1.0 - over.a) + over.rgb, vec3(BRIGHTEST)), 1.0);
 }
 
-// The sample of a thread with a number: those of a pair of rows and columns are next to each other.
+// The sample of a thread with an index: samples of two by two are consecutive.
 ivec2 sample_of(ivec2 corner, int index)
 {
   return corner + ivec2((index >> 2 & 1) * 2 + (index & 1), (index >> 3) * 2 + (index >> 1 & 1));
 }
 
-// Which sample is shaded first of each two by two: these are all in other rows and columns.
+// The sample of each two by two that is shaded first: these are all in different rows and columns.
 int first_of(int index)
 {
   int first = (index >> 2 & 1) * 2 + (index >> 3) + int(4.0 * view.coverage_turn);
   return (index & ~3) | ((index + first) & 3);
 }
 
-// The row of this thread. Software drivers give each processor groups that follow each other: they are of rows all over the
-// picture, as a surface may be in a part of it.
+// The row of this thread. Software drivers give consecutive groups to each processor: their rows are spread over the picture,
+// as a surface may only be in a part of it.
 uint turned_row()
 {
   uint group = gl_WorkGroupID.y * uint(row_stride) % gl_NumWorkGroups.y;
@@ -75,7 +75,7 @@ void main()
 {
   ivec2 size = textureSize(segments, 0);
   ivec2 corner = SIDE * ivec2(gl_GlobalInvocationID.x, turned_row()) + ivec2(window_left, window_bottom);
-  // Two by two samples are those of the whole picture.
+  // Blocks are aligned to the whole picture.
   corner -= picture_place(corner) & (SIDE - 1);
   int waiting = 0;  // a bit for each sample
   for (int index = 0; index < SIDE * SIDE; index++) {
@@ -96,7 +96,7 @@ void main()
     vec2 depth_steps;
     SurfacePoint point = found_point(int(triangle), vec2(place) + 0.5, vec2(size), depth_steps);
     if (is_coarse != 0) {
-      // Images are averaged over the samples that take their light from this one.
+      // Images are averaged over the samples that share this light.
       point.uv_right *= 2.0;
       point.uv_up *= 2.0;
     }
@@ -105,7 +105,7 @@ void main()
     waiting &= ~(1 << shown);
     imageStore(picture, place, below_what_is_over(light, place));
 
-    // Highlights so small that they change from sample to sample are shaded in each.
+    // Highlights that vary between samples are shaded in each sample.
     bool is_even = 8.0 * point.normal_variance <= EVEN * light_here.alpha * light_here.alpha;
     if (is_quiet && is_even) {
       for (int next = 1; next < 4; next++) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Empties the samples that show surfaces, so that what is drawn over these is alone there.
+// Blanks the samples that show surfaces, before drawing over them.
 
 #include "visibility/sample_values.glsl"
 

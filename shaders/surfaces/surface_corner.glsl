@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A corner of a surface's triangles, by its index: needs the samplers places, normals and corners.
+// Corners of a surface's triangles: needs the samplers places, normals and corners.
 
 #include "surfaces/vertex_position.glsl"
 
@@ -9,7 +9,7 @@ struct Corner {
   vec2 uv;
 };
 
-// Its vertex is in two numbers of sixteen bits, as floats hold no greater ones exactly.
+// The vertex is stored as two 16-bit numbers, as floats cannot represent all indices exactly.
 Corner corner_at(int index)
 {
   int row = textureSize(corners, 0).x;
@@ -32,8 +32,8 @@ vec3 corner_position(Corner corner)
   return (view.object_to_world * vec4(vertex_place(places, corner.vertex_index), 1.0)).xyz;
 }
 
-// A normal where a matrix brings what it is of: by its cofactors, which a flattened object has too. Where it mirrors,
-// triangles turn their other side to the front, and their normals with it.
+// Transforms a normal by the cofactors of the matrix, which also exist for flattened objects. A mirroring matrix turns the
+// other side of triangles to the front, and flips the normals too.
 vec3 corner_world_normal(Corner corner)
 {
   vec3 normal = vertex_place(normals, corner.normal_index);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Vertices of triangles by their places in a texture: there a driver has what was just uploaded at hand, as vertices may
-// stay in the host's memory until they were drawn some times.
+// Vertices of triangles with positions from a texture: it is in GPU memory once uploaded, while drivers may keep vertex
+// buffers in the host's memory until they were drawn several times.
 
 #include "surfaces/vertex_position.glsl"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light from a point of a surface, a Principled BSDF: diffuse below a rough dielectric, or metal.
+// Light from a point of a surface with a Principled BSDF: diffuse below a rough dielectric, or metal.
 
 #include "shadows/surface_visibility.glsl"
 #include "light/world.glsl"
@@ -7,10 +7,10 @@
 #include "surfaces/surface_material.glsl"
 #include "surfaces/surface_point.glsl"
 
-// Largest light that a picture's half-precision samples hold.
+// Maximum light, within the range of a picture's half floats.
 const float BRIGHTEST = 6e4;
 
-// alpha of microfacets and of the normal's change within a sample, which would leave dots of light [Tokuyoshi19].
+// alpha of microfacets, widened by the normal's variance within a sample to avoid fireflies [Tokuyoshi19].
 float filtered_alpha(float roughness, float variance)
 {
   float squared = roughness * roughness * roughness * roughness;
@@ -19,13 +19,13 @@ float filtered_alpha(float roughness, float variance)
 
 struct SurfaceLight {
   vec3 below;  // through the coat
-  vec3 highlight;  // what the coat, or metal, reflects
-  float coat;  // the part of even light that it does
-  float alpha;  // of its microfacets
-  float noise;  // variance of its irradiance, by that squared
+  vec3 highlight;  // reflected by the coat, or by metal
+  float coat;  // reflected fraction of uniform light
+  float alpha;  // of the microfacets
+  float noise;  // variance of the irradiance, relative to its square
 };
 
-// turn: of `sample_turn`.
+// turn: from `sample_turn`.
 SurfaceLight surface_light(SurfacePoint point, vec2 turn)
 {
   vec3 N = point.N;
@@ -35,7 +35,7 @@ SurfaceLight surface_light(SurfacePoint point, vec2 turn)
   float roughness = base_roughness(point.uv, point.uv_right, point.uv_up);
   float alpha = filtered_alpha(roughness, point.normal_variance);
   vec4 share = directional_albedo(surface_albedo, n_dot_v, roughness);
-  // A surface that reflects nothing straight on does not at any angle.
+  // A surface without reflectance at normal incidence reflects nothing at any angle.
   float grazing = share.z * min(50.0 * surface.reflectance, 1.0);
   float coat = surface.reflectance * (share.x - share.z) + grazing;
   vec3 reflectance = mix(vec3(surface.reflectance), albedo, surface.metallic);
@@ -61,7 +61,7 @@ SurfaceLight surface_light(SurfacePoint point, vec2 turn)
                                      light.blend,
                                      light.radius,
                                      point.position);
-      // A plane receives less of a wide lobe of the world than a ball does, in the mean by its variance.
+      // A plane receives less light of a wide lobe than a ball, on average by the lobe's variance.
       float blur = light_blur(light.kind, light.position.xyz, light.radius, point.position);
       variance += seen.variance * squared_mean(facing);
       vec3 arriving = facing * seen.past_hair * ((light.kind == LIGHT_SUN) ? 1.0 - blur : 1.0);
@@ -69,7 +69,7 @@ SurfaceLight surface_light(SurfacePoint point, vec2 turn)
       float n_dot_l = max(dot(N, L), 1e-3);
       vec3 H = normalize(L + V);
       float v_dot_h = clamp(dot(V, H), 0.0, 1.0);
-      // A light's size widens its highlight: half its angle, seen by the microfacets' normals.
+      // A light's size widens its highlight, by half its angle in terms of the microfacets' normals.
       float widened = min(sqrt(alpha * alpha + 0.5 * blur), 1.0);
       vec3 dielectric = vec3(F_dielectric(v_dot_h, surface.reflectance));
       vec3 fresnel = mix(dielectric, F_schlick(v_dot_h, albedo), surface.metallic);

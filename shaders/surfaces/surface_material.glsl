@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A surface's material at a point: needs the block `surface` and its samplers.
 
-// An image, whose coordinates are given by two rows; right, up: change of uv to the next samples.
+// A texture lookup; first: the first of two rows that transform uv to coordinates of the image; right, up: change of uv to
+// the next samples.
 vec4 image_at(sampler2D image, vec2 uv, vec2 right, vec2 up, int first)
 {
   mat3x2 rows;
@@ -26,17 +27,18 @@ float base_roughness(vec2 uv, vec2 right, vec2 up)
   if (surface.has_roughness_image != 0) {
     roughness = dot(surface.roughness_channels, image_at(roughness_image, uv, right, up, 2));
   }
-  // A mirror's highlight of a light without size would be smaller than a sample.
+  // The highlight of a light without size on a mirror would be smaller than a sample.
   return clamp(roughness, 0.03, 1.0);
 }
 
-// What the normal map has, in axes along u, v and the normal.
+// The vector of the normal map, in axes along u, v and the normal.
 vec3 normal_map(vec2 uv, vec2 right, vec2 up)
 {
   return 2.0 * image_at(normal_image, uv, right, up, 4).xyz - 1.0;
 }
 
-// The normal by what the normal map has, in axes along u and v by what both change in two steps on the surface.
+// The normal with the normal map applied; the axes along u and v follow from the changes of position and uv in two steps on
+// the surface.
 vec3 mapped_normal(vec3 N, vec3 map, vec3 x_step, vec3 y_step, vec2 x_uv, vec2 y_uv)
 {
   if (surface.has_normal_image == 0) {
@@ -46,7 +48,7 @@ vec3 mapped_normal(vec3 N, vec3 map, vec3 x_step, vec3 y_step, vec2 x_uv, vec2 y
   vec3 y_across = cross(y_step, N);
   vec3 along_u = x_uv.x * y_across + y_uv.x * x_across;
   vec3 along_v = x_uv.y * y_across + y_uv.y * x_across;
-  // Both have the sign of this determinant, which is negative where the picture is mirrored.
+  // Both have the sign of this determinant, which is negative in a mirrored picture.
   float way = sign(dot(x_step, y_across));
   vec3 T = way * along_u * inversesqrt(max(dot(along_u, along_u), 1e-30));
   vec3 B = way * along_v * inversesqrt(max(dot(along_v, along_v), 1e-30));
@@ -54,8 +56,8 @@ vec3 mapped_normal(vec3 N, vec3 map, vec3 x_step, vec3 y_step, vec2 x_uv, vec2 y
   return normalize(N + max(surface.normal_strength, 0.0) * (bent - N));
 }
 
-// Mean squared change of the normal within a sample, along each of two axes: by its steps to the next samples, and by what
-// the normal map's mean has lost in length [Toksvig05], beyond its rounding.
+// Mean squared change of the normal within a sample, along each of two axes: from its steps to the next samples, and from the
+// shortening of the normal map's mean [Toksvig05], beyond rounding.
 float normal_variance(vec3 x_step, vec3 y_step, vec3 map)
 {
   float size = length(map);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reflection of light by a rough surface: microfacets with the GGX distribution [Walter07]. Cosines are positive.
+// Reflection of light by a rough surface with GGX microfacets [Walter07]. Cosines are positive.
 
 #include "fibre/constants.glsl"
 
-// Density of microfacets' normals at an angle to the surface's. alpha: the square of the roughness.
+// Density of microfacets' normals at an angle to the surface's normal. alpha: the square of the roughness.
 float D_ggx(float n_dot_h, float alpha)
 {
   float squared = alpha * alpha;
@@ -11,9 +11,9 @@ float D_ggx(float n_dot_h, float alpha)
   return squared / (PI * spread * spread);
 }
 
-// The same for light from a disk, which a smooth surface mirrors with its border: half vectors within half of its angular
-// radius are as one. n_dot_h: to the disk's middle; half_radius: half of the angular radius. The factor keeps the integral
-// for small angles.
+// The same for light from a disk, whose border a smooth surface mirrors: all half vectors within half of its angular radius
+// are treated alike. n_dot_h: for the disk's center; half_radius: half of the angular radius. The factor preserves the
+// integral for small angles.
 float D_ggx_of_disk(float n_dot_h, float half_radius, float alpha)
 {
   float outside = max(acos(clamp(n_dot_h, 0.0, 1.0)) - half_radius, 0.0);
@@ -21,7 +21,7 @@ float D_ggx_of_disk(float n_dot_h, float half_radius, float alpha)
   return D_ggx(cos(outside), alpha) / (1.0 + ratio * (0.5 * PI + ratio));
 }
 
-// Part of the microfacets that both light and eye see, over 4 (N·L) (N·V) [Heitz14, Eq. 99].
+// Fraction of the microfacets visible from both light and eye, divided by 4 (N·L) (N·V) [Heitz14, Eq. 99].
 float V_smith(float n_dot_l, float n_dot_v, float alpha)
 {
   float squared = alpha * alpha;
@@ -30,7 +30,7 @@ float V_smith(float n_dot_l, float n_dot_v, float alpha)
   return 0.5 / max(to_eye + to_light, 1e-7);
 }
 
-// Fresnel reflectance of a dielectric, by its reflectance at normal incidence.
+// Fresnel reflectance of a dielectric; reflectance: at normal incidence.
 float F_dielectric(float cosine, float reflectance)
 {
   float root = sqrt(min(reflectance, 0.99));
@@ -41,22 +41,22 @@ float F_dielectric(float cosine, float reflectance)
   return 0.5 * across * across * (1.0 + along * along);
 }
 
-// The same of a metal, approximately.
+// Fresnel reflectance of a metal, approximately.
 vec3 F_schlick(float cosine, vec3 reflectance)
 {
   float rest = 1.0 - cosine;
   return reflectance + (vec3(1.0) - reflectance) * rest * rest * rest * rest * rest;
 }
 
-// What microfacets reflect of uniform light towards the eye: a texel of core/shading/tables/surface_albedo.py, whose
-// first and last are at 0 and 1.
+// Uniform light that microfacets reflect towards the eye: a lookup in the table of core/shading/tables/surface_albedo.py,
+// whose first and last texel centers are at 0 and 1.
 vec4 directional_albedo(sampler2D albedo_table, float n_dot_v, float roughness)
 {
   float size = float(textureSize(albedo_table, 0).x);
   return textureLod(albedo_table, (vec2(n_dot_v, roughness) * (size - 1.0) + 0.5) / size, 0.0);
 }
 
-// Light that microfacets send back after more than one reflection, as a factor of that after one [Kulla17].
+// Factor of light after one reflection by microfacets that includes multiple reflections [Kulla17].
 vec3 multiple_reflections(vec4 share, vec3 reflectance)
 {
   vec3 mean = (20.0 * reflectance + 1.0) / 21.0;

@@ -2,7 +2,7 @@
 
 #include "strands/strip.glsl"
 
-// Three numbers of a vertex, of a texture that has them in texels one after the other: its place, or a normal.
+// The position or normal of a vertex, from a texture with three consecutive texels per vertex.
 vec3 vertex_place(sampler2D places, int index)
 {
   ivec2 texel = strand_texel(index, 0, 3, textureSize(places, 0).x / 3);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// No strand and no triangle in any sample, where a picture starts.
+// Clears all samples at the start of a picture: no strand and no triangle.
 
 #include "visibility/sample_values.glsl"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A view that planes cut something off of: they leave the places of the world that are below none of them.
+// Clipping by planes: world positions below any plane are clipped.
 
 const bool IS_CLIPPED = true;
 
-// Whether a place is cut off.
+// Whether a world position is clipped.
 bool is_cut_off(vec3 place)
 {
   for (int i = 0; i < 6; i++) {
@@ -14,8 +14,8 @@ bool is_cut_off(vec3 place)
   return false;
 }
 
-// What is left of a line between two places: where it starts and ends, as parts of the line. The end is not beyond the start
-// where nothing is.
+// Remaining part of a line between two world positions: its start and end as fractions of the line. If nothing remains, the
+// end is not greater than the start.
 vec2 part_left(vec3 start, vec3 end)
 {
   vec2 part = vec2(0.0, 1.0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The farthest of the nearest depths in each tile of a picture: what lies beyond it there is hidden [Greene93].
+// The farthest of the nearest depths in each tile of a picture: anything beyond it is occluded [Greene93].
 
 #include "visibility/tile.glsl"
 

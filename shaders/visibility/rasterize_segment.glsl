@@ -1,47 +1,47 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rasterisation of strands, a thread for each run of segments. Hair consists of lines about a sample wide, for which this is
-// faster than triangles: graphics hardware draws those four samples at a time, software drivers at an even greater cost.
+// Rasterization of strands, one thread for each run of segments. Hair consists of lines about a sample wide, for which this
+// is faster than triangles: GPUs draw triangles in blocks of four samples, and software drivers are slower still.
 
 #include "visibility/coverage.glsl"
 #include "visibility/segment.glsl"
 #include "visibility/tile.glsl"
 #include "visibility/unclipped.glsl"
 
-// Constants of a program, which are known when it is compiled: software drivers run all of a branch, even if no thread takes it.
+// Compile-time constants of a program, as software drivers execute all branches:
 //
 // IS_ROUND
-//     bends are filled and wide ends are drawn as disks; without it, strands cover their length times their width, and as far
-//     beyond either end as half a disk covers
+//     bends are filled and wide ends are drawn as disks; otherwise strands cover their length times their width, extended at
+//     both ends by the area of half a disk
 // HAS_TILES
-//     tiles may be hidden, and samples may lie off their centers
+//     tiles may be occluded, and samples may be jittered
 
 // Consecutive segments per thread: their points are read and projected once.
 const int RUN_LENGTH = 8;
 
-// Half width [samples] from which bends are filled and ends drawn as disks: of thinner strands these are smaller than a sample.
+// Minimum half width [samples] for filled bends and disks at ends: those of thinner strands are smaller than a sample.
 const float LEAST_BEND = 1.0;
 
 // Functions that a program defines before it includes this:
 //
 // bool is_left_out(int run), void end_run(int run)
-//     whether a run of segments need not be walked along; the end of one that was. Runs of strands that are drawn are
-//     counted in the order of these, whatever part of them is walked
+//     whether to skip a run of segments; called after a run. Runs are numbered in drawing order of all drawn strands, also if
+//     only a part of them is rasterized
 // void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
-//     the start of a segment
+//     called at the start of a segment
 // bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
-//     whether none of the samples from `low` to `high` need be met, of a part between two parameters along the segment
+//     whether to skip the samples from `low` to `high`, of a part between two parameters along the segment
 // void meet(ivec2 place, float along, float across, float coverage)
-//     a covered sample: its parameter along the segment, outside [0, 1] in a round end; its offset from the axis as a part
-//     of the drawn half width, and the coverage of the drawn width by the strand
+//     called for a covered sample: its parameter along the segment, outside of [0, 1] in a round end; its offset from the
+//     axis as a fraction of the drawn half width, and the strand's coverage of the drawn width
 
-// The first of the samples, counted from -1, whose center lies beyond a place.
+// The first sample, counted from -1, whose center is beyond a position.
 int first_sample(float place)
 {
   return int(ceil(clamp(place, -1.0, 1e6) - 0.5));
 }
 
-// How far a segment goes on beyond its start and its end [samples], to cover what the half disks of its round ends add to its
-// length times its width. Those of a cone that points at the viewer are more than half of a disk at its wide end.
+// Extension of a segment beyond its start and end [samples], with the area of the half disks of its round ends. The wide end
+// of a cone that points at the viewer is more than half a disk.
 vec2 end_lengths(Segment segment)
 {
   float narrowing = segment.half_width.x - segment.half_width.y;
@@ -50,8 +50,8 @@ vec2 end_lengths(Segment segment)
   return segment.half_width * max(FOURTH_OF_PI + vec2(more, -more), vec2(0.0));
 }
 
-// Samples that lie in the segment, column by column along the axis on which it is longer. Across the columns, samples may
-// lie off their centers. beyond_ends: of `end_lengths`, zero where other segments go on.
+// Visits the samples in a segment, column by column along the axis on which it is longer. Samples may be jittered along the
+// columns. beyond_ends: from `end_lengths`, zero at ends that join other segments.
 void walk(Segment segment, vec2 beyond_ends, ivec2 size)
 {
   vec2 extent = abs(segment.end.xy - segment.start.xy);
@@ -61,7 +61,7 @@ void walk(Segment segment, vec2 beyond_ends, ivec2 size)
   vec2 way = end - start;
   vec2 columns = vec2(start.x, end.x);
   if (beyond_ends != vec2(0.0)) {
-    way.x = (abs(way.x) < 1e-4) ? 1e-4 : way.x;  // of one that points at the viewer
+    way.x = (abs(way.x) < 1e-4) ? 1e-4 : way.x;  // for a segment that points at the viewer
     columns += vec2(-1.0, 1.0) * beyond_ends * way.x / length(way);
   }
   ivec2 last_place = (is_steep ? size.yx : size) - 1;
@@ -72,7 +72,7 @@ void walk(Segment segment, vec2 beyond_ends, ivec2 size)
   }
   float slope = way.y / way.x;
   float per_column = 1.0 / way.x;
-  // Width across the columns, of a strip that is as wide as the strand across its own axis.
+  // Factor from the strand's width across its axis to its width along the columns.
   float widening = sqrt(1.0 + slope * slope);
   float least_half_width = view.least_half_width * view.pixels_per_unit;
   float most_reach = max(max(segment.half_width.x, segment.half_width.y), least_half_width) * widening;
@@ -81,7 +81,7 @@ void walk(Segment segment, vec2 beyond_ends, ivec2 size)
   int column = first_column;
   float beyond = float(first_column) + 0.5 - start.x;  // the column's center from the start
   while (column <= last_column) {
-    // As far as the end of the tile.
+    // Up to the end of the tile.
     int end_column = HAS_TILES ? min((column & ~(TILE - 1)) + TILE - 1, last_column) : last_column;
     float end_beyond = beyond + float(end_column - column);
     vec2 rows = start.y + vec2(beyond, end_beyond) * slope;
@@ -114,8 +114,8 @@ void walk(Segment segment, vec2 beyond_ends, ivec2 size)
   }
 }
 
-// Samples around the end of a segment that neither it nor the next one covers as `walk` cuts them off: the outside of a bend.
-// start, end, next: their places [samples]; half_width: at the end.
+// Visits samples on the outside of a bend, which neither a segment nor the next covers in `walk`. start, end, next: positions
+// of their points [samples]; half_width: at the end.
 void fill_bend(vec2 start, vec2 end, vec2 next, float half_width, ivec2 size)
 {
   vec2 before = end - start;
@@ -124,7 +124,7 @@ void fill_bend(vec2 start, vec2 end, vec2 next, float half_width, ivec2 size)
   bool is_steep = abs(after.y) > abs(after.x);
   float left = was_steep ? before.y : before.x;
   float right = is_steep ? after.y : after.x;
-  // Where both are cut off along the same axis and go on, they meet.
+  // Segments that are cut off along the same axis and continue in the same direction leave no gap.
   if (half_width < LEAST_BEND || (was_steep == is_steep && left * right > 0.0)) {
     return;
   }
@@ -142,7 +142,7 @@ void fill_bend(vec2 start, vec2 end, vec2 next, float half_width, ivec2 size)
   }
 }
 
-// Samples of the disk at the end of a strand; along: outside [0, 1].
+// Visits samples of the disk at the end of a strand; along: outside of [0, 1].
 void fill_end(vec2 end, float half_width, float along, ivec2 size)
 {
   ivec2 low = max(ivec2(first_sample(end.x - half_width), first_sample(end.y - half_width)), ivec2(0));
@@ -157,7 +157,7 @@ void fill_end(vec2 end, float half_width, float along, ivec2 size)
   }
 }
 
-// Walk along a segment that may begin and end a strand.
+// Visits the samples of a segment, including the ends of a strand.
 void walk_to_ends(Segment segment, bvec2 are_ends, ivec2 size)
 {
   vec2 beyond_ends = vec2(0.0);
@@ -175,7 +175,7 @@ void walk_to_ends(Segment segment, bvec2 are_ends, ivec2 size)
   walk(segment, beyond_ends, size);
 }
 
-// The turn of a strand among all that are drawn, of which one in FIRST_SHARE comes before the others.
+// Index in drawing order of a rasterized strand; one in FIRST_SHARE strands comes before the others.
 const int FIRST_SHARE = 8;
 const int WALK_ALL = 0;
 const int WALK_FIRST = 1;
@@ -189,7 +189,7 @@ int walked_turn(int walked)
   return (walked_part == WALK_OTHERS) ? walked + walked / (FIRST_SHARE - 1) + 1 : walked;
 }
 
-// The run of segments of this thread, between every how many-th point is drawn.
+// Rasterizes the run of segments of this thread.
 void walk_run(ivec2 size)
 {
   int group = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);

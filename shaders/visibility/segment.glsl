@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Segments of strands, each between two neighbouring points, in image space: needs the samplers strands and strand_radii.
+// Segments of strands between adjacent points, in image space: needs the samplers strands and strand_radii.
 
 #include "strands/level_of_detail.glsl"
 #include "strands/packed_strand.glsl"
 
-const float FOURTH_OF_PI = 0.785398163;  // a half disk's area by its width and its radius
+const float FOURTH_OF_PI = 0.785398163;  // a half disk's area divided by its width and its radius
 
 // Index of the strand point at which a segment starts.
 int piece_start(int piece)
@@ -17,29 +17,29 @@ ivec2 strand_first(int strand)
   return packed_first(strand, 0, view.point_count, view.row_strands);
 }
 
-// Radii of one strand are those of all where all are alike.
+// The radii of a single strand are stored if they are the same for all.
 float strand_radius(int strand, int point)
 {
   ivec2 texel = strand_texel(min(strand, view.radius_strands - 1), point, view.point_count, view.row_strands);
   return texelFetch(strand_radii, texel, 0).r * view.radius_unit;
 }
 
-// A point and, last, its radius, of the strand with a first texel and its head.
+// A point and its radius; first: the strand's first texel, head: by `packed_head`.
 vec4 strand_point(int strand, ivec2 first, vec4 head, int point)
 {
   return vec4(packed_place(strands, first, head, point), strand_radius(strand, point));
 }
 
-// The part of a segment in front of the near plane: its two ends.
+// The part of a segment in front of the near plane.
 struct Segment {
   vec3 start;  // [samples], and the depth from 0 to 1
   vec3 end;
   vec2 w;  // of clip space
   vec2 half_width;  // [samples]
-  vec2 part;  // where the ends lie between the two points
+  vec2 part;  // parameters of the ends between the two points
 };
 
-// Place of a point of clip space: [samples], and the depth from 0 to 1.
+// Position of a clip-space point: [samples], and the depth from 0 to 1.
 vec3 sample_place(vec4 clip, vec2 size)
 {
   return (0.5 * clip.xyz / clip.w + 0.5) * vec3(size, 1.0);
@@ -50,7 +50,7 @@ vec4 to_clip(vec4 point)
   return view.object_to_clip * vec4(point.xyz, 1.0);
 }
 
-// Place [samples] where a perspective's axis meets the picture.
+// Position [samples] of a perspective's axis in the picture.
 vec2 axis_place(vec2 size)
 {
   mat4 to_clip = view.object_to_clip;
@@ -58,8 +58,8 @@ vec2 axis_place(vec2 size)
   return (view.is_perspective == 0) ? vec2(0.0) : sample_place(to_clip * forward, size).xy;
 }
 
-// How much wider strands along a line of the picture [samples] are than through its middle: a perspective stretches what is
-// beside its axis. axis: of `axis_place`.
+// Factor of the width of strands along a line of the picture [samples], relative to the middle: a perspective stretches
+// everything off its axis. axis: from `axis_place`.
 float width_stretch(vec2 start, vec2 end, vec2 axis)
 {
   vec2 along = end - start;
@@ -72,8 +72,8 @@ float width_stretch(vec2 start, vec2 end, vec2 axis)
   return sqrt(1.0 + distance * distance / squared);
 }
 
-// False where a segment lies behind the near plane. start, end: its two points in clip space; size: of the picture
-// [samples]; axis: of `axis_place`.
+// Computes the segment in front of the near plane; false if all of it is behind. start, end: its points in clip space; size:
+// of the picture [samples]; axis: from `axis_place`.
 bool segment_in_front(vec4 start, vec4 end, vec2 radii, vec2 size, vec2 axis, out Segment segment)
 {
   vec2 beyond = vec2(start.z + start.w, end.z + end.w);
@@ -97,11 +97,11 @@ bool segment_in_front(vec4 start, vec4 end, vec2 radii, vec2 size, vec2 axis, ou
   return true;
 }
 
-// Sine of a strand's inclination to the view below which the side that faces the viewer comes no nearer.
+// Minimum sine of a strand's inclination to the view for the depth of the side that faces the viewer.
 const float LEAST_SINE = 0.25;
 
-// Difference of depth between the ends' axis and the side of the round strand that faces the viewer. way: length between
-// the two points.
+// Difference of depth between the axis and the side of a round strand that faces the viewer, at both ends. way: distance
+// between the two points.
 vec2 depth_rises(Segment segment, float way)
 {
   float full = way * view.object_scale * (segment.part.y - segment.part.x) * view.pixels_per_unit;
@@ -110,11 +110,11 @@ vec2 depth_rises(Segment segment, float way)
   return segment.half_width / segment.w * (view.depth_rise / sine);
 }
 
-// Parameter in [0, 1] of a point of the picture along the axis of a segment.
+// Parameter in [0, 1] along a segment of a position in the picture.
 float place_on_segment(Segment segment, vec2 place)
 {
   vec2 along = segment.end.xy - segment.start.xy;
   float on_screen = clamp(dot(place - segment.start.xy, along) / max(dot(along, along), 1e-12), 0.0, 1.0);
-  float near_end = on_screen * segment.w.x;  // perspective
+  float near_end = on_screen * segment.w.x;  // perspective-correct
   return mix(segment.part.x, segment.part.y, near_end / mix(segment.w.y, segment.w.x, on_screen));
 }

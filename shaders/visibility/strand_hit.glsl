@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The strand and the position along it of a sample, for shading.
+// The strand in a sample and the position along it, for shading.
 
 #include "visibility/segment.glsl"
 
@@ -9,14 +9,14 @@ vec3 strand_tangent;
 vec3 drawn_position;
 float drawn_radius;
 
-// Direction of a strand at a point, of any length; arbitrary where the strand folds back on itself.
+// Unnormalized direction of a strand at a point; arbitrary where the strand folds back on itself.
 vec3 tangent_at(vec3 before, vec3 after)
 {
   vec3 along = after - before;
   return (dot(along, along) > 0.0) ? along : vec3(0.0, 0.0, 1.0);
 }
 
-// Unit vector from the root of a strand, in the world.
+// Unit direction of a strand at its root, in the world.
 vec3 root_direction(int strand)
 {
   ivec2 first = strand_first(strand);
@@ -25,7 +25,7 @@ vec3 root_direction(int strand)
   return normalize(mat3(view.object_to_world) * tangent_at(vec3(0.0), along));
 }
 
-// The place on segment `index` of the strands that a sample shows.
+// Sets the variables above for segment `index` of the strands, in a sample at `at` [samples].
 void find_place(int index, vec2 at, vec2 size)
 {
   int pieces = view.drawn_points - 1;

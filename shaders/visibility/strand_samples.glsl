@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The main of programs that fill the samples of a picture in which a strand of this hair is nearest: needs the sampler
-// segments and the image picture. They run over a window of it that holds all of this hair, and end by including this.
+// The main function of programs that fill the samples of a picture in which a strand of this hair is nearest: needs the
+// sampler segments and the image picture. They run over a window that contains all of this hair, include this file last, and
+// define
 //
 // vec4 sample_value()
-//     what a sample is filled with, at the place that `find_place` found
+//     the value of a sample, at the result of `find_place`
 
 #include "visibility/strand_hit.glsl"
 #include "fibre/single_look.glsl"
 
-// Samples of a column that one thread fills. Software drivers run all of a branch, even if no thread takes it: with one sample
-// a thread, those without hair would cost as much as the others.
+// Samples of a column per thread. Software drivers execute all branches: with one sample per thread, samples without hair
+// would cost as much as others.
 const int SAMPLES_OF_THREAD = 8;
 
-// Segments of other hair, and no segment at all, are beyond this hair's count either way.
+// Segments of other hair, and NO_SEGMENT, result in numbers beyond this hair's count.
 uint segment_at(ivec2 place)
 {
   return texelFetch(segments, place, 0).r - uint(view.first_segment);

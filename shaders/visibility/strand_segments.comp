@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Visibility buffer of strands: first the depth of the nearest segment (IS_DEPTH), then its index. Strands are round: the
-// depth is that of the side which faces the viewer. IS_ROUND: as in visibility/rasterize_segment.glsl.
+// depth is of the side that faces the viewer. IS_ROUND: see visibility/rasterize_segment.glsl.
 
 #include "visibility/segment.glsl"
 #include "visibility/tile.glsl"
@@ -8,8 +8,8 @@
 const int RUNS_IN_ROW = 16384;  // of `seen_runs`
 
 vec2 end_depths;  // of the axis
-vec2 end_rises;  // from there to the side that faces the viewer
-vec2 round_rises;  // the same of the spheres that a strand ends with
+vec2 end_rises;  // difference of depth to the side that faces the viewer
+vec2 round_rises;  // the same for the spheres at the ends of a strand
 uint this_index;
 bool is_seen = false;
 
@@ -19,7 +19,7 @@ ivec2 run_texel(int run)
   return ivec2(texel & (RUNS_IN_ROW - 1), texel / RUNS_IN_ROW);
 }
 
-// Indices are those of runs whose depths were the least when they were met: of one in many.
+// Only runs whose depths were the least when they were written can have indices: one in many.
 bool is_left_out(int run)
 {
   return !IS_DEPTH && imageLoad(seen_runs, run_texel(run)).r == 0u;
@@ -40,7 +40,7 @@ void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
   this_index = uint(view.first_segment + strand * (view.drawn_points - 1) + piece);
 }
 
-// Whether all samples of tiles have something nearer. Depths are linear along a segment, but for rounding.
+// Whether all samples in the tiles have nearer depths. Depths are linear along a segment, except for rounding.
 bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
 {
   if (are_tiles_known == 0) {
@@ -62,14 +62,14 @@ bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
 
 void meet(ivec2 place, float along, float across, float coverage)
 {
-  // The bits of non-negative floats sort like their values.
+  // The bits of nonnegative floats have the order of the floats.
   float within = clamp(along, 0.0, 1.0);
   vec2 rises = (within == along) ? end_rises : round_rises;
   float rise = mix(rises.x, rises.y, within) * sqrt(max(1.0 - across * across, 0.0));
   uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, within) - rise, 0.0));
   uint nearest = imageLoad(depths, place).r;
-  // The second condition is always true. It is a branch that is decided at run time: without one, NVIDIA's compiler makes the
-  // walk a sixth slower.
+  // The second condition is always true, but unknown at compile time: without it NVIDIA's compiler makes the program a sixth
+  // slower.
   if (IS_DEPTH && are_tiles_known >= 0) {
     is_seen = is_seen || depth <= nearest;
     // Most samples are occluded: reading first is cheaper than writing.
@@ -78,7 +78,7 @@ void meet(ivec2 place, float along, float across, float coverage)
     }
   }
   else if (depth == nearest) {
-    imageAtomicMin(segments, place, this_index);  // the same one at each redraw
+    imageAtomicMin(segments, place, this_index);  // the same index at each redraw
   }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visibility buffer of strands drawn as strips: segment index, and depth of the round side as in visibility/strand_segments.comp.
+// Visibility buffer of strands drawn as strips: segment index, and depth of the round side as in
+// visibility/strand_segments.comp.
 
 #include "visibility/coverage.glsl"
 #include "visibility/unclipped.glsl"
@@ -7,7 +8,7 @@
 void main()
 {
   vec2 place = gl_FragCoord.xy + vec2(view.first_column, view.first_row);
-  // As in visibility/rasterize_segment.glsl: a sample lies off its center along the axis on which the strand is shorter.
+  // As in visibility/rasterize_segment.glsl: samples are jittered along the axis on which the strand is shorter.
   vec2 across = vec2(dFdx(strand_side_place), dFdy(strand_side_place));
   bool is_steep = abs(across.x) > abs(across.y);
   float slope = is_steep ? across.x : across.y;

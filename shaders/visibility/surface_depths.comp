@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The depth of surfaces, as the numbers that strands are compared with; and no strand anywhere, where a picture starts.
+// The depth of surfaces, as integers for comparison with strands; also clears segments and picture at the start of a picture.
 
 #include "visibility/sample_values.glsl"
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The point of a surface in a sample that shows one of its triangles, interpolated between the triangle's corners.
+// The point of a surface in a sample, interpolated between the corners of its triangle.
 
 #include "surfaces/surface_corner.glsl"
 #include "surfaces/surface_point.glsl"
 #include "surfaces/surface_material.glsl"
 
-// Perspective-correct barycentric coordinates at a place of the picture, from -1 to 1, of a triangle in clip space, which
-// may reach behind the viewer [Olano97]. facing: its signed area, positive if the front is seen in a view that is not
-// mirrored. Corners are taken relative to the place, so that rounding errors are as small as the triangle.
+// Perspective-correct barycentric coordinates at a position in the picture, from -1 to 1, of a triangle in clip space, which
+// may extend behind the viewer [Olano97]. facing: its signed area, positive if the front is visible in a view that is not
+// mirrored. Corners are relative to the position, so that rounding errors are proportional to the triangle.
 vec3 barycentrics_at(vec4 clip[3], vec2 place, out float facing)
 {
   vec2 away[3];
@@ -32,7 +32,8 @@ float depth_at(vec4 clip[3], vec3 barycentrics)
   return 0.5 * there.z / there.w + 0.5;
 }
 
-// place: of the sample [samples], in a picture of a size; triangle: of the surface; depth_steps: to the next samples.
+// triangle: index in the surface; place: position of the sample [samples]; size: of the picture; depth_steps: change of depth
+// to the next samples.
 SurfacePoint found_point(int triangle, vec2 place, vec2 size, out vec2 depth_steps)
 {
   vec4 clip[3];
@@ -55,7 +56,7 @@ SurfacePoint found_point(int triangle, vec2 place, vec2 size, out vec2 depth_ste
   vec3 barycentrics = barycentrics_at(clip, 2.0 * place / size - 1.0, facing);
   vec3 right = barycentrics_at(clip, 2.0 * (place + vec2(1.0, 0.0)) / size - 1.0, beside);
   vec3 up = barycentrics_at(clip, 2.0 * (place + vec2(0.0, 1.0)) / size - 1.0, beside);
-  // A sample on the triangle's edge may be beyond it by rounding.
+  // A sample on the triangle's edge may be outside by rounding.
   barycentrics = max(barycentrics, vec3(0.0));
   barycentrics /= max(barycentrics.x + barycentrics.y + barycentrics.z, 1e-6);
 

@@ -1,3 +1,3 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-const int TILE = 8;  // samples along each side of the tiles that hidden parts of segments are recognised in
+const int TILE = 8;  // samples along each side of the tiles for occlusion culling

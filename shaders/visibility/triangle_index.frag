@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The nearest triangle of each sample: in the visibility buffer, numbers of triangles are beyond those of segments.
+// The nearest triangle of each sample: in the visibility buffer, indices of triangles follow those of segments.
 
 #include "visibility/sample_values.glsl"
 

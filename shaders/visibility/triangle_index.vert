@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A corner of a triangle, with the triangle's number.
+// A corner of a triangle, with the triangle's index.
 
 #include "surfaces/surface_corner.glsl"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A view that shows all: visibility/clipped.glsl takes the place of this file where planes cut something off.
+// A view without clipping: visibility/clipped.glsl replaces this file in views with clipping planes.
 
 const bool IS_CLIPPED = false;
 

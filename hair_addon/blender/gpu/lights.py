@@ -57,8 +57,8 @@ def _read_light(light, matrix):
     record["casts_shadow"] = light.use_shadow
     if light.type == "SUN":
         record["radius"] = np.tan(0.5 * min(light.angle, 3.0))
-        # The strength of a sun is the irradiance of a perpendicular plane. A small ball receives more; the surface
-        # shader divides by the factor again.
+        # The strength of a sun is the irradiance of a perpendicular plane. A small ball receives more;
+        # shaders/surfaces/surface_light.glsl multiplies by the factor again.
         record["power"][:3] /= 1.0 - 0.25 * min(float(record["radius"]) ** 2, 1.0)
     elif light.type == "AREA":
         record["cos_cone"] = np.cos(0.5 * light.spread)
