@@ -50,7 +50,7 @@ def test_a_handler_of_a_render_that_draws_hears_that_blender_has_the_graphics(ha
     finally:
         bpy.app.handlers.render_post.remove(listen)
     (error,) = heard.said
-    assert isinstance(error, api.HairError) and "lends its graphics to nobody while it renders" in str(error)
+    assert isinstance(error, api.HairError) and "Drawing is not possible while Blender renders" in str(error)
     assert api.draw(width=8, height=8).shape == (8, 8, 4)
 
 

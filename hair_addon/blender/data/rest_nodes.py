@@ -102,17 +102,17 @@ def _group():
     for name, kind in (("Mesh", "Geometry"), ("Mirrored", "Vector"), ("Placed", "Bool")):
         group.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
     group.interface.new_socket("Mesh", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    given, output = group.nodes.new("NodeGroupInput").outputs, group.nodes.new("NodeGroupOutput")
+    inputs, output = group.nodes.new("NodeGroupInput").outputs, group.nodes.new("NodeGroupOutput")
     place = group.nodes.new("GeometryNodeInputPosition").outputs[0]
     stored = group.nodes.new("GeometryNodeInputNamedAttribute")
     stored.data_type, stored.inputs["Name"].default_value = "FLOAT_VECTOR", "rest_position"
     rest = stored.outputs["Attribute"]
     beyond = _vector(group, "MULTIPLY", _vector(group, "ABSOLUTE", rest), _vector(group, "SIGN", place))
-    moved = _vector(group, "MULTIPLY", _vector(group, "SUBTRACT", beyond, rest), given["Mirrored"])
-    apart = _switch(group, given["Placed"], _vector(group, "ADD", rest, moved), place)
+    moved = _vector(group, "MULTIPLY", _vector(group, "SUBTRACT", beyond, rest), inputs["Mirrored"])
+    apart = _switch(group, inputs["Placed"], _vector(group, "ADD", rest, moved), place)
     store = group.nodes.new("GeometryNodeStoreNamedAttribute")
     store.data_type, store.domain, store.inputs["Name"].default_value = "FLOAT_VECTOR", "POINT", "rest_position"
-    group.links.new(given["Mesh"], store.inputs["Geometry"])
+    group.links.new(inputs["Mesh"], store.inputs["Geometry"])
     group.links.new(_switch(group, stored.outputs["Exists"], place, apart), store.inputs["Value"])
     group.links.new(store.outputs["Geometry"], output.inputs["Mesh"])
     return group

@@ -39,8 +39,8 @@ def _sources(surface_object):
         if modifier.type == "NODES" and modifier.node_group is not None:
             for item in modifier.node_group.interface.items_tree:
                 if item.item_type == "SOCKET" and item.in_out == "INPUT":
-                    given = getattr(modifier.properties.inputs, item.identifier, None)
-                    named.add(getattr(given, "value", None) if _names_objects(item.socket_type) else None)
+                    socket = getattr(modifier.properties.inputs, item.identifier, None)
+                    named.add(getattr(socket, "value", None) if _names_objects(item.socket_type) else None)
             named |= _named_in(modifier.node_group, known)
     collections = [block for block in named if isinstance(block, bpy.types.Collection)]
     objects = {o for collection in collections for o in collection.all_objects} | named

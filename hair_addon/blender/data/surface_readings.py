@@ -35,7 +35,7 @@ class Reading:
         named = [(read.name, read.uv_map, read.has_rest, read.is_turned, read.is_divided) for read in (self, other)]
         if named[0] != named[1] or (self.loop_uvs is None) != (other.loop_uvs is None):
             return False
-        mine, its = (
+        own, others = (
             (
                 r.rest,
                 r.faces.corner_vertices,
@@ -45,7 +45,7 @@ class Reading:
             )
             for r in (self, other)
         )
-        return all(a is b or np.array_equal(a, b) for a, b in zip(mine, its, strict=True))
+        return all(a is b or np.array_equal(a, b) for a, b in zip(own, others, strict=True))
 
 
 def surface_of(read, posed, corners, cage_corners, undivided, own=None):

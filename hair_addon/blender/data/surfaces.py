@@ -151,25 +151,25 @@ class Surface:
 
     def is_at_rest_as(self, other):
         """Whether strands generated on one surface also fit the other."""
-        mine, its = ((s.rest, s.mesh.triangles, s.to_world_axes) for s in (self, other))
+        own, others = ((s.rest, s.mesh.triangles, s.to_world_axes) for s in (self, other))
         are_divided_alike = (self.cage_corners, self.undivided_corners) == (other.cage_corners, other.undivided_corners)
-        return are_divided_alike and all(map(np.array_equal, mine, its))
+        return are_divided_alike and all(map(np.array_equal, own, others))
 
     def is_same_cage(self, other):
         """Whether another surface is the same surface at rest, at any level of subdivision."""
         if cage_of(self.topology) != cage_of(other.topology) or self.cage_corners != other.cage_corners:
             return False
-        mine, its = ((s.of_cage(s.rest), s.to_world_axes) for s in (self, other))
-        return all(map(np.array_equal, mine, its))
+        own, others = ((s.of_cage(s.rest), s.to_world_axes) for s in (self, other))
+        return all(map(np.array_equal, own, others))
 
     def is_same(self, other):
         """Whether another surface equals this one, so that cached results are valid."""
-        mine, its = (
+        own, others = (
             (s.rest, s.posed, s.mesh.triangles, s.faces.corner_vertices, s.faces.starts, s.to_world_axes, s.corner_uvs)
             for s in (self, other)
         )
         named = [(s.name, s.uv_map, s.cage_corners, s.undivided_corners) for s in (self, other)]
-        return named[0] == named[1] and all(map(np.array_equal, mine, its))
+        return named[0] == named[1] and all(map(np.array_equal, own, others))
 
     @property
     def mirror(self):

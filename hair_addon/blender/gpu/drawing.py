@@ -55,7 +55,7 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
 
 
 def pass_shift(turn):
-    """(2,) [samples] sub-sample jitter of a pass, up to one half: a low-discrepancy sequence [Roberts18]."""
+    """(2,) jitter [samples] of a pass, up to one half: a low-discrepancy sequence [Roberts18]."""
     return np.modf(turn * np.array([0.75487767, 0.56984029]) + 0.5)[0] - 0.5
 
 

@@ -19,7 +19,7 @@ def made(size: tuple[int, ...], texture_format: str, texels: np.ndarray | None =
         texture = gpu.types.GPUTexture(size, format=texture_format, **data)
     except (RuntimeError, ValueError, MemoryError, OverflowError) as error:
         megabytes = max(round(float(np.prod(size, dtype=np.float64)) * _TEXEL_BYTES.get(texture_format, 16) / 1e6), 1)
-        sentence = "The graphics driver refuses {megabytes} MB of strands: decrease Strand Count or Points per Strand."
+        sentence = "The graphics driver cannot allocate {megabytes} MB: decrease Strand Count or Points per Strand."
         raise HairError(sentence, megabytes=megabytes) from error
     texture.filter_mode(False)
     return texture

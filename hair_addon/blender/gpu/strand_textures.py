@@ -3,7 +3,7 @@
 
 Points take eight bytes each: core/geometry/packed_strands.py.
 
-A change costs one upload, or only that of the moved strands; a redraw costs none.
+A change uploads all strands, or only the moved strands; a redraw uploads nothing.
 """
 
 from dataclasses import dataclass, field, replace

@@ -36,8 +36,8 @@ class _Corners:
 
     def is_same(self, other):
         """Whether other corners are drawn the same way."""
-        mine, its = ((c.has_vertex_normals, c.colors, c.vertex_count, c.uvs is None) for c in (self, other))
-        return mine == its and all(
+        own, others = ((c.has_vertex_normals, c.colors, c.vertex_count, c.uvs is None) for c in (self, other))
+        return own == others and all(
             a is b or np.array_equal(a, b) for a, b in ((self.vertices, other.vertices), (self.uvs, other.uvs))
         )
 

@@ -142,5 +142,5 @@ def outside_drivers():
         yield
     except RuntimeError as error:
         raise HairError(
-            "Blender evaluates the scene right now: call this from an operator or a handler, not from a driver."
+            "Blender is evaluating the scene: call this from an operator or a handler, not from a driver."
         ) from error

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Free memory of computers whose system has no file that tells it: Windows and macOS, asked through their libraries.
-
-What cannot be asked is not known, which nothing is said of.
-"""
+"""Free memory of Windows and macOS, from their system libraries; it is unknown, without a message, if a call fails."""
 
 import ctypes
 import functools
@@ -26,21 +23,21 @@ class _MemoryStatus(ctypes.Structure):
     )
 
 
-# Of macOS: what is asked for, room for more numbers than any version answers with, and which of them are pages.
+# macOS: the kind of statistics, the size of the buffer, more than any version fills, and the indices of page counts.
 _VM_INFO, _ROOM, _FREE, _INACTIVE = 4, 64, 0, 2
 
 
 def free_bytes() -> int | None:
-    """Memory that programs can still get [bytes]; None on other systems, and where the system does not answer."""
-    ask = {"win32": _of_windows, "darwin": _of_mac}.get(sys.platform)
+    """Available memory [bytes]; None on other systems, or if the call fails."""
+    read = {"win32": _of_windows, "darwin": _of_mac}.get(sys.platform)
     try:
-        return None if ask is None else ask()
+        return None if read is None else read()
     except (OSError, AttributeError):  # no such library, or no such function in it
         return None
 
 
 def _of_windows():
-    """No more than may be committed: Windows promises nothing that it does not have."""
+    """Free physical memory, limited to what may be committed, as Windows does not overcommit."""
     status = _MemoryStatus(length=ctypes.sizeof(_MemoryStatus))
     if not _library("kernel32").GlobalMemoryStatusEx(ctypes.byref(status)):
         return None
@@ -48,17 +45,17 @@ def _of_windows():
 
 
 def _of_mac():
-    """Free pages, and those that were not used for long, which go when they are needed."""
+    """Free and inactive pages, as the system reclaims inactive pages on demand."""
     pages, count = (ctypes.c_uint32 * _ROOM)(), ctypes.c_uint32(_ROOM)
-    ask = _library(None).host_statistics64
-    if ask(_host(), _VM_INFO, ctypes.byref(pages), ctypes.byref(count)) or count.value <= _INACTIVE:
+    read = _library(None).host_statistics64
+    if read(_host(), _VM_INFO, ctypes.byref(pages), ctypes.byref(count)) or count.value <= _INACTIVE:
         return None
     return (pages[_FREE] + pages[_INACTIVE]) * os.sysconf("SC_PAGE_SIZE")
 
 
 @functools.cache
 def _host():
-    """The right to ask a Mac, which each call would take once more."""
+    """The Mach host port; cached, as each call would create another right to it."""
     return _library(None).mach_host_self()
 
 

@@ -71,15 +71,15 @@ def check_animation(guides, frame, blender_scene, depsgraph):
     try:
         settings = properties.dynamics_of(guides.vellus)
         now = frame_animation.digest_of(guides, blender_scene, depsgraph, settings)
-        what = frame_animation.change(frame.digest, now, frame.is_carried)
+        part = frame_animation.change(frame.digest, now, frame.is_carried)
     except HairError:  # invalid surface: baked frames are shown nevertheless
-        what = frame_animation.SURFACE
-    if what is None:
+        part = frame_animation.SURFACE
+    if part is None:
         changed.pop(number, None)
         return
     if not changed and not running.has_window():
-        notices.say(f'Guides "{notices.name_of(guides)}": {_OTHER[what].format(frame=number)}.')
-    changed[number] = what
+        notices.say(f'Guides "{notices.name_of(guides)}": {_OTHER[part].format(frame=number)}.')
+    changed[number] = part
 
 
 def _changes(guides):
@@ -111,31 +111,31 @@ def _unknown():
 
 def _of_played(played, frame):
     if played.outdated is not None:
-        return "Frames up to {frame} have other settings: play from the start", {"frame": played.outdated}
-    if frame > played.frame:
-        return "Simulated up to frame {frame}, and frames after it were skipped: play from there", {
-            "frame": played.frame
+        return "Frames up to {frame} were simulated with other settings: play from the start", {
+            "frame": played.outdated
         }
+    if frame > played.frame:
+        return "Simulated up to frame {frame}; frames after it were skipped: play from there", {"frame": played.frame}
     simulation = played.simulated.simulation
     values = {"frame": played.frame, "count": simulation.substeps}
     if simulation.asked_substeps > simulation.substeps:
         return (
-            "Simulated up to frame {frame}, in {count} substeps a frame, where motion asks for {asked}:"
+            "Simulated up to frame {frame} with {count} substeps per frame, but motion needs {asked}:"
             " use Automatic Substeps",
             {**values, "asked": simulation.asked_substeps},
         )
-    return "Simulated up to frame {frame}, in {count} substeps a frame", values
+    return "Simulated up to frame {frame} with {count} substeps per frame", values
 
 
 def _of_baked(manifest, guides, blender_scene):
     values = {"first": manifest.first, "last": manifest.last}
     if manifest.guide_count != len(guides.curves):
-        return "The baked frames are of other guides: bake again", {}
+        return "The baked frames belong to other guides: bake again", {}
     if guide_baking.changed_parts(guides, blender_scene, manifest):
         return _BAKED_OTHERWISE, values
     change = _first_change(guides)
     if change is not None:
         return _OTHER[change[1]], {"frame": change[0]}
     if manifest.state != "complete":
-        return "Frames {first} to {last} are baked in part: Bake Dynamics goes on", values
+        return "Frames {first} to {last} are partly baked: Bake Dynamics continues", values
     return "Frames {first} to {last} are baked", values

@@ -3,7 +3,7 @@
 
 Older versions rotated strands with the flat faces of the cage; this version rotates them with its smooth surface
 (smooth_surface.py). Rest points are moved so that strands stay in place. Live hair is computed again between its
-guides, which keeps neighbouring strands together.
+guides, which keeps neighboring strands together.
 """
 
 import bpy

@@ -208,7 +208,7 @@ def _played_now(guides):
 
 
 def _follow_applied(guides, played):
-    """Keep frames where they are in the world if a transform was applied to the surface; whether that is all."""
+    """Keep frames in place in the world if a transform was applied to the surface; returns whether that was all."""
     roots = played.simulated.roots
     change = played.simulated.follow_applied(guides)
     if change is None:
@@ -220,7 +220,7 @@ def _follow_applied(guides, played):
 
 
 def _stay_as_seen(guides, blender_scene):
-    """Where a transform was just applied to the surface, keep the frame that is shown as its guides are seen."""
+    """If a transform was just applied to the surface, keep the shown frame in place."""
     played, shown = played_cache.get(guides.session_uid), simulated_guides.point_cache.get(guides.session_uid)
     if played is None or shown is None or not played.simulated.has_other_space(guides):
         return

@@ -176,7 +176,7 @@ def follow_styles(changed):
 
 
 def mark_followers(guide_curves, gone_along=()):
-    """Mark all hair between some guides as stale, except kept hair that has followed them, and `gone_along`."""
+    """Mark all hair between some guides as stale, except kept hair that has followed them; redraw `gone_along`."""
     for hair in curves.followers(guide_curves):
         if hair in gone_along:
             events.strands_made(hair)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A scene's hair as it is drawn: its strands made for the GPU, its light, films of it; offscreen pictures."""
+"""Drawing a scene's hair: strands for the GPU, lighting, films and offscreen pictures."""
 
 from ...core.lazy import submodules
 

@@ -194,8 +194,8 @@ def _hair_receivers(hair, owners):
 def read_render(depsgraph, known, refused, noted, progress=no_progress):
     """`read` for a render, whose depsgraph may be at another time than the file: evaluated hair is read.
 
-    refused: called with the datablock and the `HairError` of hair that is left out; noted: the same for hair of which
-    some strands are left out; known: {session_uid: (arrays of the strands, StrandsOnGPU)} of the previous motion step,
+    refused: called with the datablock and the `HairError` of hair that is left out; noted: the same for hair with some
+    strands left out; known: {session_uid: (arrays of the strands, StrandsOnGPU)} of the previous motion step,
     updated here: unchanged hair is not uploaded again.
     """
     unlit = read_unlit(depsgraph, known, refused, noted, part_of(progress, 0.0, 0.5))

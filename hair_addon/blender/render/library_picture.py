@@ -12,7 +12,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.imaging.pixel_sampling import PictureSettings
-from ..data.made import groom_assets
+from ..data.datablocks import groom_assets
 from . import offscreen
 
 SIZE = 256  # pixels
@@ -56,7 +56,7 @@ def _studio(hair_object, points) -> Generator[bpy.types.Scene]:
     middle, radius = Vector((0.5 * (low + high)).tolist()), 0.5 * float(np.linalg.norm(high - low))
     studio = bpy.data.scenes.new("Vellus picture")
     studio.vellus.multiple_scattering = "DUAL"  # fast, as the groom is being saved
-    made = []
+    datablocks = []
     try:
         surface = hair_object.data.surface
         for shown in {hair_object, *_seen(surface)}:
@@ -65,21 +65,21 @@ def _studio(hair_object, points) -> Generator[bpy.types.Scene]:
         camera.lens, camera.sensor_width, camera.clip_start = _LENS, _SENSOR, 0.01 * radius
         distance = _MARGIN * radius / math.sin(math.atan(0.5 * _SENSOR / _LENS))
         camera.clip_end = 3.0 * distance
-        made.append(camera)
+        datablocks.append(camera)
         studio.camera = _placed(studio, camera, middle, distance * _VIEW.normalized())
         for direction, watts, size in _LIGHTS:
             lamp = bpy.data.lights.new("Vellus picture", "AREA")
-            made.append(lamp)
+            datablocks.append(lamp)
             lamp.energy, lamp.size = watts * radius**2, size * radius
             _placed(studio, lamp, middle, _LIGHT_DISTANCE * radius * Vector(direction).normalized())
         studio.world = bpy.data.worlds.new("Vellus picture")
-        made.append(studio.world)
+        datablocks.append(studio.world)
         background = next(node for node in studio.world.node_tree.nodes if node.type == "BACKGROUND")
         background.inputs["Color"].default_value = _WORLD
         yield studio
     finally:
-        placed = [o for o in studio.collection.objects if o.data in made]
-        bpy.data.batch_remove([studio, *placed, *made])
+        placed = [o for o in studio.collection.objects if o.data in datablocks]
+        bpy.data.batch_remove([studio, *placed, *datablocks])
 
 
 def _seen(surface):

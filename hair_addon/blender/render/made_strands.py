@@ -152,8 +152,8 @@ class Making:
         return True
 
     def _is_carried_on(self, surface):
-        mine, its = (self._triangles, self.carrier.vertices), (surface.mesh.triangles, surface.rest)
-        return all(a is b or np.array_equal(a, b) for a, b in zip(mine, its, strict=True))
+        own, others = (self._triangles, self.carrier.vertices), (surface.mesh.triangles, surface.rest)
+        return all(a is b or np.array_equal(a, b) for a, b in zip(own, others, strict=True))
 
 
 def _is_deformed(pose):

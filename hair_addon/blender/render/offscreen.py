@@ -77,9 +77,7 @@ def start_gpu():
     try:
         gpu.types.GPUTexture((1, 1), format="R32F")
     except RuntimeError as error:
-        sentence = (
-            "Blender lends its graphics to nobody while it renders: draw before the render, or after it has ended."
-        )
+        sentence = "Drawing is not possible while Blender renders: draw before the render, or after it has ended."
         raise HairError(sentence) from error
 
 

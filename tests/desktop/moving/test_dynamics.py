@@ -75,7 +75,7 @@ def test_esc_keeps_the_frames_so_far(walk):
     stop = walk.facts["stop"]
     count = len(stop["frames"])
     assert stop["frames"] == list(range(1, count + 1)) and stop["before"] < count < 1000
-    assert stop["frame"] == 12 and "are baked in part" in stop["state"]
+    assert stop["frame"] == 12 and "are partly baked" in stop["state"]
     assert stop["moved"] < ROUNDING and stop["picture"] < FLIPPED
     assert stop["freed"] == []
 

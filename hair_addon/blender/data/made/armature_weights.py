@@ -57,10 +57,10 @@ def _add(mesh_object, names, weights, piece_size, modifiers):
         if of_pieces.any():
             vertex_groups.paint(mesh_object.vertex_groups.new(name=name), np.repeat(of_pieces, piece_size))
     for modifier in modifiers:
-        made = mesh_object.modifiers.new(modifier.name, "ARMATURE")
-        made.object, made.use_bone_envelopes = modifier.object, False
-        made.use_deform_preserve_volume = modifier.use_deform_preserve_volume
-        made.show_viewport, made.show_render = modifier.show_viewport, modifier.show_render
+        copy = mesh_object.modifiers.new(modifier.name, "ARMATURE")
+        copy.object, copy.use_bone_envelopes = modifier.object, False
+        copy.use_deform_preserve_volume = modifier.use_deform_preserve_volume
+        copy.show_viewport, copy.show_render = modifier.show_viewport, modifier.show_render
 
 
 def _poses(places, weights, names, mesh_object, surface_object):

@@ -23,7 +23,7 @@ def keep(levels, folder, stem):
 
     levels: [`new_images`]; folder: of the files, None to pack. Files are named after `stem`, the level and the map.
     """
-    images = [(f"{stem}{index}_{kind}", image) for index, made in enumerate(levels) for kind, image in made.items()]
+    images = [(f"{stem}{index}_{kind}", image) for index, level in enumerate(levels) for kind, image in level.items()]
     if folder is None:
         for _name, image in images:
             image.pack()

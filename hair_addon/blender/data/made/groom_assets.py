@@ -16,12 +16,12 @@ def surface_object(name, mesh, corner_uvs, masks):
 
     corner_uvs: (F, 3, 2), None for no UV map; masks: {name: (V,) weights}, which become vertex groups.
     """
-    made = bpy.data.meshes.new(name)
-    made.from_pydata(mesh.vertices.astype(np.float64), [], mesh.triangles)
+    data = bpy.data.meshes.new(name)
+    data.from_pydata(mesh.vertices.astype(np.float64), [], mesh.triangles)
     if corner_uvs is not None:
-        layer = made.uv_layers.new(name=_UV_MAP)
+        layer = data.uv_layers.new(name=_UV_MAP)
         layer.uv.foreach_set("vector", np.ascontiguousarray(corner_uvs, np.float32).ravel())
-    owner = bpy.data.objects.new(name, made)
+    owner = bpy.data.objects.new(name, data)
     for mask, weights in masks.items():
         vertex_groups.paint(owner.vertex_groups.new(name=mask), weights)
     return owner

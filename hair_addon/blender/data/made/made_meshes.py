@@ -11,23 +11,23 @@ UV_MAP = "UVMap"
 
 def new_collection(name, surface_object):
     """A new collection in the collection of a surface."""
-    made = bpy.data.collections.new(name)
-    surface_collections.collection_of(surface_object).children.link(made)
-    return made
+    collection = bpy.data.collections.new(name)
+    surface_collections.collection_of(surface_object).children.link(collection)
+    return collection
 
 
-def new_object(name, made, surface_object, collection, material):
+def new_object(name, source, surface_object, collection, material):
     """A new mesh object of a `PolygonMesh` in a surface's local coordinates, a child of the surface."""
     mesh = bpy.data.meshes.new(name)
-    faces = made.faces
-    mesh.vertices.add(len(made.vertices))
-    mesh.vertices.foreach_set("co", np.ascontiguousarray(made.vertices, np.float32).ravel())
+    faces = source.faces
+    mesh.vertices.add(len(source.vertices))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(source.vertices, np.float32).ravel())
     mesh.loops.add(len(faces.corner_vertices))
     mesh.loops.foreach_set("vertex_index", faces.corner_vertices)
     mesh.polygons.add(len(faces.starts) - 1)
     mesh.polygons.foreach_set("loop_start", faces.starts[:-1])
     uv_map = mesh.uv_layers.new(name=UV_MAP)
-    uv_map.uv.foreach_set("vector", np.ascontiguousarray(made.uvs, np.float32).ravel())
+    uv_map.uv.foreach_set("vector", np.ascontiguousarray(source.uvs, np.float32).ravel())
     mesh.update(calc_edges=True)
     mesh.shade_smooth()
     mesh.materials.append(material)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a picture is taken of and with: cameras, lights, materials, compositor nodes."""
+"""Data of pictures: cameras, light links, materials, drawn meshes, compositor nodes, files."""
 
 from ....core.lazy import submodules
 

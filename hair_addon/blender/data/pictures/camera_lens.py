@@ -15,7 +15,7 @@ def read_lens(scene, depsgraph, camera=None):
         return None
     camera = camera.evaluated_get(depsgraph)
     depth_of_field = camera.data.dof
-    # As in Cycles: with a parallel projection the aperture follows from the f-stop and a focal length of one metre.
+    # As in Cycles: with a parallel projection the aperture follows from the f-stop and a focal length of one meter.
     focal_length = 1.0 if camera.data.type == "ORTHO" else 1e-3 * camera.data.lens
     lens = Lens(
         0.5 * focal_length / max(depth_of_field.aperture_fstop, _LEAST),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compositor nodes that composite hair of another scene over a scene's render, in the artist's node tree or a new one.
+"""Compositor nodes that lay hair of another scene over a scene's render, in the artist's node tree or a new tree.
 
 The nodes stand between a Render Layers node and the targets of its image: they multiply the image by the light that
 hair leaves on surfaces, and lay hair over the result. They are identified by their names.

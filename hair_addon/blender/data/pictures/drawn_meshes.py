@@ -87,8 +87,8 @@ class _Layout:
 
     def fits(self, faces, slots):
         if faces is not self.faces:
-            mine, its = ((f.corner_vertices, f.starts) for f in (self.faces, faces))
-            if not all(map(np.array_equal, mine, its)):
+            own, others = ((f.corner_vertices, f.starts) for f in (self.faces, faces))
+            if not all(map(np.array_equal, own, others)):
                 return False
         return np.array_equal(self.slots, slots)
 

@@ -147,8 +147,8 @@ def _files(reached, numbers) -> Iterator[RenderedFile]:
         elif isinstance(datablock, bpy.types.Volume) and datablock.packed_file is None:
             yield from _numbered_file(datablock, datablock.is_sequence, ())
         elif isinstance(datablock, bpy.types.CacheFile):
-            asked = [round(datablock.frame)] if datablock.override_frame else numbers
-            yield from _numbered_file(datablock, datablock.is_sequence, asked)
+            needed = [round(datablock.frame)] if datablock.override_frame else numbers
+            yield from _numbered_file(datablock, datablock.is_sequence, needed)
 
 
 def _image_users(datablock):
@@ -171,8 +171,8 @@ def _image_files(image, users, numbers):
         yield RenderedFile(image.filepath, paths, is_image=True)
     elif image.source == "SEQUENCE":
         timed = [user for user in users if hasattr(user, "frame_duration")]
-        asked = sorted({_image_number(user, number) for user in timed for number in numbers})
-        paths = tuple(_numbered(path, number) for number in asked) or (path,)
+        needed = sorted({_image_number(user, number) for user in timed for number in numbers})
+        paths = tuple(_numbered(path, number) for number in needed) or (path,)
         yield RenderedFile(image.filepath, paths, is_image=True, siblings=_row_of(path))
     else:
         yield RenderedFile(image.filepath, (path,), is_image=image.source == "FILE")

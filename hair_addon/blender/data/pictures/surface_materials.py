@@ -143,7 +143,7 @@ def _image_map(shader_input, material, uv_map=""):
         return None
     mapping = _mapping(found["Vector"])
     if mapping is None:
-        say(f'The texture coordinates of "{name_of(material)}" are no UV map: it is drawn without its image.')
+        say(f'The texture coordinates of "{name_of(material)}" are not UV coordinates: it is drawn without its image.')
         return None
     rows, own_map = mapping
     extension, is_smooth = _EXTENSIONS[node.extension], node.interpolation != "Closest"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What guides are simulated in: poses of their surface, force fields, colliders, wetness."""
+"""Data of simulations: poses of surfaces, force fields, colliders, wetness."""
 
 from ....core.lazy import submodules
 

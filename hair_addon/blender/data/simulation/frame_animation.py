@@ -37,7 +37,7 @@ def digest_of(guides, blender_scene, depsgraph, settings):
     vertices = _vertices(surface, depsgraph, metres)
     places = stored_roots.places(guides, len(vertices))
     if places is None or not len(vertices):
-        sentence = 'The guides "{name}" are not rooted on their surface as it is now: comb or regenerate them.'
+        sentence = 'The guides "{name}" are not rooted on their current surface: comb or regenerate them.'
         raise HairError(sentence, name=name_of(guides))
     roots = np.einsum("nc,ncx->nx", places[1].astype(np.float64), vertices[places[0]])
     carrying = np.float32(np.concatenate([roots, *_bounds(vertices), _matrix(surface, depsgraph)[:3, :3]]))

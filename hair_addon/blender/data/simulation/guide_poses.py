@@ -73,14 +73,14 @@ class GuidePose:
         return dynamics.root_motion.RootPose(self._to_world(posed[:, 0]), turns, _rounded(self.scale / start.scale))
 
     def after(self, change: Affine) -> "GuidePose":
-        """The same place in the world where an `Affine` was applied to the local coordinates.
+        """The pose that is the same in the world after an `Affine` was applied to the local coordinates.
 
-        Its scale and the axes of its groom are those of now, and nothing else.
+        Only use its scale and the axes of its groom, which are in the new coordinates.
         """
         return replace(self, matrix=self.matrix @ change.inverse.matrix)
 
     def turn_to(self, other: "GuidePose") -> np.ndarray:
-        """(4,) rotation x, y, z, w from the axes of `other.groom` to those of this one's."""
+        """(4,) rotation x, y, z, w from the axes of `other.groom` to those of `self.groom`."""
         return dynamics.rod.rotations.from_matrices((self._polar[0].T @ other._polar[0])[None])[0]
 
     def to_rest(self, points: np.ndarray) -> np.ndarray:
@@ -131,7 +131,7 @@ def read(guides, depsgraph, metres):
     places = stored_roots.places(guides, len(pose.surface.rest))
     if places is None or guides.vellus.topology != pose.surface.topology or not places[1].any(axis=1).all():
         raise HairError(
-            'The guides "{name}" are not rooted on their surface as it is now: comb or regenerate them.',
+            'The guides "{name}" are not rooted on their current surface: comb or regenerate them.',
             name=guides.name,
         )
     matrix = np.array(surface_object.evaluated_get(depsgraph).matrix_world, np.float64)[:3]

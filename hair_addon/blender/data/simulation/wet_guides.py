@@ -50,7 +50,7 @@ def _weights(guides, surface, depsgraph, key, known, roots=None):
         roots = stored_roots.points(guides, surface) if roots is None else roots
         if roots is None:
             raise HairError(
-                'The guides "{name}" are not rooted on their surface as it is now: comb or regenerate them.',
+                'The guides "{name}" are not rooted on their current surface: comb or regenerate them.',
                 name=name_of(guides),
             )
         known[key] = style_inputs.read_mask(guides.surface, surface, guides, key, depsgraph).of_guides(roots)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves ↔ arrays: points, attributes, what deforms them, and the lines that part and guide them."""
+"""Curves ↔ arrays: points, attributes, deformation, and the lines that part and guide them."""
 
 from ....core.lazy import submodules
 

@@ -166,28 +166,28 @@ def _group():
 
 
 class _Tree:
-    """Nodes as functions of sockets: each method adds some and returns what they compute."""
+    """Nodes as functions of sockets: each method adds nodes and returns their outputs."""
 
     def __init__(self, group):
         self._group = group
 
     def build(self):
         """Build the whole group, from its input to its output."""
-        given = self._node("NodeGroupInput").outputs
+        inputs = self._node("NodeGroupInput").outputs
         # In the surface's local coordinates, which its children share.
-        info = self._node("GeometryNodeObjectInfo", {"Object": given["Surface"]}, transform_space="ORIGINAL")
+        info = self._node("GeometryNodeObjectInfo", {"Object": inputs["Surface"]}, transform_space="ORIGINAL")
         position = self._node("GeometryNodeInputPosition").outputs[0]
         # Rest positions of strands, for nodes that use them: Blender shares the array.
         at_rest = self._node(
             "GeometryNodeStoreNamedAttribute",
-            {"Geometry": given["Curves"], "Name": "rest_position", "Value": position},
+            {"Geometry": inputs["Curves"], "Name": "rest_position", "Value": position},
             data_type="FLOAT_VECTOR",
             domain="POINT",
         ).outputs[0]
-        smooth_rest = self._smooth_rest(info.outputs["Geometry"], given["Cage Corners"], self._rest(position))
+        smooth_rest = self._smooth_rest(info.outputs["Geometry"], inputs["Cage Corners"], self._rest(position))
         surface, (after, *axes) = self._with_motion(*smooth_rest, position)
         before, after, x_axis, y_axis = self._at_roots(
-            surface, info.outputs["Geometry"], given["Vertices"], [self._rest(position), after, *axes]
+            surface, info.outputs["Geometry"], inputs["Vertices"], [self._rest(position), after, *axes]
         )
         rotation = self._node(
             "FunctionNodeAxesToRotation",
@@ -204,14 +204,14 @@ class _Tree:
         moved = self._node(
             "GeometryNodeSetPosition",
             {
-                "Geometry": self._with_turns_for_brushes(curves, given["Combed"]),
+                "Geometry": self._with_turns_for_brushes(curves, inputs["Combed"]),
                 "Position": self._vector("ADD", turned, offset),
             },
         )
         # An undeformed surface costs only a comparison.
         is_deformed = self._is_deformed(info.outputs["Geometry"])
         carried = self._switch(is_deformed, at_rest, moved.outputs[0], "GEOMETRY")
-        self._node("NodeGroupOutput", {0: self._switch(self._is_paused(given), carried, given["Curves"], "GEOMETRY")})
+        self._node("NodeGroupOutput", {0: self._switch(self._is_paused(inputs), carried, inputs["Curves"], "GEOMETRY")})
         self._spread_out()
 
     def _spread_out(self):
@@ -219,10 +219,10 @@ class _Tree:
         count = len(self._group.nodes)
         self._group.nodes.foreach_set("location", [part for column in range(count) for part in (180.0 * column, 0.0)])
 
-    def _is_paused(self, given):
+    def _is_paused(self, inputs):
         """Paused in viewports only: renders always deform strands."""
         in_viewport = self._node("GeometryNodeIsViewport").outputs[0]
-        return self._node("FunctionNodeBooleanMath", {0: given["Paused"], 1: in_viewport}, operation="AND").outputs[0]
+        return self._node("FunctionNodeBooleanMath", {0: inputs["Paused"], 1: in_viewport}, operation="AND").outputs[0]
 
     def _is_deformed(self, surface):
         position = self._node("GeometryNodeInputPosition").outputs[0]

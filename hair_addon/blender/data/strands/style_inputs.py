@@ -17,7 +17,7 @@ from ...host.notices import name_of
 from .. import scene
 from . import attributes
 
-# Luminance of linear colours, Rec. 709.
+# Luminance of linear colors, Rec. 709.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 _NUMBERS = {"FLOAT": ("value", 1), "FLOAT_COLOR": ("color", 4), "BYTE_COLOR": ("color", 4), "BOOLEAN": ("value", 1)}
 
@@ -107,7 +107,7 @@ def _require_same(is_same, surface_object):
 
 
 def _numbers(attribute, owner):
-    """(N,) float32 of an attribute: numbers, or the luminance of colours. Raises `HairError`."""
+    """(N,) float32 of an attribute: numbers, or the luminance of colors. Raises `HairError`."""
     if attribute.data_type not in _NUMBERS or attribute.domain not in ("POINT", "CORNER", "FACE"):
         sentence = 'The attribute "{attribute}" of "{name}" cannot mask hair: use numbers or colors.'
         raise HairError(sentence, attribute=name_of(attribute), name=owner)

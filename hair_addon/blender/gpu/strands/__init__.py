@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands made on the GPU: interpolated between guides, styled, carried by their surface; what of them changed."""
+"""Strands made on the GPU: interpolation between guides, styles, deformation with the surface, and changes."""
 
 from ....core.lazy import submodules
 

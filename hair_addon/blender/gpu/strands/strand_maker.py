@@ -205,5 +205,5 @@ def _strands_program(slot_count, is_plain):
         declare_put(info, first_slot=0)
         return shaders.compile_compute(info, "strands/interpolate_strands.comp")
     info.image(0, "RGBA32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
-    put = "strands/write_packed_strand.glsl", "strands/write_plain_strand.glsl"
-    return shaders.compile_compute(info, "strands/interpolate_strands.comp", dict([put]))
+    replaced = {"strands/write_packed_strand.glsl": "strands/write_plain_strand.glsl"}
+    return shaders.compile_compute(info, "strands/interpolate_strands.comp", replaced)

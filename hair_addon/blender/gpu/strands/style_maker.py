@@ -41,7 +41,7 @@ def can_style(styling: "Styling") -> bool:
 
 @dataclass
 class _Pass:
-    """Strands that are styled together: all of the hair, or the centres of one level of a clump tree."""
+    """Strands that are styled together: all of the hair, or the centers of one level of a clump tree."""
 
     known: gpu.types.GPUTexture  # for each strand its normal, identity, clump centers and masks
     record: np.ndarray  # uniforms.STYLING

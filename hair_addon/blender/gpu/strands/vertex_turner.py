@@ -79,7 +79,7 @@ def new_turner(turning: "Turning", rest: np.ndarray) -> VertexTurner:
     if max(len(needed), len(turning.corners), ring_count) >= _LARGEST_INDEX or (
         len(turning.vertices) > MOST_GROUPS * _GROUP_SIZE
     ):
-        raise HairError("The surface has too many vertices to turn on the graphics card.")
+        raise HairError("The surface has too many vertices for the graphics card.")
     _turn_program()  # first: if it is not supported, nothing is uploaded
     places = np.zeros(vertex_count, np.int32)
     places[needed] = np.arange(len(needed))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rendered frames: the render engine, tiles, panoramas, and hair among the pictures of other engines."""
+"""Rendered frames: the render engine, tiles, panoramas, and compositing over other engines' renders."""
 
 from ....core.lazy import submodules
 

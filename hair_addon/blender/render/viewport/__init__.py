@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair in 3-D viewports: pictures that settle, outlines of what is selected, what was shown before."""
+"""Hair in 3D viewports: progressive pictures, outlines of selected hair, and the history of pictures."""
 
 from ....core.lazy import submodules
 
