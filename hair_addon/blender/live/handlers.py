@@ -265,7 +265,7 @@ def after_frame_change(scene, depsgraph):
 
 @persistent
 def before_reading(*_args):
-    """Write hair before a save or a render reads its Curves, and update the hidden scene that a render composites."""
+    """Write hair before a save or a render reads its Curves, and update the hair scene that a render composites."""
     moving_surfaces.resume()
     stale_marks.follow_applied()
     live_hair.write_all()
