@@ -13,6 +13,7 @@ from ..groom.dynamics import frame_folders
 from ..host import memory, running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
+from ..render import refused_strands
 from ..render.frames import composite
 from ..settings import animated, style_items
 from . import (
@@ -386,7 +387,8 @@ def unregister():
     """Remove the handlers, write pending hair, and stop compositing hair over other engines' renders."""
     for handlers, handler in _HANDLERS:
         handlers.remove(handler)
-    for timer in (_take_over, unlocked_renders.offer, refused_hair.offer, composite.repair):
+    offers = unlocked_renders.offer, refused_hair.offer, refused_strands.show_in_panels
+    for timer in (_take_over, *offers, composite.repair):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
     every_frame.end()

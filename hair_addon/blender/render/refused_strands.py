@@ -4,7 +4,10 @@
 import sys
 from dataclasses import dataclass
 
+import bpy
+
 from ...core.errors import HairError
+from ..host import running
 
 
 @dataclass(frozen=True)
@@ -17,7 +20,18 @@ class Refused:
 def refused(error: HairError) -> Refused:
     """Print why strands are not drawn, and return the marker."""
     print(f"Vellus: {error}", file=sys.stderr)
+    if running.has_window() and not bpy.app.timers.is_registered(show_in_panels):
+        bpy.app.timers.register(show_in_panels)
     return Refused(error)
+
+
+def show_in_panels() -> None:
+    """Redraw the sidebars, for `bpy.app.timers`: they were drawn before the strands that their panels report."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if region.type == "UI":
+                    region.tag_redraw()
 
 
 def error_of(cached: object) -> HairError | None:

@@ -6,6 +6,7 @@ import gpu
 import pytest
 
 from hair_addon.blender.gpu import driver_textures
+from hair_addon.blender.host import running
 from hair_addon.blender.render import drawn_scene, hair_cache, refused_strands
 from hair_addon.core.errors import HairError
 from tests.support.interface.layout import draw
@@ -22,12 +23,16 @@ def test_a_driver_that_refuses_a_texture_is_one_sentence(hair, raised, monkeypat
         return real(size, format=format, **data)
 
     hair_cache.strand_cache.clear()
+    monkeypatch.setattr(running, "has_window", lambda: True)
     monkeypatch.setattr(driver_textures.gpu.types, "GPUTexture", refuse)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for _redraw in range(3):
         drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph, None, hair_cache.refuse)
         assert not drawn.hair
     assert len(tries) == 1
+    assert bpy.app.timers.is_registered(refused_strands.show_in_panels), "they were drawn before"
+    assert refused_strands.show_in_panels() is None
+    bpy.app.timers.unregister(refused_strands.show_in_panels)
     said = capsys.readouterr().err
     assert said.count("Vellus: The graphics driver cannot allocate") == 1 and "decrease Strand Count" in said
     assert "Traceback" not in said

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Progress of a rendered frame in Blender's bar and text, and requests to stop."""
+"""Progress of a rendered frame in Blender's bar and text, and requests to stop.
 
-import time
+In a window Blender shows and hears nothing until the view layer is done: drawing windows waits for the engine that has
+the GPU context.
+"""
 
 import bpy
 
 from ....core.long_work import Progress, Stopped
 from ...settings.translations import status_text
 
-_TURN = 0.002  # [s] for the window to redraw
 _LEAST = 1e-3  # fraction that is not visible in a bar
 
 
@@ -32,8 +33,6 @@ class FrameProgress:
         self._shown, self._text = shown, text
         self._engine.update_progress(shown)
         self._engine.update_stats("", text)
-        if not bpy.app.background:
-            time.sleep(_TURN)
         self._listener("Rendering", shown)
         if self._engine.test_break():
             raise Stopped
