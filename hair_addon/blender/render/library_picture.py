@@ -12,7 +12,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.imaging.pixel_sampling import PictureSettings
-from ..data.datablocks import groom_assets
+from ..data.made import groom_assets
 from . import offscreen
 
 SIZE = 256  # pixels
