@@ -30,7 +30,8 @@ def _directions(
 def test_directions_are_as_dense_as_light(rng):
     """Light of each half of the world, along three axes, found by directions and as the sum over texels."""
     picture = rng.exponential(size=(12, 24, 3)) ** 3
-    world = world_light.world_of(picture)
+    with wp.ScopedDevice("cpu"):
+        world = world_light.world_of(picture)
     directions, misses = (wp.zeros(200_000, dtype=wp.vec3, device="cpu") for _ in range(2))
     densities = wp.zeros((200_000, 2), dtype=float, device="cpu")
     wp.launch(_directions, 200_000, [world, directions, misses, densities], device="cpu")
