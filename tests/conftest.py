@@ -20,7 +20,7 @@ def pytest_configure():
 
     So do the processes that tests start.
     """
-    folder = build_extension.kernel_folder()
+    folder = build_extension.kernel_folder(is_for_tests=True)
     if compile_kernels.are_up_to_date(folder):
         compiled_kernels.FOLDER = folder
         os.environ[compiled_kernels.VARIABLE] = str(folder)

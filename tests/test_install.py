@@ -31,7 +31,7 @@ def extension():
     Built from a checkout that has run, so that there is bytecode to leave out.
     """
     compileall.compile_dir(build_extension.ROOT / "hair_addon" / "core", quiet=1)
-    return build_extension.build(compile_kernels.this_platform())
+    return build_extension.build(compile_kernels.this_platform(), is_for_tests=True)
 
 
 @pytest.fixture(scope="session")

@@ -45,6 +45,10 @@ _X86 = (
     Processor("x86-64-v3", _AVX2),
     Processor("x86-64-v2", _AVX),
 )
+# Packages whose results are compared bit for bit between processors, by tests/support/any_processor.py.
+COMPARED = tuple(
+    f"core.{name}." for name in ("dynamics.rod", "geometry", "grooming", "interpolation", "placement", "styling")
+)
 # The best first.
 PROCESSORS = {"linux-x64": _X86, "windows-x64": _X86, "macos-arm64": (Processor("apple-m1", ()),)}
 
@@ -70,8 +74,11 @@ def sources_digest():
     return total.hexdigest()
 
 
-def compile_into(folder, processors):
-    """Write the folder that `compiled_kernels` reads: an index, and each Warp module for each `Processor`."""
+def compile_into(folder, processors, is_for_tests=False):
+    """Write the folder that `compiled_kernels` reads: an index, and each Warp module for each `Processor`.
+
+    is_for_tests: for other processors than this one, compile only the packages that tests compare.
+    """
     import warp as wp
 
     wp.config.kernel_cache_dir = str(CACHE)
@@ -84,13 +91,17 @@ def compile_into(folder, processors):
     # The hash that a user's Warp computes holds its flags, not the processor that those stand for.
     entries = {names[m]: {"hash": m.get_module_hash(1).hex(), "files": {}} for m in modules}
     native_flags = wp.config.cpu_compiler_flags
+    features = compiled_kernels.processor_features()
+    here = next((processor for processor in processors if features.issuperset(processor.features)), None)
     for processor in processors:
+        is_whole = processor == here or not is_for_tests
+        wanted = [module for module in modules if is_whole or names[module].startswith(COMPARED)]
         wp.config.cpu_compiler_flags = native_flags.replace("-march=native", f"-target-cpu {processor.name}")
         assert wp.config.cpu_compiler_flags != native_flags
-        for module in modules:
+        for module in wanted:
             module.unload()
-        wp.force_load("cpu", modules, max_workers=os.process_cpu_count() or 1)
-        for module in modules:
+        wp.force_load("cpu", wanted, max_workers=os.process_cpu_count() or 1)
+        for module in wanted:
             made = Path(wp.config.kernel_cache_dir) / module.get_module_identifier(1)
             paths = [folder / path for path in compiled_kernels.file_names(names[module], processor.name)]
             for path, ending in zip(paths, (".o", ".meta"), strict=True):
@@ -133,12 +144,14 @@ def main():
     """The command line."""
     parser = argparse.ArgumentParser(description="Compile the extension's kernels for this platform.")
     parser.add_argument("folder", type=Path, help="output folder; its content is replaced")
-    folder = parser.parse_args().folder.resolve()
+    parser.add_argument("--tests", action="store_true", help="for older processors, only what tests compare")
+    arguments = parser.parse_args()
+    folder = arguments.folder.resolve()
     processors = PROCESSORS.get(this_platform())
     if processors is None:
         sys.exit(f"Kernels are not compiled for {this_platform()}.")
     shutil.rmtree(folder, ignore_errors=True)
-    compile_into(folder, processors)
+    compile_into(folder, processors, arguments.tests)
 
 
 if __name__ == "__main__":

@@ -11,17 +11,9 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.io import mesh_files
-from hair_addon.command_line import import_mesh
 from tests.support.commands import HEAD, TETRAHEDRON, command, largest_file, run_here, write_obj
 
 SMALL = ("--guides", 5, "--strands", 20)
-
-
-@pytest.fixture(autouse=True)
-def one_process(monkeypatch):
-    """Files that have a process of their own (test_meshes_apart.py) are read in this one, which is quicker."""
-    monkeypatch.setattr(import_mesh, "open_apart", lambda path, up, *_others: mesh_files.open_file(path, up=up))
 
 
 @pytest.fixture

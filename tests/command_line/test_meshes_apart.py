@@ -49,7 +49,9 @@ def test_another_process_gives_the_same_scene(files, tmp_path, ending):
     file_axes = mesh_files.open_file(files[ending], up=up)
     expected = seen()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    ended = run_here("groom", files[ending], *GROOM, tmp_path / "out.npz", *(["--up", up] if up == "Y" else []))
+    ended = run_here(
+        "groom", files[ending], *GROOM, tmp_path / "out.npz", *(["--up", up] if up == "Y" else []), reads_apart=True
+    )
     assert (ended.status, ended.errors) == (0, "")
     meshes, path, scale = seen()
     assert expected == ({name: of for name, of in meshes.items() if name in expected[0]}, path, scale)
@@ -64,7 +66,9 @@ def test_an_importer_that_ends_its_process_is_one_sentence(files, tmp_path, monk
     script = f"import os; os.kill(os.getpid(), {int(signal.SIGSEGV)})"
     monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", script])
     before = set(tmp_path.iterdir())
-    ended = run_here(verb, files[ending], *([*GROOM, tmp_path / "out.npz"] if verb == "groom" else []))
+    ended = run_here(
+        verb, files[ending], *([*GROOM, tmp_path / "out.npz"] if verb == "groom" else []), reads_apart=True
+    )
     assert (ended.status, ended.out) == (1, "") and set(tmp_path.iterdir()) == before
     assert ended.errors == (
         f"vellus: {files[ending]} cannot be read: its reader ended without a word (signal 11), as it does "
@@ -77,7 +81,7 @@ def test_curves_are_tried_apart(files, tmp_path, monkeypatch):
     script = "import time; time.sleep(600)"
     monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", script])
     monkeypatch.setattr(import_mesh, "_PATIENCE", 0.2)
-    ended = run_here("groom", HEAD, "--guides-from", files[".usdc"], "--out", tmp_path / "out.npz")
+    ended = run_here("groom", HEAD, "--guides-from", files[".usdc"], "--out", tmp_path / "out.npz", reads_apart=True)
     assert (ended.status, ended.out) == (1, "")
     assert ended.errors == (
         f"vellus: {files['.usdc']} cannot be read: its reader came to no end, as it does where a file is damaged.\n"
@@ -86,7 +90,7 @@ def test_curves_are_tried_apart(files, tmp_path, monkeypatch):
 
 def test_what_the_other_process_says_is_said(files):
     files[".usdc"].write_bytes(files[".usdc"].read_bytes()[:200])
-    ended = run_here("info", files[".usdc"])
+    ended = run_here("info", files[".usdc"], reads_apart=True)
     assert (ended.status, ended.out) == (1, "")
     assert ended.errors == f"vellus: {files['.usdc']} is not a valid USD file: it is damaged, or has another format.\n"
 

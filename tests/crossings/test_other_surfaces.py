@@ -8,6 +8,7 @@ from mathutils import Matrix
 
 from tests.support import placed_hair
 from tests.support.exchange.imported import curves_object, select
+from tests.support.pairs import pairs
 from tests.support.placed_hair import PLACES, require_carried, seen
 from tests.support.reading import points
 
@@ -49,8 +50,7 @@ def stand(place):
 
 
 @pytest.mark.parametrize("is_picked", [False, True], ids=["selected", "picked"])
-@pytest.mark.parametrize("is_deleted", [False, True], ids=["old surface there", "old surface deleted"])
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize(("is_deleted", "place"), pairs([False, True], PLACES, 2))
 def test_attached_hair_stays_where_it_is(placed_file, place, is_deleted, is_picked):
     bpy.ops.wm.read_homefile(filepath=placed_file)
     if is_deleted:
@@ -106,8 +106,9 @@ def test_hair_far_from_a_mesh_is_not_attached_to_it(placed_file):
 
 
 @pytest.mark.parametrize("use", ["use_as_hair", "use_as_guides"])
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("own_scale", [(0.01, 0.01, 0.01), (1.0, 1.0, 1.0), (-50.0, 100.0, 80.0)], ids=str)
+@pytest.mark.parametrize(
+    ("own_scale", "place"), pairs([(0.01, 0.01, 0.01), (1.0, 1.0, 1.0), (-50.0, 100.0, 80.0)], PLACES), ids=str
+)
 def test_used_curves_keep_their_places_and_widths(placed_file, place, own_scale, use):
     bpy.ops.wm.read_homefile(filepath=placed_file)
     other = stand(place)

@@ -9,6 +9,7 @@ import pytest
 from tests.support import placed_hair
 from tests.support.exchange.imported import select
 from tests.support.guide_tools import SHAPING, select_guides
+from tests.support.pairs import pairs
 from tests.support.placed_hair import PLACES, require_carried, seen
 from tests.support.reading import points, write_points
 
@@ -53,8 +54,9 @@ def after_tool(path, tool, values, is_applied):
     return seen()
 
 
-@pytest.mark.parametrize("name", TOOLS, ids=" ".join)
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize(
+    ("name", "place"), pairs(TOOLS, PLACES), ids=lambda one: one if isinstance(one, str) else " ".join(one)
+)
 def test_tools_do_the_same_in_the_world(placed_files, place, name):
     tool, values = name[0], TOOLS[name]
     if tool == "drape_guides" and place in {"small", "on a rig in centimetres"}:

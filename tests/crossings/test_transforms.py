@@ -14,6 +14,7 @@ from hair_addon.blender.live import handlers
 from hair_addon.blender.settings import style_items
 from tests.support import placed_hair
 from tests.support.exchange.imported import select
+from tests.support.pairs import pairs
 from tests.support.placed_hair import PLACES, Placed, require_carried, seen
 
 
@@ -138,8 +139,7 @@ CHANGES = {
 SELECTED_TOO = [name for name in CHANGES if "and hair" in name]
 
 
-@pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize("place", PLACES, indirect=True)
+@pytest.mark.parametrize(("change", "place"), pairs(CHANGES, PLACES), indirect=["place"])
 def test_hair_goes_wherever_its_surface_goes(place, change):
     if place == "on a sheared rig" and change in SELECTED_TOO:
         pytest.skip("Blender itself distorts what is selected")
@@ -220,8 +220,9 @@ def test_hair_stays_where_its_surface_was_scaled_unevenly_after_it_grew(place, c
     assert np.median(np.linalg.norm(seen().strands["Hair"][0] - before.strands["Hair"][0], axis=1)) > 0.01, "it follows"
 
 
-@pytest.mark.parametrize("change", ["apply all", "apply scale", "origin to cursor"])
-@pytest.mark.parametrize("place", PLACES, indirect=True)
+@pytest.mark.parametrize(
+    ("change", "place"), pairs(["apply all", "apply scale", "origin to cursor"], PLACES), indirect=["place"]
+)
 def test_changes_without_vellus_are_followed_when_the_file_is_opened(place, change, tmp_path):
     before, path = seen(), str(tmp_path / "changed.blend")
     handlers.unregister()

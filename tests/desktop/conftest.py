@@ -39,7 +39,11 @@ def _once(tmp_path_factory, name, make):
 @pytest.fixture(scope="session")
 def extension(tmp_path_factory):
     """The extension's zip."""
-    return _once(tmp_path_factory, "extension", lambda _folder: build_extension.build(compile_kernels.this_platform()))
+    return _once(
+        tmp_path_factory,
+        "extension",
+        lambda _folder: build_extension.build(compile_kernels.this_platform(), is_for_tests=True),
+    )
 
 
 @pytest.fixture(scope="session")

@@ -10,10 +10,13 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
 from hair_addon import command_line
+from hair_addon.blender.io import mesh_files
+from hair_addon.command_line import import_mesh
 from hair_addon.command_line.console import Console
 from hair_addon.command_line.interruption import Interruption
 
@@ -52,16 +55,28 @@ def run(*arguments, **details):
     return Ended(done.returncode, done.stdout, done.stderr)
 
 
-def run_here(*arguments, terminal=None):
-    """Run a command in this process, where Blender is there already; terminal: takes errors and progress."""
+def run_here(*arguments, terminal=None, reads_apart=False):
+    """Run a command in this process, where Blender is there already; terminal: takes errors and progress.
+
+    reads_apart: whether importers that end on damaged files run in a process of their own, as they do for users.
+    """
     out, errors = io.StringIO(), io.StringIO()
     try:
         given = command_line.parser("vellus").parse_args(list(map(str, arguments)))
     except SystemExit as end:
         return Ended(end.code, "", "")
-    with Interruption() as interruption:
+    with contextlib.nullcontext() if reads_apart else _importers_here(), Interruption() as interruption:
         status = command_line.run(given, Console(out, terminal or errors, interruption, given.quiet, given.json))
     return Ended(status, out.getvalue(), errors.getvalue())
+
+
+def _importers_here():
+    """A context in which files are imported by this process: starting another one takes two seconds."""
+    return mock.patch.multiple(
+        import_mesh,
+        open_apart=lambda path, up, *_others: mesh_files.open_file(path, up=up),
+        try_curves=lambda *_given: None,
+    )
 
 
 @contextlib.contextmanager

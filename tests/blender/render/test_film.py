@@ -9,18 +9,18 @@ import pytest
 
 from hair_addon.blender.data.scene import read_camera
 from hair_addon.blender.render import film
+from tests.support.pairs import pairs
 from tests.support.reading import evaluated_points
 from tests.support.rendering import configure, layers_of, light_up, rendered
 
 MODELS = [("KAJIYA_KAY", "energy"), ("MARSCHNER", "energy"), ("MARSCHNER", "classic")]
 
 
-@pytest.mark.parametrize("is_varied", [False, True])
-@pytest.mark.parametrize(("model", "mode"), MODELS)
-def test_the_lobes_add_up_to_the_light_of_hair(lit, tmp_path, model, mode, is_varied):
+@pytest.mark.parametrize(("model_mode", "is_varied"), pairs(MODELS, [False, True], 2))
+def test_the_lobes_add_up_to_the_light_of_hair(lit, tmp_path, model_mode, is_varied):
     """Under a sun, a world and on a surface that throws light back: of each model, and where strands differ."""
     light_up()
-    state = lit.data.vellus
+    state, (model, mode) = lit.data.vellus, model_mode
     state.model, state.appearance.mode, state.marschner.size = model, mode, 64
     if is_varied:
         state.appearance.random_color = state.appearance.random_roughness = 0.4

@@ -64,7 +64,7 @@ OLD_PROCESSOR = {
 @pytest.fixture(scope="module")
 def made():
     """The folder as the extension's zip has it: compiled once for the same sources."""
-    return build_extension.compiled_kernels()
+    return build_extension.compiled_kernels(is_for_tests=True)
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def change_index(folder, change):
 def test_of_several_that_ask_for_kernels_one_compiles_them(tmp_path, monkeypatch):
     compiling, asked = [], threading.Barrier(3)
 
-    def compile_kernels_once(folder):
+    def compile_kernels_once(folder, _is_for_tests):
         compiling.append(folder)
         folder.mkdir()
 
@@ -98,7 +98,7 @@ def test_of_several_that_ask_for_kernels_one_compiles_them(tmp_path, monkeypatch
         asked.wait()
         return build_extension.compiled_kernels()
 
-    monkeypatch.setattr(build_extension, "kernel_folder", lambda: tmp_path / "kernels" / "here")
+    monkeypatch.setattr(build_extension, "kernel_folder", lambda _is_for_tests: tmp_path / "kernels" / "here")
     monkeypatch.setattr(compile_kernels, "are_up_to_date", lambda folder: folder.exists())
     monkeypatch.setattr(build_extension, "_compile_kernels", compile_kernels_once)
     with ThreadPoolExecutor(3) as pool:
