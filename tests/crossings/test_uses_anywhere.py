@@ -21,6 +21,7 @@ from hair_addon.core.long_work import run_now
 from tests.support import placed_hair
 from tests.support.exchange import alembic_reader
 from tests.support.exchange.imported import select
+from tests.support.pairs import pairs, share_of
 from tests.support.placed_hair import PLACES, require_carried, seen, world_scale
 
 LAST = 4
@@ -123,7 +124,7 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("place", share_of(PLACES, 3))
 def test_files_have_hair_where_it_is_shown(placed_files, tmp_path, place):
     opened(placed_files(place))
     before, metres = seen(), bpy.context.scene.unit_settings.scale_length
@@ -158,8 +159,9 @@ MESHES = {
 }
 
 
-@pytest.mark.parametrize("made", MESHES)
-@pytest.mark.parametrize("place", ["large", "uneven", "mirrored", "mirrored and uneven", "on a sheared rig"])
+@pytest.mark.parametrize(
+    ("made", "place"), pairs(MESHES, ["large", "uneven", "mirrored", "mirrored and uneven", "on a sheared rig"], 2)
+)
 def test_meshes_of_hair_are_where_it_is(placed_files, place, made):
     """Faces look the same way, also where the surface is mirrored."""
     found = []
@@ -201,7 +203,8 @@ COPIES = {
 
 
 @pytest.mark.parametrize(
-    "place", ["turned", "small", "large", "uneven", "mirrored", "on a sheared rig", "in a scene of centimetres"]
+    "place",
+    share_of(["turned", "small", "large", "uneven", "mirrored", "on a sheared rig", "in a scene of centimetres"]),
 )
 def test_copies_on_a_mesh_elsewhere_are_the_same_in_the_world(placed_files, tmp_path, place):
     """The same mesh, whose object has another transform."""
@@ -229,7 +232,7 @@ def test_copies_on_a_mesh_elsewhere_are_the_same_in_the_world(placed_files, tmp_
 # ------------------------------------------------------------------------------------------ particle hair
 
 
-@pytest.mark.parametrize("place", ["turned", "small", "uneven", "mirrored", "on a sheared rig"])
+@pytest.mark.parametrize("place", share_of(["on a sheared rig", "small", "uneven", "mirrored", "turned"]))
 def test_converted_particle_hair_is_where_it_was(blender, place):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     body = placed_hair.add_body()
@@ -269,7 +272,7 @@ def baked(folder):
     return found
 
 
-@pytest.mark.parametrize("place", ["turned", "uneven", "mirrored", "on a scaled rig", "on a sheared rig"])
+@pytest.mark.parametrize("place", share_of(["mirrored", "uneven", "turned", "on a sheared rig", "on a scaled rig"]))
 def test_guides_move_as_where_the_transform_was_applied(placed_files, tmp_path, place):
     path, found = placed_files(place), []
     for is_applied in (False, True):

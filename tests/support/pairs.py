@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests of all pairs of two lists, of which `make test` runs a share and `pytest -m long` all."""
+"""Tests of long lists, and of all pairs of two, of which `make test` runs a share and `pytest -m long` the rest."""
 
 from collections.abc import Iterable
 
 import pytest
+
+
+def share_of(values: Iterable, share: int = 3) -> list:
+    """Parameters for `pytest.mark.parametrize`: one value in `share` is not marked `long`."""
+    return [pytest.param(value, marks=() if i % share == 0 else pytest.mark.long) for i, value in enumerate(values)]
 
 
 def pairs(rows: Iterable, columns: Iterable, share: int = 3) -> list:

@@ -12,6 +12,7 @@ from hair_addon.blender.gpu import drawing, hair_shading, scene_programs, strand
 from hair_addon.core.shading.fibre import kajiya_kay
 from hair_addon.core.shading.fibre.angles import FibreAngles
 from hair_addon.core.shading.tables import lookup_tables
+from tests.support.pairs import pairs
 
 SIZE = 8  # pixels along a side of the picture; the strand fills it
 RADIUS = 0.5  # of the strand [m]
@@ -78,8 +79,7 @@ def test_kajiya_kay_is_brightest_on_the_mirror_cone(strand, no_shadow_maps, thet
     np.testing.assert_allclose(seen, expected, rtol=2.0**-10)  # a half float, cut off
 
 
-@pytest.mark.parametrize("tilt", [math.radians(6.0), math.radians(-3.0)])
-@pytest.mark.parametrize("theta_i", [-0.5, 0.0, 0.3])
+@pytest.mark.parametrize(("theta_i", "tilt"), pairs([-0.5, 0.0, 0.3], [math.radians(6.0), math.radians(-3.0)], 2))
 def test_the_first_highlight_of_marschner_is_shifted_towards_the_root_by_twice_the_tilt(
     strand, no_shadow_maps, theta_i, tilt
 ):

@@ -12,6 +12,7 @@ from hair_addon.blender.render import film, hair_cache, offscreen
 from hair_addon.blender.settings import style_items
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from hair_addon.core.styling import wet
+from tests.support.pairs import share_of
 from tests.support.rendering import light_up, rendered
 from tests.support.scenes import even_guides
 
@@ -82,15 +83,15 @@ def test_a_mask_of_one_is_wet_and_of_zero_is_dry(small):
 
 
 @even_guides
-@pytest.mark.parametrize("model, mode, random_color", MODELS)
-def test_half_of_the_hair_is_wet(small, model, mode, random_color, monkeypatch):
+@pytest.mark.parametrize("look", share_of(MODELS, 2))
+def test_half_of_the_hair_is_wet(small, look, monkeypatch):
     """Away from the border each half is as in the picture of all dry and of all wet hair.
 
     With surfaces that are shaded in each sample: by noise, and so by the hair, they share light from sample to sample.
     """
     monkeypatch.setattr(film, "VisibilityBuffer", lambda *size, **_options: visibility_buffer.VisibilityBuffer(*size))
     state = small.data.vellus
-    state.model, state.appearance.mode, state.appearance.random_color = model, mode, random_color
+    state.model, state.appearance.mode, state.appearance.random_color = look
     group("any", np.ones(len(bpy.data.objects["Sphere"].data.vertices)))
     wetten(small, mask="any")
     roots = curves.first_points(small.data)

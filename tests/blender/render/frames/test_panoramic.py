@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
+from tests.support.pairs import share_of
 from tests.support.rendering import light_up, rendered
 
 WIDTH, HEIGHT = 72, 48
@@ -49,7 +50,7 @@ def passes(folder, **settings):
     return rendered(folder, **shape | settings)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", share_of(KINDS, 2))
 def test_silhouettes_and_distances_are_those_of_cycles(inside, tmp_path, kind):
     choose(inside, kind)
     ours, theirs = passes(tmp_path), passes(tmp_path, engine="CYCLES")
