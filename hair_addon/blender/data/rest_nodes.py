@@ -20,7 +20,7 @@ _DEFORMING = {
 }
 
 
-def tell_apart(surface_object):
+def separate_copies(surface_object):
     """Add our nodes after the last modifier that copies faces, or remove them if there is none.
 
     Returns whether anything was changed. Mirrored faces are separated even if the mesh is deformed before them;

@@ -276,7 +276,7 @@ def move_strands(strands, moved, points):
     turn, rows = (strands.moved.turn, strands.moved.rows) if strands.moved else (0, _no_rows(strands))
     rows.clear(format="FLOAT", value=(0.0,))
     before = like(texture)
-    keep_strands(strands, before, len(moved), row_strands, texture)
+    copy_strands(strands, before, len(moved), row_strands, texture)
     program = _move_program()
     program.bind()
     program.uniform_sampler("moved_strands", texture)
@@ -286,7 +286,7 @@ def move_strands(strands, moved, points):
     return replace(strands, moved=Moved(before, row_strands, rows, turn + 1), lengthenings={}, is_made=False)
 
 
-def keep_strands(strands, target, count, row_kept, listed=None):
+def copy_strands(strands, target, count, row_kept, listed=None):
     """Copy the texels of strands, preceded by one extra texel each, to a texture with `row_kept` strands per row.
 
     count: of strands; listed: a texture in this layout whose extra texels are indices of strands; None: all strands.

@@ -127,7 +127,7 @@ class VisibilityBuffer:
             framebuffer.clear(color=color)
             yield
 
-    def put_hair_first(self):
+    def exclude_behind_hair(self):
         """Set `surface_depth` to zero where hair is nearest, to draw nothing there, and blank samples of surfaces."""
         self.nearest_depths()  # reads `surface_depth`
         with drawing.gpu_state("NONE", depth_writes=False):

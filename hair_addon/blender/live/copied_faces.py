@@ -14,11 +14,11 @@ from ..data.surfaces import cage_of
 from ..groom import bindings
 
 
-def tell_apart(surface_object):
+def separate_copies(surface_object):
     """Add, move or remove the nodes of a surface; returns whether they changed, so that `follow` must be called."""
     if not surface_object.add_rest_position_attribute or not _on(surface_object):
         return False
-    return rest_nodes.tell_apart(surface_object)
+    return rest_nodes.separate_copies(surface_object)
 
 
 def follow(surfaces, view_layer):

@@ -64,14 +64,14 @@ def after_depsgraph_update(scene, depsgraph):
     deformed = updates.deformed(reports)
     moving_surfaces.shape_changed(deformed & _surfaces())
     changed = updates.originals([u for u in reports if not _is_only_carried(u, deformed)], is_geometry=True)
-    told_apart = []
+    separated = []
     for surface_object in deformed:
         events.surface_moved(surface_object)
         # Hair waits until the surface leaves edit and paint modes, and until copies of its faces are separated.
         if surface_object.mode != "OBJECT":
             continue
-        if copied_faces.tell_apart(surface_object):
-            told_apart.append(surface_object)
+        if copied_faces.separate_copies(surface_object):
+            separated.append(surface_object)
         else:
             is_edited = surface_object.data in changed and not moving_surfaces.is_to_be_checked_later(surface_object)
             stale_marks.follow_surface(surface_object, depsgraph, is_edited)
@@ -106,8 +106,8 @@ def after_depsgraph_update(scene, depsgraph):
     if running.job() is None:
         stored_guide_maps.follow(reports, depsgraph)
         live_hair.follow_masks(_painted(reports), depsgraph)
-    if told_apart:  # last: the update of the view layer calls this handler again
-        copied_faces.follow(told_apart, scene.view_layers[depsgraph.view_layer.name])
+    if separated:  # last: the update of the view layer calls this handler again
+        copied_faces.follow(separated, scene.view_layers[depsgraph.view_layer.name])
 
 
 def _surfaces():

@@ -4,7 +4,7 @@
 import bpy
 
 from ...core.shading import appearance
-from ..data.strands import curves as curves_door
+from ..data.strands import curves as curve_data
 from ..host.notices import name_of
 from ..settings import properties, setting_properties, shared_wetness
 from . import eevee_nodes, strand_nodes, wet_nodes
@@ -38,7 +38,7 @@ def write_hair_material(curves):
         if node is not None:  # otherwise the user has edited it
             look = properties.look_of(curves.vellus)
             if not appearance.strand_settings(look).is_even:
-                curves_door.write_randoms(curves)  # older hair lacks this attribute
+                curve_data.write_randoms(curves)  # older hair lacks this attribute
             if _has_places(curves):
                 _fill(node, material, properties.dry_look_of(curves.vellus))
                 wettest = wet_nodes.write(material.node_tree, node, shared_wetness.of_hair(curves.vellus))
@@ -51,7 +51,7 @@ def write_hair_material(curves):
 def _has_places(curves):
     """Whether strands differ in wetness."""
     least, most = shared_wetness.of_hair(curves.vellus)
-    return least < most and curves_door.has_wetness(curves)
+    return least < most and curve_data.has_wetness(curves)
 
 
 def _fill_first_slot(curves, material):
@@ -73,7 +73,7 @@ def _values(curves):
     state = curves.vellus
     values = setting_properties.values_of(state.appearance, setting_properties.names_of(appearance.Appearance))
     least, most = shared_wetness.of_hair(state)
-    return values | {"wetness": (least if curves_door.has_wetness(curves) else most, most)}
+    return values | {"wetness": (least if curve_data.has_wetness(curves) else most, most)}
 
 
 def is_hair_material(material):

@@ -17,7 +17,7 @@ from ..gpu import (
     uniforms,
     windows,
 )
-from ..gpu import lights as light_door
+from ..gpu import lights as blender_lights
 from ..gpu.shadows import ShadowMaps
 from ..host.notices import can_be_drawn
 from . import hair_cache, hair_places, made_strands, read_strands
@@ -35,7 +35,7 @@ class DrawnScene:
     hair: list  # (StrandsOnGPU, Shading, object to world, part in viewports)
     surfaces: list  # visible solid surfaces: (SurfaceOnGPU, parts of a `DrawnMesh`, None for a holdout)
     lights: np.ndarray  # uniforms.LIGHTS shared by all receivers
-    world: light_door.World
+    world: blender_lights.World
     shadow_maps: ShadowMaps | None  # None in a viewport without hair
     hair_visibility: list  # {sampler: texture} of the world's visibility from each hair
     surface_visibility: list  # of `surfaces`, then of `clear`
@@ -65,7 +65,7 @@ class Blocker:
     is_seen: bool = True
 
 
-_EMPTY = DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
+_EMPTY = DrawnScene([], [], uniforms.LIGHTS.record(), blender_lights.World(np.zeros(3)), None, [], [])
 
 
 def read(
@@ -97,16 +97,16 @@ def read(
         has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # for the shadow of hair on surfaces
         meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
         if is_shaded:
-            meshes = drawn_meshes.told_apart(meshes)
+            meshes = drawn_meshes.split_clear(meshes)
         shown = _upload(meshes, is_shaded, has_paths=viewport is None)
-        world = light_door.read_world(blender_scene, view_layer)
+        world = blender_lights.read_world(blender_scene, view_layer)
         lamps = maps = None
     else:
         shown = {name: getattr(before, name) for name in _SHOWN}
         world, lamps, maps = before.world, before.lamps, before.shadow_maps
     hair_receivers = _hair_receivers(hair, [(place.owner, place.hair_object.session_uid) for place in places])
     if lamps is None:
-        found = light_door.read_lights(depsgraph, for_render=viewport is None)
+        found = blender_lights.read_lights(depsgraph, for_render=viewport is None)
         lamps = scene_lights.gather(*found, world, hair_receivers)
     # Without a GPU, frames of playback are drawn like still frames. Hair that is only moved by its object is handled
     # like hair made on the GPU, also once it is at rest.
@@ -200,9 +200,9 @@ def read_render(depsgraph, known, refused, noted, progress=no_progress):
     """
     unlit = read_unlit(depsgraph, known, refused, noted, part_of(progress, 0.0, 0.5))
     progress("Reading lights", 0.5)
-    world = light_door.read_world(depsgraph.scene_eval, depsgraph.view_layer_eval)
+    world = blender_lights.read_world(depsgraph.scene_eval, depsgraph.view_layer_eval)
     hair_receivers = _hair_receivers(unlit.hair, [owner[1::-1] for owner in unlit.owners])
-    lamps = scene_lights.gather(*light_door.read_lights(depsgraph, for_render=True), world, hair_receivers)
+    lamps = scene_lights.gather(*blender_lights.read_lights(depsgraph, for_render=True), world, hair_receivers)
     hair_seen, surfaces_seen = visibility(unlit)
     progress("Drawing shadows", 0.7)
     drawn = replace(unlit, world=world, hair_visibility=hair_seen, surface_visibility=surfaces_seen)
@@ -218,9 +218,9 @@ def read_unlit(depsgraph, known, refused, noted, progress=no_progress):
         found.append(one)
         progress("Reading hair", 0.6 * len(found) / count)
     progress("Reading surfaces", 0.6)
-    meshes = drawn_meshes.told_apart(drawn_meshes.read_drawn_meshes(depsgraph))
+    meshes = drawn_meshes.split_clear(drawn_meshes.read_drawn_meshes(depsgraph))
     if depsgraph.scene.vellus.is_hair_only:
-        meshes = drawn_meshes.held_out(meshes)
+        meshes = drawn_meshes.as_holdouts(meshes)
     hair, owners = [hair for hair, _owner in found], tuple(owner for _hair, owner in found)
     return replace(_EMPTY, hair=hair, owners=owners, **_upload(meshes, is_shaded=True, has_paths=True))
 

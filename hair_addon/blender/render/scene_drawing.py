@@ -111,7 +111,7 @@ def _shade_behind_hair(drawn, view, buffer, picture, is_transparent):
             if has_image:
                 world_texture.draw_background(drawn.world, view, *buffer.size)
             if has_over:
-                buffer.put_hair_first()
+                buffer.exclude_behind_hair()
                 _draw_over_surfaces(drawn, _nearer(view))
     else:
         buffer.fill(picture, background)

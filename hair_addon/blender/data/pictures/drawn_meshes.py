@@ -115,12 +115,12 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
     return [mesh for mesh in meshes if len(mesh.triangles)]
 
 
-def told_apart(meshes):
+def split_clear(meshes):
     """Split meshes into solid and clear parts, for drawing with materials; invisible parts are left out."""
     return [part for mesh in meshes for part in _solid_and_clear(mesh)]
 
 
-def held_out(meshes):
+def as_holdouts(meshes):
     """The meshes as holdouts, without clear meshes, which hide nothing."""
     return [replace(mesh, parts=None) for mesh in meshes if not mesh.is_clear]
 

@@ -104,7 +104,7 @@ def keep_rest(surface_object):
     is_new = not surface_object.add_rest_position_attribute
     if is_new:
         surface_object.add_rest_position_attribute = True
-    if rest_nodes.tell_apart(surface_object) or is_new:
+    if rest_nodes.separate_copies(surface_object) or is_new:
         # Blender reports this as a change of the mesh: update before hair exists that would react to it.
         bpy.context.view_layer.update()
     if rest_sources.keep(surface_object):

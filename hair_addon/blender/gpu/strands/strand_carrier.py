@@ -15,7 +15,7 @@ from ....core.kernels.checks import require_count, require_indices
 from .. import shaders
 from ..strand_textures import StrandsOnGPU, run_for_each
 from . import vertex_turner
-from .strand_changes import StrandChanges, declare_put, new_changes, rows_texture
+from .strand_changes import StrandChanges, declare_written, new_changes, rows_texture
 
 if TYPE_CHECKING:
     from ....core.geometry.vertex_turns import Turning
@@ -105,7 +105,7 @@ def _carry_program():
     info.local_group_size(_GROUP_SIZE)
     for slot, name in enumerate(("rest", "roots", "vertices")):
         info.sampler(slot, "FLOAT_2D", name)
-    declare_put(info, first_slot=0)
+    declare_written(info, first_slot=0)
     for name in ("strand_count", "point_count", "row_strands", "is_posed"):
         info.push_constant("INT", name)
     return shaders.compile_compute(info, "strands/carry_strands.comp")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ....core import geometry
 from .. import driver_textures
-from ..strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, keep_strands, numbers_texture, row_strands_of
+from ..strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, copy_strands, numbers_texture, row_strands_of
 from . import strand_bounds
 
 # Maximum number of points whose former positions are stored for motion vectors: 64 MiB.
@@ -32,7 +32,7 @@ class StrandChanges:
     def keep(self, strands: StrandsOnGPU) -> None:
         """Store the points of strands that a program is about to change."""
         if self.row_moved:
-            keep_strands(strands, self.moved, strands.strand_count, self.row_moved)
+            copy_strands(strands, self.moved, strands.strand_count, self.row_moved)
 
     def bind(self, program: gpu.types.GPUShader) -> None:
         """Bind the image `boxes` of a bound program."""
@@ -62,7 +62,7 @@ def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -
     return StrandChanges(empty_rows(1, 1, "RG32F")[0], 0, empty_rows(1, 1)[0], bounds)
 
 
-def declare_put(info: gpu.types.GPUShaderCreateInfo, first_slot: int) -> None:
+def declare_written(info: gpu.types.GPUShaderCreateInfo, first_slot: int) -> None:
     """Declare the images of shaders/strands/write_packed_strand.glsl, from an image slot on."""
     for slot, (name, texture_format) in enumerate((("strands", "RG32F"), ("boxes", "RGBA32F")), start=first_slot):
         info.image(slot, texture_format, "FLOAT_2D", name, qualifiers={"WRITE"})

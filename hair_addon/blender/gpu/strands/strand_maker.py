@@ -14,7 +14,7 @@ from ....core.interpolation.hair_binding import HairBinding
 from ....core.kernels.checks import require_count, require_indices
 from .. import shaders, uniforms
 from ..strand_textures import TEXTURE_WIDTH, StrandsOnGPU, row_strands_of, run_for_each
-from .strand_changes import StrandChanges, declare_put, empty_rows, new_changes, rows_texture
+from .strand_changes import StrandChanges, declare_written, empty_rows, new_changes, rows_texture
 
 _GROUP_SIZE = 64
 
@@ -202,7 +202,7 @@ def _strands_program(slot_count, is_plain):
     for name in ("first_strand", "some_count"):
         info.push_constant("INT", name)
     if not is_plain:
-        declare_put(info, first_slot=0)
+        declare_written(info, first_slot=0)
         return shaders.compile_compute(info, "strands/interpolate_strands.comp")
     info.image(0, "RGBA32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
     replaced = {"strands/write_packed_strand.glsl": "strands/write_plain_strand.glsl"}

@@ -47,11 +47,11 @@ class _Pass:
     record: np.ndarray  # uniforms.STYLING
     block: gpu.types.GPUUniformBuf
 
-    def put_masks(self, data: "StrandData") -> None:
-        """Upload the data of strands again; must be followed by `put_steps`."""
+    def upload_masks(self, data: "StrandData") -> None:
+        """Upload the data of strands again; must be followed by `upload_steps`."""
         self.known, self.record["row_known"], self.record["known_texels"] = _known(data)
 
-    def put_steps(self, program: Program) -> None:
+    def upload_steps(self, program: Program) -> None:
         """Upload the rows of a program."""
         _put_steps(self.record, program)
         self.block.update(uniforms.bytes_of(self.record))
@@ -134,8 +134,8 @@ class StyleMaker:
                 binding.limits.fading, binding.keep_length
             )
         for part, data, program in self._parts(styling):
-            part.put_masks(data)
-            part.put_steps(program)
+            part.upload_masks(data)
+            part.upload_steps(program)
         return replace(self, binding=binding, styling=styling, maker=maker, centre_maker=centre_maker)
 
     def _parts(self, styling):
@@ -156,8 +156,8 @@ class StyleMaker:
         masks = styling.data.masks.numpy(), self.styling.data.masks.numpy()
         for part, data, program in self._parts(styling):
             if not np.array_equal(*masks):
-                part.put_masks(data)
-            part.put_steps(program)
+                part.upload_masks(data)
+            part.upload_steps(program)
         self.styling = styling
         return True
 
@@ -304,7 +304,7 @@ def _styles_program(point_count, step_kinds):
     both = {"NO_RESTRICT", "READ", "WRITE"}  # centers are read from the image that other centers are written to
     for slot, name in enumerate(("plain_strands", "centres")):
         info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=both)
-    strand_changes.declare_put(info, first_slot=2)
+    strand_changes.declare_written(info, first_slot=2)
     for name in ("first_strand", "some_count"):
         info.push_constant("INT", name)
     constants = {"POINTS": point_count, **style_text.constants(), **{f"HAS_{name}": 1 for name in step_kinds}}
