@@ -2,6 +2,7 @@
 """blender --command vellus: the installed extension's command line, in a Blender without a window."""
 
 import json
+import re
 
 import bpy
 import numpy as np
@@ -76,3 +77,38 @@ def test_it_ends_as_it_should(vellus):
     # Debian's Blender is built without USD.
     refused = vellus("groom", HEAD, *SMALL, "--out", vellus.folder / "a.usdc")
     assert (refused.returncode, len(refused.stderr.splitlines())) in ((1, 1), (0, 0))
+
+
+# Frames 1 and 2, and the one after, are baked of an animation of five.
+BAKE = """
+import bpy
+scene = bpy.context.scene
+guides = next(o for o in scene.objects if o.type == "CURVES" and o.data.vellus.kind == "GUIDES")
+guides.data.vellus.simulates, guides.data.vellus.cache_folder = True, "//frames"
+scene.frame_start, scene.frame_end, scene.render.engine = 1, 2, "BLENDER_WORKBENCH"
+scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+scene.collection.objects.link(scene.camera)
+scene.render.filepath = "//f_"
+scene.render.resolution_x = scene.render.resolution_y = 16
+bpy.context.view_layer.objects.active = guides
+assert bpy.ops.vellus.bake_dynamics() == {"FINISHED"}
+scene.frame_end = 5
+bpy.ops.wm.save_mainfile()
+"""
+
+
+def test_another_engine_ends_before_a_frame_that_is_not_baked(vellus, desktop):
+    """With Blender's own engine and `-a`: frames before are written, the status is 1, one sentence says why."""
+    folder = vellus.folder / "unbaked"
+    folder.mkdir()
+    shot = folder / "shot.blend"
+    assert vellus("groom", HEAD, *SMALL, "--out", shot).returncode == 0
+    made = desktop.command("-b", shot, "--python-exit-code", 5, "--python-expr", BAKE, profile=vellus.folder)
+    assert made.returncode == 0, made.stderr
+    done = desktop.command("-b", shot, "-a", profile=vellus.folder)
+    said = [line for line in done.stderr.splitlines() if line.startswith("Vellus:")]
+    assert done.returncode == 1 and len(said) == 1, done.stderr
+    assert re.fullmatch(r'Vellus: Frame 4 of the guides ".+" is not baked: bake their dynamics first\.', said[0])
+    assert sorted(path.name for path in folder.glob("f_*.png")) == [f"f_{frame:04}.png" for frame in (1, 2, 3)]
+    baked = desktop.command("-b", shot, "-f", 3, profile=vellus.folder)
+    assert baked.returncode == 0 and "Vellus:" not in baked.stderr

@@ -30,6 +30,7 @@ from . import (
     simulated_hair,
     stale_marks,
     stored_guide_maps,
+    unbaked_renders,
     unlocked_renders,
     updates,
 )
@@ -283,6 +284,12 @@ def before_rendering(*_args):
 
 
 @persistent
+def before_rendered_frame(scene, *_args):
+    """Refuse a frame, or say so, whose baked hair another engine would render as it is combed."""
+    unbaked_renders.before_frame(scene)
+
+
+@persistent
 def before_saving(*_args):
     """Store in the file where its baked frames and surfaces are, so that they are found under another file name."""
     frame_folders.remember()
@@ -366,6 +373,7 @@ _HANDLERS = (
     (bpy.app.handlers.save_pre, before_saving),
     (bpy.app.handlers.render_init, before_reading),
     (bpy.app.handlers.render_init, before_rendering),
+    (bpy.app.handlers.render_pre, before_rendered_frame),
     (bpy.app.handlers.render_complete, after_render),
     (bpy.app.handlers.render_cancel, after_render),
     (bpy.app.handlers.undo_post, after_undo),

@@ -17,7 +17,7 @@ from ..render import hair_cache
 from ..render.frames import composite
 from ..render.viewport import region_pictures, viewport
 from ..settings import animated
-from . import dynamics_state, every_frame, moving_surfaces, reported, simulated_hair, unlocked_renders
+from . import dynamics_state, every_frame, moving_surfaces, refused_hair, reported, simulated_hair, unlocked_renders
 
 # Copies of Blender's data, and values computed from them. Undo and redo replace the data.
 COPIES = (
@@ -60,6 +60,7 @@ OTHERS = (
     every_frame.before_cache,
     unlocked_renders.noted_cache,
     composite.refused_cache,
+    refused_hair.noted_cache,
     frame_folders.folder_cache,
     followed_names.object_cache,
     guide_simulation.stiffness_cache,

@@ -6,8 +6,7 @@ import bpy
 from ..groom.foreign import particle_hair
 from ..groom.foreign.foreign_curves import is_foreign
 from ..groom.selection import guides_of, hair_of, parts_of, surface_of
-from ..live import unlocked_renders
-from ..render.frames import composite
+from ..live import refused_hair, unlocked_renders
 from ..settings.translations import CONTEXT, interface_text
 
 # In groups: length and shape, then number and place.
@@ -64,14 +63,14 @@ class VELLUS_MT_unlocked_render(bpy.types.Menu):
 
 
 class VELLUS_MT_refused_hair(bpy.types.Menu):
-    """What hair a render of surfaces and hair lacks, and why"""
+    """What hair a render lacks or shows as it is combed, and why"""
 
-    bl_label = "Hair Is Missing in This Render"
+    bl_label = "Hair Is Missing or as Combed in This Render"
     bl_idname = "VELLUS_MT_refused_hair"
     bl_translation_context = CONTEXT
 
     def draw(self, context):
-        told = composite.refusals(context.scene)
+        told = refused_hair.told_of(context.scene)
         for sentence in told[:_MOST_REFUSALS]:
             self.layout.label(text=sentence, icon="ERROR", translate=False)
         if len(told) > _MOST_REFUSALS:

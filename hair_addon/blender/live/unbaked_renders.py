@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Renders of other engines that lack baked frames: Blender would draw that hair as it is combed.
+
+Our engine refuses such a frame. Blender lets nobody stop another engine. Where it was started to render and has no
+window it is ended before that frame, with a sentence and status 1; in a window the sentence is said.
+"""
+
+import sys
+
+import bpy
+
+from ...core.errors import HairError
+from ..groom.dynamics import frame_folders
+from ..host import running, running_operators, scene_time
+from ..render.frames import composite
+from ..settings.translations import error_text
+from . import refused_hair
+
+_RENDERS = {"-a", "--render-anim", "-f", "--render-frame"}  # words of Blender's command line
+
+
+def before_frame(blender_scene):
+    """A frame is about to be rendered. Called in the render's thread, where there is a window."""
+    is_other = blender_scene.render.engine != "VELLUS" and not composite.is_on(blender_scene)
+    if not is_other or not (_is_by_command() or _is_animation()):
+        return
+    try:
+        frame_folders.require_baked([scene_time.frame_of(blender_scene)], blender_scene)
+    except HairError as error:
+        if running.has_window():
+            refused_hair.note(blender_scene, error)
+            return
+        print(f"Vellus: {error_text(error)}", file=sys.stderr, flush=True)
+        raise SystemExit(1) from error
+
+
+def _is_by_command():
+    """Whether Blender, and no Python with Blender in it, was started without a window to render."""
+    words = sys.argv[: sys.argv.index("--")] if "--" in sys.argv else sys.argv
+    return not running.has_window() and bool(bpy.app.binary_path) and not _RENDERS.isdisjoint(words)
+
+
+def _is_animation():
+    """Whether a window renders an animation: a still picture may be of a frame that is not baked."""
+    rendering = (one for one in running_operators.found() if one.bl_idname == "RENDER_OT_render")
+    return running.has_window() and any(one.properties.animation for one in rendering)
