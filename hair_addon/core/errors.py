@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one exception that is meant for the user's eyes, and what other exceptions say."""
+"""`HairError`, the exception that is shown to the user, and short descriptions of other exceptions."""
 
 import contextlib
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ class HairError(Exception):
 
 @contextlib.contextmanager
 def memory_as_sentence() -> Iterator[None]:
-    """Raise a `HairError` where memory is used up in a context, or in a function that this decorates."""
+    """Turn `MemoryError` into `HairError`, in a context or as a decorator."""
     try:
         yield
     except MemoryError as error:
@@ -26,12 +26,12 @@ def memory_as_sentence() -> Iterator[None]:
 
 
 def cause_of(error: Exception) -> str:
-    """Return a short description of an error of the system or of an operator."""
+    """Return a short description of a system error or an operator's error."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     lines = [line for line in str(error).splitlines() if line.strip()] or [type(error).__name__]
     if "Traceback" in lines[0]:
-        # For an operator in Python, Blender passes on the whole traceback, then the error and where it was called.
+        # For a Python operator, Blender reports the whole traceback, then the error and the location of the call.
         lines = [line for line in lines if not line.startswith("Location: ")][-1:]
     line = lines[0]
     return line.strip().removeprefix("Error: ").rstrip(".")

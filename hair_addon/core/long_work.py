@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Long operations as generators: steps on the caller's thread, and computations that may run on another one.
 
-A generator reads, yields a function of (progress) that computes, receives its result, writes, and returns what it
-created. `run_now` runs it at once, and a `Job` runs one computation in a thread. Kernels release the GIL, so the
-window is drawn meanwhile.
+A generator reads its input, yields a function `compute(progress)`, receives the function's result, writes it, and
+returns what it created. `run_now` runs a generator at once; a `Job` runs one computation in a thread. Kernels release
+the GIL, so the window is redrawn meanwhile.
 """
 
 import threading
@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from .errors import memory_as_sentence
 
-Progress = Callable[[str, float], None]  # told a step and the part of the work that is done
+Progress = Callable[[str, float], None]  # (step, completed fraction)
 Compute = Callable[[Progress], Any]
 T = TypeVar("T")
 Work = Generator[Compute, Any, T]
@@ -39,14 +39,14 @@ class Stage:
 
 
 def part_of(progress: Progress, first: float, last: float) -> Progress:
-    """Progress of a stage that makes up the part between `first` and `last` of the whole."""
+    """Return the progress callback of a stage that covers the fractions `first` to `last` of the whole."""
     return lambda step, part: progress(step, first + (last - first) * part)
 
 
 def run_now(work: Work[T], progress: Progress = no_progress) -> T:
-    """Run such a generator to its end; returns its result. progress: callback for each computation.
+    """Run a generator of this module to its end and return its result. progress: callback for each computation.
 
-    After an error, of a computation or of progress, it is closed: what it had begun is undone by then.
+    An error in a computation or in `progress` closes the generator, which undoes its changes.
     """
     try:
         with memory_as_sentence():
@@ -89,20 +89,20 @@ class Job:
         return not self._thread.is_alive()
 
     def stop(self) -> None:
-        """Ask the computation to end at its next step."""
+        """Request the computation to end at its next step."""
         self._is_stopped.set()
 
     @property
     def is_stopping(self) -> bool:
-        """Whether it was asked to end."""
+        """Whether `stop` was called."""
         return self._is_stopped.is_set()
 
     def wait(self) -> None:
-        """Return when the computation has ended, however it did."""
+        """Wait until the computation has ended, with or without an error."""
         self._thread.join()
 
     def result(self) -> Any:
-        """The result; waits for it. Re-raises exceptions of the computation, `Stopped` if it was stopped."""
+        """Wait for the result and return it. Re-raises the computation's exceptions; raises `Stopped` after `stop`."""
         self.wait()
         if self._error is not None:
             with memory_as_sentence():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Declaration of settings: default, range, unit and tooltip in a frozen `Settings` dataclass.
 
-Blender's properties, the panel's rows, the command line's options and the checks below all follow from it.
+Blender's properties, panel rows, command-line options and the checks below are derived from this declaration.
 """
 
 import math
@@ -24,42 +24,42 @@ class Param:
     description: str
     label: str = ""  # empty: the field's name in words
     low: float = -math.inf  # smallest allowed value
-    above: float = -math.inf  # largest forbidden value below the range, for settings such as a positive distance
+    above: float = -math.inf  # exclusive lower limit, for settings such as a positive distance
     high: float = math.inf
-    soft_high: float = math.inf  # where a slider ends; larger values may be typed
+    soft_high: float = math.inf  # upper end of the slider; larger values can be typed
     unit: str = "NONE"  # Blender's names: LENGTH, ROTATION
     subtype: str = "NONE"  # Blender's names: ANGLE, DISTANCE, FACTOR, COLOR
     precision: int = 3
     choices: tuple[tuple[str, str, str], ...] = ()  # (value, label, tooltip) of an enumeration
-    typical: float | None = None  # of a setting that is None, and follows from the surface, unless it is given
-    diameter: tuple[str, str] | None = None  # of a radius: property that shows it in mm, and its description
-    is_structural: bool = False  # changes which strands belong together: cannot be keyed, as strands would jump
+    typical: float | None = None  # typical value of a setting that is computed from the surface unless given
+    diameter: tuple[str, str] | None = None  # for a radius: property that shows the diameter in mm, its description
+    is_structural: bool = False  # changes the grouping of strands: not animatable, because strands would jump
 
 
 def param(default: Any, description: str, **details: Any) -> Any:
-    """A dataclass field that carries a `Param`; `details` are its other attributes."""
+    """Return a dataclass field with a `Param`; details: further attributes of the `Param`."""
     return field(default=default, metadata={"param": Param(description, **details)})
 
 
 def param_from_surface(typical: Any, description: str, **details: Any) -> Any:
-    """A dataclass field that is None unless given: core/grooming/groom_defaults.py then computes it from the surface.
+    """Return a dataclass field with default None, which core/grooming/groom_defaults.py computes from the surface.
 
-    typical: the value for a human head, of the type that the setting has.
+    typical: the value for a human head, in the setting's type.
     """
     return param(None, description, typical=typical, **details)
 
 
 def param_of(settings_class: type["Settings"], name: str, default: Any = None, **details: Any) -> Any:
-    """A dataclass field as another class declares it, its default too unless one is given; `details` replace its."""
+    """Return a copy of another class's field; default and details override the declared ones."""
     declaration = settings_class.__dataclass_fields__[name]
     metadata = {"param": replace(declaration.metadata["param"], **details)}
     return field(default=declaration.default if default is None else default, metadata=metadata)
 
 
 def declared(settings_class: type["Settings"]) -> list[tuple[str, Any, Param]]:
-    """[(name, default, Param)] of a `Settings` class, in the order of declaration.
+    """Return [(name, default, Param)] of a `Settings` class, in the order of declaration.
 
-    The default of a setting that follows from the surface is its typical value.
+    The default of a setting that is computed from the surface is its typical value.
     """
     return list(_declared(settings_class))
 
@@ -71,33 +71,33 @@ def _declared(settings_class):
 
 
 def from_surface(settings_class: type["Settings"]) -> tuple[str, ...]:
-    """Names of the settings of a class that are computed from the surface unless given."""
+    """Return the names of the settings that are computed from the surface unless given."""
     return tuple(name for name, _default, details in declared(settings_class) if details.typical is not None)
 
 
 def given(settings: "Settings") -> dict[str, Any]:
-    """{name: value} of `Settings`, without those to be computed from the surface."""
+    """Return {name: value} of `Settings`, without values to be computed from the surface."""
     values = {name: getattr(settings, name) for name, *_ in declared(type(settings))}
     return {name: value for name, value in values.items() if value is not None}
 
 
 def label_of(name: str, details: Param) -> str:
-    """The words an artist reads: the declared label, or the field's name."""
+    """Return the label in the interface: the declared one, or the field's name in words."""
     return details.label or name.replace("_", " ").capitalize()
 
 
 def unit_of(details: Param) -> str:
-    """The unit of a setting in a file or on a command line, empty where it has none."""
+    """Return the unit of a setting in files and on the command line, "" for none."""
     return {"ROTATION": "rad", "LENGTH": "m"}.get(details.unit, "")
 
 
 def is_text(value: str) -> bool:
-    """Whether a str can be a name or a path in Blender: valid UTF-8 without null characters."""
+    """Return whether a str is a valid name or path in Blender: valid UTF-8 without null characters."""
     return "\0" not in value and not any("\ud800" <= character <= "\udfff" for character in value)
 
 
 def like(default: Any, value: Any) -> Any:
-    """A value that JSON gave, as the type of a setting's default; raises TypeError or ValueError for another kind."""
+    """Convert a JSON value to the type of a setting's default. Raises TypeError or ValueError for another type."""
     if isinstance(default, tuple) and isinstance(value, list):
         return tuple(like(example, component) for example, component in zip(default, value, strict=True))
     if isinstance(default, float) and type(value) is int:
@@ -109,10 +109,10 @@ def like(default: Any, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Settings:
-    """Base of every stage's settings. Values become plain Python values of their defaults' types.
+    """Base class of each stage's settings. Values are converted to plain Python values of their defaults' types.
 
-    Whole floats, NumPy's numbers, and any sequence for a tuple are taken. Raises `HairError` for a value of another
-    type or outside its range.
+    Accepts integral floats for int, NumPy scalars, and any sequence for a tuple. Raises `HairError` for a value of
+    another type or outside its range.
     """
 
     def __post_init__(self) -> None:
@@ -125,7 +125,7 @@ class Settings:
 
 
 def require_class(value: object, settings_class: type, name: str) -> None:
-    """Raise `HairError` unless a value is of a class of settings; name: of the argument that it was given as."""
+    """Raise `HairError` unless a value is an instance of a settings class; name: of the argument."""
     if not isinstance(value, settings_class):
         module = settings_class.__module__.rpartition(".")[2]
         raise HairError(f"{name} must be {module}.{settings_class.__name__}, not {described(value)}.")
@@ -143,16 +143,16 @@ def described(value: object) -> str:
 
 
 def array_of(given: Any, dtype: type | None = None) -> np.ndarray | None:
-    """Return a script's values as an array; None for what NumPy cannot take as one."""
+    """Return a script's values as an array; None if NumPy cannot convert them."""
     try:
-        with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
+        with np.errstate(over="ignore"):  # values beyond single precision become infinite
             return np.asarray(given, dtype)
-    except (TypeError, ValueError, OverflowError, RuntimeError):  # rows of several lengths; tensors with gradients
+    except (TypeError, ValueError, OverflowError, RuntimeError):  # ragged rows; tensors with gradients
         return None
 
 
 def plain_value(label: str, value: Any, default: Any, details: Param) -> Any:
-    """A value as the type of a setting's default, within its range. Raises `HairError`."""
+    """Convert a value to the type of a setting's default and check its range. Raises `HairError`."""
     if isinstance(default, str):
         return _plain_text(label, value, details)
     if isinstance(default, bool):
@@ -168,10 +168,10 @@ def plain_value(label: str, value: Any, default: Any, details: Param) -> Any:
 
 
 def _length(value):
-    """Of any sequence but text; None for other values."""
+    """Return the length of a sequence that is not text; None for other values."""
     if not hasattr(value, "__len__") or isinstance(value, str | bytes | Mapping | Set):
         return None
-    if isinstance(value, np.ndarray) and value.ndim == 0:  # has the method, and no length
+    if isinstance(value, np.ndarray) and value.ndim == 0:  # its `__len__` raises
         return None
     return len(value)
 
@@ -195,14 +195,14 @@ def _plain_number(label, value, is_whole, details):
     number = _as_float(value)
     if is_whole and not number.is_integer() and abs(number) != math.inf:
         raise HairError(f"{label} must be a whole number, not {number:g}.")
-    # Written so that NaN fails too: every comparison with it is false.
+    # NaN fails as well: every comparison with NaN is false.
     if not (math.isfinite(number) and details.low <= number <= details.high and number > details.above):
         raise HairError(f"{label} must be {_range(details)}, not {number:g}.")
     return round(value) if is_whole else number
 
 
 def _as_float(number):
-    """Any real number as a float; infinity where it is too large for one."""
+    """Convert a real number to float; infinity if it is too large."""
     try:
         return float(number)
     except OverflowError:

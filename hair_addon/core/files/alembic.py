@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""[Alembic26] archives in Ogawa: objects with properties, of which some have a sample for each time.
+"""Writer of [Alembic26] archives in Ogawa: objects with properties, some of which have a sample for each time.
 
-An archive is written from its leaves: samples, then the properties that have them, the compounds that hold these, the
-objects, and in the end the archive.
+An archive is written bottom-up: samples, then their properties, the compounds of these, the objects, and finally the
+archive.
 
     archive   version of this layout, version of the library, root object, metadata, time samplings, table of metadata
     object    its properties (a compound), its child objects, their headers and two digests
     compound  its properties, their headers
     array     for each sample its content and its dimensions; a scalar has only the content
 
-Headers are bits that say which type a property has and how many samples; `_property_header` packs them.
+A header packs a property's type and number of samples in bits, see `_property_header`.
 """
 
 import struct
@@ -34,18 +34,18 @@ TYPES = {
 }
 
 _LAYOUT_VERSION = 0
-_LIBRARY_VERSION = 10700  # whose files these are like: 1.7.0
-_MOST_INDEXED = 254  # entries of the table of metadata; others are written in full
+_LIBRARY_VERSION = 10700  # Alembic 1.7.0, whose layout is written
+_MOST_INDEXED = 254  # entries of the metadata table; further metadata is written in full
 
 Metadata = Mapping[str, str]
 
 
 @dataclass
 class Property:
-    """A property: its header's fields, and the addresses of its samples; of a compound, its own.
+    """A property: the fields of its header, and the addresses of its samples, or a compound's own address.
 
-    type and extent: of an element, such as float32 and 3 for points; "" for a compound. A new one of several samples
-    takes them from `AlembicWriter.add_sample`.
+    type and extent: of an element, such as float32 and 3 for points; type "" for a compound. `AlembicWriter.add_sample`
+    adds samples to a new property.
     """
 
     name: str
@@ -53,16 +53,16 @@ class Property:
     extent: int
     metadata: str
     is_array: bool = False
-    sampling: int = 0  # index of its times
+    sampling: int = 0  # index of its time sampling
     addresses: list[int] = field(default_factory=list)
-    sizes: list[int] = field(default_factory=list)  # elements of each sample
+    sizes: list[int] = field(default_factory=list)  # number of elements of each sample
     digest: bytes = b""
     group: int | None = None
 
 
 @dataclass(frozen=True)
 class Object:
-    """An object whose group is written."""
+    """An object whose group has been written."""
 
     name: str
     metadata: str
@@ -73,75 +73,76 @@ class Object:
 class AlembicWriter:
     """Writes an archive to an empty, seekable file.
 
-    application: the program that it names; frame_rate: frames a second of its scene, None if there are none.
+    application: name of the writing program; frame_rate: of the scene [1/s], None for none.
 
-    Methods raise OSError where the disk is full.
+    Methods raise OSError if the disk is full.
     """
 
     def __init__(self, file: BinaryIO, application: str, frame_rate: float | None = None) -> None:
         self._container = ogawa.OgawaWriter(file)
         rate = "" if frame_rate is None else f"{frame_rate:.6f}"
         self._metadata = {"_ai_Application": application, "FramesPerTimeUnit": rate}
-        self._indices = {"": 0}  # of the table of metadata
+        self._indices = {"": 0}  # of the metadata table
         self._samplings = [(1.0, 0.0)]  # (seconds between samples, time of the first [s])
-        self._most_samples = [0]  # of each sampling
+        self._most_samples = [0]  # largest number of samples of each sampling
 
     def add_sampling(self, step: float, first: float) -> int:
-        """Add times [s], a sample each step from the first on; returns their index."""
+        """Add a uniform time sampling with a step and a first time [s]; returns its index."""
         self._samplings.append((step, first))
         self._most_samples.append(0)
         return len(self._samplings) - 1
 
     def scalar(self, name: str, type: str, value: ArrayLike, metadata: Metadata | None = None) -> Property:
-        """Write a property of one value: a number or a sequence of numbers."""
+        """Write a scalar property of one sample: a number or a sequence of numbers."""
         elements = np.atleast_1d(np.asarray(value, TYPES[type][2]))
-        made = Property(name, type, len(elements), serialized(metadata))
-        self.add_sample(made, [elements])
-        return made
+        result = Property(name, type, len(elements), serialized(metadata))
+        self.add_sample(result, [elements])
+        return result
 
     def array(self, name: str, type: str, values: ArrayLike, metadata: Metadata | None = None) -> Property:
         """Write an array property of one sample: (N,) or (N, extent) numbers."""
         elements = np.asarray(values, TYPES[type][2])
-        made = Property(name, type, 1 if elements.ndim == 1 else elements.shape[1], serialized(metadata), is_array=True)
-        self.add_sample(made, [elements])
-        return made
+        extent = 1 if elements.ndim == 1 else elements.shape[1]
+        result = Property(name, type, extent, serialized(metadata), is_array=True)
+        self.add_sample(result, [elements])
+        return result
 
     def strings(self, name: str, texts: Sequence[str], metadata: Metadata | None = None) -> Property:
-        """Write an array property of one sample of str, which have no null characters."""
-        made = Property(name, "string", 1, serialized(metadata), is_array=True)
-        self.add_sample(made, [_encoded(texts)], len(texts))
-        return made
+        """Write an array property of one sample of str without null characters."""
+        result = Property(name, "string", 1, serialized(metadata), is_array=True)
+        self.add_sample(result, [_encoded(texts)], len(texts))
+        return result
 
     def add_sample(self, target: Property, parts: Iterable[ogawa.Data], count: int | None = None) -> None:
-        """Write the next sample of a property: the bytes of its elements, in parts; count: of strings."""
+        """Write the next sample of a property: the bytes of its elements, in parts; count: number of strings."""
         address, size, digest = self._container.sample(_bytes(parts))
         target.addresses.append(address)
         if target.type != "string":
             count = size // (target.extent * np.dtype(TYPES[target.type][2]).itemsize)
         target.sizes.append(1 if count is None else count)
         if target.is_array:
-            # Of numbers readers know it from the size of the content.
+            # Readers derive numeric counts from the sample size.
             dimensions = struct.pack("<Q", target.sizes[-1]) if target.type == "string" else b""
             target.addresses.append(self._container.data(dimensions))
         target.digest = ogawa.digest_of(target.digest, digest)
         self._most_samples[target.sampling] = max(self._most_samples[target.sampling], len(target.sizes))
 
     def compound(self, name: str, properties: Sequence[Property], metadata: Metadata | None = None) -> Property:
-        """Write a property that holds others, which get no more samples."""
-        made = Property(name, "", 0, serialized(metadata))
-        made.group, made.digest = self._write_properties(properties)
-        return made
+        """Write a compound of properties whose samples are complete."""
+        result = Property(name, "", 0, serialized(metadata))
+        result.group, result.digest = self._write_properties(properties)
+        return result
 
     def object(
         self, name: str, metadata: Metadata, properties: Sequence[Property], children: Sequence[Object] = ()
     ) -> Object:
-        """Write an object; names of properties, and of children, have to differ."""
+        """Write an object; names of properties, and of children, must be unique."""
         written = serialized(metadata)
         group, digest = self._write_object(properties, children)
         return Object(name, written, group, ogawa.digest_of(digest, written.encode(), name.encode()))
 
     def close(self, children: Sequence[Object]) -> None:
-        """Write the archive around its topmost objects."""
+        """Finish the archive with its top-level objects."""
         root, _digest = self._write_object([], children)
         version = f"Alembic {_LIBRARY_VERSION // 10000}.{_LIBRARY_VERSION // 100 % 100}.{_LIBRARY_VERSION % 100}"
         metadata = serialized({"_ai_AlembicVersion": version, **self._metadata})
@@ -164,7 +165,7 @@ class AlembicWriter:
             yield bytes([len(text.encode())]) + text.encode()
 
     def _write_object(self, properties, children):
-        """(group, digest) of an object's properties and children."""
+        """Write an object's properties and children; returns (group, digest)."""
         own, own_digest = self._write_properties(properties)
         headers = b"".join(self._object_header(child) for child in children)
         of_children = ogawa.digest_of(*(child.digest for child in children)) if children else bytes(ogawa.DIGEST_SIZE)
@@ -173,7 +174,7 @@ class AlembicWriter:
         return group, ogawa.digest_of(of_children, own_digest)
 
     def _write_properties(self, properties):
-        """(group, digest) of a compound."""
+        """Write a compound; returns (group, digest)."""
         groups = [p.group if p.group is not None else self._container.group(p.addresses) for p in properties]
         headers = [_property_header(p, self._index(p.metadata)) for p in properties]
         children = [*groups, self._container.data(b"".join(headers))] if properties else []
@@ -186,18 +187,18 @@ class AlembicWriter:
         return struct.pack("<I", len(name)) + name + bytes([index]) + in_full
 
     def _index(self, metadata):
-        """The place of metadata in the table, 0xff for what is written in full."""
+        """Return the index of metadata in the table, 0xff if it is written in full."""
         if len(metadata.encode()) > 0xFF or (metadata not in self._indices and len(self._indices) > _MOST_INDEXED):
             return 0xFF
         return self._indices.setdefault(metadata, len(self._indices))
 
 
 def _property_header(header, index):
-    """The bytes of a property's header.
+    """Return the bytes of a property's header.
 
     Bits 0 and 1: 0 compound, 1 scalar, 2 array, 3 array with one element in each sample; 2 and 3: bytes of the numbers
-    below, 1, 2 or 4; 4 to 7: type; 8: has times of its own; 10: as many elements in every sample; 11: one sample only;
-    12 to 19: extent; 20 to 27: place of the metadata in the table.
+    below, 1, 2 or 4; 4 to 7: type; 8: has its own time sampling; 10: same number of elements in every sample; 11: one
+    sample only; 12 to 19: extent; 20 to 27: index of the metadata in the table.
     """
     name, metadata, count = header.name.encode(), header.metadata.encode(), len(header.sizes)
     largest = max(len(name), len(metadata), count, header.sampling)
@@ -216,12 +217,12 @@ def _property_header(header, index):
 
 
 def serialized(metadata: Metadata | None) -> str:
-    """Return metadata as the file has it: key=value, in order, with semicolons between; empty values are left out."""
+    """Return metadata in the file's form: sorted key=value pairs with semicolons between; empty values are omitted."""
     return ";".join(f"{key}={value}" for key, value in sorted((metadata or {}).items()) if value)
 
 
 def _encoded(texts):
-    """The bytes of str, which each end with a null."""
+    """Return the bytes of null-terminated strings."""
     return b"".join(text.encode() + b"\0" for text in texts)
 
 

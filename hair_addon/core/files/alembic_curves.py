@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transforms and curves as AbcGeom of [Alembic26] has them: objects of its schemas, and geometry parameters."""
+"""Writer of transforms and curves in the AbcGeom schemas of [Alembic26], with geometry parameters."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from . import ogawa
 from .alembic import TYPES, AlembicWriter, Object, Property, serialized
 
-# How many values a parameter has: one, one for each curve, one for each point.
+# Number of values of a parameter: one, one for each curve, one for each point.
 SCOPES = {"constant": "con", "uniform": "uni", "vertex": "vtx"}
 
 _CURVES = {"schema": "AbcGeom_Curve_v2", "schemaBaseType": "AbcGeom_GeomBase_v1"}
@@ -22,7 +22,7 @@ _LINEAR = (1, 0, 0, 0)  # type, periodicity, and twice the basis
 class Parameter:
     """A geometry parameter, with its values in parts: arrays of (n,) or (n, extent) numbers, or lists of str.
 
-    meaning: of vectors, as in metadata: vector, point, rgb.
+    meaning: interpretation of vectors, as in metadata: vector, point, rgb.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Parameter:
 
 @dataclass
 class Curves:
-    """Polylines that are being written: `CurvesWriter.add` made them, `CurvesWriter.write_points` gives them points."""
+    """Polylines that are being written: `CurvesWriter.add` returns them, `CurvesWriter.write_points` adds points."""
 
     name: str
     properties: list[Property]
@@ -46,16 +46,16 @@ class Curves:
 
 
 class CurvesWriter:
-    """Writes curves and transforms to an `AlembicWriter`; sampling: index of the times of points, 0 for a file of one.
+    """Writes curves and transforms to an `AlembicWriter`; sampling: index of the points' time sampling, 0 for static.
 
-    An object takes the samples of its points from `write_points`, one for each time, before `close`.
+    Call `write_points` once for each time, then `close`.
     """
 
     def __init__(self, archive: AlembicWriter, sampling: int = 0) -> None:
         self._archive, self._sampling = archive, sampling
 
     def add(self, name: str, counts: np.ndarray, widths: Parameter | None, parameters: Iterable[Parameter]) -> Curves:
-        """Write all of some polylines but their points; counts: (S,) points of each."""
+        """Write everything but the points of polylines; counts: (S,) points of each."""
         archive = self._archive
         properties = [
             archive.array("nVertices", "int32", counts),
@@ -69,13 +69,13 @@ class CurvesWriter:
         return Curves(name, properties, points, bounds, [self._parameter(one) for one in parameters])
 
     def write_points(self, curves: Curves, parts: Iterable[np.ndarray]) -> None:
-        """Write the points at the next time: arrays of (n, 3) numbers, of all curves one after another."""
+        """Write the points at the next time: arrays of (n, 3) numbers, concatenated over all curves."""
         bounds = np.array([np.full(3, np.inf), np.full(3, -np.inf)])
         self._archive.add_sample(curves.points, _measured(parts, bounds))
         self._archive.add_sample(curves.bounds, [bounds])
 
     def close(self, curves: Curves) -> Object:
-        """Write the object of curves whose points are written."""
+        """Write the object of curves whose points are complete."""
         archive = self._archive
         parameters = [archive.compound(".arbGeomParams", curves.parameters)] if curves.parameters else []
         every = [curves.bounds, curves.points, *curves.properties, *parameters]
@@ -83,7 +83,7 @@ class CurvesWriter:
         return archive.object(curves.name, _object_metadata(_CURVES, ".geom"), [schema])
 
     def transform(self, name: str, children: Sequence[Object], parameters: Iterable[Parameter] = ()) -> Object:
-        """Write a transform that leaves its children where they are."""
+        """Write an identity transform with children."""
         archive = self._archive
         written = [self._parameter(one) for one in parameters]
         properties = [archive.scalar(".inherits", "bool", True)]
@@ -92,7 +92,7 @@ class CurvesWriter:
         return archive.object(name, _object_metadata(_TRANSFORM, ".xform"), [schema], children)
 
     def _parameter(self, parameter):
-        """The property of a geometry parameter."""
+        """Write a geometry parameter; returns its property."""
         metadata = {
             "isGeomParam": "true",
             "geoScope": SCOPES[parameter.scope],
@@ -104,14 +104,14 @@ class CurvesWriter:
         if parameter.type == "string":
             (texts,) = parameter.parts
             return self._archive.strings(parameter.name, texts, metadata)
-        made = Property(parameter.name, parameter.type, parameter.extent, serialized(metadata), is_array=True)
+        result = Property(parameter.name, parameter.type, parameter.extent, serialized(metadata), is_array=True)
         kind = TYPES[parameter.type][2]
-        self._archive.add_sample(made, (np.ascontiguousarray(part, kind) for part in parameter.parts))
-        return made
+        self._archive.add_sample(result, (np.ascontiguousarray(part, kind) for part in parameter.parts))
+        return result
 
 
 def _measured(parts, bounds) -> Iterator[ogawa.Data]:
-    """Points in parts as the file has them; bounds: (2, 3) float64 that grow around them."""
+    """Yield points in parts as float32; bounds: (2, 3) float64, which are grown to include them."""
     for part in parts:
         points = np.ascontiguousarray(part, np.float32)
         if len(points):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of [Alembic26] files as a `CurveFile`: where transforms put them, and what grooms say of them [UnrealGroom26].
+"""Curves of [Alembic26] files as a `CurveFile`, with their transforms and the groom attributes of [UnrealGroom26].
 
-Files have no unit and no axis. Those of Vellus are in centimetres with Z up; programs are known by what they usually
-write.
+Alembic files have no unit and no up axis. Files of Vellus are in centimetres with Z up; for other programs their
+default convention is assumed.
 """
 
 from collections import Counter
@@ -19,7 +19,7 @@ from .alembic_reader import Archive, Damaged, Property
 from .curve_file import Convention, CurveFile, CurveSet, Motion
 from .groom_curves import GUIDE_SLOTS
 
-# What programs write by default, by the beginning of their names; Y is up in all of them.
+# Default convention of programs, by the beginning of their names; all have Y up.
 _OF_BLENDER = Convention(1.0, "Y")
 _USUAL = {"Houdini": Convention(1.0, "Y")}
 _OF_OTHERS = Convention(0.01, "Y")
@@ -29,9 +29,7 @@ _MOST_OBJECTS = 1_000_000
 
 @dataclass(frozen=True)
 class _Node:
-    """An object of curves: its path, its schema's properties, and the schemas' properties of the transforms that it is
-    in, by the number of objects above.
-    """
+    """An object of curves: its path, the properties of its schema, and those of its parent transforms, by depth."""
 
     path: tuple[str, ...]
     properties: Mapping[str, Property]
@@ -39,11 +37,8 @@ class _Node:
 
 
 def read(path: Path) -> CurveFile:
-    """The curves of an Alembic file. Raises `HairError`.
-
-    Curves that move stand where they are in the file's first sample of them.
-    """
-    with _told(path), Archive(path) as archive:
+    """Read the curves of an Alembic file, animated curves at their first sample. Raises `HairError`."""
+    with _damage_as_error(path), Archive(path) as archive:
         nodes = _nodes(archive.top())
         application = archive.metadata.get("_ai_Application", "")
         notes: list[HairError] = []
@@ -54,9 +49,9 @@ def read(path: Path) -> CurveFile:
 
 
 @contextmanager
-def _told(path) -> Iterator[None]:
+def _damage_as_error(path) -> Iterator[None]:
     try:
-        # Curves of non-finite points are left out where they are used, with a sentence.
+        # Curves with non-finite points are reported and skipped by the code that uses them.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             yield
     except (Damaged, OSError, MemoryError) as error:
@@ -77,7 +72,7 @@ def _usual(application):
 
 
 def _nodes(top) -> list[_Node]:
-    """All objects of curves; instances have those of what they show."""
+    """Return all objects of curves; instances repeat the objects of their sources."""
     found, instances, pending, count = [], [], [(top, {})], 0
     while pending:
         one, transforms = pending.pop()
@@ -94,22 +89,22 @@ def _nodes(top) -> list[_Node]:
         if schema.startswith("AbcGeom_Curve") and ".geom" in properties:
             found.append(_Node(one.path, properties[".geom"].children, transforms))
         pending += [(child, transforms) for child in reversed([*one.children()])]
-    made = [*found]
+    expanded = [*found]
     for path, transforms, source in instances:
         for node in found:
             if node.path[: len(source)] == source:
-                # Transforms that the source stands in do not move its instances.
+                # The parent transforms of the source do not apply to its instances.
                 below = {
                     depth + len(path) - len(source): t for depth, t in node.transforms.items() if depth >= len(source)
                 }
-                made.append(_Node((*path, *node.path[len(source) :]), node.properties, {**transforms, **below}))
-                if len(made) > _MOST_OBJECTS:
+                expanded.append(_Node((*path, *node.path[len(source) :]), node.properties, {**transforms, **below}))
+                if len(expanded) > _MOST_OBJECTS:
                     raise Damaged
-    return made
+    return expanded
 
 
 def _names(nodes):
-    """Names by which people choose: of the transform that has these curves alone, else of the curves; or paths."""
+    """Return unique names: the transform's if the curves are its only child, else the curves'; paths for duplicates."""
     siblings = Counter(node.path[:-1] for node in nodes)
     own = [node.path[-2] if len(node.path) > 1 and siblings[node.path[:-1]] == 1 else node.path[-1] for node in nodes]
     counts = Counter(own)
@@ -120,11 +115,11 @@ def _names(nodes):
 
 
 def _sets_of(archive, node, name, application, notes) -> Iterator[CurveSet]:
-    """The `CurveSet` of an object; none where it has no curves. What people are to know is added to notes."""
+    """Yield the `CurveSet`s of an object, none if it has no curves; appends warnings to notes."""
     stack = [node.transforms[depth] for depth in sorted(node.transforms)]
     shape = alembic_shapes.Shape(archive, node.properties, is_of_blender=application == "Blender")
     drawn = shape.drawn()
-    for sentence, count in drawn.said:
+    for sentence, count in drawn.notes:
         notes.append(HairError(sentence, name=name, path=archive.path, count=count))
     if not len(drawn.counts):
         return
@@ -135,16 +130,16 @@ def _sets_of(archive, node, name, application, notes) -> Iterator[CurveSet]:
     radii = None if drawn.widths is None else (0.5 * scale * drawn.widths).astype(np.float32)
 
     def points_at(index):
-        with _told(archive.path), Archive(archive.path) as again:
-            placed = alembic_transforms.matrix_at(again, stack, float(times[index]))
-            return _placed(shape.points_at(again, float(times[index]), drawn), placed)
+        with _damage_as_error(archive.path), Archive(archive.path) as reopened:
+            placed = alembic_transforms.matrix_at(reopened, stack, float(times[index]))
+            return _placed(shape.points_at(reopened, float(times[index]), drawn), placed)
 
     motion = Motion(times, points_at) if len(times) > 1 else None
     if motion is not None and not shape.keeps_counts:
         motion = None
-        sentence = '"{name}" in {path} has other numbers of points at other times: only its first sample is read.'
+        sentence = '"{name}" in {path} changes its number of points over time: only its first sample is read.'
         notes.append(HairError(sentence, name=name, path=archive.path))
-    made = CurveSet(
+    curves = CurveSet(
         name,
         _placed(drawn.points, matrix),
         drawn.counts,
@@ -152,15 +147,15 @@ def _sets_of(archive, node, name, application, notes) -> Iterator[CurveSet]:
         radii,
         motion=motion,
     )
-    yield from _told_apart(made, _Said(archive, node, stack), drawn.kept)
+    yield from _split_by_group(curves, _Parameters(archive, node, stack), drawn.kept)
 
 
 def _placed(points, matrix):
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-class _Said:
-    """What parameters of curves, of their transforms and of what those are in say of them; the nearest counts."""
+class _Parameters:
+    """Geometry parameters of curves and of their parent transforms; the nearest one takes precedence."""
 
     def __init__(self, archive, node, stack):
         self._archive, self._places = archive, []
@@ -170,7 +165,7 @@ class _Said:
                     self._places.append(properties[name].children)
 
     def values(self, name, kind, width=1):
-        """(n,) or (n, width) values of a parameter, None where there is none of this kind: "iu", "f" or text, ""."""
+        """Return (n,) or (n, width) values of a parameter, None if missing or of another kind: "iu", "f", "" (text)."""
         for place in self._places:
             if name not in place:
                 continue
@@ -183,25 +178,25 @@ class _Said:
         return None
 
 
-def _told_apart(curves, said, kept) -> Iterator[CurveSet]:
-    """The curves with all that is said of them, a set for guides and for strands, and for each group.
+def _split_by_group(curves, parameters, kept) -> Iterator[CurveSet]:
+    """Yield the curves with their parameters: one set for each group, separately for guides and strands.
 
-    kept: (C,) which of the file's curves, of which it may say something, these are.
+    kept: (C,) mask of these curves among those of the file, for which parameters have values.
     """
     file_count = len(kept)
 
     def of_curves(name, kind, width=1):
-        values = said.values(name, kind, width)
+        values = parameters.values(name, kind, width)
         return None if values is None or len(values) != file_count else values[kept]
 
     def of_all(name):
         """(C,) int64, or None."""
-        values = said.values(name, "iu")
+        values = parameters.values(name, "iu")
         if values is None or len(values) not in (1, file_count):
             return None
         return np.broadcast_to(values.astype(np.int64), file_count)[kept]
 
-    is_guide, groups, names = of_all("groom_guide"), of_all("groom_group_id"), said.values("groom_group_name", "")
+    is_guide, groups, names = of_all("groom_guide"), of_all("groom_group_id"), parameters.values("groom_group_name", "")
     ids, uvs = of_curves("groom_id", "iu"), of_curves("groom_root_uv", "f", 2)
     guide_ids, weights = (
         of_curves("groom_closest_guides", "iu", GUIDE_SLOTS),

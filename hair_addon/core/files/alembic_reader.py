@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading of [Alembic26] archives in Ogawa that anybody may have made; alembic.py and ogawa.py say what is where.
+"""Reader of untrusted [Alembic26] archives in Ogawa; alembic.py and ogawa.py document the layout.
 
-Every position, size and count is checked before anything is read by it, and each object and property is visited once:
-reading takes memory and time by the size of the file. What is damaged raises `Damaged`.
+Every position, size and count is checked before it is used, and each object and property is visited once: memory and
+time are bounded by the size of the file. Damaged data raises `Damaged`.
 """
 
 import os
@@ -38,26 +38,26 @@ _KINDS: Mapping[int, str | None] = {
 _DATA = 1 << 63
 _DIGEST = 16  # [bytes] before the content of a sample
 _HEADER_SIZE = 16
-_ACYCLIC = float(np.finfo(np.float64).max) / 32.0  # the length of a cycle of times that do not repeat
-_MOST_DEPTH = 200  # objects in objects, compounds in compounds
-_READ_ANEW = 64  # how often the content of a file is read: samples may be shared, but not to fill the memory
+_ACYCLIC = float(np.finfo(np.float64).max) / 32.0  # the cycle length that marks acyclic times
+_MOST_DEPTH = 200  # nesting of objects and of compounds
+_READ_ANEW = 64  # limit of bytes read, in file sizes: samples may be shared, but must not fill the memory
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 class Damaged(ValueError):
-    """What a file has is not what the format allows."""
+    """A file's content violates the format."""
 
 
 @dataclass(frozen=True)
 class Times:
-    """Times of samples [s]: those of a cycle, which repeats each step."""
+    """Times of samples [s]: a cycle of times that repeats after each step."""
 
     step: float
     cycle: tuple[float, ...]
 
     def at(self, indices: Sequence[int]) -> np.ndarray:
-        """(n,) of samples."""
+        """Return the times (n,) of samples."""
         count, found = len(self.cycle), []
         for index in indices:
             if self.step >= _ACYCLIC:
@@ -69,10 +69,10 @@ class Times:
 
 @dataclass(frozen=True)
 class Property:
-    """A property: of a compound its children; of others the values of samples, which `Archive.values` reads.
+    """A property: the children of a compound, or samples, whose values `Archive.values` reads.
 
     kind: NumPy's type, None for strings; extent: numbers in an element; addresses: (n,) of the contents of samples that
-    differ from the one before, and times of these [s].
+    differ from the previous one; times: of these [s].
     """
 
     name: str
@@ -86,7 +86,7 @@ class Property:
 
 @dataclass(frozen=True)
 class Object:
-    """An object of an archive, with the names of those that it is in, from the top."""
+    """An object of an archive; path: names from the top-level object to this one."""
 
     archive: "Archive" = field(repr=False)
     path: tuple[str, ...]
@@ -95,16 +95,16 @@ class Object:
 
     @cached_property
     def properties(self) -> Mapping[str, Property]:
-        """By name."""
+        """The object's properties by name."""
         return self.archive.compound(self.group[0]) if len(self.group) > 1 else {}
 
     def children(self) -> Iterator["Object"]:
-        """The objects in it; once."""
+        """Yield the child objects; may be called once."""
         yield from self.archive.children(self)
 
 
 class Archive:
-    """An archive, open for reading: a context. Raises `HairError` for what is no archive, and `Damaged`."""
+    """An archive that is open for reading: a context manager. Raises `HairError` if it is no archive, and `Damaged`."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -123,11 +123,11 @@ class Archive:
         self._file.close()
 
     def top(self) -> Object:
-        """The object that holds all others. Called first."""
+        """Return the root object. Must be called first."""
         header = self._bytes(0, min(_HEADER_SIZE, self._size))
         if header.startswith(_HDF5):
             raise HairError(
-                "{path} is an Alembic file of the old kind, HDF5: convert it to Ogawa, with abcconvert -toOgawa.",
+                "{path} is an Alembic file in the old HDF5 format: convert it to Ogawa with abcconvert -toOgawa.",
                 path=self.path,
             )
         if not header.startswith(b"Ogawa") or len(header) < _HEADER_SIZE:
@@ -143,7 +143,7 @@ class Archive:
         return Object(self, (), {}, self._visit(root[2]))
 
     def children(self, parent: Object) -> Iterator[Object]:
-        """The objects in another."""
+        """Yield the child objects of an object."""
         group = parent.group
         if len(group) < 3:
             return
@@ -158,7 +158,7 @@ class Archive:
             yield Object(self, (*parent.path, name), metadata, self._visit(address))
 
     def compound(self, address: int, depth: int = 0) -> dict[str, Property]:
-        """The properties of a compound, by name."""
+        """Return the properties of a compound by name."""
         if depth > _MOST_DEPTH:
             raise Damaged
         group = self._visit(address)
@@ -166,12 +166,12 @@ class Archive:
             return {}
         headers, found = _Bytes(self._content(group[-1])), {}
         for child in group[:-1]:
-            made = self._property(headers, child, depth)
-            found[made.name] = made
+            entry = self._property(headers, child, depth)
+            found[entry.name] = entry
         return found
 
     def values(self, target: Property, sample: int = 0) -> Any:
-        """The elements of a property's n-th address: (n,) or (n, extent) numbers, or a list of str."""
+        """Return the elements at a property's n-th address: (n,) or (n, extent) numbers, or a list of str."""
         if not target.addresses:
             raise Damaged
         content = self._content(target.addresses[min(sample, len(target.addresses) - 1)])
@@ -186,14 +186,14 @@ class Archive:
         return elements if target.extent == 1 else elements.reshape(-1, target.extent)
 
     def require_there(self, properties: Mapping[str, Property]) -> None:
-        """Raise `Damaged` unless all samples of properties, and of those in them, are in the file."""
+        """Raise `Damaged` unless all samples of properties and of their children are within the file."""
         for one in properties.values():
             self.require_there(one.children)
             for address in one.addresses:
                 self._size_of(address)
 
     def _property(self, headers, address, depth):
-        """A property and all in it; headers: at the place of its own, which is passed."""
+        """Read a property and its children; headers: positioned at its header, which is consumed."""
         bits = headers.number("I")
         width = "BHI"[min(bits >> 2 & 3, 2)]
         form, kind, extent = bits & 3, bits >> 4 & 0xF, bits >> 12 & 0xFF
@@ -210,11 +210,11 @@ class Archive:
         if not form:
             return Property(name, metadata, self.compound(address, depth + 1))
         if kind not in _KINDS or not extent:
-            return Property(name, metadata)  # such as text of wide characters: nothing of it is needed
+            return Property(name, metadata)  # unused types, such as wide strings
         addresses = self._group(address)[:: 1 if form == 1 else 2]
         if count and not addresses:
             raise Damaged
-        # The samples that differ from the one before, and the last one before they begin to.
+        # The samples that differ from the previous one, and the last sample before the first change.
         changes = range(first, last + 1) if 0 < first <= last < count else range(0)
         if changes and len(changes) >= len(addresses):
             raise Damaged
@@ -252,7 +252,7 @@ class Archive:
             yield _metadata(rest.take(rest.number("B")))
 
     def _visit(self, address):
-        """A group that belongs to one object or compound."""
+        """Return a group that belongs to only one object or compound."""
         if address and address in self._visited:
             raise Damaged
         self._visited.add(address)
@@ -275,7 +275,7 @@ class Archive:
         return self._bytes((address & ~_DATA) + 8, size) if size else b""
 
     def _size_of(self, address):
-        """The number of bytes of a content, all of which are in the file."""
+        """Return the number of bytes of a content, which lies within the file."""
         if not address & _DATA:
             raise Damaged
         place = address & ~_DATA
@@ -298,7 +298,7 @@ class Archive:
 
 
 def require_whole(path: Path) -> None:
-    """Raise `HairError` unless everything that an archive names is within it, as other readers take for granted."""
+    """Raise `HairError` unless all addresses of an archive lie within the file, which other readers do not check."""
     try:
         with Archive(path) as archive:
             pending = [archive.top()]
@@ -311,7 +311,7 @@ def require_whole(path: Path) -> None:
 
 
 class _Bytes:
-    """Bytes that are taken from the front."""
+    """A cursor over bytes."""
 
     def __init__(self, data):
         self._data, self.place, self.end = data, 0, len(data)

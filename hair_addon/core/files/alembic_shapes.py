@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shape of curves of an [Alembic26] file, as polylines or Catmull-Rom splines in their object's coordinates."""
+"""Geometry of an [Alembic26] file's curves, as polylines or Catmull-Rom splines in object coordinates."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,19 +17,19 @@ _CUBIC, _LINEAR, _ANY_ORDER = 0, 1, 2
 _BASES = {1: "bezier", 2: "bspline", 3: "catmullRom"}
 _HERMITE, _POWER = 4, 5
 _MOST_ORDER = 16
-_MOST_POINTS = 2**26  # that curves are divided into: others than polylines grow
+_MOST_POINTS = 2**26  # limit of points after subdivision of curves other than polylines
 
 _NOT_DRAWN = '"{name}" in {path}: {count} curves have too few points, or points that belong to no segment.'
-_ODD_WIDTHS = '"{name}" in {path} has widths that are neither one for each point nor for each curve: left out.'
-_POWERS = '"{name}" in {path} has {count} curves of powers, which are not read.'
+_ODD_WIDTHS = '"{name}" in {path} has widths neither for each point nor for each curve: they are ignored.'
+_POWERS = '"{name}" in {path} has {count} curves in the power basis, which is not supported.'
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """Points (M, 3) float64 of curves, counts (K,) of each, and diameters (M,), None without any.
+    """Points (M, 3) float64 of curves, counts (K,) of each, and diameters (M,) or None.
 
-    kept: (S,) which of the file's curves these are; lines: into how many each segment of theirs is divided, None of
-    curves that keep their points; said: [(sentence, count)] to tell people.
+    kept: (S,) mask of these curves among those of the file; lines: number of lines of each segment, None for curves
+    that keep their points; notes: [(sentence, count)], warnings for the user.
     """
 
     points: np.ndarray
@@ -38,14 +38,14 @@ class Drawn:
     kept: np.ndarray
     is_smooth: bool
     lines: np.ndarray | None
-    said: list[tuple[str, int]]
+    notes: list[tuple[str, int]]
 
 
 class Shape:
-    """Curves with the properties of AbcGeom's schema.
+    """Curves with the properties of AbcGeom's schema. Raises `Damaged`.
 
-    is_of_blender: whether Blender wrote them, which has all points of a Catmull-Rom spline on it, and leaves out the
-    handles of Bézier curves. Raises `Damaged`.
+    is_of_blender: whether Blender wrote them. Its Catmull-Rom splines pass through all of their points, and its Bézier
+    curves have no handles.
     """
 
     def __init__(self, archive: Archive, properties: Mapping[str, Property], is_of_blender: bool) -> None:
@@ -68,37 +68,37 @@ class Shape:
             raise Damaged
         self._orders, self._knots, self._weights = self._of_nurbs()
         self._kept = self._are_valid()
-        self._trims_ends()
+        self._set_trim()
 
     def drawn(self) -> Drawn:
-        """The curves in the file's first sample."""
-        counts, kept, said = self._counts, self._kept, []
+        """Return the curves at the file's first sample."""
+        counts, kept, notes = self._counts, self._kept, []
         if self._basis == _POWER and self._kind == _CUBIC:
-            said.append((_POWERS, len(counts)))
+            notes.append((_POWERS, len(counts)))
         elif not kept.all():
-            said.append((_NOT_DRAWN, int((~kept).sum())))
-        widths = self._widths(said)
+            notes.append((_NOT_DRAWN, int((~kept).sum())))
+        widths = self._widths(notes)
         values = self._first
         if widths is not None and len(widths) == len(values):
             values = np.column_stack([values, widths])
-        values, made, places, lines = self._divided(values, None)
+        values, new_counts, places, lines = self._divided(values, None)
         if values.shape[1] > 3:
             widths = values[:, 3]
         elif widths is not None and len(widths) in (1, len(counts)):
-            widths = np.repeat(np.broadcast_to(widths, len(counts))[kept], made)
+            widths = np.repeat(np.broadcast_to(widths, len(counts))[kept], new_counts)
         elif widths is not None and places is not None:
             widths = np.interp(places, np.arange(len(widths)), widths)
-        return Drawn(values[:, :3], made, widths, kept, self._is_smooth, lines, said)
+        return Drawn(values[:, :3], new_counts, widths, kept, self._is_smooth, lines, notes)
 
     def points_at(self, archive: Archive, time: float, drawn: Drawn) -> np.ndarray:
-        """The points (M, 3) at a time; archive: that is open now; drawn: of the first sample."""
+        """Return the points (M, 3) at a time; archive: the open one; drawn: of the first sample."""
         points = _points(values_at(archive, self.points, time))
         if len(points) != len(self._first):
             raise Damaged
         return self._divided(points, drawn.lines)[0]
 
     def _of_nurbs(self):
-        """(orders (S,), knots, weights (N,) or None) of NURBS, knots None of others."""
+        """Return (orders (S,), knots, weights (N,) or None) of NURBS; knots are None for other curves."""
         counts = self._counts
         weights = self._optional("w", "f", len(self._first))
         if weights is not None and not (np.isfinite(weights).all() and (weights > 0.0).all()):
@@ -120,7 +120,7 @@ class Shape:
         return orders, knots, weights
 
     def _optional(self, name, kind, count):
-        """A property's values where there are as many."""
+        """Return a property's values if it has this kind and count, else None."""
         if name not in self._properties:
             return None
         values = parameter(self._archive, self._properties[name])
@@ -128,7 +128,7 @@ class Shape:
         return values if is_fitting else None
 
     def _are_valid(self):
-        """(S,) bool: which curves have points enough."""
+        """Return (S,) bool: which curves have enough points."""
         counts = self._counts
         if self._knots is not None:
             return counts >= self._orders
@@ -148,8 +148,8 @@ class Shape:
     def _wrap(self):
         return "periodic" if self._is_closed else "nonperiodic"
 
-    def _trims_ends(self):
-        """Take Catmull-Rom splines whose end points stand twice for what Blender draws through the others."""
+    def _set_trim(self):
+        """Drop the duplicated end points of Catmull-Rom splines, which Blender then draws through all points."""
         self._trim = 0
         if self._kind != _CUBIC or self._basis != 3 or self._is_closed or self._knots is not None:
             return
@@ -159,7 +159,7 @@ class Shape:
             self._trim, self._is_smooth, self._kind = 1, True, _LINEAR
 
     def _divided(self, values, lines):
-        """(values (M, D), counts (K,), places (M,) or None, lines or None) of the curves that are kept."""
+        """Return (values (M, D), counts (K,), places (M,) or None, lines or None) of the kept curves."""
         counts, kept = self._counts, self._kept
         rows = np.flatnonzero(np.repeat(kept, counts))
         if self._knots is not None:
@@ -189,8 +189,8 @@ class Shape:
         made, made_counts, places = bezier_segments.polylines(segments, lines)
         return made, made_counts, places, lines
 
-    def _widths(self, said):
-        """Diameters: one for each point, each curve, all, or each end of a segment; None where there are none."""
+    def _widths(self, notes):
+        """Return diameters: one for each point, each curve, all, or each end of a segment; None if there are none."""
         counts, found = self._counts, None
         for place, name in (("", "width"), (".arbGeomParams", "groom_width")):
             properties = self._properties[place].children if place in self._properties else self._properties
@@ -204,13 +204,13 @@ class Shape:
             segments = bezier_segments.segment_counts(counts, self._name, self._wrap)
             ends = int((segments + 1).sum())
         if widths.ndim != 1 or len(widths) not in (len(self._first), len(counts), 1, ends):
-            said.append((_ODD_WIDTHS, len(counts)))
+            notes.append((_ODD_WIDTHS, len(counts)))
             return None
         return widths
 
 
 def parameter(archive: Archive, target: Property) -> Any:
-    """(n,) or (n, extent) values of a geometry parameter in the first sample, or a list of str; by indices or not."""
+    """Return (n,) or (n, extent) values of a geometry parameter, indexed or not, or a list of str; first sample."""
     if ".vals" not in target.children:
         return archive.values(target) if target.addresses else np.zeros(0)
     values = archive.values(target.children[".vals"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transforms of [Alembic26] files at a time: stacks of operations, each of which may move."""
+"""Transforms of [Alembic26] files at a time: stacks of operations, each of which may be animated."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -7,21 +7,21 @@ import numpy as np
 
 from .alembic_reader import Archive, Damaged, Property
 
-# Operation → numbers that it takes.
+# Operation → number of its channels.
 _SCALE, _TRANSLATE, _ROTATE, _MATRIX, _ROTATE_X, _ROTATE_Y, _ROTATE_Z = range(7)
 _CHANNELS = {_SCALE: 3, _TRANSLATE: 3, _ROTATE: 4, _MATRIX: 16, _ROTATE_X: 1, _ROTATE_Y: 1, _ROTATE_Z: 1}
 _AXES = {_ROTATE_X: (1.0, 0.0, 0.0), _ROTATE_Y: (0.0, 1.0, 0.0), _ROTATE_Z: (0.0, 0.0, 1.0)}
 
 
 def times_of(properties: Iterable[Property]) -> np.ndarray:
-    """(T,) [s], rising: when any of some properties has another value than before, and the first time of all."""
+    """Return the times (T,) [s], ascending, at which any property changes, beginning with the first sample."""
     properties = [one for one in properties if len(one.times)]
     moving = [one.times for one in properties if len(one.times) > 1]
     return np.unique(np.concatenate(moving or [one.times[:1] for one in properties[:1]] or [np.zeros(0)]))
 
 
 def values_at(archive: Archive, target: Property, time: float) -> np.ndarray:
-    """The numbers of a property at a time, linear between samples that have as many."""
+    """Return the numbers of a property at a time, linear between samples of equal size."""
     after = int(np.searchsorted(target.times, time, side="right"))
     before = max(after - 1, 0)
     values = archive.values(target, before)
@@ -35,7 +35,7 @@ def values_at(archive: Archive, target: Property, time: float) -> np.ndarray:
 
 
 def matrix_at(archive: Archive, stack: Sequence[Mapping[str, Property]], time: float) -> np.ndarray:
-    """(4, 4) float64: from an object to the world; stack: properties of the transforms that it is in, from the top."""
+    """Return the object-to-world matrix (4, 4) float64; stack: properties of the parent transforms, topmost first."""
     matrix = np.eye(4)
     for properties in stack:
         if ".inherits" in properties and not values_at(archive, properties[".inherits"], time).any():
@@ -49,7 +49,7 @@ def matrix_at(archive: Archive, stack: Sequence[Mapping[str, Property]], time: f
 
 
 def _product(codes, values):
-    """The matrix of operations: the last one meets points first."""
+    """Return the matrix of operations: the last one is applied to points first."""
     matrix, place = np.eye(4), 0
     for code in codes:
         size = _CHANNELS.get(code, 0)
@@ -61,23 +61,23 @@ def _product(codes, values):
 
 
 def _operation(code, values):
-    """(4, 4), for columns of coordinates; files have them for rows."""
+    """Return the matrix (4, 4) for column vectors; files store matrices for row vectors."""
     if code == _MATRIX:
         return values.reshape(4, 4).T
-    made = np.eye(4)
+    matrix = np.eye(4)
     if code == _TRANSLATE:
-        made[:3, 3] = values
+        matrix[:3, 3] = values
     elif code == _SCALE:
-        made[:3, :3] = np.diag(values)
+        matrix[:3, :3] = np.diag(values)
     elif code == _ROTATE:
-        made[:3, :3] = _rotation(values[:3], values[3])
+        matrix[:3, :3] = _rotation(values[:3], values[3])
     else:
-        made[:3, :3] = _rotation(np.array(_AXES[code]), values[0])
-    return made
+        matrix[:3, :3] = _rotation(np.array(_AXES[code]), values[0])
+    return matrix
 
 
 def _rotation(axis, degrees):
-    """(3, 3), by Rodrigues' formula; files have angles in degrees."""
+    """Return a rotation (3, 3) by Rodrigues' formula; angles in files are in degrees."""
     length = np.linalg.norm(axis)
     if not length > 0.0:
         return np.eye(3)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays in an uncompressed .npz file, read only if it is, byte for byte, what would be written for its arrays.
+"""Arrays in an uncompressed .npz file, which is read only if it is byte for byte what `write` would produce.
 
-So no parser meets a file that somebody else has made: names, types and shapes are known before it is opened, and with
-them every byte but those of the arrays and their checksums.
+No parser runs on untrusted files: names, types and shapes are known before a file is opened, and they determine every
+byte except the arrays' contents and checksums.
 """
 
 import binascii
@@ -20,9 +20,9 @@ from . import plain_file
 Layout = Mapping[str, tuple[str, tuple[int, ...]]]
 
 TYPES = ("<f4", "<f8", "<i4", "<i8", "|u1")
-MOST_BYTES = 2**32 - 2**16  # of a file: longer ones would take another format
+MOST_BYTES = 2**32 - 2**16  # of a file: larger ones would need ZIP64
 
-_DATE = 0x0021  # 1 January 1980: the same arrays, the same file
+_DATE = 0x0021  # 1 January 1980: equal arrays give equal files
 _VERSION = 20
 _ON_UNIX = 3 << 8
 _PLAIN_FILE = 0o100644 << 16
@@ -32,7 +32,7 @@ _END = struct.Struct("<4s4H2LH")
 
 
 def encoded(arrays: Mapping[str, np.ndarray]) -> list[bytes | memoryview]:
-    """Return the parts of a file that follow each other. Raises `HairError` for arrays that `decoded` would refuse."""
+    """Return the consecutive parts of a file. Raises `HairError` for arrays that `decoded` would refuse."""
     layout = layout_of(arrays)
     require_layout(layout)
     if not all(_is_finite(array) for array in arrays.values()):
@@ -42,7 +42,7 @@ def encoded(arrays: Mapping[str, np.ndarray]) -> list[bytes | memoryview]:
 
 
 def decoded(data: bytes, layout: Layout) -> dict[str, np.ndarray] | None:
-    """Return the arrays of a file's bytes; None unless the file is one that `encoded` makes for such a layout."""
+    """Return the arrays of a file's bytes; None unless `encoded` produces this file for the layout."""
     if len(data) != size_of(layout):
         return None
     view, found, place = memoryview(data), {}, 0
@@ -52,7 +52,7 @@ def decoded(data: bytes, layout: Layout) -> dict[str, np.ndarray] | None:
         place += len(found[name])
     place = 0
     for part in _file_of(layout, found):
-        if isinstance(part, bytes) and view[place : place + len(part)] != part:  # others are parts of `data`
+        if isinstance(part, bytes) and view[place : place + len(part)] != part:  # other parts are views of `data`
             return None
         place += len(part)
     arrays = {name: np.frombuffer(found[name], kind).reshape(shape) for name, (kind, shape) in layout.items()}
@@ -65,12 +65,12 @@ def write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
     with open(path, "wb", buffering=0) as file:
         for part in parts:
             rest = memoryview(part)
-            while rest:  # a disk that fills takes the beginning of a part
+            while rest:  # a write to a disk that is almost full may be partial
                 rest = rest[file.write(rest) :]
 
 
 def read(path: Path, layout: Layout) -> dict[str, np.ndarray]:
-    """Return the arrays of a file, read-only. Raises `HairError` unless it is what `write` writes for such a layout."""
+    """Return the arrays of a file, read-only. Raises `HairError` unless `write` produces this file for the layout."""
     require_layout(layout)
     arrays = decoded(plain_file.read(path, size_of(layout)), layout)
     if arrays is None:
@@ -84,7 +84,7 @@ def layout_of(arrays: Mapping[str, np.ndarray]) -> dict[str, tuple[str, tuple[in
 
 
 def require_layout(layout: Layout) -> None:
-    """Raise `HairError` unless a file can have a layout: known types, shapes of at most four axes, a limited size."""
+    """Raise `HairError` unless a layout is valid: known types, shapes of at most four axes, a limited size."""
     for name, (kind, shape) in layout.items():
         is_named = name.isascii() and name.isidentifier() and len(name) <= 32
         if not is_named or kind not in TYPES or len(shape) > 4 or not all(0 <= size < 2**31 for size in shape):
@@ -94,7 +94,7 @@ def require_layout(layout: Layout) -> None:
 
 
 def size_of(layout: Layout) -> int:
-    """Return the number of bytes of a file."""
+    """Return the number of bytes of a file with a layout."""
     size = _END.size
     for name, (kind, shape) in layout.items():
         size += _LOCAL.size + _CENTRAL.size + 2 * len(_member(name)) + len(_header(kind, shape))
@@ -115,19 +115,19 @@ def _member(name):
 
 
 def _header(kind, shape):
-    """A .npy file's magic string, version 1.0 and header, padded to 64 bytes as NumPy does."""
+    """Return a .npy file's magic string, version 1.0 and header, padded to 64 bytes as NumPy does."""
     text = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape!r}, }}"
     size = -(-(10 + len(text) + 1) // 64) * 64 - 10
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", size) + text.ljust(size - 1).encode() + b"\n"
 
 
 def _file_of(layout, contents):
-    """The parts of a file: for each member its local header, the array's header and bytes; then the directory."""
+    """Return the parts of a file: for each member its local header, the array's header and bytes; the directory."""
     parts, directory, place = [], b"", 0
     for name, (kind, shape) in layout.items():
         member, header, content = _member(name), _header(kind, shape), contents[name]
         size, checksum = len(header) + len(content), binascii.crc32(content, binascii.crc32(header))
-        # Version, flags, method (stored), time, date, checksum, both sizes, length of the name: the same in both.
+        # Version, flags, method (stored), time, date, checksum, both sizes, length of the name: common to both headers.
         common = (_VERSION, 0, 0, 0, _DATE, checksum, size, size, len(member))
         parts += [_LOCAL.pack(b"PK\x03\x04", *common, 0) + member + header, content]
         directory += _CENTRAL.pack(b"PK\x01\x02", _ON_UNIX | _VERSION, *common, 0, 0, 0, 0, _PLAIN_FILE, place) + member

@@ -3,11 +3,11 @@
 
     roots (S, 3), strand_points (S, P, 3), guide_points (G, P, 3)   [m], in the axes of the mesh's file
     strand_widths (S, P), guide_widths (G, P)                       diameters [m]
-    strand_counts (S,), guide_counts (G,)                           of curves of unequal numbers of points, see below
-    up                                                              the axis that points up, X, Y or Z
+    strand_counts (S,), guide_counts (G,)                           points of each curve if these differ, see below
+    up                                                              the up axis: X, Y or Z
 
-A file of guide_points alone is one too: widths and axis are optional. Where curves have unequal numbers of points, all
-points stand one after another, (N, 3), their widths are (N,), and counts say how many are of each curve.
+Only one of strand_points and guide_points is required. If curves have different numbers of points, the points of all
+curves are concatenated, (N, 3), with widths (N,) and the number of points of each curve in counts.
 """
 
 from pathlib import Path
@@ -23,7 +23,7 @@ _NAMES = {"guide_points": "Guides", "strand_points": "Hair"}
 
 
 def read(path: Path, axis: str = "Z") -> CurveFile:
-    """The curves of a file of arrays; axis: that points up in one that does not say. Raises `HairError`."""
+    """Read the curves of a file of arrays; axis: the up axis of a file without one. Raises `HairError`."""
     with foreign_arrays.opened(path) as archive:
         return _read(path, archive, axis)
 
@@ -46,14 +46,14 @@ def _read(path, archive, axis):
         if counts is None:
             counts = np.full(*shape[:2])
         elif counts.min() < 2 or counts.sum() != len(points):
-            sentence = "{path}: {name} must be at least 2 of each curve, and {count} in all, as points have."
+            sentence = "{path}: {name} must be at least 2 for each curve, and {count} in total, the number of points."
             raise HairError(sentence, path=path, name=_counts_of(name), count=len(points))
         width_name = name.replace("points", "widths")
         radii = None
         if width_name in there:
             widths = foreign_arrays.array(archive, width_name)
             if widths.shape != shape[:-1] or widths.dtype.kind != "f":
-                sentence = "{path}: {name} has shape {shape}, but must be {wanted}, as points have."
+                sentence = "{path}: {name} has shape {shape}, but must be {wanted}, as the points."
                 raise HairError(sentence, path=path, name=width_name, shape=widths.shape, wanted=shape[:-1])
             radii = widths.ravel() / np.asarray(2.0, widths.dtype)
         sets.append(
@@ -78,7 +78,7 @@ def _counts_of(name):
 
 
 def _counts(path, archive, there, name):
-    """(G,) int64 points of each curve; None where all have as many, and the shape of their points says it."""
+    """Return (G,) int64 points of each curve; None if the file has no counts, and all curves have equally many."""
     if _counts_of(name) not in there:
         return None
     counts = foreign_arrays.array(archive, _counts_of(name))

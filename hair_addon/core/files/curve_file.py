@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of a file, whatever its format: readers make a `CurveFile`, and everything that uses curves takes one.
+"""Curves of a file in any format: readers return a `CurveFile`, which all users of curves accept.
 
-A reader of a format is a function of a path that returns a `CurveFile` or raises `HairError`. It returns what is drawn:
-what is neither a polyline nor a Catmull-Rom spline through all of its points is evaluated to polylines, and what is
-closed ends where it began.
+A reader is a function of a path that returns a `CurveFile` or raises `HairError`. Curves other than polylines and
+Catmull-Rom splines through all of their points are evaluated to polylines; closed curves repeat their first point.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,13 +13,13 @@ import numpy as np
 from ..errors import HairError
 from ..geometry import bezier_segments
 
-# Said of splines that move, as Blender plays polylines alone.
-SPLINES_MOVE = "{path} moves: its Catmull-Rom splines become polylines, which follow them at all times."
+# The warning for animated splines: Blender plays only polylines.
+SPLINES_MOVE = "{path} is animated: its Catmull-Rom splines become polylines."
 
-# Metres in a unit, by the names that people give them.
+# Metres in a unit, by its name in the interface.
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048, "km": 1000.0}
 
-# Axis that points up → (3, 3), from such coordinates to Blender's, where it is Z.
+# Up axis → matrix (3, 3) from such coordinates to Blender's, with Z up.
 TO_Z_UP = {
     "X": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
     "Y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
@@ -29,7 +28,7 @@ TO_Z_UP = {
 
 
 def parsed_unit(text: str) -> float:
-    """Metres in a unit, by its name or as a number. Raises `HairError`."""
+    """Return the metres in a unit, given by its name or as a number. Raises `HairError`."""
     if text in UNITS:
         return UNITS[text]
     try:
@@ -47,22 +46,22 @@ def parsed_unit(text: str) -> float:
 
 @dataclass(frozen=True)
 class Convention:
-    """Unit and axis of coordinates; None where nobody has said, and the file's own statement or a guess holds.
+    """Unit and up axis of coordinates; None where unspecified.
 
-    metres: in a unit; up: the axis that points up, X, Y or Z.
+    metres: in a unit; up: X, Y or Z.
     """
 
     metres: float | None = None
     up: str | None = None
 
     def over(self, other: "Convention") -> "Convention":
-        """This one, with the other's values where it has none."""
+        """Return this convention with unspecified values taken from another."""
         return Convention(other.metres if self.metres is None else self.metres, self.up or other.up)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Points at several times: times (T,) [s], rising, and a function of an index that gives all points (N, 3)."""
+    """Points at several times: times (T,) [s], ascending; points_at: function of a time's index → all points (N, 3)."""
 
     times: np.ndarray
     points_at: Callable[[int], np.ndarray]
@@ -70,13 +69,13 @@ class Motion:
 
 @dataclass(frozen=True)
 class CurveSet:
-    """The curves of one object of a file: C of them with N points, in the world as the file has it.
+    """The C curves of one object of a file with N points, in the file's world coordinates.
 
-    name: of the object, by which people choose it; points: (N, 3), of one curve after another; counts: (C,) points of
-    each; is_smooth: (C,) bool, which are Catmull-Rom splines whose end points count twice, as Blender draws them;
-    radii: (N,), None where the file has no widths; is_guide: what the file says, None if nothing. As Vellus and Unreal
-    have them, None if there are none: ids (C,) int32; root_uvs (C, 2); guide_ids (C, 3) int32, identities of guides of
-    the same file, and guide_weights (C, 3). motion: where the points move.
+    name: of the object, shown to the user; points: (N, 3), concatenated over the curves; counts: (C,) points of each;
+    is_smooth: (C,) bool, Catmull-Rom splines whose end points count twice, as Blender draws them; radii: (N,), None if
+    the file has no widths; is_guide: None if the file does not specify it. Attributes of Vellus and Unreal, None if
+    missing: ids (C,) int32; root_uvs (C, 2); guide_ids (C, 3) int32, IDs of guides of the same file, and guide_weights
+    (C, 3). motion: of animated points.
     """
 
     name: str
@@ -97,11 +96,11 @@ class CurveSet:
         return len(self.counts)
 
     def placed(self, metres: float, up: str) -> "CurveSet":
-        """The same in metres with Z up, float32; metres: in a unit of its coordinates, up: their axis."""
+        """Return the curves in metres with Z up, float32; metres: in a unit of the file; up: axis of the file."""
         turn, motion = TO_Z_UP[up] * metres, self.motion
 
         def turned(points):
-            with np.errstate(over="ignore", invalid="ignore"):  # such points are left out later, with a sentence
+            with np.errstate(over="ignore", invalid="ignore"):  # non-finite points are reported and skipped later
                 return (np.asarray(points, np.float64) @ turn.T).astype(np.float32)
 
         if motion is not None:
@@ -112,7 +111,7 @@ class CurveSet:
         return replace(self, points=turned(self.points), radii=radii, motion=motion)
 
     def some(self, is_chosen: np.ndarray) -> "CurveSet":
-        """Some of the curves; is_chosen: (C,) bool."""
+        """Return the chosen curves; is_chosen: (C,) bool."""
         if is_chosen.all():
             return self
         rows, motion = np.repeat(is_chosen, self.counts), self.motion
@@ -138,10 +137,10 @@ class CurveSet:
 
 
 def as_polylines(curves: CurveSet) -> CurveSet:
-    """The same curves, of which Catmull-Rom splines are lines through points on them, as many at all times."""
+    """Return the curves with Catmull-Rom splines evaluated to polylines, with the same counts at all times."""
     counts, is_smooth, motion = curves.counts, curves.is_smooth, curves.motion
     values = curves.points if curves.radii is None else np.column_stack([curves.points, curves.radii])
-    made, made_counts, lines = bezier_segments.smooth_lines(values, counts, is_smooth)
+    values, new_counts, lines = bezier_segments.smooth_lines(values, counts, is_smooth)
     if motion is not None:
         points_at = motion.points_at
         motion = Motion(
@@ -149,19 +148,19 @@ def as_polylines(curves: CurveSet) -> CurveSet:
         )
     return replace(
         curves,
-        points=made[:, :3],
-        counts=made_counts,
+        points=values[:, :3],
+        counts=new_counts,
         is_smooth=np.zeros(len(counts), bool),
-        radii=None if curves.radii is None else made[:, 3],
+        radii=None if curves.radii is None else values[:, 3],
         motion=motion,
     )
 
 
 @dataclass(frozen=True)
 class CurveFile:
-    """The objects of a file that have curves; stated: what the file says of its unit and axis; notes: to tell people.
+    """The objects of a file that have curves.
 
-    usual: what such files have where neither they nor people say.
+    stated: the file's own unit and axis; usual: the default for such files; notes: warnings for the user.
     """
 
     sets: list[CurveSet]
@@ -171,10 +170,10 @@ class CurveFile:
 
 
 def join(sets: Sequence[CurveSet]) -> CurveSet:
-    """One set of the curves of several, which are all placed; what only some of them have, none has afterwards.
+    """Join sets of curves in the same coordinates; drops attributes that are missing in any of them.
 
-    Radii are an exception: curves without any get 0, which stands for none. Motion is kept where all that move have
-    the same times.
+    Radii are an exception: curves without radii get 0, which means none. Motion is kept if all moving sets have the
+    same times.
     """
     if len(sets) == 1:
         return sets[0]

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In which unit and with which axis up the curves of a file are: as people or the file say, or where roots would lie
-on the surface.
-"""
+"""Unit and up axis of a file's curves: given by the user, stated in the file, or such that roots lie on the surface."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -15,8 +13,8 @@ from ..geometry.mesh import TriMesh, positions
 from ..geometry.strands import curve_offsets
 from .curve_file import TO_Z_UP, UNITS, Convention, CurveFile, CurveSet
 
-_TRIED = 256  # curves, whose ends are taken for those of all
-_ON = 0.05  # distance of roots that lie on the surface, as a part of its size, or of that of all curves
+_TRIED = 256  # number of curves that are sampled
+_ON = 0.05  # largest distance of roots that count as on the surface, as a fraction of its size or the curves' extent
 
 _WORDS = {
     "m": "meters",
@@ -30,20 +28,20 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class Reading:
-    """The unit and the axis that are taken, and what to tell people of them."""
+    """The chosen unit and axis, with notes for the user."""
 
     metres: float
     up: str
     notes: list[HairError]
 
 
-def choose(file: CurveFile, sets: Sequence[CurveSet], said: Convention, mesh: TriMesh, name: str) -> Reading:
-    """The `Reading` of some sets of a file, by what people say, then by what the file states, then by the surface.
+def choose(file: CurveFile, sets: Sequence[CurveSet], given: Convention, mesh: TriMesh, name: str) -> Reading:
+    """Return the `Reading` of some sets of a file: the user's convention, else the file's, else by the surface.
 
-    mesh: the surface in the world [m]; name: of the file. Raises `HairError` where roots would be further from the
-    surface than it is large.
+    mesh: the surface in world space [m]; name: of the file. Raises `HairError` if the distance of the roots to the
+    surface exceeds the surface's size.
     """
-    known = said.over(file.stated)
+    known = given.over(file.stated)
     ends = _Ends(sets, mesh)
     usual = known.over(file.usual)
     taken, notes = usual, []
@@ -59,7 +57,7 @@ def choose(file: CurveFile, sets: Sequence[CurveSet], said: Convention, mesh: Tr
 
 
 def _conventions(known, usual) -> Iterator[Convention]:
-    """What may be meant where not all is known; the most usual first."""
+    """Yield the possible conventions, the most usual first."""
     units = [usual.metres, *UNITS.values()] if known.metres is None else [known.metres]
     axes = [usual.up, "Z", "Y", "X"] if known.up is None else [known.up]
     for metres, up in itertools.product(dict.fromkeys(units), dict.fromkeys(axes)):
@@ -67,12 +65,12 @@ def _conventions(known, usual) -> Iterator[Convention]:
 
 
 def _named(metres):
-    """A unit in words."""
+    """Return a unit in words."""
     return next((_WORDS[name] for name, one in UNITS.items() if one == metres), f"units of {metres:g} m")
 
 
 class _Ends:
-    """Ends of some curves, as the file has them, and how far they are from the surface in a unit and with an axis."""
+    """Ends of some curves in file coordinates, and their distance to the surface for a convention."""
 
     def __init__(self, sets, mesh):
         found = []
@@ -88,12 +86,12 @@ class _Ends:
         self._size = float((self._high - self._low).max())
 
     def lie_on_surface(self, convention):
-        """Whether roots do; of curves so small that this says nothing they do not."""
+        """Return whether roots lie on the surface; False if the curves are too small to tell."""
         distance, extent = self._measured(convention)
         return distance <= _ON * min(self._size, extent)
 
     def complaints(self, taken, name) -> Iterator[HairError]:
-        """What to say of roots that do not. Raises `HairError` where they are further than the surface is large."""
+        """Yield warnings for roots off the surface. Raises `HairError` if their distance exceeds the surface's size."""
         others = [*_conventions(Convention(), taken)]
         distances = [self._measured(other)[0] if self.lie_on_surface(other) else np.inf for other in others]
         best = int(np.argmin(distances))
@@ -115,13 +113,13 @@ class _Ends:
         yield error
 
     def _measured(self, convention):
-        """(the median distance of roots to the surface, the size of all curves) [m]; roots are the nearer ends."""
+        """Return (median distance of roots to the surface, extent of all curves) [m]; roots are the nearer ends."""
         if not len(self._ends):
             return 0.0, 0.0
         ends = self._ends @ (TO_Z_UP[convention.up] * convention.metres).T
         extent = float(np.ptp(ends.reshape(-1, 3), axis=0).max())
         outside = np.maximum(np.maximum(self._low - ends, ends - self._high), 0.0)
-        distances = np.linalg.norm(outside, axis=2)  # to the box, where that is far already
+        distances = np.linalg.norm(outside, axis=2)  # to the bounding box: sufficient for distant ends
         near = distances < 2.0 * self._size
         places = ends[near].astype(np.float32)
         if len(places):

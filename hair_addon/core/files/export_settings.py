@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What of a groom is exported."""
+"""Settings of groom export."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ ENDINGS = (".abc", ".usd", ".usdc", ".usda")
 
 @dataclass(frozen=True)
 class ExportSettings(Settings):
-    """What a file for other programs has of hair and its guides."""
+    """Contents of a groom file for other programs."""
 
     has_hair: bool = param(True, "Write the strands; a file of guides alone can be a groom cache", label="Hair")
     has_guides: bool = param(True, "Write the guides, which engines simulate and move strands by", label="Guides")
@@ -26,5 +26,5 @@ class ExportSettings(Settings):
     )
 
     def moves(self, is_guide: bool) -> bool:
-        """Whether guides move in the file, or strands."""
+        """Return whether guides, or strands, are animated in the file."""
         return self.animation == "ALL" or (self.animation == "GUIDES" and is_guide)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """File locks that assign a file to one of several processes, on one machine or on several.
 
-A claim is a lock on a file beside the one to be written. The operating system releases it when its process ends, in
-any way: so killed processes do not block others.
+A claim is a lock on a file beside the one to be written. The operating system releases it when the process ends, even
+if killed.
 """
 
 import contextlib
@@ -19,16 +19,16 @@ else:
     import fcntl
 
 _HELD = {errno.EACCES, errno.EAGAIN, errno.EDEADLK, errno.EWOULDBLOCK}
-# No link is followed, and no pipe is waited for: others may have prepared the folder.
+# Links are not followed and opening a pipe does not block: the folder is untrusted.
 _NEVER_ELSEWHERE = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.EINVAL}
 
 
 @contextlib.contextmanager
 def claim(path: str | Path) -> Generator[bool]:
-    """Whether a file is this process's to make, for as long as this is entered: False where another is at it.
+    """Claim a file for the duration of the context; yields False if another process has claimed it.
 
-    On file systems without locks every claim succeeds: work is then done twice, and each file is still complete. Raises
+    On file systems without locks every claim succeeds: work is then duplicated, and each file is still complete. Raises
     OSError if the folder is not writable.
     """
     beside = claim_of(path)
@@ -37,7 +37,7 @@ def claim(path: str | Path) -> Generator[bool]:
         yield descriptor is not None
     finally:
         if descriptor is not None:
-            # Removed while it is locked: a process that waits for this file detects that it is no longer at its path.
+            # Removed while locked: a process that opened this file detects that it is no longer at its path.
             with contextlib.suppress(OSError):  # Windows does not remove open files
                 beside.unlink()
             os.close(descriptor)
@@ -47,13 +47,13 @@ def claim(path: str | Path) -> Generator[bool]:
 
 
 def claim_of(path: str | Path) -> Path:
-    """The file that is locked while a path is written."""
+    """Return the file that is locked while a path is written."""
     path = Path(path)
     return path.with_name(f".{path.name}.claim")
 
 
 def _locked(path):
-    """A descriptor that holds the lock of a file, or None where another process does."""
+    """Return a descriptor that holds the lock of a file, or None if another process holds it."""
     while True:
         if os.path.islink(path):  # where the system has no O_NOFOLLOW
             raise OSError(errno.ELOOP, "it is a link", str(path))
@@ -71,7 +71,7 @@ def _locked(path):
             raise
         if _is_at(descriptor, path):
             return descriptor
-        os.close(descriptor)  # its last owner has removed the file meanwhile
+        os.close(descriptor)  # the previous owner has removed the file meanwhile
 
 
 def _lock(descriptor):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of things as names of files: of different things different ones."""
+"""Unique file names for named items."""
 
 import itertools
 import re
@@ -10,14 +10,14 @@ _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f\x7f]')
 
 
 def stem_of(name: str) -> str:
-    """Return a name without what file systems forbid; letters of any language and spaces stay. It may be empty."""
+    """Return a name without characters that file systems forbid; it may be empty."""
     return _FORBIDDEN.sub("_", name).strip(" .")
 
 
 def free_stem(name: str, is_taken: Callable[[str], bool]) -> str:
-    """Return `stem_of` a name, with a number as Blender's where it is taken.
+    """Return `stem_of` a name, with a number in Blender's format if it is taken.
 
-    is_taken: whether a file of a stem belongs to another thing. Systems may take capitals for small letters.
+    is_taken: returns whether a stem belongs to another item. File systems may ignore case.
     """
     stem = stem_of(name)
     numbered = (f"{stem}.{number:03}" for number in itertools.count(1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays of .npz files that anybody may have made: no code is run, and what is damaged is refused in a sentence."""
+"""Arrays of untrusted .npz files: no code is run, and damaged files raise `HairError`."""
 
 import lzma
 import math
@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import HairError, cause_of
 
-# What zipfile, its decompressors and NumPy's parser of headers raise for bytes that are no archive of arrays.
+# Exceptions of zipfile, its decompressors and NumPy's header parser for invalid bytes.
 _OF_DAMAGE = (
     *(EOFError, LookupError, MemoryError, NotImplementedError, OverflowError, RuntimeError, SyntaxError, TypeError),
     *(ValueError, lzma.LZMAError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error),
@@ -24,7 +24,7 @@ _OF_DAMAGE = (
 
 @contextmanager
 def opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """An archive of arrays. Raises `HairError` for whatever is wrong with it, also within the context."""
+    """Open an archive of arrays. Invalid archives raise `HairError`, also within the context."""
     try:
         with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
             yield archive
@@ -35,12 +35,12 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def names(archive: zipfile.ZipFile) -> list[str]:
-    """Names of the arrays of an archive."""
+    """Return the names of an archive's arrays."""
     return [name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")]
 
 
 def header(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dtype]:
-    """Shape and type of an array, as it states them."""
+    """Return an array's shape and type from its header."""
     with archive.open(f"{name}.npy") as file:
         version = np.lib.format.read_magic(file)
         read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
@@ -49,17 +49,17 @@ def header(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dty
 
 
 def array(archive: zipfile.ZipFile, name: str) -> np.ndarray:
-    """An array of an archive, which is as large as the archive says, so that no more memory is taken."""
+    """Return an array of an archive. Its declared size may not exceed its member's, which bounds the memory used."""
     shape, kind = header(archive, name)
     member = archive.getinfo(f"{name}.npy")
     if min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize > member.file_size:
         raise ValueError("it is damaged")
     with archive.open(member) as file:
-        return np.lib.format.read_array(file)  # no objects, which could be code
+        return np.lib.format.read_array(file)  # no pickled objects, which could run code
 
 
 def _cause(error):
-    """A line of the error where it is a sentence for people."""
+    """Return the error's text if it is meant for people, else a general one."""
     if isinstance(error, zipfile.BadZipFile | RuntimeError | NotImplementedError) or type(error) is ValueError:
         return " ".join(str(error).split())[:200].rstrip(".") or "it is damaged"
     return "it is damaged"

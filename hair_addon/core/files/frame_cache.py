@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of simulated guides in a folder, and the states that a simulation goes on from.
+"""Frames of simulated guides in a folder, and the states from which a simulation continues.
 
-A folder has a marker by which it is ours, a manifest (frame_manifest.py), `+00000123.npz` for each frame and
-`state_+00000120.npz` for some. Each file appears whole; one that is not what this project writes for the manifest's
-counts is a missing frame. Nothing is written to a folder that others have prepared, nor through a link. Only what has
-such a name, in a folder of ours, is ever removed.
+A folder has a marker of ownership, a manifest (frame_manifest.py), `+00000123.npz` for each frame and
+`state_+00000120.npz` for some. Files are written atomically; a file that does not match the manifest's layout counts as
+a missing frame. Nothing is written to a foreign folder, nor through a link. Only files with these names in an own
+folder are ever removed.
 """
 
 import contextlib
@@ -25,19 +25,19 @@ from .frame_manifest import Manifest
 from .whole_file import whole_file
 
 _NAME = re.compile(r"(state_)?([+-](?!0{8})[0-9]{8}|\+0{8})\.npz", re.ASCII)  # frame 0 has one name
-# Of a killed process, as whole_file names it; of older versions with eight digits.
+# Partial files of a killed process, as `whole_file` names them; eight digits in older versions.
 _LEFT_OVER = re.compile(r"\.vellus_[0-9a-f]{8}(?:[0-9a-f]{8})?\.(npz|json)", re.ASCII)
-MARKER = ".vellus_cache"  # the file by which a folder is known to be ours
+MARKER = ".vellus_cache"  # the file that marks a folder as ours
 _MARK = b"Baked frames of Vellus\n"
 _IDENTITY = re.compile(r"[0-9a-f]{16}", re.ASCII)
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame: points (G, P, 3) float32 [m], the guides as combed ones would be, at rest.
+    """One frame: points (G, P, 3) float32 [m] of the guides, on the surface at rest.
 
-    key: of the simulation; digest: of the animation it was simulated in (`frame_manifest.digest`); is_carried: whether
-    the guides' coordinates have changed since, to which points were brought.
+    key: of the simulation; digest: of the animation (`frame_manifest.digest`); is_carried: whether points were
+    transformed because the guides' coordinates have changed since.
     """
 
     points: np.ndarray
@@ -47,33 +47,31 @@ class Frame:
 
 
 def new_identity() -> str:
-    """16 random hexadecimal digits, for guides whose frames are to have a folder of their own."""
+    """Return 16 random hexadecimal digits that identify the cache folder of some guides."""
     return secrets.token_hex(8)
 
 
 def folder_of(base: Path, identity: str) -> Path:
-    """The folder of some guides' frames. Raises `HairError` unless the identity is one of `new_identity`."""
+    """Return the folder of some guides' frames. Raises `HairError` for an invalid identity."""
     if not _IDENTITY.fullmatch(identity):
-        raise HairError("The guides name no valid cache: free it, and bake again.")
+        raise HairError("The guides have no valid cache: free it, and bake again.")
     return base / identity
 
 
 class FrameCache:
-    """Frames in a folder, to be read. Files that cannot be are missing frames, and `take_complaints` says why, once."""
+    """Reader of frames in a folder. Unreadable files are missing frames; `take_complaints` returns the reasons once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self._complaints: list[HairError] = []
-        self._checked: dict[
-            int, tuple[tuple[int, ...], HairError | None]
-        ] = {}  # by frame: marks of its file, its fault
+        self._checked: dict[int, tuple[tuple[int, ...], HairError | None]] = {}  # frame → (file's stamp, its fault)
         self.manifest: Manifest | None = None
-        self.space = Affine.identity()  # from the coordinates that guides were made in to those that they are in now
+        self.space = Affine.identity()  # from the guides' original to their present coordinates
         self.read_manifest()
 
     def read_manifest(self) -> Manifest | None:
-        """Read the manifest, again if it may have changed; None where there is none, or an invalid one."""
+        """Read the manifest from disk; None if it is missing or invalid."""
         try:
             self.manifest = frame_manifest.read(self.folder)
         except HairError as error:
@@ -83,22 +81,22 @@ class FrameCache:
         return self.manifest
 
     def frame_numbers(self) -> list[int]:
-        """Numbers of the frames that seem to be there, in order: files are not read."""
+        """Return the sorted numbers of existing frame files, without reading them."""
         return _numbers(self.folder, False)
 
     def state_numbers(self) -> list[int]:
-        """Numbers of the frames after which a state seems to be there, in order."""
+        """Return the sorted numbers of the frames with an existing state file."""
         return _numbers(self.folder, True)
 
     def fault_of(self, number: int) -> HairError | None:
-        """Why the file of a frame that is there cannot be read whole; None where it can, or there is none.
+        """Return why the file of a frame is invalid; None if it is valid or missing.
 
-        A file is read once until it changes.
+        A file is read again only after it has changed.
         """
-        marks, known = _marks_of(self.folder / _name(number, False)), self._checked.get(number)
-        if marks is None:
+        stamp, known = _stamp_of(self.folder / _name(number, False)), self._checked.get(number)
+        if stamp is None:
             return None
-        if known is None or known[0] != marks:
+        if known is None or known[0] != stamp:
             read_with = self.manifest
             is_whole = self._frame_arrays(number) is not None
             if not is_whole and self.read_manifest() != read_with:  # baked by another process meanwhile
@@ -107,7 +105,7 @@ class FrameCache:
         return None if known is None else known[1]
 
     def read_frame(self, number: int) -> Frame | None:
-        """Return a frame of any simulation that the manifest names, None for a missing one."""
+        """Return a frame of any simulation in the manifest, None for a missing one."""
         if self.manifest is None:
             return None
         arrays = self._frame_arrays(number)
@@ -133,9 +131,9 @@ class FrameCache:
         return arrays
 
     def points_at(self, time: float) -> np.ndarray | None:
-        """(G, P, 3) float32 [m] at a time in frames, which need not be whole; None where a frame is missing.
+        """Return points (G, P, 3) float32 [m] at a time in frames, whole or not; None if a frame is missing.
 
-        Between frames the cubic through four of them, linear where one of the outer two is missing.
+        Interpolation is cubic through four frames, linear if one of the outer two is missing.
         """
         number = int(np.floor(time))
         frame = self.read_frame(number)
@@ -147,12 +145,12 @@ class FrameCache:
         return None if after is None else between(before, frame.points, after, last, time - number)
 
     def take_complaints(self) -> list[HairError]:
-        """Return why files could not be read, each once."""
+        """Return the reasons why files could not be read, and clear them."""
         taken, self._complaints = self._complaints, []
         return taken
 
     def is_being_baked(self) -> bool:
-        """Whether a process writes to the folder."""
+        """Return whether a process is writing to the folder."""
         if not claim_of(self.folder / frame_manifest.NAME).exists():
             return False
         try:
@@ -172,10 +170,10 @@ class FrameCache:
             return None
 
     def _frame_arrays(self, number):
-        """The arrays of a frame's file, None without one; what is wrong with it is kept for `fault_of`."""
+        """Return the arrays of a frame's file or None; stores its fault for `fault_of`."""
         path = self.folder / _name(number, False)
-        marks, fault = _marks_of(path), None
-        if marks is None or self.manifest is None:
+        stamp, fault = _stamp_of(path), None
+        if stamp is None or self.manifest is None:
             return None
         try:
             return _arrays(path, self.manifest, self.manifest.frame_layout, number)
@@ -184,32 +182,32 @@ class FrameCache:
             self._complain(path.name, error)
             return None
         finally:
-            self._checked[number] = marks, fault
+            self._checked[number] = stamp, fault
 
     def _complain(self, name, error):
-        if name not in self._told:
-            self._told.add(name)
+        if name not in self._reported:
+            self._reported.add(name)
             self._complaints.append(error)
 
 
 class Writer:
-    """Writes frames to a folder that this process has claimed: made by `baking`."""
+    """Writes frames to a folder that this process has claimed; `baking` creates it."""
 
     def __init__(self, folder: Path, manifest: Manifest) -> None:
         self.folder, self.manifest = folder, manifest
         self._is_complete = False
 
     def write_frame(self, number: int, points: np.ndarray, digest: str) -> None:
-        """Write a frame, `Frame`'s arrays. Raises `HairError` where it cannot be: frames that are there stay whole."""
+        """Write a frame atomically, with `Frame`'s points and digest. Raises `HairError`."""
         arrays = self._marked(number) | {"digest": _bytes_of(digest), "points": points.astype(np.float32, copy=False)}
         self._write(_name(number, False), arrays, self.manifest.frame_layout, False)
 
     def write_state(self, number: int, arrays: Mapping[str, np.ndarray]) -> None:
-        """Write the state after a frame: all that the next one follows from. Forced onto the disk."""
+        """Write the state after a frame, from which the simulation can continue, and flush it to disk."""
         self._write(_name(number, True), {**self._marked(number), **arrays}, self.manifest.state_file_layout, True)
 
     def remove_states(self, after: int) -> None:
-        """Remove the states after a frame: what is simulated from there on may differ. Raises `HairError`."""
+        """Remove the states after a frame, which may differ when simulated again. Raises `HairError`."""
         try:
             _remove(self.folder, lambda name: (found := _NAME.fullmatch(name)) and found[1] and int(found[2]) > after)
         except OSError as error:
@@ -222,12 +220,12 @@ class Writer:
         self.manifest = changed
 
     def complete(self) -> None:
-        """Say that all frames have been written."""
+        """Mark all frames as written."""
         self._is_complete = True
 
     def end(self) -> None:
-        """Write how far baking came. Called by `baking`."""
-        with contextlib.suppress(HairError):  # the folder is gone, or the disk is full: as after being killed
+        """Write whether baking is complete. Called by `baking`."""
+        with contextlib.suppress(HairError):  # the folder is gone or the disk is full: equivalent to a killed process
             if self.folder.is_dir():
                 self.change(state="complete" if self._is_complete else "part")
 
@@ -246,10 +244,10 @@ class Writer:
 
 @contextlib.contextmanager
 def baking(folder: Path, manifest: Manifest) -> Generator[Writer]:
-    """Claim a folder, made if missing, and write frames to it. Frames that are there stay, of whichever simulation.
+    """Claim a folder, created if missing, and write frames to it. Existing frames of any simulation are kept.
 
-    Raises `HairError` where another process bakes it, where it cannot be written, or where it has frames of other
-    guides. In the end the manifest says whether the frames are complete.
+    Raises `HairError` if another process bakes it, if it cannot be written, or if it has frames of other guides. The
+    manifest is updated on exit: whether the frames are complete.
     """
     with contextlib.ExitStack() as stack:
         try:
@@ -271,7 +269,7 @@ def baking(folder: Path, manifest: Manifest) -> Generator[Writer]:
 
 
 def remove(folder: Path, numbers: Iterable[int] | None = None) -> int:
-    """Remove frames and their states: those of some numbers, or all and the manifest. Returns how many files.
+    """Remove frames and their states: given numbers, or all and the manifest. Returns the number of files removed.
 
     Nothing is removed from a folder without a valid manifest, through a link, or while another process bakes. Raises
     `HairError`.
@@ -291,14 +289,14 @@ def remove(folder: Path, numbers: Iterable[int] | None = None) -> int:
     except OSError as error:
         raise HairError("{path} cannot be removed: {cause}.", path=folder, cause=cause_of(error)) from error
     with contextlib.suppress(OSError):
-        if set(os.listdir(folder)) <= {MARKER}:  # else other files are in it, and it is still ours
+        if set(os.listdir(folder)) <= {MARKER}:  # with other files in it, the folder stays
             _remove(folder, lambda name: name == MARKER)
             folder.rmdir()
     return count
 
 
 def is_marked(folder: Path) -> bool:
-    """Whether a folder has our marker: the contents of a plain file, not its name."""
+    """Return whether a folder has our marker: a plain file with the right content."""
     try:
         return plain_file.read(folder / MARKER, len(_MARK)) == _MARK
     except HairError:
@@ -306,7 +304,7 @@ def is_marked(folder: Path) -> bool:
 
 
 def _require_own(folder):
-    """Raise `HairError` unless a folder is ours or empty, and no link to one that may be."""
+    """Raise `HairError` unless a folder is ours or empty, and not a link."""
     if folder.is_symlink():
         raise HairError("{path} is a link: remove it, or choose another cache folder.", path=folder)
     if is_marked(folder):
@@ -322,11 +320,11 @@ def _require_own(folder):
 
 
 def _mark(folder):
-    """Leave our marker in a folder that this process has claimed. Raises OSError."""
+    """Write our marker to a folder that this process has claimed. Raises OSError."""
     _require_own(folder)
     if is_marked(folder):
         return
-    flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0)  # which follow no link
+    flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0)  # does not follow links
     with os.fdopen(os.open(folder / MARKER, flags, 0o666), "wb") as file:
         file.write(_MARK)
 
@@ -334,9 +332,9 @@ def _mark(folder):
 def between(
     before: np.ndarray | None, start: np.ndarray, end: np.ndarray, after: np.ndarray | None, part: float
 ) -> np.ndarray:
-    """Points at a part 0..1 of the time from `start` to `end`, frames next to each other; float32.
+    """Interpolate points, float32, at a fraction `part` in [0, 1] of the time between consecutive frames start and end.
 
-    The cubic through all four, exact for cubic motion; linear where one of the outer two is None.
+    Cubic through all four frames, exact for cubic motion; linear if `before` or `after` is None.
     """
     t = float(part)
     if before is None or after is None:
@@ -352,8 +350,8 @@ def between(
     return a * before + b * start + c * end + d * after
 
 
-def _marks_of(path):
-    """What differs where a file was written anew; None where there is none."""
+def _stamp_of(path):
+    """Return a stamp that changes whenever a file is written; None for a missing file."""
     try:
         status = path.lstat()
     except OSError:
@@ -362,7 +360,7 @@ def _marks_of(path):
 
 
 def _arrays(path, manifest, layout, number):
-    """The arrays of a frame's or a state's file. Raises `HairError`."""
+    """Return the arrays of a frame's or a state's file. Raises `HairError`."""
     arrays = array_file.read(path, layout)
     if int(arrays["frame"]) != number or manifest.changed_parts(arrays["key"].tobytes().hex()) is None:
         raise HairError("{path} is a frame of another simulation.", path=path)
@@ -386,7 +384,7 @@ def _numbers(folder, is_state):
 
 
 def _remove(folder, is_chosen):
-    """Remove the plain files of a folder whose names are chosen; returns how many."""
+    """Remove the plain files of a folder whose names are chosen; returns their number."""
     with os.scandir(folder) as entries:
         chosen = [entry.path for entry in entries if is_chosen(entry.name) and entry.is_file(follow_symlinks=False)]
     for path in chosen:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What manifest.json says of a folder of simulated frames: which simulation they are of, and how large they may be."""
+"""The manifest.json of a folder of simulated frames: the simulations that they belong to, and the layout of files."""
 
 import dataclasses
 import hashlib
@@ -24,8 +24,8 @@ VERSION = 1
 
 MOST_GUIDES = 1_000_000
 MOST_POINTS = 257  # of a guide
-MOST_FRAME = 99_999_999  # what a file's name has digits for
-MOST_KEYS = 64  # simulations whose frames may stand beside each other
+MOST_FRAME = 99_999_999  # limit of eight digits in a file's name
+MOST_KEYS = 64  # simulations with frames in one folder
 STATES = ("baking", "part", "complete")
 
 _LARGEST_FILE = 1_048_576  # bytes
@@ -38,13 +38,13 @@ _STATE_BYTES_A_GUIDE = 32_768  # 65 vertices take 14,000
 
 @dataclass(frozen=True)
 class Manifest:
-    """A simulation's frames and the files they may be in.
+    """Description of the frames and files in a folder.
 
-    keys: for each simulation that frames here may be of, {part: digest of it} (`digests_of`); the last is what is
-    baked now. guide_count, point_count: of each frame; state_layout: the arrays of a state. notes: (name, reason) of
-    who was left out; parted_by: digest of what parts the hair between guides; spaces: for each of the keys the matrix
-    from the coordinates that guides were made in to those of its frames, 16 numbers, none where these are the same.
-    Raises `HairError` for values that no simulation has.
+    keys: for each simulation with frames in the folder {part: its digest} (`digests_of`); the last one is baked now.
+    guide_count, point_count: of each frame; state_layout: the arrays of a state; notes: (name, reason) of skipped
+    objects; parted_by: digest of the partings between guides; spaces: for each key the matrix from the guides' original
+    coordinates to those of its frames, 16 numbers; empty if all are the identity. Raises `HairError` for invalid
+    values.
     """
 
     keys: tuple[Mapping[str, str], ...]
@@ -76,17 +76,17 @@ class Manifest:
             raise HairError("The cache's coordinates are invalid.")
         array_file.require_layout(self.state_layout)
         if len(self.state_layout) > _MOST_PARTS or not _MARKS.keys().isdisjoint(self.state_layout):
-            raise HairError("The cache's states are not those of any simulation.")
+            raise HairError("The cache's states are invalid.")
         if array_file.size_of(self.state_layout) > (1 + self.guide_count) * _STATE_BYTES_A_GUIDE:
-            raise HairError("The cache's states are larger than those of any simulation.")
+            raise HairError("The cache's states are too large.")
 
     @property
     def key(self) -> str:
-        """Key of what is baked now."""
+        """Key of the simulation that is baked now."""
         return key_of(self.keys[-1])
 
     def space_of(self, key: str) -> tuple[float, ...]:
-        """The one of `spaces` that frames of a key are in; that of the identity for an unknown one."""
+        """Return the matrix in `spaces` of a key's frames; the identity for an unknown key."""
         for parts, space in zip(self.keys, self.spaces, strict=False):
             if key_of(parts) == key:
                 return space
@@ -104,7 +104,7 @@ class Manifest:
         return {**_MARKS, **self.state_layout}
 
     def changed_parts(self, key: str) -> list[str] | None:
-        """What was otherwise when frames of a key were baked: [] for the present one, None for an unknown one."""
+        """Return the parts that differ from a key's simulation: [] for the present key, None for an unknown one."""
         for parts in reversed(self.keys):
             if key_of(parts) == key:
                 names = {*parts, *self.keys[-1]}
@@ -112,9 +112,9 @@ class Manifest:
         return None
 
     def continued(self, before: "Manifest") -> "Manifest":
-        """This manifest for a folder with frames of another one: theirs stay, as outdated ones where keys differ.
+        """Return this manifest for a folder with frames of an earlier one; frames of other keys are kept as outdated.
 
-        Raises `HairError` where frames have other guides or points.
+        Raises `HairError` if the numbers of guides or points differ.
         """
         if (before.guide_count, before.point_count) != (self.guide_count, self.point_count):
             raise HairError("The cache has frames of other guides: free it, or bake to another folder.")
@@ -135,17 +135,17 @@ _MARKS = {"key": ("|u1", (_DIGEST,)), "frame": ("<i8", ())}
 
 
 def digests_of(parts: Mapping[str, Any]) -> dict[str, str]:
-    """{part: what a simulation follows from} → {part: digest}: arrays, and what JSON can hold."""
+    """Return {part: digest} of a simulation's inputs: arrays and JSON values."""
     return {name: digest(value) for name, value in parts.items()}
 
 
 def key_of(digests: Mapping[str, str]) -> str:
-    """32 hexadecimal digits: the key of a simulation whose parts have these digests."""
+    """Return the key of a simulation from the digests of its parts: 32 hexadecimal digits."""
     return digest(sorted(digests.items()))
 
 
 def digest(value: Any) -> str:
-    """32 hexadecimal digits of an array's type, shape and bits, or of what JSON can hold: numbers, text, lists."""
+    """Return a digest of 32 hexadecimal digits: of an array's type, shape and bits, or of a JSON value."""
     if isinstance(value, np.ndarray):
         little = np.ascontiguousarray(value, value.dtype.newbyteorder("<"))
         text = json.dumps([little.dtype.str, list(value.shape)]).encode() + b"\0" + little.tobytes()
@@ -155,7 +155,7 @@ def digest(value: Any) -> str:
 
 
 def write(folder: Path, manifest: Manifest) -> None:
-    """Write a folder's manifest, whole and onto the disk. Raises `HairError`."""
+    """Write a folder's manifest atomically and flush it to disk. Raises `HairError`."""
     notes = [[part[:_MOST_LETTERS] for part in note] for note in manifest.notes[:_MOST_NOTES]]
     found = {"format": FORMAT, "version": VERSION} | dataclasses.asdict(manifest) | {"notes": notes}
     with whole_file(folder / NAME) as partial:
@@ -163,13 +163,13 @@ def write(folder: Path, manifest: Manifest) -> None:
 
 
 def read(folder: Path) -> Manifest:
-    """Read a folder's manifest. Raises `HairError` for whatever `write` does not write."""
+    """Read a folder's manifest. Raises `HairError` for content that `write` does not produce."""
     path = folder / NAME
     return parsed(plain_file.read(path, _LARGEST_FILE), path)
 
 
 def parsed(data: bytes, path: Path) -> Manifest:
-    """`read` of a file's bytes; path: named in errors."""
+    """Parse the bytes of a manifest; path: for error messages. Raises `HairError`."""
     try:
         found = json.loads(data.decode("utf-8"))
         if type(found) is not dict or (found.pop("format"), found.pop("version")) != (FORMAT, VERSION):
@@ -224,7 +224,7 @@ def _require_text(value):
 
 
 def _require(value, kind):
-    """A value that JSON gave, if it is of a type: True is no whole number."""
+    """Return a JSON value if it is exactly of a type (bool is not int). Raises TypeError."""
     if type(value) is not kind:
         raise TypeError(f"{str(value)[:40]!r} is not of type {kind.__name__}")
     return value

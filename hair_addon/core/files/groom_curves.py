@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides and strands as other programs take them: what each has, in parts, and what an importer makes of it."""
+"""Guides and strands for export to other programs: their attributes, in parts, and the limits of importers."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -10,27 +10,27 @@ from ..errors import HairError
 from ..geometry import strands
 from ..shading.appearance import Appearance
 
-AT_ONCE = 16_384  # curves in a part: arrays of all of them would take several times their memory
+AT_ONCE = 16_384  # curves in a part: temporary arrays of all curves would multiply the memory
 
-GUIDE_SLOTS = 3  # guides of a strand that Unreal interpolates between
+GUIDE_SLOTS = 3  # guides of a strand in Unreal's interpolation
 
-# What Unreal holds; it says itself that it leaves out further points of a strand.
+# Limits of Unreal, which warns when it drops further points of a strand.
 MOST_POINTS_OF_CURVE = 255
 MOST_POINTS_OF_GROUP = 2**24 - 1
 MOST_CURVES_OF_GROUP = 2**22 - 1
 
-# Values at the points of some curves, one curve after another: those of a slice of all.
+# Function of a slice of curves → concatenated values at their points.
 Rows = Callable[[slice], np.ndarray]
 
 
 @dataclass(frozen=True)
 class GroomCurves:
-    """All of some guides or strands but where they are.
+    """Attributes of guides or strands, without their points.
 
-    counts: (S,) int32 points of each curve; first_id: identity of the first, the others' follow; widths: diameters
-    (N,), in the units of points; root_uvs: (S, 2), None without a UV map; guide_ids and guide_weights: (S, 3) as
-    `closest_guides` gives them, None of guides; colors: linear RGB (N, 3), and roughness (N,), None if they are not
-    exported; look: of strands.
+    counts: (S,) int32 points of each curve; first_id: ID of the first curve, IDs are consecutive; widths: diameters
+    (N,), in the unit of points; root_uvs: (S, 2), None without a UV map; guide_ids and guide_weights: (S, 3) from
+    `closest_guides`, None for guides; colors: linear RGB (N, 3), and roughness (N,), None if not exported; look: of
+    strands.
     """
 
     group_id: int
@@ -48,30 +48,30 @@ class GroomCurves:
 
     @property
     def name(self) -> str:
-        """The name of their object in a file."""
+        """Name of the object in a file."""
         return guides_name(self.group_name) if self.is_guide else self.group_name
 
     @property
     def curve_count(self) -> int:
-        """S."""
+        """Number of curves S."""
         return len(self.counts)
 
     @property
     def ids(self) -> np.ndarray:
-        """(S,) int32."""
+        """IDs (S,) int32."""
         return np.arange(self.first_id, self.first_id + self.curve_count, dtype=np.int32)
 
 
 def slices(count: int) -> Iterator[slice]:
-    """The parts of so many curves."""
+    """Yield slices of at most `AT_ONCE` curves."""
     return (slice(start, min(start + AT_ONCE, count)) for start in range(0, count, AT_ONCE))
 
 
 def closest_guides(indices: np.ndarray, weights: np.ndarray, first_id: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return identities (S, 3) int32 and weights (S, 3) float32, which sum to 1, of the guides that weigh most.
+    """Return IDs (S, 3) int32 and weights (S, 3) float32 with sum 1 of each strand's guides with the largest weights.
 
-    indices and weights: (S, k) of guides, -1 for none; first_id: identity of guide 0. Where a strand has fewer than
-    three, its first is repeated with weight 0; one without guides has weights of 0.
+    indices and weights: (S, k) of guides, -1 for none; first_id: ID of guide 0. A strand with fewer than three guides
+    repeats its first one with weight 0; a strand without guides has zero weights.
     """
     ids = np.empty((len(indices), GUIDE_SLOTS), np.int32)
     shares = np.empty((len(indices), GUIDE_SLOTS), np.float32)
@@ -81,7 +81,7 @@ def closest_guides(indices: np.ndarray, weights: np.ndarray, first_id: int) -> t
 
 
 def _closest(indices, weights):
-    """The same of some strands, as indices of guides."""
+    """`closest_guides` of some strands, as indices of guides."""
     kept_weights = np.where(indices >= 0, np.maximum(weights, 0.0), 0.0).astype(np.float64)
     order = np.argsort(-kept_weights, axis=1, kind="stable")[:, :GUIDE_SLOTS]
     ids, shares = np.zeros((len(indices), GUIDE_SLOTS), np.int32), np.zeros((len(indices), GUIDE_SLOTS))
@@ -95,16 +95,16 @@ def _closest(indices, weights):
 
 @dataclass
 class Check:
-    """What was found in the points of a group's guides or strands while they were written."""
+    """Checks of a group's points while they are written."""
 
     curves: GroomCurves
     no_length: set[int] = field(default_factory=set)
 
     def parts(self, points: Rows) -> Iterator[np.ndarray]:
-        """Points (N, 3) float32 of all curves, part after part. Raises `HairError` at non-finite coordinates."""
+        """Yield the points (N, 3) float32 of all curves in parts. Raises `HairError` at non-finite coordinates."""
         for chosen in slices(self.curves.curve_count):
             part = np.asarray(points(chosen), np.float32)
-            # The sum is finite exactly where all are, but for an overflow, and reads the points only once.
+            # One pass: a finite sum implies finite coordinates; only an overflow needs the second test.
             if not np.isfinite(part.sum()) and not np.isfinite(part).all():
                 raise HairError(
                     'The group "{name}" has non-finite coordinates: nothing was written.', name=self.curves.group_name
@@ -117,7 +117,7 @@ class Check:
             yield part
 
     def notes(self) -> Iterator[HairError]:
-        """What an importer will do with these curves, as sentences."""
+        """Yield warnings about the treatment of these curves by importers."""
         curves, name = self.curves, self.curves.group_name
         if self.no_length:
             count = len(self.no_length)
@@ -131,12 +131,12 @@ class Check:
             )
         if curves.guide_weights is not None and not curves.guide_weights.any(axis=1).all():
             count = int((~curves.guide_weights.any(axis=1)).sum())
-            yield HairError('"{name}": {count} strands follow no guide, and none moves them.', name=name, count=count)
+            yield HairError('"{name}": {count} strands follow no guide and will not move.', name=name, count=count)
         yield from limit_notes(name, curves.counts)
 
 
 def limit_notes(name: str, counts: np.ndarray) -> Iterator[HairError]:
-    """What Unreal will not hold of a group's guides or strands, which have (S,) points each."""
+    """Yield warnings about Unreal's limits for a group's guides or strands; counts: (S,) points of each."""
     curve_count, point_count = len(counts), int(counts.sum(dtype=np.int64))
     most = int(counts.max(initial=0))
     if most > MOST_POINTS_OF_CURVE:
@@ -163,23 +163,23 @@ def limit_notes(name: str, counts: np.ndarray) -> Iterator[HairError]:
 
 
 def group_names(names: Sequence[str], reserved: Collection[str] = ()) -> list[str]:
-    """Return names of groups that differ, of letters, digits and underscores, as all programs take them.
+    """Return unique names of groups of ASCII letters, digits and underscores, which all programs accept.
 
-    With `guides_name` no two objects of a file are called the same. reserved: names that no group has.
+    They also differ from all `guides_name`s. reserved: names that no group may have.
     """
-    made, taken = [], set(reserved)
+    result, taken = [], set(reserved)
     for name in names:
-        kept = "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in name).strip("_") or "hair"
-        kept = f"_{kept}" if kept[0].isdigit() else kept
-        unique, number = kept, 1
+        base = "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in name).strip("_") or "hair"
+        base = f"_{base}" if base[0].isdigit() else base
+        unique, number = base, 1
         while not taken.isdisjoint({unique, guides_name(unique)}):
             number += 1
-            unique = f"{kept}_{number}"
-        made.append(unique)
+            unique = f"{base}_{number}"
+        result.append(unique)
         taken |= {unique, guides_name(unique)}
-    return made
+    return result
 
 
 def guides_name(group_name: str) -> str:
-    """The name of the object of a group's guides; that of its strands is the group's."""
+    """Return the name of the object of a group's guides; the strands' object has the group's name."""
     return f"{group_name}_guides"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of a groom that leaves its scene: for a surface of another size, and with what comes along only."""
+"""Settings of a groom that leaves its scene: scaled to another surface, without references to other data."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,14 +10,14 @@ from .settings_file import GroomSettings
 
 S = TypeVar("S", bound=Settings)
 
-# Settings that name an object or an image of the scene, by their section; those of styles are looked up in each style.
+# Settings that name an object or an image of the scene, by section, and those of styles.
 _NAMES_OF_OTHERS = {"guides": ("density_image", "flow_lines"), "hair": ("density_image", "part_lines")}
 _NAMES_OF_OTHERS_IN_STYLES = ("mask_image", "cutter", "target")
 _MASKS = {"guides": ("density_group",), "hair": ("density_group", "region_group")}
 
 
 def scaled(settings: GroomSettings, factor: float) -> GroomSettings:
-    """`GroomSettings` with all lengths of guides, strands, styles and dynamics multiplied by a factor."""
+    """Return `GroomSettings` with all lengths of guides, strands, styles and dynamics multiplied by a factor."""
     if factor == 1.0:
         return settings
     sections = {name: _scaled(getattr(settings, name), factor) for name in ("guides", "hair", "dynamics")}
@@ -34,7 +34,7 @@ def _scaled(settings: S, factor: float) -> S:
 
 
 def alone(settings: GroomSettings) -> tuple[GroomSettings, list[str]]:
-    """`GroomSettings` without names of other objects and images of the scene, and these names."""
+    """Return `GroomSettings` without the names of other objects and images, and the list of these names."""
     left: list[str] = []
     sections = {
         section: _without(getattr(settings, section), names, left) for section, names in _NAMES_OF_OTHERS.items()
@@ -50,14 +50,14 @@ def _without(settings, names, left):
 
 
 def masks_of(settings: GroomSettings) -> list[str]:
-    """Names of the masks of `GroomSettings`: vertex groups, and of styles also attributes; each once."""
+    """Return the unique names of masks in `GroomSettings`: vertex groups, and attributes of styles."""
     found = [getattr(getattr(settings, section), name) for section, names in _MASKS.items() for name in names]
     found += [style.mask for style in settings.styles]
     return list(dict.fromkeys(filter(None, found)))
 
 
 def renamed(settings: GroomSettings, names: Mapping[str, str]) -> GroomSettings:
-    """`GroomSettings` whose masks have other names; {present: other} of those that change, an empty one for no mask."""
+    """Return `GroomSettings` with renamed masks; names: {old: new}, "" removes a mask."""
     sections = {section: _renamed(getattr(settings, section), masks, names) for section, masks in _MASKS.items()}
     return replace(settings, **sections, styles=tuple(_renamed(style, ("mask",), names) for style in settings.styles))
 

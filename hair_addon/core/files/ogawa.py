@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Ogawa container of [Alembic26] files: a tree of groups, whose leaves are data.
 
-Children are written before their group, and large data in parts: a file of any size takes the memory of one part.
+Children are written before their group, and large data in parts: memory is bounded by the size of one part.
 
     header   "Ogawa", 0xff when the file is complete, version 1 (16 bits, big-endian), position of the root group
     data     number of bytes, the bytes
-    group    number of children, the address of each: its position, with the highest bit set for data
+    group    number of children, the address of each: its position; the highest bit is set for data
 
 All other numbers are little-endian and have 64 bits.
 """
@@ -17,19 +17,19 @@ from typing import BinaryIO
 
 import numpy as np
 
-Data = bytes | bytearray | memoryview | np.ndarray  # what a file is written from
+Data = bytes | bytearray | memoryview | np.ndarray
 
 EMPTY_GROUP = 0
 EMPTY_DATA = 1 << 63
 
-DIGEST_SIZE = 16  # [bytes], before the content of each sample; readers take samples of one digest and size as equal
+DIGEST_SIZE = 16  # [bytes], before the content of each sample; readers treat equal digest and size as equal content
 
 _HEADER = struct.Struct("<5sB2sQ")
 _NUMBER = struct.Struct("<Q")
 
 
 def digest_of(*parts: Data) -> bytes:
-    """Return the digest of the bytes of all parts: any good hash will do, as readers only compare them."""
+    """Return the digest of the bytes of all parts. Any good hash is valid: readers only compare digests."""
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
     for part in parts:
         digest.update(part)
@@ -37,7 +37,7 @@ def digest_of(*parts: Data) -> bytes:
 
 
 class OgawaWriter:
-    """Writes a file, empty so far and seekable; what is never finished is refused by every reader."""
+    """Writes to an empty, seekable file. Readers reject a file until `finish` is called."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -54,28 +54,28 @@ class OgawaWriter:
         return address
 
     def sample(self, parts: Iterable[Data]) -> tuple[int, int, bytes]:
-        """Write a sample, its digest and then its content in parts; returns its (address, bytes of content, digest).
+        """Write a sample, its digest and then its content in parts; returns (address, bytes of content, digest).
 
-        One that the file has is not kept again, and one without content has no place.
+        Equal samples are stored once; an empty sample is not stored.
         """
         start, digest = self._end, hashlib.blake2b(digest_size=DIGEST_SIZE)
         self._append(bytes(_NUMBER.size + DIGEST_SIZE))
         for part in parts:
             digest.update(part)
             self._append(part)
-        size, made = self._end - start - _NUMBER.size, digest.digest()
+        size, digest_bytes = self._end - start - _NUMBER.size, digest.digest()
         place = EMPTY_DATA if size == DIGEST_SIZE else start | EMPTY_DATA
-        address = self._samples.setdefault((size, made), place)
+        address = self._samples.setdefault((size, digest_bytes), place)
         self._file.seek(start)
         if address != start | EMPTY_DATA:
             self._end = start
         else:
-            self._file.write(_NUMBER.pack(size) + made)
+            self._file.write(_NUMBER.pack(size) + digest_bytes)
             self._file.seek(self._end)
-        return address, size - DIGEST_SIZE, made
+        return address, size - DIGEST_SIZE, digest_bytes
 
     def group(self, children: Sequence[int]) -> int:
-        """Write a group of addresses; returns its own."""
+        """Write a group of addresses; returns the group's address."""
         if not children:
             return EMPTY_GROUP
         address = self._end
@@ -83,7 +83,7 @@ class OgawaWriter:
         return address
 
     def finish(self, root: int) -> None:
-        """Say that the file is complete, and which group is its root."""
+        """Write the root group's address and mark the file as complete."""
         self._file.truncate(self._end)
         self._write_header(True, root)
 

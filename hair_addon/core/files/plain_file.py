@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading of small files that somebody else may have made: a plain file of limited size, or a refusal."""
+"""Reading of small, untrusted files: plain files of limited size."""
 
 import errno
 import os
@@ -13,14 +13,14 @@ from ..errors import HairError, cause_of
 
 T = TypeVar("T")
 
-# A program that looks at a file, such as a virus scanner, keeps others from it on Windows for a moment.
-_PAUSES = (0.05, 0.2)  # [s] between the tries
+# On Windows, a program that reads a file, such as a virus scanner, briefly blocks others.
+_PAUSES = (0.05, 0.2)  # [s] between attempts
 
 
 def read(path: Path, most: int) -> bytes:
     """Return the bytes of a plain file, at most `most`. Raises `HairError` for anything else, and for links.
 
-    What is no plain file is not opened for reading, as a pipe would block; a larger file is not read.
+    Opening does not block on a pipe; a larger file is not read.
     """
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
 
@@ -45,7 +45,7 @@ def read(path: Path, most: int) -> bytes:
 
 
 def tried(action: Callable[[], T]) -> T:
-    """Return what an action on a file returns, which is repeated twice while another program holds the file."""
+    """Run an action on a file and return its result; repeated up to twice while another program holds the file."""
     for pause in _PAUSES:
         try:
             return action()

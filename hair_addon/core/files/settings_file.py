@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Groom settings as a human-readable JSON file, with a section for each stage.
 
-Its keys are the fields of the `Settings` classes; styles are a list, in the order in which they are applied. Omitted
-settings have their defaults, or are computed from the surface; unknown keys are errors, as they would have no effect.
+Its keys are the fields of the `Settings` classes; styles are a list in the order of application. Omitted settings have
+their defaults, or are computed from the surface; unknown keys are errors, because they would have no effect.
 Version 1 was a single look, the format of saved looks; version 2 had no styles.
 """
 
@@ -38,8 +38,8 @@ class GroomSettings:
     hair: HairSettings = field(default_factory=HairSettings)
     appearance: Appearance = field(default_factory=Appearance)
     tables: lookup_tables.Settings = field(default_factory=lookup_tables.Settings)  # except those in the appearance
-    styles: tuple[StyleSettings, ...] = ()  # in the order in which they are applied; a list becomes a tuple
-    style_names: tuple[str, ...] = ()  # of each style, empty for any; or no names
+    styles: tuple[StyleSettings, ...] = ()  # in the order of application; a list is converted to a tuple
+    style_names: tuple[str, ...] = ()  # one for each style, "" for unnamed; empty if no style has a name
     dynamics: DynamicsSettings = field(default_factory=DynamicsSettings)
 
     def __post_init__(self) -> None:
@@ -51,7 +51,7 @@ class GroomSettings:
 
 
 def require_styles(styles: object, names: object = ()) -> tuple[tuple[StyleSettings, ...], tuple[str, ...]]:
-    """Styles and their names as tuples; no names where all are empty. Raises `HairError`."""
+    """Return styles and their names as tuples; names are () if all are empty. Raises `HairError`."""
     if not isinstance(styles, list | tuple):
         raise HairError(f"styles must be a list of styles, not {described(styles)}.")
     if len(styles) > MOST_STYLES:
@@ -67,30 +67,30 @@ def require_styles(styles: object, names: object = ()) -> tuple[tuple[StyleSetti
     return tuple(styles), tuple(map(str, names))
 
 
-# Those of a single `Settings` class.
+# Sections with a single `Settings` class.
 SECTIONS: dict[str, type[Settings]] = {
     name: found for name, found in get_type_hints(GroomSettings).items() if not name.startswith("style")
 }
 
 
 def declared_in(section: str) -> list[tuple[str, Any, Param]]:
-    """[(name, default, Param)] of the settings that a section holds."""
+    """Return [(name, default, Param)] of the settings in a section."""
     left_out = TABLE_FIELDS if section == "tables" else ()
     return [setting for setting in declared(SECTIONS[section]) if setting[0] not in left_out]
 
 
 def write(path: str | Path, settings: GroomSettings) -> None:
-    """Write `GroomSettings`; the file appears whole or not at all. Raises `HairError`."""
+    """Write `GroomSettings` atomically. Raises `HairError`."""
     write_object(path, to_object(settings))
 
 
 def to_object(settings: GroomSettings) -> dict[str, Any]:
-    """Convert `GroomSettings` to the object that `write` writes."""
+    """Convert `GroomSettings` to the JSON object of a file."""
     return {"format": FORMAT, "version": VERSION, **sections_of(settings), "styles": list_of_styles(settings)}
 
 
 def sections_of(settings: GroomSettings) -> dict[str, dict[str, Any]]:
-    """{section: {name: value}} of `GroomSettings`, without those that follow from the surface."""
+    """Return {section: {name: value}} of `GroomSettings`, without values to be computed from the surface."""
     values = {section: given(getattr(settings, section)) for section in SECTIONS}
     return {
         section: {name: values[section][name] for name, *_ in declared_in(section) if name in values[section]}
@@ -99,7 +99,7 @@ def sections_of(settings: GroomSettings) -> dict[str, dict[str, Any]]:
 
 
 def list_of_styles(settings: GroomSettings) -> list[dict[str, Any]]:
-    """[{name: value}] of the styles of `GroomSettings`, each with its kind, and its name if it has one."""
+    """Return [{name: value}] of the styles of `GroomSettings`, each with its kind, and its name if it has one."""
     names = settings.style_names or [""] * len(settings.styles)
     return [
         {"kind": kind_of(style), **({"name": name} if name else {}), **given(style)}
@@ -109,14 +109,14 @@ def list_of_styles(settings: GroomSettings) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class PartialSettings:
-    """Some of the settings of a groom, as a file gives them; what it leaves out stays as it is."""
+    """Some of the settings of a groom; omitted settings are unchanged."""
 
     values: dict[str, dict[str, Any]]  # {section: {name: value}}
-    styles: tuple[StyleSettings, ...] | None = None  # None: styles stay
+    styles: tuple[StyleSettings, ...] | None = None  # None: unchanged
     style_names: tuple[str, ...] = ()
 
     def changed(self, settings: GroomSettings) -> GroomSettings:
-        """`GroomSettings` with these."""
+        """Return `GroomSettings` with these settings applied."""
         sections = {name: replace(getattr(settings, name), **values) for name, values in self.values.items()}
         settings = replace(settings, **sections)
         return settings if self.styles is None else self._styled(settings, self.styles)
@@ -136,7 +136,7 @@ def from_object(found: dict[str, Any], path: str | Path) -> GroomSettings:
 
 
 def read_partial(path: str | Path) -> PartialSettings:
-    """Read those settings that a file has. Raises `HairError`."""
+    """Read only the settings in a file. Raises `HairError`."""
     return partial_of_object(read_object(path), path)
 
 
@@ -146,19 +146,19 @@ def partial_of_object(found: dict[str, Any], path: str | Path) -> PartialSetting
     styles, names = None, ()
     if "styles" in sections:
         styles, names = _styles(sections.pop("styles"), path)
-    made = {}
+    result = {}
     for name, values in sections.items():
         if name not in SECTIONS:
             raise HairError('{path}: unknown section "{key}".', path=path, key=name)
         if not isinstance(values, dict):
             raise HairError('{path}: "{key}" must be a group of settings.', path=path, key=name)
         settings = to_settings(values, SECTIONS[name], path, f"{name}.", declared_in(name))
-        made[name] = {setting: getattr(settings, setting) for setting in values}
-    return PartialSettings(made, styles, names)
+        result[name] = {setting: getattr(settings, setting) for setting in values}
+    return PartialSettings(result, styles, names)
 
 
 def _styles(found, path):
-    """(styles, their names) of a file's list."""
+    """Return (styles, their names) of a file's list."""
     if not isinstance(found, list):
         raise HairError('{path}: "styles" must be a list of styles.', path=path)
     if len(found) > MOST_STYLES:
@@ -170,7 +170,7 @@ def _styles(found, path):
 
 
 def _style(values, path, place):
-    """(name, `StyleSettings`)."""
+    """Return (name, `StyleSettings`) of a style's object."""
     if not isinstance(values, dict):
         raise HairError('{path}: "{key}" must be a group of settings.', path=path, key=place)
     values = dict(values)
@@ -190,9 +190,9 @@ def to_settings(
     place: str = "",
     allowed: list[tuple[str, Any, Param]] | None = None,
 ) -> S:
-    """{name: value} as JSON gave it → `Settings`. Raises `HairError` that names file and key; place: what is before.
+    """Convert a JSON object to `Settings`. Raises `HairError` with file and key.
 
-    allowed: those of the class' declarations that may be named, None for all.
+    place: prefix of the key in errors; allowed: the accepted declarations of the class, None for all.
     """
     declarations = {name: default for name, default, _details in allowed or declared(settings_class)}
     checked = {}
@@ -221,7 +221,7 @@ def _kind(default):
 
 
 def _migrated(found, path):
-    """The sections of a file of any version up to ours."""
+    """Return the sections of a file of any version up to the present one."""
     version = found.get("version")
     is_ours = found.get("format") == FORMAT or version == 1
     if not is_ours or type(version) is not int or version < 1:
@@ -238,23 +238,23 @@ def _migrated(found, path):
 
 
 def _sections_of_look(found):
-    """Version 1, a look, has the settings of its appearance beside its version."""
+    """Migrate version 1, a look, whose appearance settings are at the top level."""
     return {"appearance": {name: value for name, value in found.items() if name != "version"}}
 
 
 def _without_styles(found):
-    """Version 2."""
+    """Migrate version 2, which has no styles."""
     return found | {"styles": []}
 
 
-_MIGRATIONS = {1: _sections_of_look, 2: _without_styles}  # from each version to the next
+_MIGRATIONS = {1: _sections_of_look, 2: _without_styles}  # version → its migration to the next
 
 
 # JSON.
 
 
 def read_object(path: str | Path) -> dict[str, Any]:
-    """The JSON object in a file, {name: value}. Raises `HairError`."""
+    """Read the JSON object {name: value} of a file. Raises `HairError`."""
     path = Path(path)
     try:
         if not path.is_file():
@@ -269,7 +269,7 @@ def read_object(path: str | Path) -> dict[str, Any]:
 
 
 def object_of_text(text: str, path: str | Path) -> dict[str, Any]:
-    """The JSON object in a text, {name: value}. Raises `HairError`, which names the file that it is from."""
+    """Parse the JSON object {name: value} of a text; path: for error messages. Raises `HairError`."""
     try:
         found = json.loads(text, object_pairs_hook=_once, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
@@ -291,13 +291,13 @@ def _refuse_constant(name):
 
 
 def write_object(path: str | Path, values: dict[str, Any]) -> None:
-    """Write {name: value} as JSON; the file appears whole or not at all. Raises `HairError`."""
+    """Write {name: value} as JSON, atomically. Raises `HairError`."""
     with whole_file(path) as partial:
         partial.write_text(text_of(values), encoding="utf-8")
 
 
 def text_of(values: dict[str, Any]) -> str:
-    """Format JSON with a line for each setting."""
+    """Return formatted JSON with a line for each setting."""
     return json.dumps(values, indent=2) + "\n"
 
 
@@ -305,7 +305,7 @@ def text_of(values: dict[str, Any]) -> str:
 
 
 def schema() -> dict[str, Any]:
-    """The JSON Schema (draft 2020-12) of files that `read` takes."""
+    """Return the JSON Schema (draft 2020-12) of files for `read`."""
     sections = {
         name: {
             "type": "object",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Named styles: settings files with some sections, in presets/. Lengths are for the hair of a human head.
+"""Named styles: partial settings files in presets/. Lengths are for the hair of a human head.
 
-What a preset leaves out stays as it is.
+Settings that a preset omits are unchanged.
 """
 
 from pathlib import Path
@@ -31,7 +31,7 @@ PRESETS = {
     "BRAIDS": "Braids",
 }
 
-# What a saved preset has beside its styles: settings of the hair that belong to a cut.
+# Hair settings that a saved preset stores beside its styles.
 _OF_HAIR = ("point_count", "tip_taper")
 
 
@@ -44,7 +44,7 @@ def read(identifier: str) -> PartialSettings:
 
 
 def fit(preset: PartialSettings, factor: float, strand_spacing: float) -> PartialSettings:
-    """A preset with its lengths multiplied by a factor; strand_spacing [m]: see `fitting.fitted`."""
+    """Return a preset with its lengths multiplied by a factor; strand_spacing [m]: see `fitting.fitted`."""
     values = {}
     for section, found in preset.values.items():
         details = {name: declared for name, _default, declared in settings_file.declared_in(section)}
@@ -56,7 +56,7 @@ def fit(preset: PartialSettings, factor: float, strand_spacing: float) -> Partia
 
 
 def to_object(settings: GroomSettings) -> dict[str, Any]:
-    """Convert the styles of `GroomSettings`, and what belongs to them, to the object of a preset's file."""
+    """Convert the styles of `GroomSettings`, and the hair settings of `_OF_HAIR`, to the JSON object of a preset."""
     found = settings_file.to_object(settings)
     kept = {name: value for name, value in found["hair"].items() if name in _OF_HAIR}
     return {"format": found["format"], "version": found["version"], "hair": kept, "styles": found["styles"]}

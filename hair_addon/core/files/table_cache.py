@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Disk cache of baked tables: each set has a name derived from its settings.
+"""Disk cache of baked tables: the name of each set is derived from its settings.
 
-A cached set is used only if it is complete, its texels match the digest in its header, and its settings are those
-requested; otherwise it is baked again and replaced. Other files in the folder are never changed.
+A cached set is used only if it is complete, its texels match the digest in its header, and its settings match the
+request; otherwise it is baked again and replaced. Other files in the folder are never changed.
 """
 
 import contextlib
@@ -27,15 +27,15 @@ _NAME = re.compile(r"tables-[0-9a-f]{32}")
 def tables(
     folder: Path, settings: lookup_tables.Settings, version: str, *, device: str = "cpu", capacity: int = CAPACITY
 ) -> lookup_tables.Tables:
-    """`lookup_tables.Tables` of these settings, from the folder or baked now and put there.
+    """Return `lookup_tables.Tables` of these settings from the folder; bakes and stores them if missing.
 
-    version: of the project, whose bakes may differ; capacity: sets kept; the least recently used are removed. A
-    folder that cannot be written only costs the next bake.
+    version: of the project, part of the name; capacity: number of sets, beyond which the least recently used are
+    removed. If the folder cannot be written, tables are returned without being stored.
     """
     place = Path(folder) / _name(settings, version)
     try:
         found = table_exr.read_tables(place)
-    except HairError:  # missing or damaged: handled alike
+    except HairError:  # missing or damaged
         found = None
     if found is not None and found.settings == settings:
         _mark_used(place)
@@ -56,9 +56,9 @@ def _name(settings, version):
 
 
 def _mark_used(place):
-    """Touch a set's `used` file, for finding the least recently used."""
+    """Update the time of last use in a set's `used` file; a read-only folder is left unchanged."""
     with contextlib.suppress(HairError), whole_file(place / "used", is_forced=False) as partial:
-        partial.write_text(str(time.time_ns()))  # a read-only folder keeps its order
+        partial.write_text(str(time.time_ns()))
 
 
 def _last_used(place):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lookup tables as OpenEXR files: half floats, with their settings and axes in the header.
 
-The first line of a file is row 0 of its table. A file is encoded in memory and decoded from memory, because OpenEXR
-reports neither a full disk nor a truncated file as an error.
+The first line of a file is row 0 of its table. Files are encoded and decoded in memory, because OpenEXR reports neither
+a full disk nor a truncated file as an error.
 """
 
 import contextlib
@@ -33,25 +33,25 @@ _PREFIX = "vellus."  # of our header attributes
 
 
 def write_tables(folder: str | Path, tables: Tables, version: str) -> list[Path]:
-    """`Tables` → m.exr, n.exr, n_trt.exr and, if there is a residual, n_res.exr in a folder, made if missing.
+    """Write `Tables` as m.exr, n.exr, n_trt.exr and, if there is a residual, n_res.exr to a folder, created if missing.
 
     Returns their paths. All are on disk before the first is moved to its place. version: of the project, for the
-    header. Raises `HairError` when the folder cannot be written.
+    header. Raises `HairError` if the folder cannot be written.
     """
     names = table_axes.tables_of(tables.settings.mode)
     return _write_set(folder, {name: getattr(tables, name) for name in names}, tables.settings, version)
 
 
 def write_dual_tables(folder: str | Path, dual: DualTables, version: str) -> list[Path]:
-    """`DualTables` → dual.exr, n_g.exr and n_g_trt.exr in a folder, as `write_tables`."""
+    """Write `DualTables` as dual.exr, n_g.exr and n_g_trt.exr, like `write_tables`."""
     arrays = {"dual": dual.theta, "n_g": dual.n_g, "n_g_trt": dual.n_g_trt}
     return _write_set(folder, arrays, dual.settings, version)
 
 
 def read_tables(folder: str | Path) -> Tables:
-    """`Tables` from a folder that `write_tables` filled, with the settings that they were baked with.
+    """Read `Tables`, with their settings, from a folder of `write_tables`.
 
-    Raises `HairError` if a file is missing, damaged, of another origin, or of another bake.
+    Raises `HairError` if a file is missing, damaged, foreign, or from another bake.
     """
     settings = _settings_of_folder(folder, "n")
     arrays = _read_set(folder, table_axes.tables_of(settings.mode), settings)
@@ -59,7 +59,7 @@ def read_tables(folder: str | Path) -> Tables:
 
 
 def read_dual_tables(folder: str | Path) -> DualTables:
-    """`DualTables` from a folder that `write_dual_tables` filled. Raises `HairError` as `read_tables`."""
+    """Read `DualTables` from a folder of `write_dual_tables`. Raises `HairError` like `read_tables`."""
     settings = _settings_of_folder(folder, "dual")
     arrays = _read_set(folder, table_axes.DUAL_TABLES, settings)
     return DualTables(arrays["dual"], arrays["n_g"], arrays["n_g_trt"], settings)
@@ -79,7 +79,7 @@ def _write_set(folder, arrays, settings, version):
 
 
 def _settings_of_folder(folder, name):
-    """The settings in the header of a table whose channels are the same in both modes."""
+    """Return the settings in the header of a table; name: of one with the same channels in both modes."""
     image = _Image(Path(folder) / f"{name}.exr", table_axes.channels(name, "classic"))
     return _settings_from_header(image, name)
 
@@ -98,7 +98,7 @@ def _read_set(folder, names, settings):
     return arrays
 
 
-# What a header says.
+# Headers.
 
 
 def _table_header(name, half, settings, version):
@@ -115,14 +115,14 @@ def _table_header(name, half, settings, version):
         "settings": exact,
         "sha256": _digest(half, exact),
     }
-    for key, default, _ in declared(Settings):  # to single precision, for readability
+    for key, default, _ in declared(Settings):  # in single precision, for readability
         value = getattr(settings, key)
         header["settings." + key] = tuple(map(float, value)) if isinstance(default, tuple) else type(default)(value)
     return {_PREFIX + key: value for key, value in header.items()}
 
 
 def _digest(half, settings_text):
-    """Digest that detects damaged or edited texels and settings, which OpenEXR may not notice."""
+    """Return a digest that detects damaged or edited texels and settings; OpenEXR may not report them."""
     return hashlib.sha256(settings_text.encode() + np.ascontiguousarray(half, "<f2").tobytes()).hexdigest()
 
 
@@ -155,8 +155,8 @@ def _settings_from_header(image, name):
 
 
 def _encode(half, channels, header):
-    # In a Blender that links OpenEXR as a shared library, as Debian's does, its functions override those of the wheel,
-    # which is another version: compression then prints errors for every block, though the file is valid.
+    # If Blender links OpenEXR as a shared library, as Debian's does, its functions override those of the wheel, which
+    # has another version: compression would then print errors for every block, although the file is valid.
     attributes = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.NO_COMPRESSION, **header}
     planes = {name: np.ascontiguousarray(half[..., index]) for index, name in enumerate(channels)}
     stream = io.BytesIO()
@@ -168,7 +168,7 @@ def _encode(half, channels, header):
 
 
 class _Image:
-    """A file whose header is that of one plain image with the requested channels."""
+    """An EXR file of one plain image with the requested channels."""
 
     def __init__(self, path, channels):
         self.path = Path(path)
@@ -185,7 +185,7 @@ class _Image:
         self.demand_size(None)
 
     def demand_size(self, size):
-        """Refuse any other (height, width) than `size`, and any beyond `MAX_SIZE`."""
+        """Raise `HairError` unless (height, width) is `size`, or, if None, at most `MAX_SIZE`."""
         (left, top), (right, bottom) = self.header["dataWindow"]
         height, width = int(bottom) - int(top) + 1, int(right) - int(left) + 1
         if max(height, width) > MAX_SIZE:
@@ -194,7 +194,7 @@ class _Image:
             self._refuse(f"is {width} x {height} texels, not {size[1]} x {size[0]}")
 
     def pixels(self):
-        """(H, W, C) float16, all finite."""
+        """Return (H, W, C) float16, all finite. Raises `HairError`."""
         _, _, planes = self._parse(header_only=False)
         planes = [planes[name].pixels for name in self.channels]
         if any(plane.dtype != np.float16 for plane in planes):
@@ -205,9 +205,9 @@ class _Image:
         return half
 
     def _read_bytes(self):
-        """The bytes of a plain file that begins as an EXR does and is not too large."""
+        """Return the bytes of a plain file of limited size with the magic number of EXR."""
         try:
-            # Not blocking: opening a pipe without a writer would block.
+            # O_NONBLOCK: opening a pipe without a writer would block.
             flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
             with open(self.path, "rb", opener=lambda path, _flags: os.open(path, flags)) as file:
                 status = os.fstat(file.fileno())
@@ -222,11 +222,11 @@ class _Image:
             raise HairError(f"Cannot read {self.path}: {cause_of(error)}. Bake the tables again.") from error
 
     def _parse(self, header_only):
-        """(part count, header, {channel: Channel}) of the first part; header["channels"] is {name: sampling}."""
+        """Return (part count, header, {channel: Channel}) of the first part; header["channels"] is {name: sampling}."""
         try:
             with _size_limit():
                 file = OpenEXR.File(io.BytesIO(self._data), separate_channels=True, header_only=header_only)
-            # After pixels that cannot be decoded OpenEXR only warns on the console, and gives no parts.
+            # If pixels cannot be decoded, OpenEXR only warns on the console and returns no parts.
             if not file.parts:
                 self._refuse("is truncated or damaged")
             header = file.header()
@@ -241,7 +241,7 @@ class _Image:
 
 @contextlib.contextmanager
 def _size_limit():
-    """Keeps OpenEXR from larger images than `MAX_SIZE`; the limit is the whole process's, so it is put back."""
+    """Limit OpenEXR's images to `MAX_SIZE`; the process-wide limit is restored afterwards."""
     image, tile = OpenEXR.getMaxImageSize(), OpenEXR.getMaxTileSize()
     OpenEXR.setMaxImageSize(MAX_SIZE, MAX_SIZE)
     OpenEXR.setMaxTileSize(MAX_SIZE, MAX_SIZE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms for Unreal: an Alembic file after [UnrealGroom26], version 1.5, in centimetres with Z up.
+"""Grooms for Unreal: an Alembic file as specified in [UnrealGroom26], version 1.5, in centimetres with Z up.
 
     groom                    transform: version, tool, settings
       <group>_guides         transform
@@ -7,7 +7,7 @@
       <group>                transform
         <group>Shape         curves: groom_guide 0
 
-The axes are Blender's, right-handed: Unreal's importer takes them with the scale (1, -1, 1).
+The axes are Blender's, right-handed: Unreal's importer needs the scale (1, -1, 1).
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ _ROOT = "groom"
 
 
 class UnrealGroomWriter:
-    """Writes a groom; `writing` makes it. Guides and strands are added, and then get their points for each time."""
+    """Writes a groom; `writing` creates it. Add guides and strands first, then write their points for each time."""
 
     def __init__(self, archive: AlembicWriter, sampling: int, tool: str, properties: str) -> None:
         self._archive, self._tool, self._properties = archive, tool, properties
@@ -35,23 +35,23 @@ class UnrealGroomWriter:
         self._added: list[tuple[Curves, CurvesWriter, Check]] = []
 
     def add(self, curves: GroomCurves, moves: bool = False) -> int:
-        """Write all of some curves but their points; returns their number. moves: whether points of each time come."""
+        """Write the attributes of curves; returns their number. moves: whether points are written for each time."""
         writer = self._moving if moves else self._still
         width = Parameter("width", "float32", "vertex", _of_points(curves, curves.widths))
         self._added.append((writer.add(curves.name, curves.counts, width, _parameters(curves)), writer, Check(curves)))
         return len(self._added) - 1
 
     def write_points(self, number: int, points: Rows) -> None:
-        """Write the points (N, 3) [cm] of added curves, at the next time. Raises `HairError` for non-finite ones."""
+        """Write the points (N, 3) [cm] of curves at the next time. Raises `HairError` for non-finite coordinates."""
         curves, writer, check = self._added[number]
         writer.write_points(curves, check.parts(points))
 
     def notes(self) -> list[HairError]:
-        """What Unreal's importer will do with what was written."""
+        """Return warnings about the treatment of the written curves by Unreal's importer."""
         return [note for _curves, _writer, check in self._added for note in check.notes()]
 
     def close(self) -> None:
-        """Write what is around the curves. Called by `writing`."""
+        """Write the objects of the curves and finish the archive. Called by `writing`."""
         objects = []
         for curves, writer, _check in self._added:
             transform = curves.name
@@ -70,10 +70,10 @@ class UnrealGroomWriter:
 def writing(
     path: Path, tool: str, properties: str, rate: float | None = None, first_frame: int = 0
 ) -> Iterator[UnrealGroomWriter]:
-    """Write a groom to a path; the file is whole after the context.
+    """Write a groom to a path; the file is complete after the context.
 
-    tool: the program and its version; properties: its settings, for people; rate: frames a second of points that move,
-    from `first_frame` on; None where none do. Raises OSError where the disk is full.
+    tool: the program and its version; properties: its settings, for information; rate: frame rate [1/s] of moving
+    points, from `first_frame` on, None for a static groom. Raises OSError if the disk is full.
     """
     with open(path, "wb") as file:
         archive = AlembicWriter(file, tool, rate)
@@ -84,7 +84,7 @@ def writing(
 
 
 def _parameters(curves) -> Iterator[Parameter]:
-    """The geometry parameters of guides or strands."""
+    """Yield the geometry parameters of guides or strands."""
     yield Parameter("groom_guide", "int16", "constant", [[int(curves.is_guide)]])
     yield Parameter("groom_group_id", "int32", "constant", [[curves.group_id]])
     yield Parameter("groom_group_name", "string", "constant", [[curves.group_name]])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that appear whole or not at all: written beside their place, and moved there in the end."""
+"""Atomic writing of files: into a temporary file beside the target, which is replaced at the end."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ _PARTIAL = re.compile(r"\.vellus_[0-9a-f]{16}_(.+)", re.ASCII | re.DOTALL)
 
 @contextlib.contextmanager
 def whole_file(path: str | Path, partial: Path | None = None, is_forced: bool = True) -> Generator[Path]:
-    """`whole_files` of one file; partial: the temporary path, None for a new one."""
+    """`whole_files` for one file; partial: the temporary path, None for a new one."""
     with whole_files([path], None if partial is None else [partial], is_forced) as (there,):
         yield there
 
@@ -25,15 +25,15 @@ def whole_file(path: str | Path, partial: Path | None = None, is_forced: bool = 
 def whole_files(
     paths: Iterable[str | Path], partials: list[Path] | None = None, is_forced: bool = True
 ) -> Generator[list[Path]]:
-    """Paths beside `paths` to write to: when all are written they take their places, after an error none does.
+    """Yield temporary paths to write to; on success they replace `paths`, after an error none does.
 
-    partials: those paths, None for new ones. Raises `HairError` where a folder may not be written or its disk is full,
-    of which not every program that writes tells: so files are forced onto the disk first, unless `is_forced` is off.
+    partials: the temporary paths, None for new ones. Raises `HairError` if a folder cannot be written or the disk is
+    full. Some exporters do not report a full disk: `is_forced` flushes files to disk before they are moved.
     """
     places = [Path(path) for path in paths]
     for path in places:
         _require_file(path)
-    # In the same folder, otherwise paths relative to the file would be wrong.
+    # In the same folder, because files may contain relative paths.
     partials = partials or [new_partial_of(path) for path in places]
     try:
         for path in places:
@@ -50,22 +50,22 @@ def whole_files(
         raise HairError("{path} cannot be written: {cause}.", path=places[0], cause=cause_of(error)) from error
     finally:
         for partial in partials:
-            with contextlib.suppress(OSError):  # it has moved to its place, or was never made
+            with contextlib.suppress(OSError):  # moved to its place, or never created
                 partial.unlink()
 
 
 def new_partial_of(path: Path) -> Path:
-    """Return a path for writing a file that nothing else is written to: nobody can guess it and put a link there."""
+    """Return an unpredictable temporary path beside a file, so that no link can be placed there in advance."""
     return path.with_name(f".vellus_{secrets.token_hex(8)}{path.suffix}")
 
 
 def partial_of(path: Path) -> Path:
-    """Return such a path for writing a claimed file, by which `leftovers` finds what a killed process leaves there."""
+    """Return an unpredictable temporary path for a claimed file; `leftovers` finds it after a killed process."""
     return path.with_name(f".vellus_{secrets.token_hex(8)}_{path.name}")
 
 
 def leftovers(folder: Path) -> dict[str, list[Path]]:
-    """{name of a file: partial ones that `partial_of` named} in a folder, which has none if it cannot be listed."""
+    """Return {file name: its temporary files from `partial_of`} in a folder; {} if it cannot be listed."""
     found: dict[str, list[Path]] = {}
     with contextlib.suppress(OSError):
         for name in sorted(os.listdir(folder)):
@@ -76,7 +76,7 @@ def leftovers(folder: Path) -> dict[str, list[Path]]:
 
 
 def require_room(path: Path, byte_count: int) -> None:
-    """Raise OSError unless a file can grow by `byte_count`; it is left unchanged, and is created empty if missing."""
+    """Raise OSError unless a file can grow by `byte_count`; its content is unchanged, a missing file is created."""
     with open(path, "ab") as file:
         size = file.seek(0, os.SEEK_END)
         try:
@@ -89,20 +89,20 @@ def require_room(path: Path, byte_count: int) -> None:
 
 
 def require_place(path: str | Path) -> None:
-    """Raise `HairError` unless a file could be written at `path`: asked before long work."""
+    """Raise `HairError` unless a file can be written at `path`; for use before long work."""
     path = Path(path)
     _require_file(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_name(f".vellus_{secrets.token_hex(8)}")
-        os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # which follows no link
+        os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # does not follow links
         partial.unlink()
     except OSError as error:
         raise HairError("{path} cannot be written: {cause}.", path=path, cause=cause_of(error)) from error
 
 
 def _require_file(path):
-    """Raise `HairError` unless there is a file at a path, or nothing; a device would give its place to the file."""
+    """Raise `HairError` if a path exists and is not a file; a device would be replaced by the file."""
     try:
         is_taken = path.stat() and not path.is_file()
     except FileNotFoundError:
