@@ -1,44 +1,44 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Affine transforms between coordinates that strands are stored in."""
+"""Affine transforms between coordinate spaces of strands."""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-_ROUNDING = 1e-6  # of single precision, in which Blender multiplies matrices
+_ROUNDING = 1e-6  # tolerance for single precision, in which Blender multiplies matrices
 
 
 @dataclass(frozen=True, eq=False)
 class Affine:
-    """What takes points from one space to another: matrix (4, 4) float64. Its product with another does that first.
+    """An affine transform between spaces: matrix (4, 4) float64. `a @ b` applies b first.
 
-    Widths and lengths in a space are multiplied by `scale`, as renderers do: unevenly scaled strands are round, and as
-    thick as the mean of the three axes makes them.
+    Widths and lengths are multiplied by `scale`, as in renderers: unevenly scaled strands stay round, with the
+    geometric mean of the three axes' scales.
     """
 
     matrix: np.ndarray
 
     @classmethod
     def of(cls, values: object) -> "Affine":
-        """The transform of 16 numbers, row after row, or of a matrix of Blender."""
+        """Return the transform of 16 numbers in row-major order, or of Blender's `Matrix`."""
         return cls(np.array(values, np.float64).reshape(4, 4))
 
     @classmethod
     def identity(cls) -> "Affine":
-        """The transform that changes nothing."""
+        """Return the identity transform."""
         return cls(np.eye(4))
 
     @classmethod
     def linear(cls, axes: np.ndarray) -> "Affine":
-        """The transform of (3, 3) axes that leaves the origin where it is."""
+        """Return the linear transform of a matrix (3, 3)."""
         matrix = np.eye(4)
         matrix[:3, :3] = axes
         return cls(matrix)
 
     @classmethod
     def shift(cls, offset: np.ndarray) -> "Affine":
-        """The transform that adds (3,) to all points."""
+        """Return the translation by an offset (3,)."""
         matrix = np.eye(4)
         matrix[:3, 3] = offset
         return cls(matrix)
@@ -48,58 +48,58 @@ class Affine:
 
     @cached_property
     def inverse(self) -> "Affine":
-        """The way back. Raises `LinAlgError` where there is none."""
+        """The inverse transform. Raises `LinAlgError` for a singular matrix."""
         return Affine(np.linalg.inv(self.matrix))
 
     @property
     def axes(self) -> np.ndarray:
-        """(3, 3): of directions, without the translation."""
+        """The linear part (3, 3), for directions."""
         return self.matrix[:3, :3]
 
     @property
     def scale(self) -> float:
-        """The mean factor of lengths, at least zero."""
+        """The geometric mean of the axes' scales, at least zero."""
         return float(abs(np.linalg.det(self.axes))) ** (1.0 / 3.0)
 
     def as_blender(self) -> list[list[float]]:
-        """Rows, of which Blender's `Matrix` is made."""
+        """Return the rows for Blender's `Matrix`."""
         return self.matrix.tolist()
 
     @property
     def is_mirroring(self) -> bool:
-        """Whether it turns left into right."""
+        """Whether the determinant is negative."""
         return bool(np.linalg.det(self.axes) < 0.0)
 
     @property
     def is_valid(self) -> bool:
-        """Whether it is finite and has an inverse."""
+        """Whether the matrix is finite and invertible."""
         return bool(np.isfinite(self.matrix).all()) and abs(np.linalg.det(self.axes)) >= 1e-30
 
     @property
     def keeps_axes(self) -> bool:
-        """Whether it only shifts, and scales all axes by one factor, of either sign, beyond rounding."""
+        """Whether the linear part is a uniform scale, of either sign, within rounding."""
         size = np.trace(self.axes) / 3.0
         return np.allclose(self.axes, size * np.eye(3), rtol=0.0, atol=_ROUNDING * abs(size))
 
     @property
     def is_identity(self) -> bool:
-        """Whether it changes nothing beyond rounding."""
+        """Whether the matrix is the identity within rounding."""
         return np.allclose(self.matrix, np.eye(4), rtol=0.0, atol=_ROUNDING)
 
     @property
     def is_as_wide(self) -> bool:
-        """Whether it leaves widths as they are, beyond rounding."""
+        """Whether widths are unchanged within rounding."""
         return abs(self.scale - 1.0) <= _ROUNDING
 
     def points(self, points: np.ndarray) -> np.ndarray:
-        """(..., 3) points as float32; as they are, to the last bit, where nothing changes."""
+        """Transform points (..., 3), float32; bit-identical for the identity."""
         if self.is_identity:
             return np.asarray(points, np.float32)
         with np.errstate(invalid="ignore", over="ignore"):
             return (np.asarray(points, np.float64) @ self.axes.T + self.matrix[:3, 3]).astype(np.float32)
 
     def widths(self, widths: np.ndarray) -> np.ndarray:
-        """Widths, radii or lengths as float32; as they are where they do not change."""
+        """Scale widths, radii or lengths, float32; bit-identical if `is_as_wide`."""
         if self.is_as_wide:
             return np.asarray(widths, np.float32)
         with np.errstate(invalid="ignore", over="ignore"):

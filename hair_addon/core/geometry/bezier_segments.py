@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cubic curves of [UsdCurves24] and NURBS as rational Bézier segments, and these as polylines.
+"""Cubic curves of [UsdCurves24] and NURBS as rational Bézier segments, and Bézier segments as polylines.
 
-A curve's values are rows of numbers: three of its place, and any others that are interpolated as its points are, such
-as a width.
+A curve's values are rows of numbers: the position, and further attributes that are interpolated likewise, such as a
+width.
 """
 
 from dataclasses import dataclass
@@ -11,15 +11,15 @@ import numpy as np
 
 from . import strands
 
-# How close a polyline comes to its curve: that of a strand of 20 cm to 40 µm, half a hair's thickness. An angle
-# keeps its length within its square / 24 of the curve's, 0.1 %.
-SAGITTA = 2e-4  # largest distance from the curve, as a part of its length
+# Accuracy of polylines: for a strand of 20 cm 40 µm, half a hair's thickness. The relative error of the length is at
+# most the angle squared / 24, 0.1 %.
+SAGITTA = 2e-4  # largest distance from the curve, as a fraction of its length
 TURN = 0.15  # largest angle between neighbouring lines [rad]
 
 _MOST_LINES = 128  # of a segment
-_AT_ONCE = 2048  # segments, which fit caches
+_AT_ONCE = 2048  # segments in a batch, which fits caches
 
-# Rows are Bézier controls, columns a segment's own four.
+# Rows: Bézier controls; columns: the segment's four controls in the basis.
 BASES = {
     "bezier": np.eye(4),
     "bspline": np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6.0,
@@ -30,11 +30,11 @@ STEPS = {"bezier": 3, "bspline": 1, "catmullRom": 1}
 
 @dataclass(frozen=True)
 class Segments:
-    """Bézier segments of curves, one curve after another.
+    """Bézier segments, concatenated over the curves.
 
     controls: (K, p + 1, D) float64; weights: (K, p + 1), positive, None for polynomials; counts: (S,) segments of each
-    curve; places: (K, 2) where a segment begins and ends among values that are linear between the ends of segments, of
-    which a curve of n segments has n + 1.
+    curve; places: (K, 2) indices, with fractions, of a segment's start and end among attribute values that are linear
+    between the ends of segments; a curve of n segments has n + 1 of these.
     """
 
     controls: np.ndarray
@@ -44,10 +44,10 @@ class Segments:
 
 
 def cubic(values: np.ndarray, counts: np.ndarray, basis: str, wrap: str) -> Segments:
-    """The `Segments` of cubic curves of a basis; values: (N, D), counts: (S,) rows of each curve.
+    """Return the `Segments` of cubic curves of a basis; values: (N, D), counts: (S,) rows of each curve.
 
-    wrap: "nonperiodic", "periodic", or "pinned", which lets B-splines and Catmull-Rom splines begin and end at their
-    first and last points. `is_cubic` says which curves have segments.
+    wrap: "nonperiodic", "periodic", or "pinned", where B-splines and Catmull-Rom splines begin and end at their first
+    and last points. All curves must be `is_cubic`.
     """
     values, counts = np.asarray(values, np.float64), np.asarray(counts, np.int64)
     if wrap == "pinned" and basis != "bezier":
@@ -62,14 +62,14 @@ def cubic(values: np.ndarray, counts: np.ndarray, basis: str, wrap: str) -> Segm
     rows = strands.curve_offsets(counts)[own][:, None] + within
     controls = np.zeros((len(rows), 4, values.shape[1]))
     for near, shares in enumerate(BASES[basis].T):
-        there = values[rows[:, near]]
+        column = values[rows[:, near]]
         for control in np.flatnonzero(shares):
-            controls[:, control] += shares[control] * there
+            controls[:, control] += shares[control] * column
     return Segments(controls, segments, _places(segments, own, along))
 
 
 def segment_counts(counts: np.ndarray, basis: str, wrap: str) -> np.ndarray:
-    """(S,) segments of cubic curves of so many points; of those that are not `is_cubic` any number."""
+    """Return the number of segments (S,) of cubic curves with counts (S,) of points; arbitrary unless `is_cubic`."""
     counts = np.asarray(counts)
     if wrap == "periodic":
         return counts // STEPS[basis]
@@ -79,7 +79,7 @@ def segment_counts(counts: np.ndarray, basis: str, wrap: str) -> np.ndarray:
 
 
 def is_cubic(counts: np.ndarray, basis: str, wrap: str) -> np.ndarray:
-    """(S,) bool: which cubic curves of so many points have segments, and no points that belong to none."""
+    """Return (S,) bool: which counts of points are valid for cubic curves, with segments and no unused points."""
     counts = np.asarray(counts)
     if wrap == "periodic":
         return (counts >= 3) & (counts % STEPS[basis] == 0)
@@ -89,7 +89,7 @@ def is_cubic(counts: np.ndarray, basis: str, wrap: str) -> np.ndarray:
 
 
 def _pinned(values, counts):
-    """Values of pinned curves with the two points before and after that they imply."""
+    """Return values and counts of pinned curves with a phantom point added at each end."""
     starts = strands.curve_offsets(counts)
     first, last = starts[:-1], starts[1:] - 1
     out = np.empty((len(values) + 2 * len(counts), values.shape[1]))
@@ -102,7 +102,7 @@ def _pinned(values, counts):
 
 
 def hermite(values: np.ndarray, tangents: np.ndarray, counts: np.ndarray) -> Segments:
-    """The `Segments` of cubic Hermite curves; values and tangents: (N, D), counts: (S,) rows of each curve."""
+    """Return the `Segments` of cubic Hermite curves; values and tangents: (N, D), counts: (S,) rows of each curve."""
     values, tangents, counts = np.asarray(values, np.float64), np.asarray(tangents, np.float64), np.asarray(counts)
     segments = np.maximum(counts - 1, 0)
     own, along = each(segments)
@@ -121,9 +121,9 @@ def nurbs(
     knots: np.ndarray,
     ranges: np.ndarray | None,
 ) -> Segments:
-    """The `Segments` of NURBS; values: (N, D) and weights (N,), counts: (S,) rows of each curve, orders: (S,).
+    """Return the `Segments` of NURBS; values: (N, D) and weights (N,), counts: (S,) rows of each curve, orders: (S,).
 
-    knots: (N + sum of orders,), which rise; ranges: (S, 2) parameters where curves begin and end, None for all of them.
+    knots: (N + sum of orders,), non-decreasing; ranges: (S, 2) parameters of the curves' ends, None for whole curves.
     """
     values, counts, orders = np.asarray(values, np.float64), np.asarray(counts, np.int64), np.asarray(orders, np.int64)
     is_rational = weights is not None
@@ -138,9 +138,9 @@ def nurbs(
     span_counts = counts - orders + 1
     value_starts = strands.curve_offsets(span_counts + 1)
     degree = int(orders.max(initial=2)) - 1
-    # Curve, place along it, controls, places; of no curves, all of which may have too few points.
+    # Curve, span along it, controls, places; empty arrays first, as all curves may have too few points.
     none = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, degree + 1, values.shape[1])), np.zeros((0, 2))
-    kept = [[empty] for empty in none]
+    groups = [[empty] for empty in none]
     for order in np.unique(orders):
         its = np.flatnonzero(orders == order)
         own, along = each(span_counts[its])
@@ -153,11 +153,11 @@ def nurbs(
         near_values = values[(starts[own] + along)[:, None] + np.arange(order)]
         controls = _blossom(near_values, near_knots, begin, end)
         part = (np.stack([begin, end], 1) - knots[knot][:, None]) / (knots[knot + 1] - knots[knot])[:, None]
-        for group, made in zip(
-            kept, (own, along, _raised(controls, degree), (value_starts[own] + along)[:, None] + part), strict=True
+        for group, array in zip(
+            groups, (own, along, _raised(controls, degree), (value_starts[own] + along)[:, None] + part), strict=True
         ):
-            group.append(made)
-    own, along, controls, places = (np.concatenate(group) for group in kept)
+            group.append(array)
+    own, along, controls, places = (np.concatenate(group) for group in groups)
     sorted_rows = np.lexsort((along, own))
     controls, places = controls[sorted_rows], places[sorted_rows]
     segments = np.bincount(own.astype(np.intp), minlength=len(counts))
@@ -167,7 +167,7 @@ def nurbs(
 
 
 def _blossom(values, knots, begin, end):
-    """Bézier controls (K, p + 1, D) of spans; values: (K, p + 1, D) and knots (K, 2 p) that span the parameters."""
+    """Return the Bézier controls (K, p + 1, D) of spans, by blossoming; values: (K, p + 1, D), knots: (K, 2 p)."""
     degree = values.shape[1] - 1
     controls = np.empty_like(values)
     for control in range(degree + 1):
@@ -182,7 +182,7 @@ def _blossom(values, knots, begin, end):
 
 
 def _raised(controls, degree):
-    """The same segments as controls of a higher degree."""
+    """Return the controls of the same segments after degree elevation."""
     while controls.shape[1] <= degree:
         higher = controls.shape[1]
         part = (np.arange(1, higher) / higher)[:, None]
@@ -192,7 +192,7 @@ def _raised(controls, degree):
 
 
 def each(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(own, along): of each of the things that counts (S,) say how many there are, whose it is, and which of its."""
+    """Return (own, along) of the items of ragged rows with counts (S,): each item's row, and its index in the row."""
     own = np.repeat(np.arange(len(counts)), counts)
     return own, np.arange(len(own)) - strands.curve_offsets(counts)[:-1][own]
 
@@ -203,9 +203,10 @@ def _places(segments, own, along):
 
 
 def polylines(segments: Segments, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(values (M, D), counts (S,), places (M,)) of polylines that follow curves; places: as of `Segments`.
+    """Evaluate segments to polylines: (values (M, D), counts (S,), places (M,)); places: see `Segments`.
 
-    All points are on the curves, and the first and the last are the curves' own. lines: (K,) as `line_counts` has them.
+    All points are on the curves, including their end points. lines: (K,) number of lines of each segment, as from
+    `line_counts`.
     """
     owners = np.repeat(np.arange(len(segments.counts)), segments.counts)
     has_any = segments.counts > 0
@@ -217,7 +218,7 @@ def polylines(segments: Segments, lines: np.ndarray) -> tuple[np.ndarray, np.nda
     firsts = strands.curve_offsets(segments.counts)[:-1][has_any]
     at = strands.curve_offsets(counts)[:-1][has_any]
     values[at], places[at] = controls[firsts, 0], segments.places[firsts, 0]
-    # Lines of a segment come after all before, and the first points of its own and of all earlier curves.
+    # A segment's rows follow all earlier lines and the first points of its own and all earlier curves.
     after = strands.curve_offsets(lines)[:-1] + np.cumsum(has_any)[owners]
     in_order = np.argsort(lines, kind="stable")
     numbers, begins = np.unique(lines[in_order], return_index=True)
@@ -237,10 +238,10 @@ def polylines(segments: Segments, lines: np.ndarray) -> tuple[np.ndarray, np.nda
 def smooth_lines(
     values: np.ndarray, counts: np.ndarray, is_smooth: np.ndarray, lines: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(values (M, D), counts (S,), lines (K,)): curves, some of them Catmull-Rom splines, as polylines through them.
+    """Evaluate the Catmull-Rom splines among curves to polylines: (values (M, D), counts (S,), lines (K,)).
 
     values: (N, D), counts: (S,) rows of each curve; is_smooth: (S,) bool, the splines, whose end points count twice as
-    in Blender; lines: into how many the segments of all splines are divided, None for as many as each needs.
+    in Blender; lines: number of lines of each segment of the splines, None for `line_counts`.
     """
     values, counts = np.asarray(values), np.asarray(counts, np.int64)
     is_divided = np.asarray(is_smooth) & (counts > 1)
@@ -249,20 +250,20 @@ def smooth_lines(
     rows = starts[own] + np.clip(along - 1, 0, its[own] - 1)
     segments = cubic(values[rows], its + 2, "catmullRom", "nonperiodic")
     lines = line_counts(segments) if lines is None else lines
-    made, made_counts, _places = polylines(segments, lines)
+    divided, divided_counts, _places = polylines(segments, lines)
     all_counts = counts.copy()
-    all_counts[is_divided] = made_counts
-    is_made = np.repeat(is_divided, all_counts)
-    out = np.empty((len(is_made), values.shape[1]), values.dtype)
-    out[is_made], out[~is_made] = made, values[~np.repeat(is_divided, counts)]
+    all_counts[is_divided] = divided_counts
+    is_new = np.repeat(is_divided, all_counts)
+    out = np.empty((len(is_new), values.shape[1]), values.dtype)
+    out[is_new], out[~is_new] = divided, values[~np.repeat(is_divided, counts)]
     return out, all_counts, lines
 
 
 def _at(controls, parts):
-    """(T, K, D) polynomial values of segments (K, p + 1, D) at parts (T,) in [0, 1] of each."""
+    """Return polynomial values (T, K, D) of segments (K, p + 1, D) at parameters (T,) in [0, 1]."""
     degree, total, binomial = controls.shape[1] - 1, 0.0, 1.0
     for control in range(degree + 1):
-        # Sums in this order, and no product of matrices, have the same bits on every processor.
+        # Sums in a fixed order, unlike a matrix product, are bit-identical on every processor.
         basis = binomial * parts**control * (1.0 - parts) ** (degree - control)
         total = total + basis[:, None, None] * controls[:, control]
         binomial *= (degree - control) / (control + 1)
@@ -270,7 +271,7 @@ def _at(controls, parts):
 
 
 def line_counts(segments: Segments) -> np.ndarray:
-    """(K,) int64: into how many lines of the same range of parameters to divide segments, by `SAGITTA` and `TURN`."""
+    """Return the number of lines (K,) int64, uniform in parameter, for each segment by `SAGITTA` and `TURN`."""
     points = segments.controls[..., :3]
     degree = points.shape[1] - 1
     legs = np.diff(points, axis=1)
@@ -285,6 +286,6 @@ def line_counts(segments: Segments) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         by_distance = np.sqrt(bend / (8.0 * SAGITTA * whole))
         by_angle = bend / (TURN * lengths)
-        # Straight lines are one, in spite of rounding.
+        # Segments that are straight within rounding become one line.
         wanted = np.where(bend > 1e-9 * whole, np.ceil(np.maximum(by_distance, by_angle)), 1.0)
     return np.clip(np.nan_to_num(wanted, nan=1.0), 1, _MOST_LINES).astype(np.int64)

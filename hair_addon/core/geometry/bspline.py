@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""B-spline curves three ways: the recursive basis, subdivision, and a constant matrix on Warp  ([Report12] 2.2).
+"""B-spline curves in three ways: recursive basis, subdivision, and a constant matrix in Warp  ([Report12] 2.2).
 
-The report states that the first two cannot run in parallel. But curves are always evaluated at the same parameters,
-so the basis is computed once, and every point of a curve is a small product with its control points.
+The report states that the first two cannot run in parallel. Curves are always evaluated at the same parameters,
+however, so the basis is computed once, and each point is a small product with the control points.
 """
 
 from functools import lru_cache, reduce
@@ -12,12 +12,12 @@ import warp as wp
 
 from ..kernels import kernel_cache
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 def clamped_knots(control_count: int, degree: int = 3) -> np.ndarray:
-    """(control_count + degree + 1,) knots on [0, 1]: ends repeated, so that curves start and end at their controls."""
+    """Return clamped knots (control_count + degree + 1,) on [0, 1]: curves start and end at their controls."""
     if not 1 <= degree < control_count:
         raise ValueError(f"a B-spline of degree {degree} needs more than {degree} control points, not {control_count}")
     inside = np.linspace(0.0, 1.0, control_count - degree + 1)
@@ -25,7 +25,7 @@ def clamped_knots(control_count: int, degree: int = 3) -> np.ndarray:
 
 
 def greville_abscissae(control_count: int, degree: int = 3) -> np.ndarray:
-    """(control_count,) parameters: controls spaced like these along a line give points evenly spaced along it."""
+    """Return the parameters (control_count,) at which controls on a line give a uniform parametrization."""
     knots = clamped_knots(control_count, degree)
     return np.array([knots[i + 1 : i + degree + 1].mean() for i in range(control_count)])
 
@@ -35,7 +35,7 @@ def basis(parameters: np.ndarray, control_count: int, degree: int = 3) -> np.nda
     knots = clamped_knots(control_count, degree)
     t = np.asarray(parameters, dtype=np.float64)[:, None]
     values = ((knots[:-1] <= t) & (t < knots[1:])).astype(np.float64)  # Eq. 2
-    # With half-open spans only, nothing would hold the tip: the last span that is not empty is closed.
+    # Spans are half-open, except for the last non-empty one, which includes the tip.
     values[t[:, 0] == 1.0, control_count - 1] = 1.0
     for p in range(1, degree + 1):  # Eq. 3, with 0/0 = 0 where knots repeat
         rising = _ratio(t - knots[: -p - 1], knots[p:-1] - knots[: -p - 1])
@@ -47,9 +47,9 @@ def basis(parameters: np.ndarray, control_count: int, degree: int = 3) -> np.nda
 def evaluate_recursive(
     controls: np.ndarray, parameters: np.ndarray, degree: int = 3, weights: np.ndarray | None = None
 ) -> np.ndarray:
-    """Controls (C, n, 3) [m] at (T,) parameters in [0, 1] → (C, T, 3) float64 [m].  Eq. 1 as corrected.
+    """Evaluate controls (C, n, 3) [m] at parameters (T,) in [0, 1] → (C, T, 3) float64 [m].  Eq. 1 as corrected.
 
-    weights: (n,) or (C, n), positive, for rational curves (NURBS); None for plain ones.
+    weights: (n,) or (C, n), positive, for rational curves (NURBS); None for polynomial ones.
     """
     controls = np.asarray(controls, dtype=np.float64)
     values = basis(parameters, controls.shape[1], degree)
@@ -60,10 +60,10 @@ def evaluate_recursive(
 
 
 def subdivide(controls: np.ndarray, levels: int) -> np.ndarray:
-    """Controls (C, n, 3) [m] → (C, (n - 1) 2^levels + 1, 3) float64 [m]: each level puts a point between two old ones.
+    """Subdivide controls (C, n, 3) [m] → (C, (n - 1) 2^levels + 1, 3) float64 [m]; each level adds midpoints.
 
-    The limit is the *uniform* cubic B-spline, its ends held by a phantom control mirrored beyond each: another curve
-    than the clamped one of `evaluate_recursive`. The points reach it only in the limit.
+    The limit curve is the *uniform* cubic B-spline with a mirrored phantom control at each end, which differs from the
+    clamped curve of `evaluate_recursive`. The points reach it only in the limit.
     """
     points = np.asarray(controls, dtype=np.float64)
     for _ in range(levels):
@@ -77,7 +77,7 @@ def subdivide(controls: np.ndarray, levels: int) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def basis_matrix(control_count: int, point_count: int, degree: int = 3) -> np.ndarray:
-    """W (point_count, control_count) float64, read-only: points = W @ controls, at evenly spaced parameters."""
+    """Return W (point_count, control_count) float64, read-only: points = W @ controls, at uniform parameters."""
     matrix = basis(np.linspace(0.0, 1.0, point_count), control_count, degree)
     matrix.flags.writeable = False
     return matrix
@@ -86,9 +86,9 @@ def basis_matrix(control_count: int, point_count: int, degree: int = 3) -> np.nd
 def evaluate(
     controls: np.ndarray, point_count: int, device: wp.DeviceLike = "cpu", degree: int = 3
 ) -> wp.array2d[wp.vec3]:
-    """Controls (C, n, 3) float32 [m] → points (C, point_count) vec3 [m] on the device, by the constant matrix.
+    """Evaluate controls (C, n, 3) float32 [m] → points (C, point_count) vec3 [m] on the device, by the constant matrix.
 
-    Not by BLAS, which rounds in another way on each kind of processor.
+    BLAS is not used, because its rounding depends on the processor.
     """
     controls = wp.array(np.asarray(controls, dtype=np.float32), dtype=wp.vec3, device=device)
     matrix = _device_matrix(controls.shape[1], point_count, degree, device)
@@ -113,14 +113,14 @@ def _evaluate(
 
 @lru_cache(maxsize=16)
 def _device_matrix(control_count, point_count, degree, device):
-    """W (point_count, control_count) float32 on the device."""
+    """Return W (point_count, control_count) float32 on the device."""
     return wp.array(basis_matrix(control_count, point_count, degree), dtype=float, device=device)
 
 
 def controls_through(points: np.ndarray, degree: int = 3) -> np.ndarray:
-    """Points (C, n, 3) float32 [m] at the Greville abscissae → controls (C, n, 3) of the curves through them.
+    """Return the controls (C, n, 3) of curves through points (C, n, 3) float32 [m] at the Greville abscissae.
 
-    Sums have one order, as in `evaluate`.
+    Sums have a fixed order, as in `evaluate`.
     """
     matrix = _controls_matrix(points.shape[1], degree)
     terms = (matrix[:, i, None] * points[:, i, None] for i in range(points.shape[1]))
@@ -129,7 +129,7 @@ def controls_through(points: np.ndarray, degree: int = 3) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _controls_matrix(count, degree):
-    """(count, count) float32: controls = matrix @ points at the abscissae, by elimination without pivots."""
+    """Return (count, count) float32: controls = matrix @ points at the abscissae, by elimination without pivoting."""
     rows = np.concatenate([basis(greville_abscissae(count, degree), count, degree), np.eye(count)], axis=1)
     for i in range(count):
         rows[i] /= rows[i, i]
@@ -139,5 +139,5 @@ def _controls_matrix(count, degree):
 
 
 def _ratio(numerator, denominator):
-    """numerator / denominator, zero where the denominator is."""
+    """Return numerator / denominator, zero where the denominator is not positive."""
     return np.where(denominator > 0.0, numerator, 0.0) / np.where(denominator > 0.0, denominator, 1.0)

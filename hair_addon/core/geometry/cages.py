@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cages: the faces that modifiers subdivide, found in the subdivided ones. They are the same at every level.
+"""Recovery of the cage, the faces before subdivision, from a subdivided mesh at any level.
 
-A subdivided mesh has the vertices of its cage first. Each corner of the cage is one of its own corners, in order, and
-as many quads stand for it: all of the first corner, then all of the next.
+A subdivided mesh has the vertices of its cage first. Each corner of the cage corresponds to one corner of the mesh, in
+order, and to an equal number of quads: all quads of the first corner, then all of the next.
 """
 
 import numpy as np
@@ -11,9 +11,9 @@ from .mesh import Faces
 
 
 def cage_vertices(faces: Faces, corner_count: int) -> np.ndarray:
-    """(N,) int32: vertices at the corners of a cage, face after face; all of `faces` where it is not subdivided.
+    """Return the vertices (N,) int32 at a cage's corners, concatenated over faces; those of `faces` if not subdivided.
 
-    corner_count: of the cage, 0 where nothing is subdivided.
+    corner_count: of the cage, 0 without subdivision.
     """
     vertices = faces.corner_vertices
     if corner_count:
@@ -25,9 +25,9 @@ def cage_vertices(faces: Faces, corner_count: int) -> np.ndarray:
 
 
 def cage_starts(faces: Faces, corner_count: int) -> np.ndarray | None:
-    """(F + 1,) int: the first of the quads that each face of a cage is divided into, and their number at the end.
+    """Return (F + 1,) int: the first quad of each face of a cage, and the number of quads at the end.
 
-    None where that is not known. corner_count: as of `cage_vertices`.
+    None if unknown. corner_count: see `cage_vertices`.
     """
     of_cage = cage_vertices(faces, corner_count)
     if of_cage is faces.corner_vertices or (np.diff(faces.starts) != 4).any():
@@ -36,7 +36,7 @@ def cage_starts(faces: Faces, corner_count: int) -> np.ndarray | None:
     per_corner, rest = divmod(len(quads), corner_count)
     if not per_corner or rest:
         return None
-    # The vertices inside the faces of the cage come last, face after face, and each quad has one of them.
+    # The vertices inside the cage's faces come last, in the order of the faces, and each quad has one of them.
     inside = quads.max(axis=1)
     is_first = np.append(True, np.maximum.accumulate(inside)[:-1] < np.minimum.accumulate(inside[::-1])[::-1][1:])
     starts = np.append(np.flatnonzero(is_first & (np.arange(len(quads)) % per_corner == 0)), len(quads))
@@ -44,9 +44,9 @@ def cage_starts(faces: Faces, corner_count: int) -> np.ndarray | None:
 
 
 def cage_faces(faces: Faces, corner_count: int, own: Faces | None = None) -> tuple[Faces, np.ndarray] | None:
-    """(`Faces` of a cage, (F,) int: one of the faces that each of them is divided into); None where they are not known.
+    """Return (`Faces` of a cage, (F,) int: one subdivided face of each of them); None if unknown.
 
-    corner_count: as of `cage_vertices`; own: `Faces` that the cage has if it has their corners.
+    corner_count: see `cage_vertices`; own: the cage's `Faces`, if their corners match.
     """
     corners = cage_vertices(faces, corner_count)
     if corners is faces.corner_vertices or not len(corners) or len(faces.starts) - 1 < corner_count:
@@ -61,9 +61,9 @@ def cage_faces(faces: Faces, corner_count: int, own: Faces | None = None) -> tup
 
 
 def triangle_corners(faces: Faces, vertices: np.ndarray) -> np.ndarray:
-    """(T, 3) int32: the corners of triangles that faces are cut into, triangles and quads as Blender cuts them.
+    """Return the corners (T, 3) int32 of triangulated faces; triangles and quads are cut as in Blender.
 
-    vertices: (V, 3). Faces with more corners are cut into a fan; who knows better writes over it.
+    vertices: (V, 3). Larger faces become fans, which callers may replace.
     """
     sizes = np.diff(faces.starts)
     counts = np.maximum(sizes - 2, 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The nearest point of a surface, by Warp's bounding volume hierarchy."""
+"""Closest points on a surface, by Warp's bounding volume hierarchy."""
 
 import numpy as np
 import warp as wp
@@ -10,36 +10,36 @@ from ..kernels.checks import require_count
 from ..kernels.parallel import Rows
 from .mesh import SurfacePoints, TriMesh
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
-FARTHEST = 1.0e15  # [m]: its square is still a float
+FARTHEST = 1.0e15  # [m]: the square does not overflow
 
 
 class SurfaceQuery:
-    """A `TriMesh` of finite vertices, or some of its triangles, to find the nearest points of.
+    """Closest-point queries on a `TriMesh` with finite vertices, or on some of its triangles.
 
-    Triangles without an area take no part; one at least must have some. Raises `HairError`.
+    Triangles of zero area are ignored. Raises `HairError` if no triangle is left.
     """
 
     def __init__(self, mesh: TriMesh, triangles: np.ndarray | None = None, device: wp.DeviceLike = "cpu") -> None:
-        """triangles: indices of those that take part, at least one of them with an area; None for all."""
+        """triangles: indices of the triangles to query, None for all."""
         chosen = np.arange(len(mesh.triangles)) if triangles is None else np.asarray(triangles)
         # Warp's queries fail on triangles that degenerate to points.
         self._triangles = chosen[mesh.areas[chosen] > 0.0].astype(np.int32)
         if not len(self._triangles) or not np.isfinite(mesh.vertices).all():
             raise HairError("The surface has no faces with an area, or vertices with non-finite coordinates.")
-        # Kernels query this, whose faces are those of the triangles that take part.
+        # For kernels; its faces are the queried triangles.
         self.mesh = wp.Mesh(
             points=wp.array(mesh.vertices, dtype=wp.vec3, device=device),
             indices=wp.array(mesh.checked_triangles[self._triangles].ravel(), dtype=int, device=device),
         )
 
     def nearest(self, places: np.ndarray, farthest: np.ndarray | None = None) -> SurfacePoints:
-        """(N, 3) finite positions [m] → the nearest `SurfacePoints`.
+        """Return the closest `SurfacePoints` to finite positions (N, 3) [m].
 
-        farthest (N,) [m]: distances within which there is some surface, if they are known: so it is found sooner.
+        farthest: (N,) [m] upper bounds of the distances, which speed up the search; None if unknown.
         """
         device = self.mesh.device
         if not np.isfinite(places).all():
@@ -66,7 +66,7 @@ class SurfaceQuery:
 def normal_and_offset(
     surface: wp.uint64, vertex_normals: wp.array[wp.vec3], face: int, u: float, v: float, place: wp.vec3
 ):
-    """(unit normal at a point of a face, vector from there to a place [m]), in a kernel; vertex_normals: (V,) unit."""
+    """Return (unit normal at a point of a face, vector from the point to `place` [m]); vertex_normals: (V,) unit."""
     indices = wp.mesh_get(surface).indices
     normal = wp.normalize(
         u * vertex_normals[indices[3 * face]]

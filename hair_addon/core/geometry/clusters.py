@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clusters of alike rows of numbers: k-means [Lloyd82] from a balanced division into boxes."""
+"""Clusters of similar rows: k-means [Lloyd82], initialized by a balanced division into boxes."""
 
 import numpy as np
 
@@ -7,29 +7,26 @@ from ..errors import HairError
 from ..long_work import Progress, no_progress, part_of
 
 _ROUNDS = 8
-_AT_ONCE = 4_000_000  # distances
+_AT_ONCE = 4_000_000  # distances in a batch
 
 
 def strand_features(points: np.ndarray) -> np.ndarray:
-    """(S, P, 3) points [m] → (S, 12) float32: where strands are at the root, at both thirds and at the tip."""
+    """Return features (S, 12) float32 of points (S, P, 3) [m]: positions at the root, both thirds and the tip."""
     chosen = np.round(np.linspace(0.0, points.shape[1] - 1, 4)).astype(int)
     return np.ascontiguousarray(points[:, chosen].reshape(len(points), -1), np.float32)
 
 
 def clusters(features: np.ndarray, count: int, progress: Progress = no_progress) -> np.ndarray:
-    """(N, D) features → (N,) int32 labels below `count`, each of which some row has. Raises `HairError`.
-
-    The same for the same rows in the same order: nothing is random.
-    """
+    """Return labels (N,) int32 in [0, count) of features (N, D), all in use. Deterministic. Raises `HairError`."""
     if not 1 <= count <= len(features):
         raise HairError("{rows} strands cannot form {count} clumps.", rows=len(features), count=count)
-    # Squares of coordinates far from the origin would leave nothing of the distances between.
+    # Far from the origin, squared coordinates would cancel the distances between rows.
     features = features - features.mean(axis=0, dtype=np.float64).astype(np.float32)
     labels = _boxes(features, count)
     for turn in range(_ROUNDS):
         centres = cluster_means(features, labels, count)
-        told = part_of(progress, turn / _ROUNDS, (turn + 1) / _ROUNDS)
-        nearest, squares = _nearest(features, centres, told)
+        round_progress = part_of(progress, turn / _ROUNDS, (turn + 1) / _ROUNDS)
+        nearest, squares = _nearest(features, centres, round_progress)
         changed = _without_empty(nearest, squares, count)
         if np.array_equal(changed, labels):
             break
@@ -38,7 +35,7 @@ def clusters(features: np.ndarray, count: int, progress: Progress = no_progress)
 
 
 def cluster_means(values: np.ndarray, labels: np.ndarray, count: int) -> np.ndarray:
-    """Means of (N, ...) values over rows of the same label, (count, ...) float64; every label has some row."""
+    """Return the means (count, ...) float64 of values (N, ...) over each label; no label may be empty."""
     order = np.argsort(labels, kind="stable")
     starts = np.searchsorted(labels[order], np.arange(count))
     sizes = np.diff(np.append(starts, len(labels)))
@@ -47,14 +44,14 @@ def cluster_means(values: np.ndarray, labels: np.ndarray, count: int) -> np.ndar
 
 
 def medoids(features: np.ndarray, labels: np.ndarray, count: int) -> np.ndarray:
-    """(count,) index of the row that is nearest to the mean of each cluster."""
+    """Return the index (count,) of the row closest to the mean of each cluster."""
     squares = ((features - cluster_means(features, labels, count)[labels]) ** 2).sum(axis=1)
     order = np.lexsort((squares, labels))
     return order[np.searchsorted(labels[order], np.arange(count))]
 
 
 def _boxes(features, count):
-    """Labels by halving along the widest extent, in proportion to the clusters that each half is to have."""
+    """Return labels by recursive division along the widest extent, in proportion to the clusters of each part."""
     labels, parts, first = np.empty(len(features), np.int32), [(np.arange(len(features)), count)], 0
     while parts:
         rows, wanted = parts.pop()
@@ -72,7 +69,7 @@ def _boxes(features, count):
 
 
 def _nearest(features, centres, progress):
-    """(N,) label of the nearest of (K, D) centres, and (N,) squares of distances."""
+    """Return the label (N,) of the closest of the centres (K, D), and squared distances (N,)."""
     centres = centres.astype(np.float32)
     labels, squares = np.empty(len(features), np.int32), np.empty(len(features), np.float32)
     halves, step = 0.5 * (centres**2).sum(axis=1), max(_AT_ONCE // len(centres), 1)
@@ -86,7 +83,7 @@ def _nearest(features, centres, progress):
 
 
 def _without_empty(labels, squares, count):
-    """Labels of which none is missing: the rows farthest from their centre, of clusters with others, take those."""
+    """Fill empty clusters with the rows farthest from their centres, taken from clusters of several rows."""
     sizes = np.bincount(labels, minlength=count)
     missing = list(np.flatnonzero(sizes == 0))
     for row in np.argsort(-squares, kind="stable"):

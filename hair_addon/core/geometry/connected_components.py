@@ -7,12 +7,12 @@ import warp as wp
 from ..kernels import kernel_cache
 from .mesh import TriMesh
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 def connected_components(mesh: TriMesh) -> np.ndarray:
-    """(F,) int32: the same number for triangles that shared vertices join; vertices in one place count as one."""
+    """Return the component (F,) int32 of each triangle; vertices at the same position count as one."""
     found = _joined(mesh.checked_triangles, len(mesh.vertices))
     if found.any():  # several: seams with unmerged vertices do not separate a surface
         _, welded = np.unique(mesh.vertices, axis=0, return_inverse=True)
@@ -22,8 +22,8 @@ def connected_components(mesh: TriMesh) -> np.ndarray:
 
 
 def _joined(triangles, vertex_count):
-    """(F,) int32: of each triangle's island the lowest vertex."""
-    # A chain of dependent steps, which is fast only on a CPU.
+    """Return (F,) int32: the lowest vertex of each triangle's component."""
+    # Union-find is sequential, and therefore runs on the CPU.
     parents = wp.array(np.arange(vertex_count, dtype=np.int32), device="cpu")
     triangles = wp.array(triangles.astype(np.int32), dtype=int, device="cpu")
     found = wp.empty(len(triangles), dtype=int, device="cpu")

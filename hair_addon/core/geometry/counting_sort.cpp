@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Keys by their upper bits, equal ones as they come: counted, then each put in its place.
+// Stable counting sort of keys by their upper bits.
 //
 // The body of `_put_in_buckets` in counting_sort.py. Parameters, for N keys and B buckets:
 //
 //   array_t<uint64> keys        (N,) keys; key >> shift is below B
-//   int shift                   lower bits, which do not count
-//   array_t<int> out_starts     (B + 1,) zeros; where each bucket begins in `out_keys`, and the end
-//   array_t<uint64> out_keys    (N,) bucket after bucket
+//   int shift                   number of lower bits to ignore
+//   array_t<int> out_starts     (B + 1,) zeros; becomes the start of each bucket in `out_keys`, and the end
+//   array_t<uint64> out_keys    (N,) sorted by bucket
 
 const auto* key = keys.data;
 auto* start = out_starts.data;
@@ -22,6 +22,6 @@ for (int bucket = 0; bucket < bucket_count; ++bucket) {
   total += count;
 }
 for (int i = 0; i < key_count; ++i) to[start[key[i] >> shift]++] = key[i];
-// Each start has become the end of its bucket.
+// Each start is now the end of its bucket.
 for (int bucket = bucket_count; bucket > 0; --bucket) start[bucket] = start[bucket - 1];
 start[0] = 0;

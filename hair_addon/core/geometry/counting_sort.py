@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Orders found by counting instead of comparing: a third of the time of NumPy's sort."""
+"""Counting sorts, in a third of the time of NumPy's sort."""
 
 import numpy as np
 import warp as wp
@@ -10,15 +10,14 @@ from ..kernels.parallel import Rows
 
 wp.set_module_options({"enable_backward": False})
 
-MOST_GROUPS = 1 << 22  # that are counted, each in four bytes
-BUCKET = 16  # random numbers that are sorted together, on average
+MOST_GROUPS = 1 << 22  # limit of counters, four bytes each
+BUCKET = 16  # average number of keys in a bucket
 
 
 def grouped(groups: np.ndarray, group_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Indices (N,) int32 of items, group after group and rising in each, and where each group that has any begins.
+    """Return indices (N,) int32 of items, sorted by group and then by index, and the starts int32 of non-empty groups.
 
-    groups: (N,) int32 of items, at least 0 and below group_count, else `HairError`. The second result is int32, the
-    end included.
+    groups: (N,) int32 in [0, group_count), else `HairError`. Starts include the end.
     """
     require_indices("groups", groups, group_count)
     keys = groups.astype(np.uint64) << np.uint64(32)
@@ -33,14 +32,14 @@ def grouped(groups: np.ndarray, group_count: int) -> tuple[np.ndarray, np.ndarra
 
 
 def rising(numbers: np.ndarray) -> np.ndarray:
-    """Indices (N,) int32 of numbers (N,) in [0, 1), in the order in which these rise; else `HairError`.
+    """Return the indices (N,) int32 that sort numbers (N,) in [0, 1); else `HairError`.
 
-    Numbers that differ by less than 2^-32 / N are in the order of their indices. It takes time in proportion to N where
-    they are evenly distributed.
+    Numbers that differ by less than 2^-32 / N are in the order of their indices. Takes O(N) time for uniformly
+    distributed numbers.
     """
     index_bits = len(numbers).bit_length()
     bucket_bits = max(len(numbers) // BUCKET, 1).bit_length()
-    # Sorted with their indices as one number each.
+    # Each key combines a number with its index.
     keys = (numbers * 2.0 ** (64 - index_bits)).astype(np.uint64) << np.uint64(index_bits)
     keys |= np.arange(len(numbers), dtype=np.uint64)
     keys, starts = _in_buckets(keys, 64 - bucket_bits, 1 << bucket_bits)
@@ -50,7 +49,7 @@ def rising(numbers: np.ndarray) -> np.ndarray:
 
 
 def _in_buckets(keys, shift, bucket_count):
-    """Keys (N,) uint64 by what stands above `shift` bits, and where each of so many buckets begins: Warp arrays."""
+    """Return keys (N,) uint64 sorted by key >> shift, and the starts of the buckets, as Warp arrays."""
     keys = wp.array(keys, dtype=wp.uint64, device="cpu", copy=False)
     starts = wp.zeros(bucket_count + 1, dtype=int, device="cpu")
     in_buckets = wp.empty_like(keys)

@@ -9,10 +9,10 @@ SHARPEST = 10.0  # limit of the curvature, relative to a sphere of the same area
 
 
 def mean_curvature(mesh: TriMesh) -> np.ndarray:
-    """(V,) float64 [1/m]: half the sum of the principal curvatures, its absolute value; 1 / r on a sphere.
+    """Return the absolute mean curvature (V,) float64 [1/m], half the sum of the principal ones; 1 / r on a sphere.
 
-    The integral of mean curvature over a piece of surface is a quarter of its edges' lengths times the angles by which
-    they bend, both faces having half an edge each [CohenSteiner03]. An edge with one face, or more than two, has none.
+    The integral of mean curvature over a patch is the sum of a quarter of each edge's length times its dihedral angle,
+    with half of the edge in each face [CohenSteiner03]. An edge with one face, or more than two, has no curvature.
     """
     triangles = np.flatnonzero(mesh.areas > 0.0)
     corners = mesh.triangles[triangles]
@@ -24,7 +24,7 @@ def mean_curvature(mesh: TriMesh) -> np.ndarray:
     firsts = firsts[counts == 2]
     one, other = order[firsts], order[firsts + 1]
     normals = mesh.scaled_normals[triangles] / (2.0 * mesh.areas[triangles, None])
-    # Two faces with opposite winding share an edge in the same sense: one of their normals is flipped.
+    # Faces with opposite winding traverse a shared edge in the same direction: one of the normals is flipped.
     senses = np.where(starts[one] == starts[other], -1.0, 1.0)[:, None]
     first_normals, second_normals = normals[one // 3], senses * normals[other // 3]
     edges = (mesh.vertices[ends[one]] - mesh.vertices[starts[one]]).astype(np.float64)
@@ -39,18 +39,18 @@ def mean_curvature(mesh: TriMesh) -> np.ndarray:
         integrals += np.bincount(vertices, weights=bends, minlength=vertex_count)
     for vertices in corners.T:
         areas += np.bincount(vertices, weights=mesh.areas[triangles] / 3.0, minlength=vertex_count)
-    # Also over the neighbours' triangles: the value at a single vertex depends on the shapes of its triangles.
+    # Summed over neighbours too: the value at a single vertex depends on the shapes of its triangles.
     integrals, areas = (_over_neighbours(sums, corners) for sums in (integrals, areas))
     return np.abs(integrals) / np.where(areas > 0.0, areas, 1.0)
 
 
 def _over_neighbours(sums, corners):
-    """(V,) sums of each vertex and those it shares triangles (F, 3) with, these once for each."""
+    """Return sums (V,) over the corners of each vertex's triangles (F, 3)."""
     of_triangles = sums[corners].sum(axis=1)
     return sum(np.bincount(vertices, weights=of_triangles, minlength=len(sums)) for vertices in corners.T)
 
 
 def bend_density(mesh: TriMesh, strength: float) -> np.ndarray:
-    """(V,) float64: one where a surface is flat, 1 + strength where it bends as a sphere with as much area does."""
+    """Return a density (V,) float64: 1 where flat, 1 + strength at the curvature of a sphere with the same area."""
     sphere_radius = np.sqrt(mesh.areas.sum() / (4.0 * np.pi))
     return 1.0 + strength * np.minimum(sphere_radius * mean_curvature(mesh), SHARPEST)

@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Places in the polygons of a mesh, whichever triangles these are cut into.
+"""Places in the polygons of a mesh, independent of the triangulation.
 
-A place is three corners of a polygon and their weights. Where the polygon is cut otherwise, such as a quad that bends
-the other way now, the place is found in the triangles that it has: of a quad straight above or below, as seen across
-both diagonals, which keeps neighboring places apart however it bends; nearest where it is not convex from there, and of
-polygons with more corners.
+A place is three corners of a polygon and their weights. If the triangulation has changed, for example because a quad
+bends the other way, the place is found in the new triangles. In a quad it is projected along the normal of both
+diagonals, which keeps neighboring places apart however the quad bends. In quads that are not convex in this projection,
+and in larger polygons, it is the closest point.
 """
 
 import numpy as np
 
 from .mesh import Faces, SurfacePoints, TriMesh
 
-_LEAST_TURN = 1e-3  # sine of the turn at a corner of a quad that is convex, where its sides are as long
+_LEAST_TURN = 1e-3  # least sine of the turn at the corners of a convex quad with sides of equal length
 
 
 def owners(faces: Faces) -> np.ndarray:
-    """(T,) int32: the polygon of each triangle, of which one with n corners has n - 2, polygon after polygon."""
+    """Return the polygon (T,) int32 of each triangle; a polygon with n corners has n - 2 consecutive triangles."""
     sizes = np.diff(faces.starts)
     return np.repeat(np.arange(len(sizes), dtype=np.int32), sizes - 2)
 
@@ -23,10 +23,9 @@ def owners(faces: Faces) -> np.ndarray:
 def on_triangles(
     mesh: TriMesh, faces: Faces, polygons: np.ndarray, vertices: np.ndarray, weights: np.ndarray
 ) -> tuple[SurfacePoints, np.ndarray]:
-    """(`SurfacePoints` on a mesh, (N,) bool: which are none) of places (N,) polygons, (N, 3) vertices and weights.
+    """Return (`SurfacePoints` on a mesh, (N,) bool: invalid) of places: polygons (N,), vertices and weights (N, 3).
 
-    mesh: the polygons of `faces` cut into triangles, polygon after polygon. A place is none where a vertex is no corner
-    of its polygon.
+    mesh: the triangulated polygons of `faces`, in order. A place is invalid if a vertex is not a corner of its polygon.
     """
     sizes = np.diff(faces.starts)[polygons]
     corners = corners_of(faces, polygons, vertices)
@@ -39,10 +38,10 @@ def on_triangles(
     best = np.full(len(polygons), np.inf)
     for step in range(int(sizes.max(initial=3)) - 2):
         rows = np.flatnonzero((step < sizes - 2) & ~are_none)
-        there = mesh.triangles[first[rows] + step]
-        own_corners = corners_of(faces, polygons[rows], there)
+        triangle_vertices = mesh.triangles[first[rows] + step]
+        own_corners = corners_of(faces, polygons[rows], triangle_vertices)
         is_large = (sizes[rows] > 4)[:, None, None]
-        at = np.where(is_large, mesh.vertices[there], _of_each(flat[rows], own_corners))
+        at = np.where(is_large, mesh.vertices[triangle_vertices], _of_each(flat[rows], own_corners))
         found, apart = _nearest(at, places[rows])
         is_better = apart < best[rows]
         better = rows[is_better]
@@ -54,9 +53,9 @@ def on_triangles(
 
 
 def polygons_with(faces: Faces, vertex_count: int, vertices: np.ndarray) -> np.ndarray:
-    """(N,) int32: the polygon that has three vertices (N, 3) among its corners, -1 where none has.
+    """Return the polygon (N,) int32 that has all three vertices (N, 3) as corners, -1 for none.
 
-    vertex_count: of the mesh; negative vertices are of no polygon.
+    vertex_count: of the mesh; negative vertices match no polygon.
     """
     found = np.full(len(vertices), -1, np.int32)
     rows = np.flatnonzero((vertices >= 0).all(axis=1))
@@ -81,13 +80,13 @@ def polygons_with(faces: Faces, vertex_count: int, vertices: np.ndarray) -> np.n
 
 
 def matching_vertices(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """(V,) int32: which of the vertices (W, 3) after an edit each of those (V, 3) before it is, -1 where none is.
+    """Match vertices (V, 3) before an edit to vertices (W, 3) after it: (V,) int32 indices, -1 for none.
 
-    They are known by their places. Those that have moved are known by their neighbors in order, which edits keep:
-    between two that are known there are as many as before.
+    Vertices are matched by position. Moved vertices are matched by index, because edits keep the order: between two
+    matched vertices there must be as many as before.
     """
     found = _same_places(before, after)
-    known = np.append(-1, np.flatnonzero(found >= 0))  # as if one more before the first had stayed there
+    known = np.append(-1, np.flatnonzero(found >= 0))  # with a sentinel before the first vertex
     there = np.append(-1, found[known[1:]])
     is_taken = np.zeros(len(after) + 1, np.int64)
     is_taken[there[1:] + 1] = 1
@@ -102,24 +101,24 @@ def matching_vertices(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 
 def _same_places(before, after):
-    """(V,) int32: vertices at the same places, to the last bit; where several are, in their order."""
+    """Match vertices with bit-identical positions: (V,) int32; several at one position are matched in order."""
     rows = np.ascontiguousarray(np.concatenate([before, after]), np.float32) + np.float32(0.0)  # no -0.0
     _places, which = np.unique(rows.view("V12").ravel(), return_inverse=True)
     which, count = which.ravel(), len(before)
     of_before, of_after = (np.bincount(part, minlength=len(_places)) for part in (which[:count], which[count:]))
-    is_told = (of_before == of_after)[which[:count]]
+    is_matched = (of_before == of_after)[which[:count]]
     orders = [np.argsort(part, kind="stable") for part in (which[:count], which[count:])]
     of_those = [part[order] for part, order in zip((which[:count], which[count:]), orders, strict=True)]
     starts = np.searchsorted(of_those[1], of_those[0])
     ranks = np.arange(count) - np.searchsorted(of_those[0], of_those[0])
     found = np.full(count, -1, np.int32)
-    is_told = is_told[orders[0]]
-    found[orders[0][is_told]] = orders[1][(starts + ranks)[is_told]]
+    is_matched = is_matched[orders[0]]
+    found[orders[0][is_matched]] = orders[1][(starts + ranks)[is_matched]]
     return found
 
 
 def corners_of(faces: Faces, polygons: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """(N, K) int32: which corner of its polygon each of the vertices (N, K) is, -1 for none."""
+    """Return the corner (N, K) int32 of its polygon (N,) at which each vertex (N, K) is, -1 for none."""
     sizes, starts = np.diff(faces.starts)[polygons], faces.starts[polygons]
     found = np.full(vertices.shape, -1, np.int32)
     for corner in range(int(sizes.max(initial=0)) - 1, -1, -1):
@@ -130,7 +129,10 @@ def corners_of(faces: Faces, polygons: np.ndarray, vertices: np.ndarray) -> np.n
 
 
 def _flat_quads(vertices, faces, polygons):
-    """(N, 4, 3) float64: corners of quads among polygons (N,) as seen across diagonals, in place if not convex."""
+    """Return corners (N, 4, 3) float64 of the quads among polygons (N,), projected to a plane along both diagonals.
+
+    Quads that are not convex in the plane keep their positions.
+    """
     flat = np.zeros((len(polygons), 4, 3))
     quads = np.flatnonzero(np.diff(faces.starts)[polygons] == 4)
     at = vertices[faces.corner_vertices[faces.starts[polygons[quads]][:, None] + np.arange(4)]].astype(np.float64)
@@ -147,12 +149,12 @@ def _flat_quads(vertices, faces, polygons):
 
 
 def _of_each(flat, corners):
-    """(N, 3, 3): places of corners (N, 3), of which others than the first four stand for those of larger polygons."""
+    """Return the positions (N, 3, 3) of corners (N, 3); corners beyond four, of larger polygons, are placeholders."""
     return np.take_along_axis(flat, np.where((corners < 0) | (corners > 3), 0, corners)[..., None], axis=1)
 
 
 def _nearest(triangles, places):
-    """(N, 3) barycentric coordinates of the points of triangles (N, 3, 3) nearest to places (N, 3), (N,) how far²."""
+    """Return (barycentric coordinates (N, 3), distance² (N,)) of the points of triangles (N, 3, 3) closest to places."""
     inside = _barycentric(triangles, places)
     best, least = inside, np.where((inside >= 0.0).all(axis=1), _apart(triangles, inside, places), np.inf)
     for corner in range(3):
@@ -175,7 +177,7 @@ def _apart(triangles, barycentric, places):
 
 
 def _barycentric(triangles, places):
-    """(N, 3) barycentric coordinates of places (N, 3), above or below triangles (N, 3, 3)."""
+    """Return barycentric coordinates (N, 3) of places (N, 3) projected to the planes of triangles (N, 3, 3)."""
     first = triangles[:, 0]
     along, across, place = triangles[:, 1] - first, triangles[:, 2] - first, places - first
     square, product, other = (
@@ -183,7 +185,7 @@ def _barycentric(triangles, places):
     )
     on_along, on_across = (np.einsum("ni,ni->n", place, edge) for edge in (along, across))
     area = square * other - product * product
-    area = np.where(area > 0.0, area, np.inf)  # nothing is found on triangles without an area
+    area = np.where(area > 0.0, area, np.inf)  # triangles of zero area
     second = (other * on_along - product * on_across) / area
     third = (square * on_across - product * on_along) / area
     return np.stack([1.0 - second - third, second, third], axis=1)

@@ -10,14 +10,14 @@ from ..kernels.parallel import Rows
 
 wp.set_module_options({"enable_backward": False})
 
-BLOCK = 16  # words that one vector holds
-PART = 256  # blocks that one thread adds up
+BLOCK = 16  # words in a vector
+PART = 256  # blocks of a thread
 block = wp.types.vector(length=BLOCK, dtype=wp.uint32)
 
 
 @wp.func
 def _mixed(words: block):
-    # The upper half is added again, so that a sign bit, which an odd factor does not move, affects other bits.
+    # The upper half is mixed into the lower bits: odd factors alone would leave a sign bit in place.
     return words + wp.uint32(31) * (words / wp.uint32(65536))
 
 
@@ -54,12 +54,12 @@ def _sums_and_copies(
 
 
 def fingerprint(points: np.ndarray, out: np.ndarray | None = None) -> str:
-    """16 hexadecimal digits of the bits of an array (..., 3) float32: those of another one differ, but for a freak.
+    """Return a hash of 16 hexadecimal digits of the bits of an array (..., 3) float32.
 
-    The sum of its words, each times an odd number that depends on its index: integers, so that it is the same on
-    every machine, and nearly as fast as reading memory.
+    The hash is the sum of the words, each times an odd number that depends on its index. Integer sums are equal on all
+    machines and nearly as fast as reading memory.
 
-    out: contiguous float32, as many, that the points are copied to meanwhile: they are read once for both.
+    out: contiguous float32 of the same size, to which the points are copied in the same pass.
     """
     words = np.ascontiguousarray(points, np.float32).view(np.uint32).ravel()
     part_count = len(words) // (BLOCK * PART)
@@ -72,13 +72,13 @@ def fingerprint(points: np.ndarray, out: np.ndarray | None = None) -> str:
         copies[whole_count:] = words[whole_count:]
         outputs, kernel = [*outputs, _blocks(copies[:whole_count].reshape(part_count, PART, BLOCK))], _sums_and_copies
     if part_count:
-        given = [Rows(_blocks(words[:whole_count].reshape(part_count, PART, BLOCK)))]
-        parallel.launch(kernel, part_count, inputs=given, outputs=outputs, device="cpu", least_rows=128)
+        inputs = [Rows(_blocks(words[:whole_count].reshape(part_count, PART, BLOCK)))]
+        parallel.launch(kernel, part_count, inputs=inputs, outputs=outputs, device="cpu", least_rows=128)
     rest = np.concatenate([sums.ravel(), words[whole_count:]]).astype(np.uint64)
     odd = 2 * np.arange(len(rest), dtype=np.uint64) + np.uint64(1)
     return f"{int((odd * rest).sum(dtype=np.uint64)) ^ len(words):016x}"
 
 
 def _blocks(words):
-    """(..., BLOCK) uint32 as Warp's array of blocks."""
+    """Return (..., BLOCK) uint32 as a Warp array of blocks."""
     return wp.array(words, dtype=block, device="cpu", copy=False)

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The points nearest to each query of a cell, QUERIES_AT_ONCE queries at once in Clang's vectors: the candidates that
-// the cell's queries share are sorted by their distance to each query.
+// Nearest points of each query of a cell, for QUERIES_AT_ONCE queries at once in Clang's vectors: the shared candidates
+// of the cell are sorted by their distance to each query.
 //
 // The body of `_rank` in hash_grid.py. Parameters, for Q queries and `limit` slots of neighbours each:
 //
 //   array_t<vec3> queries                   (Q,) positions [m]
-//   array_t<int> order                      (Q,) indices of queries, cell after cell
-//   int first, end                          range of `order` that is this cell's
+//   array_t<int> order                      (Q,) indices of queries, sorted by cell
+//   int first, end                          the cell's range in `order`
 //   int candidate_count                     at most CANDIDATE_LIMIT
-//   vec_t<CANDIDATE_LIMIT, int> candidates  indices of points, rising
+//   vec_t<CANDIDATE_LIMIT, int> candidates  indices of points, ascending
 //   vec_t<CANDIDATE_LIMIT, float> candidates_x, candidates_y, candidates_z
 //                                           their coordinates [m]
-//   float distance                          distance below which points count [m]
+//   float distance                          search distance [m]
 //   float first_radius                      distance within which all points are among the candidates [m]
-//   array_t<int> out_indices                (Q, limit) points by rising distance, -1 in unused slots; SHORT in the
+//   array_t<int> out_indices                (Q, limit) points by ascending distance, -1 in unused slots; SHORT in the
 //                                           first slot of a query that needs a wider search
 //   array_t<float> out_distances            (Q, limit) [m], infinite in unused slots
 //
@@ -23,7 +23,7 @@
 //   QUERIES_AT_ONCE                         queries of a vector
 //   CANDIDATE_LIMIT                         a power of two
 //   LIMIT                                   most slots of a query
-//   SLOTS_AT_ONCE                           slots that are sorted together, as many as stay in registers
+//   SLOTS_AT_ONCE                           slots that are sorted together in registers
 //   SHORT                                   see above
 
 #if !defined(__CUDA_ARCH__)
@@ -43,7 +43,7 @@
       z[lane] = query[2];
     }
     keys nearest[LIMIT];
-    // Keys sort as squared distances and then as candidates: a float leaves 29 bits of a double free for the candidate.
+    // Keys sort by squared distance and then by candidate: a float leaves 29 bits of a double free for the candidate.
     keys handed[CANDIDATE_LIMIT];
     for (int candidate = 0; candidate < candidate_count; ++candidate) {
       const floats away_x = candidates_x[candidate] - x;
@@ -53,7 +53,7 @@
       const bits key = __builtin_bit_cast(bits, __builtin_convertvector(apart, keys)) | candidate;
       handed[candidate] = __builtin_bit_cast(keys, key);
     }
-    // Insertion sort without branches. What falls out of the last slot in registers is handed on to the next ones.
+    // Insertion sort without branches. Keys beyond the slots in registers are passed on to the next round.
     for (int slot = 0; slot < limit; slot += SLOTS_AT_ONCE) {
       keys kept[SLOTS_AT_ONCE];
       for (int i = 0; i < SLOTS_AT_ONCE; ++i) kept[i] = keys(__builtin_inf());
@@ -78,7 +78,7 @@
         const float apart = __builtin_sqrtf(squared);
         const bool is_near = squared < reach;
         found_count += is_near;
-        // Points out of reach do not count, except for the nearest.
+        // Points out of reach are dropped, except for the nearest.
         const bool is_found = is_near && (slot == 0 || apart < distance);
         const int candidate = __builtin_bit_cast(long long, key) & (CANDIDATE_LIMIT - 1);
         out_indices.data[row + slot] = is_found ? candidates[candidate] : -1;

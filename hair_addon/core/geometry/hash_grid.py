@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Neighbour search: the sorted spatial hash of [Report12] section 2.4 [Teschner03], as `wp.HashGrid` builds it.
 
-Warp's grid visits all 27 cells around a query and each cell once (the report's 26 leave out the query's own).
+Warp's grid visits all 27 cells around a query, each once (the report's 26 omit the query's own cell).
 """
 
 import math
@@ -14,46 +14,46 @@ from ..kernels import kernel_cache, native_code, parallel
 from ..kernels.parallel import Rows
 from . import counting_sort
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-GRID_SIZE = 32  # cells along each axis; farther ones wrap around and share a bucket, which costs time, never truth
-CELLS_PER_RADIUS = 2.0  # cell width / first search radius: fewer cells to visit beats fewer points to compare
-CELL_WIDTH = 0.8  # of the cells that queries are sorted by / first search radius
-CELLS_ALONG = 1024  # of those cells, at most, along each axis
-CANDIDATE_LIMIT = 128  # points that the queries of one cell share
+GRID_SIZE = 32  # cells along each axis; distant cells wrap around and share a bucket, which only costs time
+CELLS_PER_RADIUS = 2.0  # cell width / first search radius: visiting fewer cells is faster than comparing fewer points
+CELL_WIDTH = 0.8  # width of the cells that sort the queries / first search radius
+CELLS_ALONG = 1024  # maximum number of these cells along each axis
+CANDIDATE_LIMIT = 128  # candidate points of the queries of one cell
 candidate_indices = wp.types.vector(length=CANDIDATE_LIMIT, dtype=int)
 candidate_values = wp.types.vector(length=CANDIDATE_LIMIT, dtype=float)
-LIMIT = 64  # points that a query finds, at most
+LIMIT = 64  # maximum number of neighbours of a query
 key_list = wp.types.vector(length=LIMIT, dtype=wp.uint64)
 NO_KEY = wp.constant(wp.uint64(2**64 - 1))
 QUERIES_AT_ONCE = 8  # of a cell, in vector registers
 SLOTS_AT_ONCE = 9
-SHORT = -2  # in place of the nearest point's index: nearer points were too few, and it takes a wider search
-WIDENINGS = 3  # doublings of the search radius before all points are read instead
+SHORT = -2  # replaces the nearest point's index if too few points were found: the query needs a wider search
+WIDENINGS = 3  # doublings of the search radius before a brute-force search
 
 
 @wp.func
 def key_of(squared: float, point: int):
-    """A key that sorts by squared distance, then by index: the bits of non-negative floats sort like their values."""
+    """Return a key that sorts by squared distance, then by index; bits of non-negative floats sort like the values."""
     return wp.bit_or(wp.lshift(wp.uint64(wp.cast(squared, dtype=wp.uint32)), wp.uint64(32)), wp.uint64(point))
 
 
 @wp.func
 def point_of(key: wp.uint64):
-    """The index in a key."""
+    """Return the index in a key."""
     return int(wp.bit_and(key, wp.uint64(0xFFFFFFFF)))
 
 
 @wp.func
 def square_of(key: wp.uint64):
-    """The squared distance in a key."""
+    """Return the squared distance in a key."""
     return wp.cast(wp.uint32(wp.rshift(key, wp.uint64(32))), dtype=float)
 
 
 @wp.func
 def _inserted(nearest: key_list, key: wp.uint64, limit: int):
-    """Insert a key in order and drop the last, without an unpredictable branch."""
+    """Insert a key in order and drop the last one, without branches."""
     for slot in range(limit):
         other = nearest[slot]
         nearest[slot] = wp.min(other, key)
@@ -76,7 +76,7 @@ def _widened(
     widening: int,
     limit: int,
 ):
-    """Search with a growing radius until there are enough keys, or the whole distance was searched and had a point."""
+    """Search with a growing radius until enough keys are found, or any key within the whole distance."""
     nearest = key_list(NO_KEY)
     searching = bool(True)
     while searching and widening <= WIDENINGS:
@@ -101,7 +101,7 @@ def _write(nearest: key_list, distance: float, out_indices: wp.array[int], out_d
         key = nearest[slot]
         point = point_of(key)
         apart = wp.sqrt(square_of(key))
-        # Points out of range do not count, except the nearest.
+        # Points out of range are dropped, except for the nearest.
         if key == NO_KEY or (slot > 0 and apart >= distance):
             point = -1
             apart = wp.inf
@@ -176,7 +176,7 @@ def _by_cells(
     for place in range(first + 1, end):
         low = wp.min(low, queries[order[place]])
         high = wp.max(high, queries[order[place]])
-    # All points in reach of any query of the cell, by rising index: found once, compared with each.
+    # All points in reach of any query of the cell, in ascending order: collected once for all queries.
     candidates = candidate_indices()
     count = int(0)
     for point in wp.hash_grid_query(grid, 0.5 * (low + high), first_radius + 0.5 * wp.length(high - low)):
@@ -244,8 +244,8 @@ def neighbours(
     """Find the nearest points within a distance of each query: at most `limit`, at least one.
 
     points (N,) and queries (Q,) are vec3 arrays [m] on one device, N > 0; distance [m]. Returns indices (Q, limit)
-    int32 and distances (Q, limit) float32 [m] there, every row sorted by distance and then by index, unused slots
-    holding -1 and infinity. A query without a point in range gets the nearest one.
+    int32 and distances (Q, limit) float32 [m] on the device; rows are sorted by distance and then by index, unused
+    slots are -1 and infinity. A query without a point in range gets the nearest one. Raises `HairError`.
     """
     if not (math.isfinite(distance) and distance > 0.0):  # also refuses NaN, which wp.HashGrid does not
         raise HairError(f"The search distance must be positive and finite, not {distance:g} m.")
@@ -258,7 +258,7 @@ def neighbours(
     distances = wp.empty((len(queries), limit), dtype=float, device=device)
     if len(queries) == 0:
         return indices, distances
-    # Cells of non-finite coordinates lie outside the grid's memory.
+    # Non-finite coordinates would be written outside the grid's memory.
     if not (np.isfinite(points.numpy()).all() and (device.is_cuda or np.isfinite(queries.numpy()).all())):
         raise HairError("Some guides or strands have roots with non-finite coordinates: repair the surface.")
     first_radius = _first_radius(points.numpy(), distance, limit)
@@ -278,7 +278,7 @@ def by_queries(
     out_indices: wp.array2d[int],
     out_distances: wp.array2d[float],
 ) -> None:
-    """Fill the rows of `neighbours`, each query separately: for GPUs."""
+    """Fill the rows of `neighbours`, each query separately; for GPUs."""
     kernel_cache.launch(
         _by_queries,
         dim=len(queries),
@@ -297,7 +297,7 @@ def by_cells(
     out_indices: wp.array2d[int],
     out_distances: wp.array2d[float],
 ) -> None:
-    """Fill the rows of `neighbours`, all queries of a cell together: for CPUs, twice as fast there."""
+    """Fill the rows of `neighbours`, all queries of a cell together; for CPUs, where this is twice as fast."""
     device = points.device
     order, bounds = _sorted_by_cell(points.numpy(), queries, CELL_WIDTH * first_radius)
     order, firsts, ends = (wp.array(part, dtype=int, device=device) for part in (order, bounds[:-1], bounds[1:]))
@@ -323,9 +323,9 @@ def by_cells(
 
 
 def _sorted_by_cell(points, queries, width):
-    """Indices (Q,) int32 of queries cell after cell, and where each cell's begin, the end included.
+    """Return indices (Q,) int32 of queries sorted by cell, and the start of each cell, the end included.
 
-    Cells of a width [m] fill the box around points (N, 3); queries outside share those of its border.
+    Cells of a width [m] fill the bounding box of points (N, 3); queries outside are assigned to its border cells.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     width = max(width, float((high - low).max()) / CELLS_ALONG)
@@ -342,11 +342,11 @@ def _sorted_by_cell(points, queries, width):
 
 
 def _first_radius(points, distance, limit):
-    """Radius [m] to search first: the distance, unless that holds far more points than wanted, or none as a rule."""
+    """Return the first search radius [m]: the distance, unless it typically contains far too many points, or none."""
     extent = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
-    # Of points that lie on a surface; a lone one is looked for in wide cells, which are few.
+    # Mean spacing of points on a surface; a single point gets wide cells, which are few.
     spacing = extent / math.sqrt(len(points)) if extent else distance
-    # Cells narrower than the rounding of the coordinates could not tell points apart.
+    # Cells need not be narrower than the rounding of the coordinates.
     finest = max(1e-6 * float(np.abs(points).max()), 1e-30)
-    enough = max(math.sqrt(0.5 * limit), 1.0) * spacing  # half as many again as are wanted, on the whole
+    enough = max(math.sqrt(0.5 * limit), 1.0) * spacing  # contains 1.5 times the wanted points on average
     return max(distance if distance < 1.5 * enough else enough, 0.5 * spacing, finest)

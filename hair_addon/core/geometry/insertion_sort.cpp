@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A few keys in rising order, in their place.
+// In-place insertion sort of a few keys.
 //
 // The body of `_sort_bucket` in counting_sort.py. Parameters:
 //
 //   array_t<uint64> keys        of all buckets
-//   int first, end              those that are sorted
+//   int first, end              range of keys to sort
 
 auto* key = keys.data;
 for (int i = first + 1; i < end; ++i) {

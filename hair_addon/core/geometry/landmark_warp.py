@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps of space: affine ones, and thin-plate splines through pairs of landmarks [Bookstein89].
+"""Maps of space: affine maps, and thin-plate splines through pairs of landmarks [Bookstein89].
 
-In three dimensions the spline that bends least has the kernel |r|. It is fitted to what the best similarity [Umeyama91]
-leaves over, so that landmarks that were only turned, scaled and moved are mapped by exactly that.
+In three dimensions the spline of least bending has the kernel |r|. It is fitted to the residual of the best similarity
+[Umeyama91], so that a similarity between landmarks is reproduced exactly.
 """
 
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import HairError
 
-# Of landmarks' largest extent: the least for a direction to take part in the affine map, or in the rotation.
+# Least extent of landmarks along a direction for it to enter the affine map, or the rotation; relative to the largest.
 _DEEP, _WIDE = 0.1, 1e-3
 
 
@@ -29,13 +29,13 @@ class Warp:
     weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def places(self, points: np.ndarray) -> np.ndarray:
-        """(N, 3) float64 [m]: where points (N, 3) [m] go."""
+        """Map points (N, 3) [m] → (N, 3) float64 [m]."""
         points = np.asarray(points, np.float64)
         distances = np.linalg.norm(points[:, None] - self.centers, axis=2)
         return points @ self.linear.T + self.offset + distances @ self.weights
 
     def derivatives(self, points: np.ndarray) -> np.ndarray:
-        """(N, 3, 3): the Jacobian at points (N, 3) [m]; at a landmark that of the mean around it."""
+        """Return the Jacobian (N, 3, 3) at points (N, 3) [m]; at a landmark its mean over all directions."""
         apart = np.asarray(points, np.float64)[:, None] - self.centers
         distances = np.linalg.norm(apart, axis=2, keepdims=True)
         directions = apart / np.where(distances > 0.0, distances, 1.0)
@@ -43,10 +43,10 @@ class Warp:
 
 
 def through_landmarks(sources: ArrayLike, targets: ArrayLike) -> Warp:
-    """The `Warp` that takes landmarks (L, 3) [m] to others. Raises `HairError`.
+    """Return the `Warp` that maps landmarks (L, 3) [m] to others. Raises `HairError`.
 
-    At least three that are not in line. Where they are not nearly in one plane either, the spline reproduces any affine
-    map; of fewer or flatter ones only similarities.
+    At least three landmarks that are not collinear are required. The spline reproduces any affine map if there are more
+    than three and they are not nearly coplanar, else only similarities.
     """
     sources, targets = (np.asarray(points, np.float64).reshape(-1, 3) for points in (sources, targets))
     if len(sources) != len(targets):
@@ -72,7 +72,7 @@ def through_landmarks(sources: ArrayLike, targets: ArrayLike) -> Warp:
 
 
 def similarity(sources: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(3, 3), a rotation times a scale, and (3,) [m]: the similarity nearest to points (L, 3) → others [Umeyama91]."""
+    """Return the best similarity of points (L, 3) → others [Umeyama91]: scaled rotation (3, 3), offset (3,) [m]."""
     middle, other_middle = sources.mean(axis=0), targets.mean(axis=0)
     left, values, right = np.linalg.svd((targets - other_middle).T @ (sources - middle))
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])
@@ -82,19 +82,19 @@ def similarity(sources: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np
 
 
 def between_boxes(sources: np.ndarray, targets: np.ndarray) -> Warp:
-    """The affine `Warp` that takes the box around vertices (V, 3) [m] to that around others, axis by axis."""
+    """Return the axis-aligned affine `Warp` between the bounding boxes of vertices (V, 3) [m] and of others."""
     low, high = sources.min(axis=0).astype(np.float64), sources.max(axis=0).astype(np.float64)
     other_low, other_high = targets.min(axis=0).astype(np.float64), targets.max(axis=0).astype(np.float64)
     sides, other_sides = high - low, other_high - other_low
     even = other_sides.max() / sides.max() if sides.max() > 0.0 else 1.0
-    # A flat box says nothing about the scale across it.
+    # A flat box does not determine the scale across it.
     is_thick = (sides > _WIDE * sides.max()) & (other_sides > _WIDE * other_sides.max())
     factors = np.where(is_thick, other_sides / np.where(sides > 0.0, sides, 1.0), even)
     return Warp(np.diag(factors), 0.5 * (other_low + other_high) - 0.5 * factors * (low + high))
 
 
 def _spread(points):
-    """The singular values of points about their middle, largest first, three of them."""
+    """Return the three singular values of points about their mean, in descending order."""
     if len(points) < 2:
         return np.zeros(3)
     values = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -102,6 +102,6 @@ def _spread(points):
 
 
 def _closest(points):
-    """The smallest distance [m] between two of several points."""
+    """Return the smallest distance [m] between two points."""
     apart = np.linalg.norm(points[:, None] - points[None], axis=2)
     return float(apart[~np.eye(len(points), dtype=bool)].min())

@@ -11,7 +11,7 @@ from ..errors import HairError
 from ..kernels.checks import require_count, require_indices
 from ..params import array_of
 
-# Of the box around a mesh along each axis, into the cells by which triangles are put in order.
+# Halvings of the bounding box along each axis into the cells that sort triangles.
 _HALVINGS = 10
 
 
@@ -26,19 +26,19 @@ class SurfacePoints:
         return len(self.triangle)
 
     def __getitem__(self, selection: slice | np.ndarray) -> "SurfacePoints":
-        """The points of a slice, a mask or an index array."""
+        """Return the points of a slice, a mask or an index array."""
         return SurfacePoints(self.triangle[selection], self.barycentric[selection])
 
     def is_same(self, others: "SurfacePoints") -> bool:
-        """Whether these are the same points, to the last bit."""
+        """Return whether the points are bit-identical to others."""
         return np.array_equal(self.triangle, others.triangle) and np.array_equal(self.barycentric, others.barycentric)
 
     def wound_otherwise(self) -> "SurfacePoints":
-        """The same points on triangles whose last two corners have changed places."""
+        """Return the same points for triangles whose last two corners are swapped."""
         return SurfacePoints(self.triangle, np.ascontiguousarray(self.barycentric[:, [0, 2, 1]]))
 
     def joined(self, others: "SurfacePoints") -> "SurfacePoints":
-        """These points, and then the others."""
+        """Return these points followed by others."""
         return SurfacePoints(
             np.concatenate([self.triangle, others.triangle]), np.concatenate([self.barycentric, others.barycentric])
         )
@@ -46,13 +46,13 @@ class SurfacePoints:
 
 @dataclass(frozen=True)
 class TriMesh:
-    """vertices (V, 3) float32 [m] and triangles (F, 3) int32, wound counter-clockwise seen from outside.
+    """A mesh of vertices (V, 3) float32 [m] and triangles (F, 3) int32, wound counter-clockwise seen from outside.
 
-    Degenerate triangles are kept, so that triangle indices are the same everywhere; nothing grows on them.
+    Degenerate triangles are kept, so that triangle indices are stable; no hair grows on them.
     Call `check_mesh` on meshes from outside.
 
-    smooth_vertices: (V, 3) float32 [m] of the smooth surface that a subdivided mesh stands for, whose normals are those
-    of the vertices; None for the mesh itself.
+    smooth_vertices: (V, 3) float32 [m] on the smooth surface of a subdivided mesh, used for normals; None for
+    `vertices`.
     """
 
     vertices: np.ndarray
@@ -61,36 +61,36 @@ class TriMesh:
 
     @cached_property
     def checked_triangles(self) -> np.ndarray:
-        """`triangles` for a kernel: every corner is known to be a vertex. Raises `HairError`."""
+        """`triangles` with valid vertex indices, for kernels. Raises `HairError`."""
         _check_corners(self.triangles, len(self.vertices))
         return self.triangles
 
     @cached_property
     def corners(self) -> np.ndarray:
-        """(F, 3, 3) float64 [m]: the positions of each triangle's corners."""
+        """Positions (F, 3, 3) float64 [m] of the triangles' corners."""
         return self.vertices.astype(np.float64)[self.checked_triangles]
 
     @cached_property
     def scaled_normals(self) -> np.ndarray:
-        """(F, 3) float64 [m²]: each triangle's normal, twice its area long."""
+        """Normals (F, 3) float64 [m²] of the triangles, with twice the area as length."""
         first, second, third = np.moveaxis(self.corners, 1, 0)
         return np.cross(second - first, third - first)
 
     @cached_property
     def areas(self) -> np.ndarray:
-        """(F,) float64 [m²]; exactly zero where a triangle is degenerate to single precision."""
+        """Areas (F,) float64 [m²]; exactly zero for triangles that are degenerate in single precision."""
         areas = 0.5 * np.linalg.norm(self.scaled_normals, axis=1)
         first, second, third = np.moveaxis(self.corners, 1, 0)
         edges = np.stack([second - first, third - second, first - third])
         longest = np.einsum("efi,efi->ef", edges, edges).max(axis=0)
-        # A sliver thinner than the rounding of its coordinates has no reliable side.
+        # The normal of a sliver thinner than the rounding of its coordinates is unreliable.
         return np.where(areas > 1e-9 * longest, areas, 0.0)
 
     @cached_property
     def vertex_normals(self) -> np.ndarray:
-        """(V, 3) float32: unit normals, each the mean of the faces around weighted by their angle [Thurmer98].
+        """Unit normals (V, 3) float32: means of the faces' normals weighted by their angles [Thurmer98].
 
-        Zero where no face with an area meets, or where those that do cancel.
+        Zero where no face of positive area meets, or where normals cancel.
         """
         if self.smooth_vertices is not None:
             return TriMesh(self.smooth_vertices, self.triangles).vertex_normals
@@ -109,7 +109,7 @@ class TriMesh:
 
     @cached_property
     def surface_order(self) -> np.ndarray:
-        """(F,) indices of triangles, so that neighbours on the surface are near each other: a Z-curve [Morton66]."""
+        """Indices (F,) of triangles along a Z-curve [Morton66]: neighbours on the surface are near in memory."""
         centres = self.corners.mean(axis=1)
         extent = max(float(np.ptp(centres, axis=0).max()), 1e-30)
         cells = ((centres - centres.min(axis=0)) * ((2**_HALVINGS - 1) / extent)).astype(np.uint32)
@@ -120,15 +120,15 @@ class TriMesh:
 
 @dataclass(frozen=True)
 class Faces:
-    """A mesh's polygons: corner_vertices (C,) int32, face after face, and starts (F+1,) int32, where each begins."""
+    """Polygons of a mesh: corner_vertices (C,) int32, concatenated, and starts (F+1,) int32 of each polygon."""
 
     corner_vertices: np.ndarray
     starts: np.ndarray
 
     def around(self, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-        """(V+1,) int32 starts and (C,) int32: the faces around each vertex, in the order of their corners.
+        """Return starts (V+1,) int32 and (C,) int32: the faces around each vertex, in the order of their corners.
 
-        vertex_count: of a mesh that all corners are of. Raises `HairError` where these are no such polygons.
+        vertex_count: of the mesh. Raises `HairError` for invalid polygons.
         """
         ends, faces = self._around
         require_indices("vertices", self.corner_vertices, vertex_count)
@@ -147,9 +147,9 @@ class Faces:
 
 
 def from_arrays(vertices: ArrayLike, triangles: ArrayLike) -> TriMesh:
-    """Numbers (V, 3) [m] and whole numbers (F, 3), as arrays or nested lists of any such type → `TriMesh`.
+    """Return a `TriMesh` of vertices (V, 3) [m] and triangles (F, 3), arrays or nested lists of any numeric type.
 
-    Raises `HairError`, so that a cast can neither wrap an index nor cut off its fraction.
+    Raises `HairError`, also for indices that a cast would wrap or truncate.
     """
     vertices, triangles = _numbers(vertices, "vertices"), _numbers(triangles, "triangles")
     if vertices.ndim != 2 or vertices.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3:
@@ -171,7 +171,7 @@ def _numbers(given, name):
 
 
 def _check_corners(triangles, vertex_count):
-    """Raise `HairError` unless every corner of triangles, of any type of whole numbers, is a vertex."""
+    """Raise `HairError` unless every corner of triangles, of any integral type, is a vertex."""
     if not len(triangles):
         return
     lowest, highest = int(triangles.min()), int(triangles.max())
@@ -183,7 +183,7 @@ def _check_corners(triangles, vertex_count):
 
 
 def check_mesh(mesh: TriMesh) -> None:
-    """Raise `HairError` unless hair can grow on the mesh: faces, indices in range, finite vertices, some area."""
+    """Raise `HairError` unless hair can grow on the mesh: faces, valid indices, finite vertices, positive area."""
     if len(mesh.triangles) == 0:
         raise HairError("The surface has no faces to grow hair on.")
     _ = mesh.checked_triangles
@@ -204,13 +204,13 @@ def check_mesh(mesh: TriMesh) -> None:
 
 
 def require_finite(vertices: np.ndarray) -> None:
-    """Raise `HairError` unless vertices (V, 3) are finite numbers."""
+    """Raise `HairError` unless vertices (V, 3) are finite."""
     if not np.isfinite(vertices).all():
         raise HairError("Some of the surface's vertices have non-finite coordinates: repair the mesh or its modifiers.")
 
 
 def check_points(mesh: TriMesh, points: SurfacePoints) -> None:
-    """Raise `HairError` unless the points are on the mesh: read from a file, they may belong to another one."""
+    """Raise `HairError` unless the points are on the mesh; points from a file may belong to another one."""
     triangle, barycentric = points.triangle, points.barycentric
     if len(points) == 0:
         raise HairError("There are no guides: generate guides first.")
@@ -221,10 +221,10 @@ def check_points(mesh: TriMesh, points: SurfacePoints) -> None:
 
 
 def interpolate(values: np.ndarray, mesh: TriMesh, points: SurfacePoints) -> np.ndarray:
-    """Per-vertex values (V,) or (V, K) → (N,) or (N, K) float32 at the points, linear inside each triangle."""
+    """Interpolate values (V,) or (V, K) of vertices linearly to points: (N,) or (N, K) float32."""
     values = np.asarray(values, dtype=np.float32)
     total = np.zeros((), np.float32)
-    # Three times as fast as indexing with brackets, and in the memory of the first term.
+    # `take` is three times as fast as indexing with brackets.
     for corner, vertices in enumerate(mesh.triangles.take(points.triangle, axis=0).T):
         part = values.take(vertices, axis=0)
         part *= points.barycentric[:, corner].reshape((-1,) + (1,) * (values.ndim - 1))
@@ -234,12 +234,12 @@ def interpolate(values: np.ndarray, mesh: TriMesh, points: SurfacePoints) -> np.
 
 
 def positions(mesh: TriMesh, points: SurfacePoints) -> np.ndarray:
-    """(N, 3) float32 [m]."""
+    """Return the positions (N, 3) float32 [m] of points."""
     return interpolate(mesh.vertices, mesh, points)
 
 
 def normals(mesh: TriMesh, points: SurfacePoints) -> np.ndarray:
-    """(N, 3) float32: unit normals, smooth over the surface; the triangle's own where the smooth one vanishes."""
+    """Return smooth unit normals (N, 3) float32; the triangle's normal where the smooth one vanishes."""
     smooth = interpolate(mesh.vertex_normals, mesh, points)
     lengths = np.linalg.norm(smooth, axis=1, keepdims=True)
     vanishing = np.flatnonzero(lengths < 1e-6)
@@ -249,6 +249,6 @@ def normals(mesh: TriMesh, points: SurfacePoints) -> np.ndarray:
 
 
 def _unit(vectors):
-    """Vectors (N, 3) made unit; zero stays zero."""
+    """Normalize vectors (N, 3); zero stays zero."""
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.where(lengths > 0.0, lengths, 1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mirrors: planes through the origin, and along what things are mirrored at them."""
+"""Reflections in planes through the origin."""
 
 from dataclasses import dataclass
 
@@ -8,26 +8,26 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Mirror:
-    """A plane through the origin [m], and along what things are mirrored at it.
+    """A reflection in a plane through the origin, along a given direction.
 
-    normal (3,), unit; across (3,): from the plane to height 1 above it, None for the normal. An object that is sheared
-    in the world is mirrored along its own axis, which is not at right angles to the plane.
+    normal (3,), unit; across (3,): direction of the reflection with across · normal = 1, None for the normal. An object
+    that is sheared in world space is reflected along its own axis, which is oblique to the plane.
     """
 
     normal: np.ndarray
     across: np.ndarray | None = None
 
     def image(self, vectors: np.ndarray) -> np.ndarray:
-        """(N, 3) positions or directions, mirrored."""
+        """Reflect positions or directions (N, 3)."""
         return vectors - 2.0 * (vectors @ self.normal)[:, None] * self._across
 
     @property
     def matrix(self) -> np.ndarray:
-        """(3, 3): that mirrors a position or a direction."""
+        """The matrix (3, 3) of the reflection."""
         return np.eye(3) - 2.0 * np.outer(self._across, self.normal)
 
     def flipped(self) -> "Mirror":
-        """The same, with its normal towards the other side."""
+        """Return the same reflection with the opposite normal."""
         return Mirror(-self.normal, None if self.across is None else -self.across)
 
     @property

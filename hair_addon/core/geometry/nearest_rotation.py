@@ -2,8 +2,8 @@
 """Nearest rotations of many matrices: their orthogonal polar factors, by Newton's iteration  [Higham86].
 
 X' = (γ X + X^-T / γ) / 2 with γ = (|X^-1| / |X|)^(1/2) converges quadratically to U V^T of the singular value
-decomposition, in six to nine steps. One thread a matrix takes microseconds; matrices that are all but singular, for
-which the iteration is not accurate, take the decomposition.
+decomposition, in six to nine steps. A thread for each matrix takes microseconds. Nearly singular matrices, for which
+the iteration is inaccurate, use the decomposition.
 """
 
 import numpy as np
@@ -15,16 +15,16 @@ from ..kernels.parallel import Rows
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _STEPS = 20
-_LAST_CHANGE = 1e-7  # after which what is left is its square
+_LAST_CHANGE = 1e-7  # convergence is quadratic: the remaining error is its square
 _LEAST_VOLUME = 1e-9  # determinant of a matrix whose largest singular value is about one
 
 
 def nearest_rotations(matrices: np.ndarray) -> np.ndarray:
-    """(N, 3, 3) float64: U V^T of (N, 3, 3) matrices U Σ V^T; not of determinant one where a matrix mirrors."""
-    given = wp.array(np.ascontiguousarray(matrices, np.float64), dtype=wp.mat33d, device="cpu", copy=False)
-    found = wp.empty(len(given), dtype=wp.mat33d, device="cpu")
-    is_found = wp.empty(len(given), dtype=wp.int32, device="cpu")
-    parallel.launch(_polar_factors, len(given), inputs=[Rows(given)], outputs=[found, is_found], device="cpu")
+    """Return U V^T (N, 3, 3) float64 of matrices U Σ V^T (N, 3, 3); with determinant -1 if the matrix reflects."""
+    source = wp.array(np.ascontiguousarray(matrices, np.float64), dtype=wp.mat33d, device="cpu", copy=False)
+    found = wp.empty(len(source), dtype=wp.mat33d, device="cpu")
+    is_found = wp.empty(len(source), dtype=wp.int32, device="cpu")
+    parallel.launch(_polar_factors, len(source), inputs=[Rows(source)], outputs=[found, is_found], device="cpu")
     rotations, singular = found.numpy().reshape(-1, 3, 3), np.flatnonzero(is_found.numpy() == 0)
     if len(singular):
         left, _stretches, right = np.linalg.svd(matrices[singular])
@@ -39,7 +39,7 @@ def _size(matrix: wp.mat33d):
 
 @wp.func
 def polar_factor(given: wp.mat33d):
-    """(U V^T of U Σ V^T, 1); where the iteration is not accurate the second is 0."""
+    """Return (U V^T, 1) of a matrix U Σ V^T; the second value is 0 if the iteration is inaccurate."""
     size = _size(given)
     matrix = given
     is_found = int(0)

@@ -2,7 +2,7 @@
 //
 // One strand as texels of two floats each: its root and its range, then the offsets of its points from the root.
 //
-// The body of `_pack` in packed_strands.py. Parameters:
+// The body of `_pack_strand` in packed_strands.py. Parameters:
 //
 //   array_t<vec3> points    (S, P) positions, contiguous
 //   int strand              index into the first axis
@@ -18,7 +18,7 @@
   float* out = (float*)(texels.data + (size_t)strand * (point_count + 1));
   const float x = place[0], y = place[1], z = place[2];
   float range = 0.0f;
-  float not_finite = 0.0f;  // becomes NaN with the first coordinate that is not
+  float not_finite = 0.0f;  // NaN after the first non-finite coordinate
   for (int i = 1; i < point_count; ++i) {
     const float along_x = __builtin_fabsf(place[3 * i] - x);
     const float along_y = __builtin_fabsf(place[3 * i + 1] - y);
@@ -34,7 +34,7 @@
   out[3] = range + not_finite;
   const bool is_wide = range > 1e-30f && not_finite == 0.0f;
   const float steps = is_wide ? (float)MOST / range : 0.0f;
-  const float middle = (float)MOST + 1.5f;  // which half a step is added to, as integers are cut off
+  const float middle = (float)MOST + 1.5f;  // includes half a step, because the cast truncates
   unsigned* words = (unsigned*)(out + 2);
   for (int i = 1; i < point_count; ++i) {
     const unsigned column = (unsigned)(int)(is_wide ? (place[3 * i] - x) * steps + middle : middle);
@@ -42,7 +42,7 @@
     const unsigned layer = (unsigned)(int)(is_wide ? (place[3 * i + 2] - z) * steps + middle : middle);
     const unsigned low = (column << 10) | (layer & 1023u);
     const unsigned high = (row << 10) | (layer >> 10);
-    // Bit 30 set and bit 29 clear: a normal number, whatever the others are.
+    // Bit 30 set and bit 29 clear: a normal number for any other bits.
     words[2 * i] = (low & 0x1FFFFFFFu) | ((low & 0x20000000u) << 2) | 0x40000000u;
     words[2 * i + 1] = (high & 0x1FFFFFFFu) | ((high & 0x20000000u) << 2) | 0x40000000u;
   }

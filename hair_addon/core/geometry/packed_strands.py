@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands in eight bytes a point, as they are drawn: offsets from the root in steps of the strand's own range.
+"""Strands packed for drawing in eight bytes per point: offsets from the root, quantized to the strand's own range.
 
-A strand of P points is P + 1 texels of two floats: (root x, root y), (root z, range), then its points but for the root.
-An offset has 20 bits along each axis, so that each coordinate is within 2^-20 of the strand's greatest, beside the
-rounding of places: a strand that fills a picture of 4,000 pixels is drawn within 0.004 of them. The 60 bits are in two
-floats that are normal numbers whatever their values are: textures of floats keep the bits of these alone.
-shaders/strands/packed_strand.glsl is the twin.
+A strand of P points is P + 1 texels of two floats: (root x, root y), (root z, range), then its points without the root.
+An offset has 20 bits along each axis: its error is at most 2^-20 of the range, besides the rounding of positions. A
+strand that fills a picture of 4,000 pixels is accurate to 0.004 pixels. The 60 bits are stored in two floats that are
+always normal numbers, because textures preserve only the bits of these. shaders/strands/packed_strand.glsl is the twin.
 """
 
 import numpy as np
@@ -17,8 +16,8 @@ from ..kernels.parallel import Rows
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-HEAD_TEXELS = 2  # of a strand, before its points; the root is not repeated among these
-MOST = 2**19 - 1  # steps from the root to the end of the range, on each side: the root itself is one of the steps
+HEAD_TEXELS = 2  # of a strand, before its points without the root
+MOST = 2**19 - 1  # steps from the root to the end of the range on each side; the root is step 0
 _MIDDLE = MOST + 1
 
 
@@ -34,15 +33,15 @@ def _pack(points: wp.array2d[wp.vec3], texels: wp.array2d[wp.vec2]):
 
 
 def texel_count(point_count: int) -> int:
-    """Texels of a strand of so many points."""
+    """Return the number of texels of a strand."""
     return HEAD_TEXELS + point_count - 1
 
 
 def pack(points: np.ndarray, texels: np.ndarray) -> None:
     """Write the texels of strands.
 
-    points: (S, P, 3) float32; texels: (S, P + 1, 2) float32, contiguous. Strands with a coordinate that is not finite
-    are such again. Raises `HairError` where counts do not match.
+    points: (S, P, 3) float32; texels: (S, P + 1, 2) float32, contiguous. Strands with non-finite coordinates are
+    non-finite after unpacking. Raises `HairError` if counts do not match.
     """
     strand_count, point_count, _xyz = points.shape
     if not strand_count:
@@ -55,7 +54,7 @@ def pack(points: np.ndarray, texels: np.ndarray) -> None:
 
 
 def unpack(texels: np.ndarray) -> np.ndarray:
-    """(S, P, 3) float32 of (S, P + 1, 2) texels."""
+    """Return points (S, P, 3) float32 of texels (S, P + 1, 2)."""
     head = texels[:, :HEAD_TEXELS].reshape(-1, 1, 4)
     words = np.ascontiguousarray(texels[:, HEAD_TEXELS:]).view(np.uint32)
     low, high = np.moveaxis((words & 0x1FFFFFFF) | (words >> 31) << 29, -1, 0)

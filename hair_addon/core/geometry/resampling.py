@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Resampling of curves to a common point count, equally spaced, fast enough for brush strokes."""
+"""Resampling of curves to equally spaced points, fast enough for brush strokes."""
 
 import numpy as np
 import warp as wp
@@ -8,15 +8,15 @@ from ..errors import HairError
 from ..kernels import parallel
 from ..kernels.parallel import Rows
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-STEPS = 4  # straight pieces that a segment of a Catmull-Rom spline is made of
+STEPS = 4  # straight pieces of a segment of a Catmull-Rom spline
 
 
 @wp.func
 def _spline(points: wp.array[wp.vec3], first: int, last: int, segment: int, t: float):
-    """The uniform Catmull-Rom spline [Catmull74] in [0, 1] of a segment; end points count twice, as in Blender."""
+    """Evaluate a segment of a uniform Catmull-Rom spline [Catmull74] at t in [0, 1]; end points count twice."""
     before = points[wp.max(segment - 1, first)]
     start = points[segment]
     end = points[wp.min(segment + 1, last)]
@@ -29,7 +29,7 @@ def _spline(points: wp.array[wp.vec3], first: int, last: int, segment: int, t: f
 
 @wp.func
 def _place(points: wp.array[wp.vec3], first: int, last: int, step: int, step_count: int):
-    """The end of a straight piece of a curve."""
+    """Return the end of a straight piece of a curve."""
     segment = wp.min(first + step // step_count, last)
     if step_count == 1 or segment == last:
         return points[segment]
@@ -70,7 +70,7 @@ def _resample(
             point += 1
         along += span
         start = end
-    # Rounding may leave the very last ones over.
+    # Rounding may leave the last points unset.
     while point <= final:
         out_points[curve, point] = points[last]
         point += 1
@@ -79,11 +79,11 @@ def _resample(
 def resample(
     points: np.ndarray, starts: np.ndarray, point_count: int, is_smooth: np.ndarray | None = None
 ) -> np.ndarray:
-    """Ragged curves → (S, point_count, 3) float32, equally spaced along each, ends kept.
+    """Resample ragged curves → (S, point_count, 3) float32, equally spaced along each, with the same ends.
 
-    points (N, 3) holds all curves one after the other and starts (S+1,) says where each begins, the last entry being N;
-    is_smooth: (S,) bool, which are Catmull-Rom splines, the others being polylines, as all are for None. A curve of one
-    point becomes that point repeated. Raises `HairError` for curves without points or with points that are not finite.
+    points: (N, 3), concatenated; starts: (S+1,) of each curve, the last entry is N; is_smooth: (S,) bool, which are
+    Catmull-Rom splines, None if all are polylines. A curve of one point repeats it. Raises `HairError` for curves
+    without points or with non-finite points.
     """
     starts = np.asarray(starts, np.int64)
     counts = np.diff(starts)

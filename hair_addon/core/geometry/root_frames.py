@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Positions and normals of roots: mesh.py's `positions` and `normals` on a device.
-
-Also the identities of strands, independent of other strands.
-"""
+"""Positions and normals of roots on a device, as mesh.py's `positions` and `normals`, and IDs of strands."""
 
 import numpy as np
 import warp as wp
@@ -12,7 +9,7 @@ from ..kernels.checks import require_count, require_indices
 from ..kernels.parallel import Rows
 from .mesh import SurfacePoints, TriMesh
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
@@ -39,16 +36,16 @@ def _root(
         + weights[1] * vertex_normals[corners[1]]
         + weights[2] * vertex_normals[corners[2]]
     )
-    if wp.length(smooth) < 1.0e-6:  # opposite normals cancel: the triangle's own
+    if wp.length(smooth) < 1.0e-6:  # opposite normals cancel: use the triangle's normal
         longest = wp.max(wp.length(b - a), wp.length(c - a))
         smooth = wp.cross((b - a) / longest, (c - a) / longest)
     out_normals[root] = wp.normalize(smooth)
 
 
 def rooted(mesh: TriMesh, points: SurfacePoints, device: wp.DeviceLike) -> tuple[wp.array[wp.vec3], wp.array[wp.vec3]]:
-    """Positions [m] and unit normals, (N,) vec3 each, of `SurfacePoints` on a `TriMesh`.
+    """Return positions [m] and unit normals, (N,) vec3 each, of `SurfacePoints` on a `TriMesh`.
 
-    Raises `HairError` for points on triangles that the mesh does not have.
+    Raises `HairError` for points on missing triangles.
     """
     require_count("barycentric coordinates", len(points.barycentric), len(points.triangle))
     require_indices("triangles", points.triangle, len(mesh.triangles))
@@ -89,10 +86,10 @@ def _identify(
 
 
 def identities(points: SurfacePoints, is_mirrored: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """What strands rooted at `SurfacePoints` are known by: (N,) int32, and numbers (N,) float32 in [0, 1).
+    """Return IDs (N,) int32 and random numbers (N,) float32 in [0, 1) of strands rooted at `SurfacePoints`.
 
-    is_mirrored: whether triangles are wound the other way than where roots are stored.
-    Both depend only on the root, so other strands do not change them; collisions are one in some thousand millions.
+    is_mirrored: whether triangles are wound opposite to the stored roots.
+    Both depend only on the root, not on other strands; two IDs are equal with a probability of 2^-32.
     """
     points = points.wound_otherwise() if is_mirrored else points
     count = len(points)

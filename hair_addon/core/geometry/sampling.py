@@ -14,7 +14,7 @@ wp.set_module_options({"enable_backward": False})
 
 
 def check_density(mesh: TriMesh, density: np.ndarray | None) -> np.ndarray:
-    """(V,) float64 per vertex, all one where `density` is None; `HairError` unless something grows with it."""
+    """Return the density (V,) float64 of vertices, 1 for None. Raises `HairError` unless some mass is positive."""
     if density is None:
         return np.ones(len(mesh.vertices))
     density = np.asarray(density, dtype=np.float64)
@@ -32,29 +32,29 @@ def check_density(mesh: TriMesh, density: np.ndarray | None) -> np.ndarray:
 
 
 def corner_masses(mesh: TriMesh, density: np.ndarray) -> np.ndarray:
-    """(F, 3): the part of density × area that each corner's vertex brings to a triangle.
+    """Return (F, 3): the contribution of each corner to the triangle's density × area.
 
-    Density is linear inside a triangle, so the integral over it is area × mean of its corners' densities.
+    Density is linear inside a triangle, so its integral is area × mean of the corners' densities.
     """
     return mesh.areas[:, None] / 3.0 * density[mesh.triangles]
 
 
 def sample_surface(mesh: TriMesh, count: int, seed: int, density: np.ndarray | None = None) -> SurfacePoints:
-    """`count` random points on a mesh, as `SurfacePoints`, distributed as density × area: linear inside triangles too.
+    """Return `count` random `SurfacePoints` distributed as density × area, with density linear inside triangles.
 
-    mesh: a checked `TriMesh`; density: (V,) per vertex, at least 0, or None for uniform. The same seed gives the same
-    points on every machine, and the points of a smaller count are a subset. Neighbours on the surface are
-    neighbours in memory (`TriMesh.surface_order`), for cache locality.
+    mesh: a checked `TriMesh`; density: (V,) of vertices, at least 0, None for uniform. The same seed gives the same
+    points on every machine; the points of a smaller count are a subset. Points are in `TriMesh.surface_order`, for
+    cache locality. Raises `HairError`.
     """
     if count <= 0:
         raise HairError(f"The number of roots must be positive, not {count}.")
     masses = corner_masses(mesh, check_density(mesh, density)).ravel()
     random = np.random.Generator(np.random.PCG64(seed)).random((count, 4))
-    # Eq. 6 draws and rejects; the running sum takes every draw, and takes it to a corner of a triangle.
+    # Eq. 6 uses rejection; inversion of the cumulative sum uses every draw, and selects a corner of a triangle.
     running = np.cumsum(masses)
     order = counting_sort.rising(random[:, 0])
     ends = np.searchsorted(random[order, 0] * running[-1], running)
-    ends[np.flatnonzero(masses)[-1] :] = count  # rounding must not step past the last that has mass
+    ends[np.flatnonzero(masses)[-1] :] = count  # despite rounding, no point is past the last positive mass
     corner = np.repeat(np.arange(len(masses), dtype=np.int32), np.diff(ends, prepend=0))
     along = _runs(ends[2::3], mesh.surface_order)
     triangle, barycentric = np.empty(count, np.int32), np.empty((count, 3), np.float32)
@@ -78,9 +78,9 @@ def _cut(
     out_triangles: wp.array[int],
     out_barycentric: wp.array[wp.vec3],
 ):
-    """A corner's share of a linear density falls from it to nothing at the opposite edge: Dirichlet(2, 1, 1).
+    """Sample the corner's part of a linear density, which falls to zero at the opposite edge: Dirichlet(2, 1, 1).
 
-    That is how three cuts of a unit stick divide it, if two of the four pieces go to the corner [Devroye86, chapter V].
+    Three cuts divide the unit interval into four spacings, two of which go to the corner [Devroye86, chapter V].
     """
     root = wp.tid()
     corner = corners[along[root]]
@@ -100,6 +100,6 @@ def _there(array, dtype):
 
 
 def _runs(ends, order):
-    """Indices of all items, run after run; ends: of runs that are side by side; order: in which they shall be."""
+    """Return the indices of all items with runs reordered; ends: of the consecutive runs; order: of the runs."""
     counts = np.diff(ends, prepend=0)[order]
     return np.repeat((ends[order] - np.cumsum(counts)).astype(np.int32), counts) + np.arange(ends[-1], dtype=np.int32)

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The smooth surface of a subdivided mesh, from where its vertices are on the flat faces of its cage.
+"""Approximation of the smooth surface of a subdivided mesh from vertices on the flat faces of its cage.
 
-Away from corners where other than four faces meet, a Catmull-Clark surface [Catmull78] is the bicubic spline of the
-cage, and the cage with its faces is the bilinear one. B-splines are convolutions of boxes, so the first is the second
-blurred by a hat as wide as two faces, whose variance is 1/6 of a face squared along each axis. Means of neighbouring
-vertices, as many times as give this variance, stand for the hat. The normals of the result lie within a degree of the
-surface's own, but within some ten degrees at the corners of a cube. follow_nodes.py of blender/data/strands blurs
-likewise.
+Away from extraordinary vertices, a Catmull-Clark surface [Catmull78] is the bicubic B-spline of the cage, and the faces
+of the cage are the bilinear one. B-splines are convolutions of boxes, so the bicubic is the bilinear surface convolved
+with a hat as wide as two faces, whose variance is 1/6 of a face squared along each axis. Repeated means of neighbouring
+vertices with the same variance approximate the hat. Normals are within a degree of the surface's, and within ten
+degrees at the corners of a cube. follow_nodes.py of blender/data/strands uses the same blur.
 """
 
 import math
@@ -18,20 +17,20 @@ from ..kernels import parallel
 from ..kernels.checks import require_indices
 from .mesh import Faces
 
-# Nothing differentiates this kernel, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 HAT_VARIANCE = 1.0 / 6.0  # of a face of the cage, squared
-MOST_VARIANCE = 0.4  # of an edge squared, of the mean of a vertex and its four neighbours with equal weights
-MOST_ROUNDS = 128  # as four levels take; with more levels the surface is less smooth than it should be
-LEAST_REFINEMENT = 2.0  # faces for each quarter of a face of the cage; 4 with one level, at most 4/3 without
+MOST_VARIANCE = 0.4  # of an edge squared: the mean of a vertex and its four neighbours with equal weights
+MOST_ROUNDS = 128  # enough for four levels; more levels are smoothed too little
+LEAST_REFINEMENT = 2.0  # 4 × faces / corners of the cage: at least 4 with one level, at most 4/3 without
 
 
 def rounds(face_count: int, cage_corners: int) -> tuple[int, float]:
-    """How many times means are taken, and the weight of a neighbour in each, in single precision.
+    """Return the number of smoothing rounds and the weight of a neighbour, in single precision.
 
-    face_count: of the subdivided mesh; cage_corners: corners of all faces of the cage, 0 for a mesh that is not
-    smoothed. (0, 0) for it, and where nothing is subdivided.
+    face_count: of the subdivided mesh; cage_corners: corners of all faces of the cage, 0 for a mesh without smoothing.
+    (0, 0) without smoothing or subdivision.
     """
     if cage_corners <= 0:
         return 0, 0.0
@@ -45,9 +44,9 @@ def rounds(face_count: int, cage_corners: int) -> tuple[int, float]:
 
 
 def smoothed(vertices: np.ndarray, faces: Faces, cage_corners: int) -> np.ndarray:
-    """(V, 3) float32: where vertices (V, 3) on the faces of a cage are on its smooth surface, about.
+    """Return approximate positions (V, 3) float32 on the smooth surface, of vertices (V, 3) on the faces of its cage.
 
-    cage_corners: as in `rounds`; the vertices themselves where nothing is smoothed.
+    cage_corners: see `rounds`. Vertices are returned unchanged without smoothing.
     """
     count, weight = rounds(len(faces.starts) - 1, cage_corners)
     if count == 0:
@@ -70,7 +69,7 @@ def _ints(array):
 
 
 def _neighbours(faces, vertex_count):
-    """Vertices that share an edge with each vertex: (N,) int32, vertex after vertex, and (V + 1,) int32 starts."""
+    """Return the neighbours by edges (N,) int32, concatenated over vertices, and starts (V + 1,) int32."""
     corners = faces.corner_vertices.astype(np.int64)
     following = np.roll(corners, -1)
     following[faces.starts[1:] - 1] = corners[faces.starts[:-1]]

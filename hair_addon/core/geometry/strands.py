@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Strands:
-    """points (S, P) vec3 [m], a Warp array on the device that the strands live on, and the S roots on the surface.
+    """Strands with points (S, P) vec3 [m], a Warp array on any device, and S roots on the surface.
 
-    points[:, 0] are the roots' positions; every strand has the same number of points.
+    points[:, 0] are the positions of the roots; all strands have the same number of points.
     """
 
     points: "wp.array2d[wp.vec3]"
@@ -34,21 +34,21 @@ class Strands:
 
     @property
     def point_count(self) -> int:
-        """Points per strand."""
+        """Number of points of each strand."""
         return self.points.shape[1]
 
     def numpy(self) -> np.ndarray:
-        """(S, P, 3) float32 [m]; on the CPU a view that shares the strands' memory."""
+        """Return points (S, P, 3) float32 [m]; on the CPU a view."""
         return self.points.numpy()
 
     def moved(self, points: np.ndarray) -> "Strands":
-        """The same strands where they have points (S, P, 3) [m] now; on the CPU float32 points are shared."""
+        """Return the strands with other points (S, P, 3) [m]; on the CPU float32 points are shared, not copied."""
         require_count("strands", len(points), len(self))
         return Strands(_shared(points, self.points.device), self.roots)
 
 
 def from_numpy(points: ArrayLike, roots: SurfacePoints, device: str = "cpu") -> Strands:
-    """Points (S, P, 3) [m] and their S roots → `Strands`; on the CPU float32 points are shared, not copied."""
+    """Return `Strands` of points (S, P, 3) [m] and S roots; on the CPU float32 points are shared, not copied."""
 
     shape = np.shape(points)
     if len(shape) != 3 or shape[2] != 3 or shape[0] != len(roots):
@@ -62,9 +62,9 @@ def _shared(points, device):
 
 
 def check_strands(strands: Strands) -> None:
-    """Raise `HairError` unless the types, shapes and values of `Strands` are valid. For those of scripts.
+    """Raise `HairError` unless the types, shapes and values of a script's `Strands` are valid.
 
-    Whether their roots are on a mesh is for `mesh.check_points`.
+    `mesh.check_points` checks whether roots are on a mesh.
     """
     import warp as wp
 
@@ -82,46 +82,46 @@ def check_strands(strands: Strands) -> None:
 
 
 def random_numbers(count: int) -> np.ndarray:
-    """(count,) random numbers, float32 in [0, 1), of strands. A larger count does not change the first ones."""
+    """Return random numbers (count,) float32 in [0, 1) of strands. A larger count keeps the first numbers."""
     return np.random.Generator(np.random.PCG64(0)).random(count, np.float32)
 
 
 def offsets(points: np.ndarray) -> np.ndarray:
-    """(S, P, 3) [m] → o (S, P, 3) [m]: o_0 = p_0, o_i = p_i - p_(i-1)  (Eq. 7)."""
+    """Return offsets (S, P, 3) [m] of points (S, P, 3) [m]: o_0 = p_0, o_i = p_i - p_(i-1)  (Eq. 7)."""
     return np.concatenate([points[:, :1], np.diff(points, axis=1)], axis=1)
 
 
 def curve_offsets(counts: ArrayLike) -> np.ndarray:
-    """(C,) point counts → (C+1,) int64: where each curve's points begin in one array of all, and where that ends."""
+    """Return the starts (C+1,) int64 of curves with counts (C,) of points in a concatenated array, the end included."""
     return np.concatenate([[0], np.cumsum(counts)])
 
 
 def segment_lengths(points: np.ndarray) -> np.ndarray:
-    """(S, P, 3) [m] → (S, P-1) [m]."""
+    """Return segment lengths (S, P-1) [m] of points (S, P, 3) [m]."""
     return np.linalg.norm(np.diff(points, axis=1), axis=-1)
 
 
 def lengths(points: np.ndarray) -> np.ndarray:
-    """(S, P, 3) [m] → (S,) [m], from root to tip."""
+    """Return lengths (S,) [m] of strands with points (S, P, 3) [m]."""
     return segment_lengths(points).sum(axis=1)
 
 
 def ragged_lengths(points: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """(S,) float64 [m], from root to tip of ragged polylines; points and starts as of `places_along`."""
+    """Return lengths (S,) float64 [m] of ragged polylines; points and starts: see `places_along`."""
     along, starts = _along_all(points), np.asarray(starts, np.int64)
     return along[starts[1:] - 1] - along[starts[:-1]]
 
 
 def _along_all(points):
-    """(N,) float64: the length from the first of (N, 3) points to each, as if all were one polyline."""
+    """Return cumulative lengths (N,) float64 at points (N, 3), treated as one polyline."""
     steps = np.diff(np.asarray(points, np.float64), axis=0)
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
 
 
 def places_along(points: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """(N,) float32: where each point of ragged polylines is along its own, 0 at its root and 1 at its tip.
+    """Return normalized arc lengths (N,) float32 of the points of ragged polylines, 0 at the root and 1 at the tip.
 
-    points (N, 3) and starts (S+1,) as of `resample`; every polyline has points.
+    points (N, 3) and starts (S+1,): see `resample`; no polyline may be empty.
     """
     along, starts = _along_all(points), np.asarray(starts, np.int64)
     first, last = along[starts[:-1]], along[starts[1:] - 1]
@@ -131,12 +131,12 @@ def places_along(points: np.ndarray, starts: np.ndarray) -> np.ndarray:
 
 
 def resample_values(values: np.ndarray, points: np.ndarray, starts: np.ndarray, point_count: int) -> np.ndarray:
-    """Values (N,) at the points of ragged polylines → (S, point_count) float32, equally spaced along each.
+    """Resample values (N,) at the points of ragged polylines → (S, point_count) float32, equally spaced along each.
 
-    points (N, 3) and starts (S+1,) as of `resample`; every polyline has points.
+    points (N, 3) and starts (S+1,): see `resample`; no polyline may be empty.
     """
     starts = np.asarray(starts, np.int64)
-    # Polylines one behind the other, each two long.
+    # Polyline i occupies the range [2 i, 2 i + 1].
     places = places_along(points, starts).astype(np.float64) + 2.0 * np.repeat(
         np.arange(len(starts) - 1), np.diff(starts)
     )
@@ -145,10 +145,10 @@ def resample_values(values: np.ndarray, points: np.ndarray, starts: np.ndarray, 
 
 
 def resample(points: np.ndarray, starts: np.ndarray, point_count: int) -> np.ndarray:
-    """Ragged polylines → (S, point_count, 3) float32 [m], equally spaced along each, ends kept.
+    """Resample ragged polylines → (S, point_count, 3) float32 [m], equally spaced along each, with the same ends.
 
-    points (N, 3) holds all polylines one after the other and starts (S+1,) says where each begins, the last entry
-    being N (Blender's `curve_offset_data`). A polyline of one point, or of no length, becomes that point repeated.
+    points: (N, 3), concatenated; starts: (S+1,) of each polyline, the last entry is N (Blender's `curve_offset_data`).
+    A polyline of one point, or of zero length, repeats the point.
     """
     points = np.asarray(points, dtype=np.float64)
     starts = np.asarray(starts, dtype=np.int64)
@@ -161,11 +161,11 @@ def resample(points: np.ndarray, starts: np.ndarray, point_count: int) -> np.nda
         raise HairError("Some points of the curves have non-finite coordinates: delete those curves.")
     if len(counts) == 0:
         return np.empty((0, point_count, 3), np.float32)
-    # One running length over all polylines and the jumps between them, which no segment below is.
+    # Cumulative length over all polylines; the jumps between them are never used as segments.
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     first, last = starts[:-1], starts[1:] - 1
     wanted = along[first, None] + np.linspace(0.0, 1.0, point_count) * (along[last] - along[first])[:, None]
-    # The segment that holds each wanted length, kept inside its own polyline.
+    # The segment that contains each wanted length, clamped to its own polyline.
     segment = np.searchsorted(along, wanted.ravel(), side="right").reshape(wanted.shape) - 1
     segment = np.clip(segment, first[:, None], np.maximum(last - 1, first)[:, None])
     ahead = np.minimum(segment + 1, last[:, None])

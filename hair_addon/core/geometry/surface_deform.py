@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Deformation of strands with their surface, by rotations that are continuous over the surface.
 
-A face's deformation gradient takes two of its edges and its unit normal to where they are now. The mean over the faces
-around a vertex (vertex_turns.py) has a nearest rotation, its polar factor U V^T of the singular value decomposition
-[Higham86]; between vertices two of its columns are interpolated and made orthonormal again. So rigid motion is
-reproduced exactly, shear and stretch rotate no more than necessary, and neighbouring roots do not separate, as they do
-with the frames of single triangles or of a UV map. blender/data/strands/follow_nodes.py implements the same in geometry
-nodes.
+A face's deformation gradient maps two of its edges and its unit normal to their present directions. The rotation at a
+vertex is the polar factor U V^T of the mean over its faces (vertex_turns.py) [Higham86]; between vertices two of its
+columns are interpolated and orthonormalized. Thus rigid motion is reproduced exactly, shear and stretch rotate no more
+than necessary, and neighbouring roots do not separate, as they do with frames of single triangles or of a UV map.
+blender/data/strands/follow_nodes.py implements the same in geometry nodes.
 
-A subdivided surface is smooth where it is now, and flat on the faces of its cage before: from there, neighbouring roots
-would turn apart. Its rotation is that from the cage's smooth surface (smooth_surface.py).
+A deformed subdivided surface is smooth, but at rest its vertices lie on the flat faces of its cage, from which
+neighbouring roots would turn apart. Its rotation is measured from the smooth surface of the cage (smooth_surface.py).
 """
 
 from dataclasses import dataclass
@@ -23,15 +22,15 @@ from . import vertex_turns
 from .mesh import Faces, require_finite
 from .vertex_turns import Turning
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @dataclass(frozen=True)
 class SurfaceMotion:
-    """Positions of a mesh's vertices before and after, (V, 3) float32, and the rotation of the surface there.
+    """Positions of a mesh's vertices before and after, (V, 3) float32, and the rotations of the surface.
 
-    axes: (V, 2, 3) float32, where the rotation at each vertex takes the x and the y axis.
+    axes: (V, 2, 3) float32, the images of the x and the y axis under the rotation at each vertex.
     """
 
     before: np.ndarray
@@ -46,11 +45,10 @@ def motion(
     vertices: np.ndarray | None = None,
     smooth_before: np.ndarray | None = None,
 ) -> SurfaceMotion:
-    """The `SurfaceMotion` of vertices (V, 3) that went from `before` to `after`; faces: the mesh's `Faces`.
+    """Return the `SurfaceMotion` of vertices (V, 3) from `before` to `after`; faces: the mesh's `Faces`.
 
-    vertices: indices, in any shape, of those whose rotation matters, of a large mesh perhaps few; None for all;
-    smooth_before: (V, 3) of the smooth surface that they were on, from which the surface turns; None for `before`.
-    Raises `HairError` where vertices are not finite numbers: no rotation could be found for them.
+    vertices: indices, in any shape, of vertices that need a rotation, None for all; smooth_before: (V, 3) on the smooth
+    surface from which rotations are measured, None for `before`. Raises `HairError` for non-finite vertices.
     """
     require_finite(before)
     require_finite(after)
@@ -59,7 +57,7 @@ def motion(
 
 
 def turned(before: np.ndarray, after: np.ndarray, turning: Turning) -> SurfaceMotion:
-    """The same by a `Turning`, which many poses share: rotations are right at its vertices, and missing elsewhere."""
+    """Return the `SurfaceMotion` by a `Turning`, which is reused for many poses; only its vertices get rotations."""
     require_finite(after)
     require_count("vertices", len(after), len(before))
     found = turning.axes(after)
@@ -78,11 +76,10 @@ def carry(
     barycentric: np.ndarray,
     is_back: bool = False,
 ) -> np.ndarray:
-    """(N, P, 3) float32 points of strands → float32, each strand moved rigidly with the surface at its root.
+    """Move points (N, P, 3) float32 of strands rigidly with the surface at their roots; returns float32.
 
-    root_vertices: (N, 3) int32 corners of the triangles that roots lie in; barycentric: (N, 3) float32 in their order;
-    is_back: the inverse, from where the surface went to where it was. Raises `HairError` where these are not of the
-    same strands, or of another surface.
+    root_vertices: (N, 3) int32 corners of the roots' triangles; barycentric: (N, 3) float32 in the same order; is_back:
+    apply the inverse motion, from `after` to `before`. Raises `HairError` if counts or indices do not match.
     """
     vertex_count = len(surface_motion.before)
     require_count("vertices", len(surface_motion.after), vertex_count)
@@ -148,7 +145,7 @@ def _carry(
         change += wp.length_sq(axes[vertex, 0] - wp.vec3(1.0, 0.0, 0.0))
         change += wp.length_sq(axes[vertex, 1] - wp.vec3(0.0, 1.0, 0.0))
     if change == 0.0:
-        for point in range(points.shape[1]):  # undeformed parts do not change, bit for bit
+        for point in range(points.shape[1]):  # undeformed parts stay bit-identical
             out_points[strand, point] = points[strand, point]
         return
     x_axis = _unit(x_axis, wp.vec3(1.0, 0.0, 0.0))

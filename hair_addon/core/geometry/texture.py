@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An image mapped onto a surface by UVs."""
+"""Images that are mapped onto a surface by UV coordinates."""
 
 from dataclasses import dataclass
 
@@ -10,17 +10,17 @@ from .mesh import SurfacePoints
 
 @dataclass(frozen=True)
 class Texture:
-    """values (height, width) float32, the lowest row first; corner_uvs (F, 3, 2): where each triangle's corners are."""
+    """An image with values (height, width) float32, bottom row first; corner_uvs: (F, 3, 2) of triangles' corners."""
 
     values: np.ndarray
     corner_uvs: np.ndarray
 
     def wound_otherwise(self) -> "Texture":
-        """The same on triangles whose last two corners have changed places."""
+        """Return the same texture for triangles whose last two corners are swapped."""
         return Texture(self.values, np.ascontiguousarray(self.corner_uvs[:, [0, 2, 1]]))
 
     def at(self, points: SurfacePoints) -> np.ndarray:
-        """(N,) float64 at `SurfacePoints`: linear between the middles of pixels, repeated beyond the picture."""
+        """Sample the image at `SurfacePoints` → (N,) float64, bilinear between pixel centers, with repetition."""
         uvs = np.einsum("nc,ncu->nu", points.barycentric, self.corner_uvs[points.triangle].astype(np.float64))
         height, width = self.values.shape
         x, y = uvs[:, 0] * width - 0.5, uvs[:, 1] * height - 0.5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Coordinate transforms of strands."""
+"""Linear transforms of strands."""
 
 import numpy as np
 import warp as wp
@@ -8,7 +8,7 @@ from ..kernels import parallel
 from ..kernels.checks import require_count
 from ..kernels.parallel import Rows
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
@@ -25,19 +25,19 @@ def _transform(
 
 
 def transformed(points: np.ndarray, matrix: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
-    """(S, P, 3) float32 points, each multiplied by a (3, 3) matrix; by the identity they are themselves.
+    """Multiply points (S, P, 3) float32 by a matrix (3, 3); returns the points themselves for the identity.
 
-    out: array to put them in, which may be that of the points; None for a new one.
+    out: array for the result, which may be `points`; None for a new one.
     """
     points = np.ascontiguousarray(points, np.float32)
     if not len(points) or np.array_equal(matrix, np.eye(3)):
         return points
-    there = wp.array(points, dtype=wp.vec3, device="cpu", copy=False)
+    source = wp.array(points, dtype=wp.vec3, device="cpu", copy=False)
     if out is None:
-        moved = parallel.empty_vectors(there.shape, "cpu")
+        moved = parallel.empty_vectors(source.shape, "cpu")
     else:
         require_count("points", out.size, points.size)
         moved = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)
     matrix = wp.mat33(*np.asarray(matrix, np.float32).ravel().tolist())
-    parallel.launch(_transform, len(points), inputs=[Rows(there), matrix], outputs=[moved], device="cpu")
+    parallel.launch(_transform, len(points), inputs=[Rows(source), matrix], outputs=[moved], device="cpu")
     return moved.numpy()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces that Blender has turned, as it does where it applies a scale that mirrors: what they were before.
+"""Recovery of the original faces after Blender has flipped them, as it does when it applies a mirroring scale.
 
-A turned face begins at the same corner and goes the other way around. Where modifiers subdivide faces, those of the
-cage are turned: the quads that each is divided into, and the vertices inside it, come in another order then.
+A flipped face begins at the same corner and has the opposite winding. If modifiers subdivide faces, those of the cage
+are flipped, which changes the order of each face's quads and of the vertices inside it.
 """
 
 from dataclasses import dataclass
@@ -17,23 +17,23 @@ _SIDES = np.array([(0, 1), (1, 2), (2, 3), (3, 0)])
 
 @dataclass(frozen=True)
 class TurnedFaces:
-    """What corners and vertices were before a turn; to turn once more leads back.
+    """The permutation of corners and vertices by a flip, which is its own inverse.
 
-    corners: (C,) int, the present corner that each was; vertices: (V,) int32, the present number of each, which was
-    that of the vertex with its number now; None where all kept their numbers.
+    corners: (C,) int, the present corner of each original one; vertices: (V,) int32, the present number of each
+    original vertex; None if all are unchanged.
     """
 
     corners: np.ndarray
     vertices: np.ndarray | None
 
     def before(self, corner_vertices: np.ndarray) -> np.ndarray:
-        """(C,) vertices of corners before, in the numbers of before."""
-        there = corner_vertices[self.corners]
-        return there if self.vertices is None else self.vertices[there]
+        """Return the original vertices (C,) of corners, in the original numbering."""
+        permuted = corner_vertices[self.corners]
+        return permuted if self.vertices is None else self.vertices[permuted]
 
 
 def turned(faces: Faces) -> TurnedFaces:
-    """The `TurnedFaces` of faces that nothing subdivides."""
+    """Return the `TurnedFaces` of faces without subdivision."""
     starts, sizes = faces.starts[:-1], np.diff(faces.starts)
     first, size = np.repeat(starts, sizes), np.repeat(sizes, sizes)
     corner = np.arange(len(first)) - first
@@ -41,9 +41,9 @@ def turned(faces: Faces) -> TurnedFaces:
 
 
 def turned_cage(faces: Faces, corner_count: int) -> TurnedFaces | None:
-    """The `TurnedFaces` of faces whose cage was turned; None where it is not known which quads each face of it has.
+    """Return the `TurnedFaces` of faces whose cage was flipped; None if the quads of the cage's faces are unknown.
 
-    corner_count: as of `cage_vertices`.
+    corner_count: see `cage_vertices`.
     """
     starts = cage_starts(faces, corner_count)
     if starts is None:
@@ -59,17 +59,17 @@ def turned_cage(faces: Faces, corner_count: int) -> TurnedFaces | None:
         if image is None:
             return None
         its_corners, is_inside = image
-        here = 4 * firsts[:, None] + np.arange(4 * count)
-        there = 4 * firsts[:, None] + its_corners
-        corners[here] = there
-        vertices[faces.corner_vertices[here[:, is_inside]]] = faces.corner_vertices[there[:, is_inside]]
+        original = 4 * firsts[:, None] + np.arange(4 * count)
+        present = 4 * firsts[:, None] + its_corners
+        corners[original] = present
+        vertices[faces.corner_vertices[original[:, is_inside]]] = faces.corner_vertices[present[:, is_inside]]
     return TurnedFaces(corners, vertices)
 
 
 def _image(quads, cage_size):
-    """((4 Q,) int: the corner of (Q, 4) quads of one face that each is in the face's image, (4 Q,) bool: inside it).
+    """Map a face's quads (Q, 4) to its mirror image: ((4 Q,) int corners of the image, (4 Q,) bool: inside the face).
 
-    The image has the face's first corner where it is, and goes the other way around; None where there is no such image.
+    The image has the same first corner and the opposite winding; None if there is no such image.
     """
     numbers, flat = np.unique(quads, return_inverse=True)
     flat = flat.ravel()
@@ -79,7 +79,7 @@ def _image(quads, cage_size):
         return None
     sides = local[:, _SIDES].reshape(-1, 2)
     steps = _steps_from(own, np.concatenate([sides, sides[:, ::-1]]), len(numbers))
-    # Steps to all corners of the face tell a vertex.
+    # A vertex is identified by its distances to all corners of the face.
     known = {tuple(row): vertex for vertex, row in enumerate(steps.tolist())}
     images = steps[:, -np.arange(len(own)) % len(own)].tolist()
     if len(known) != len(numbers) or any(tuple(row) not in known for row in images):
@@ -100,7 +100,7 @@ def _image(quads, cage_size):
 
 
 def _steps_from(origins, links, count):
-    """(V, N) int: how many links (L, 2) it takes from each of N vertices to each of V, count where there is no way."""
+    """Return distances (V, N) int in links (L, 2) from N origins to each of V vertices; count if unreachable."""
     steps = np.full((count, len(origins)), count)
     steps[origins, np.arange(len(origins))] = 0
     while True:

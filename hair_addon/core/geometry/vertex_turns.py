@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Turns of a surface at its vertices: the rotation nearest to the mean deformation gradient of the faces around each.
+"""Rotations of a surface at its vertices, nearest to the mean deformation gradient of the faces around each.
 
-A face's gradient takes two of its edges and its unit normal from where they are at rest to where they are now. Of this
-only the second depends on the pose: what is at rest is found once, for those vertices that anything grows around.
-shaders/strands/vertex_rotations.comp is the same in single precision.
+A face's gradient maps two of its edges and its unit normal from rest to the present pose. The rest part is computed
+once, for the vertices that are needed. shaders/strands/vertex_rotations.comp is the same in single precision.
 """
 
 from dataclasses import dataclass
@@ -18,38 +17,38 @@ from ..kernels.parallel import Rows
 from . import nearest_rotation
 from .mesh import Faces
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-# Gradients take a tenth of a microsecond each: fewer are not worth a thread.
+# A gradient takes a tenth of a microsecond: fewer are not worth a thread.
 _LEAST_FACES = 32_768
 
-UNTURNED = np.eye(3, dtype=np.float32)[:2]  # of a vertex: its x and its y axis
+UNTURNED = np.eye(3, dtype=np.float32)[:2]  # x and y axis of a vertex without rotation
 
 
 @dataclass(frozen=True)
 class Turning:
-    """M vertices of a mesh at rest, and the F faces around them; made by `turning`."""
+    """Rest data of M vertices of a mesh and the F faces around them; created by `turning`."""
 
-    rest: np.ndarray  # (V, 3) float32, all vertices at rest, from where the surface turns
-    vertices: np.ndarray  # (M,) int32, those whose turn is found, ascending
+    rest: np.ndarray  # (V, 3) float32, all vertices at rest
+    vertices: np.ndarray  # (M,) int32, ascending, the vertices with a rotation
     corners: np.ndarray  # (F, 3) int32, a face's first, second and last vertex
-    inverses: np.ndarray  # (F, 3, 3) float64, of edges and normal at rest as columns; zero of faces without area
-    starts: np.ndarray  # (M + 1,) int32, where the faces of each vertex begin in `around`
+    inverses: np.ndarray  # (F, 3, 3) float64, of edges and normal at rest as columns; zero for faces of zero area
+    starts: np.ndarray  # (M + 1,) int32, start of each vertex's faces in `around`
     around: np.ndarray  # (C,) int32, faces around each vertex, in the order of their corners
 
     @cached_property
     def needed(self) -> np.ndarray:
-        """(N,) int32, ascending: the vertices whose places all turns follow from, and those that turn."""
+        """Vertices (N,) int32, ascending, on whose positions the rotations depend, and those with a rotation."""
         is_needed = np.zeros(len(self.rest), bool)
         is_needed[self.corners] = True
         is_needed[self.vertices] = True
         return np.flatnonzero(is_needed).astype(np.int32)
 
     def axes(self, after: np.ndarray) -> np.ndarray:
-        """(M, 2, 3) float32: where the turn at each vertex takes the x and the y axis; unturned where no face moves.
+        """Return (M, 2, 3) float32: images of the x and the y axis at each vertex; unrotated where no face moves.
 
-        after: (V, 3) float32, finite, all vertices now. Raises `HairError` where there are not as many.
+        after: (V, 3) float32, finite, all vertices in the present pose. Raises `HairError` for another count.
         """
         require_count("vertices", len(after), len(self.rest))
         face_count, vertex_count = len(self.corners), len(self.vertices)
@@ -66,17 +65,17 @@ class Turning:
         shared = [_shared(self.around, np.int32, wp.int32), gradients, moves]
         parallel.launch(_vertex_axes, vertex_count, [*of_vertex, *shared], [axes, is_found], "cpu")
         found = axes.numpy()
-        for vertex in np.flatnonzero(is_found.numpy() == 0):  # flattened: few
+        for vertex in np.flatnonzero(is_found.numpy() == 0):  # few, at flattened faces
             total = gradients.numpy()[self.around[self.starts[vertex] : self.starts[vertex + 1]]].sum(axis=0)
             found[vertex] = nearest_rotation.nearest_rotations(total[None])[0].T[:2]
         return found
 
 
 def turning(rest: np.ndarray, faces: Faces, vertices: np.ndarray | None = None) -> Turning:
-    """The `Turning` of a mesh whose vertices (V, 3) float32 are at rest there, finite.
+    """Return the `Turning` of a mesh with finite rest vertices (V, 3) float32.
 
-    vertices: indices, in any shape, of those whose turn matters, of a large mesh perhaps few; None for all. Raises
-    `HairError` where indices are of another mesh.
+    vertices: indices, in any shape, of vertices that need a rotation, None for all. Raises `HairError` for invalid
+    indices.
     """
     vertex_count = len(rest)
     starts, around = faces.around(vertex_count)
@@ -93,8 +92,8 @@ def turning(rest: np.ndarray, faces: Faces, vertices: np.ndarray | None = None) 
         corners, around = corners[some], around.astype(np.int32)
     corners = np.ascontiguousarray(corners, np.int32)
     inverses = wp.empty(len(corners), dtype=wp.mat33d, device="cpu")
-    given = [Rows(_shared(corners, np.int32, wp.vec3i)), _shared(rest, np.float32, wp.vec3)]
-    parallel.launch(_rest_inverses, len(corners), given, [inverses], "cpu", least_rows=_LEAST_FACES)
+    inputs = [Rows(_shared(corners, np.int32, wp.vec3i)), _shared(rest, np.float32, wp.vec3)]
+    parallel.launch(_rest_inverses, len(corners), inputs, [inverses], "cpu", least_rows=_LEAST_FACES)
     return Turning(rest, chosen, corners, inverses.numpy().reshape(-1, 3, 3), starts, around)
 
 
@@ -104,7 +103,7 @@ def _shared(array, scalar, kind):
 
 @wp.func
 def _basis(vertices: wp.array[wp.vec3], corners: wp.vec3i):
-    """Columns are the edges from a face's first corner to the next and to the last, and its normal."""
+    """Return a matrix with columns: the edges from a face's first corner to the next and to the last, its normal."""
     first = wp.vec3d(vertices[corners[0]])
     along = wp.vec3d(vertices[corners[1]]) - first
     across = wp.vec3d(vertices[corners[2]]) - first
@@ -138,7 +137,7 @@ def _gradients(
     out_gradients: wp.array[wp.mat33d],
     out_moves: wp.array[wp.int32],
 ):
-    """Of each face's deformation the gradient, zero of faces without area, and whether any of its corners moves."""
+    """Compute each face's deformation gradient, zero for zero area, and whether any of its corners moves."""
     face = wp.tid()
     out_gradients[face] = _basis(after, corners[face]) * inverses[face]
     moves = int(0)
@@ -160,7 +159,7 @@ def _vertex_axes(
     out_axes: wp.array2d[wp.vec3],
     out_is_found: wp.array[wp.int32],
 ):
-    """Rotations nearest to the mean around each vertex, without normalisation, which they ignore."""
+    """Compute the rotation nearest to the mean around each vertex; the sum suffices, as scale does not matter."""
     vertex = wp.tid()
     total = wp.mat33d()
     is_moved = int(0)
