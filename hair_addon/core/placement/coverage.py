@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The area covered by guides, so that hair between a scalp's guides does not grow on the face."""
+"""The area covered by guides: outside it no hair grows, for example on the face beside a scalp's guides."""
 
 import numpy as np
 
 from .. import geometry
 from ..geometry.mesh import TriMesh
 
-_NEIGHBOURS = 4  # neighbours of a guide, for the guide spacing
-_END = 1.3  # times that distance: there is no hair beyond
-LEVELS = 8  # of weights above zero: Blender takes those of a vertex group one by one
-_WHOLE = 0.95  # of the vertices: more count as all
+_NEIGHBOURS = 4  # neighbours of a guide that define the guide spacing
+_END = 1.3  # limit of hair, in guide spacings
+LEVELS = 8  # of positive weights: Blender assigns each weight of a vertex group by a separate call
+_WHOLE = 0.95  # mean weight above which the whole mesh counts as covered
 
 
 def coverage(mesh: TriMesh, roots: np.ndarray) -> np.ndarray | None:
-    """(V,) float32 in [0, 1] of a checked `TriMesh`: 1 among roots (G, 3) [m], 0 away from them, in `LEVELS`.
+    """Return weights (V,) float32 of a checked `TriMesh`: 1 near roots (G, 3) [m], 0 away from them, in `LEVELS` steps.
 
-    Hair thins out from once to 1.3 times the distance between roots (to the fourth nearest), or the length of
-    a vertex' edges where that is more. None where guides are all over, or too few to say.
+    Hair thins out between 1 and 1.3 times the guide spacing (distance to the fourth nearest root), or the longest edge
+    at a vertex if that is larger. None if guides cover the mesh or are too few.
     """
-    import warp as wp  # takes longer to import than the add-on may take to start
+    import warp as wp  # slow to import: the add-on must start without it
 
     if len(roots) <= _NEIGHBOURS:
         return None
@@ -33,7 +33,7 @@ def coverage(mesh: TriMesh, roots: np.ndarray) -> np.ndarray | None:
 
 
 def _longest_edges(mesh):
-    """(V,) [m]: of the triangles around each vertex."""
+    """Return the longest edge (V,) [m] of the triangles around each vertex."""
     longest = np.zeros(len(mesh.vertices))
     for start, end in ((0, 1), (1, 2), (2, 0)):
         lengths = np.linalg.norm(mesh.corners[:, start] - mesh.corners[:, end], axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The domain of roots: the surface with density, divided into pieces small enough for sums over cells."""
+"""The domain of roots: the surface with its density, divided into pieces small enough for sums over cells."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -15,21 +15,24 @@ from ..geometry.mirror import Mirror
 from ..geometry.sampling import check_density, corner_masses
 from ..geometry.texture import Texture
 
-GRID_SIZE = 32  # cells along each axis of the grid that sites are found by; farther ones wrap around
-LONGEST_EDGE = 2.5  # of a piece, by the spacing of sites: a piece is shared among few cells
-LONGEST_GRADED_EDGE = 1.5  # where the density varies: it is constant in a piece
-SLIVER_LENGTH, SLIVER_WIDTH = 8.0, 0.5  # of its longest and its shortest edge, by the longest that a piece may have
-MOST_SLICES = 64  # of a sliver at once: the density may vary along it
+GRID_SIZE = 32  # cells along each axis of the grid of sites; distant cells wrap around
+LONGEST_EDGE = 2.5  # of a piece, in spacings of sites: few cells share a piece
+LONGEST_GRADED_EDGE = 1.5  # the same for varying density, which is constant in a piece
+SLIVER_LENGTH, SLIVER_WIDTH = (
+    8.0,
+    0.5,
+)  # of the longest and the shortest edge, relative to a piece's longest allowed edge
+MOST_SLICES = 64  # of a sliver in one step: the density may vary along it
 LEAST_COSINE = -1.0 / 3.0  # between normals of one side of a surface
-LEAST_PIECES = 2000  # minimum site count for the cutting: the density is constant in a piece
-PLASTIC = 0.7548776662466927, 0.5698402909980532  # steps of the evenest sequence in a square [Roberts18]
+LEAST_PIECES = 2000  # least site count assumed for the cutting: the density is constant in a piece
+PLASTIC = 0.7548776662466927, 0.5698402909980532  # steps of the R2 low-discrepancy sequence [Roberts18]
 
 
 @dataclass(frozen=True)
 class Parts:
-    """Triangles cut out of a mesh's triangles, of triangle (Q,).
+    """Triangles that are parts of a mesh's triangles (Q,).
 
-    barycentric (Q, 3, 3) and corners (Q, 3, 3) at unit size: where their corners are; areas (Q,).
+    barycentric (Q, 3, 3) and positions (Q, 3, 3) at unit size of their corners; areas (Q,).
     """
 
     triangle: np.ndarray
@@ -38,20 +41,20 @@ class Parts:
     areas: np.ndarray
 
     def chosen(self, selection: np.ndarray) -> "Parts":
-        """The parts of a mask or an index array."""
+        """Return the parts of a mask or an index array."""
         if selection.dtype == bool and selection.all():
             return self
         return Parts(*(getattr(self, field.name)[selection] for field in fields(self)))
 
     def joined(self, *others: "Parts") -> "Parts":
-        """These parts and others, one after another."""
+        """Return these parts followed by others."""
         if not others:
             return self
         every = (self, *others)
         return Parts(*(np.concatenate([getattr(part, field.name) for part in every]) for field in fields(self)))
 
     def centres(self) -> SurfacePoints:
-        """`SurfacePoints`."""
+        """Return the centroids as `SurfacePoints`."""
         centres = self.barycentric[:, 0] + self.barycentric[:, 1] + self.barycentric[:, 2]
         return SurfacePoints(self.triangle.astype(np.int32), (centres / 3.0).astype(np.float32))
 
@@ -59,9 +62,9 @@ class Parts:
 class Domain:
     """A checked `TriMesh` at unit size with a density D, normalised by `densest`, cut for a number of sites.
 
-    mesh: scaled, `size` [m] being its own; normals: (F, 3), unit; islands: (F,); parts: `Parts` that have density, of
-    one side of a mirror if there is one; densities (Q,): D, mean; amounts (Q,): ∫ D dA; mass: ∫ D² dA; query
-    and grid: what finds places on it, and sites that are near.
+    mesh: scaled by 1 / `size` [m]; normals: (F, 3), unit; islands: (F,); parts: `Parts` of positive density, on one
+    side of the mirror if there is one; densities (Q,): mean of D; amounts (Q,): ∫ D dA; mass: ∫ D² dA; query: closest
+    points on the mesh; grid: of sites. Raises `HairError` if the density is zero everywhere.
     """
 
     def __init__(
@@ -80,7 +83,7 @@ class Domain:
         lowest, highest = used.min(axis=0), used.max(axis=0)
         self.size = float((highest - lowest).max())
         self.origin = lowest.astype(np.float64)
-        # Unused vertices may be far away, and would reduce the precision of the others.
+        # Unused vertices may be far away, which would reduce the precision of the others.
         inside = np.clip(mesh.vertices, lowest, highest)
         self.mesh = TriMesh(((inside - lowest) / np.float32(self.size)).astype(np.float32), mesh.triangles)
         values = check_density(self.mesh, density)
@@ -97,10 +100,10 @@ class Domain:
         whole = Parts(grown, corners, self.mesh.corners[grown], self.mesh.areas[grown])
         if mirror is not None:
             whole = self._heavier_side(whole)
-        if texture is not None:  # which is finer than triangles
+        if texture is not None:  # may be finer than triangles
             spacing = _spacing(whole.areas.sum(), LEAST_PIECES)
             whole = cut(whole, LONGEST_GRADED_EDGE * spacing, lambda parts: 1.0)
-        # Where the density is high sites are close, and pieces small.
+        # Pieces are smaller where the density is higher.
         amount = (whole.areas * self.density_at(whole.centres())).sum()
         if not amount > 0.0:
             raise HairError("The density is zero everywhere: paint weight where hair should grow.")
@@ -115,22 +118,22 @@ class Domain:
         self.mass = float((self.amounts * self.densities).sum())
 
     def density_at(self, points: SurfacePoints) -> np.ndarray:
-        """(N,) float64: D at `SurfacePoints`, one where the given density is highest."""
+        """Return D (N,) float64 at `SurfacePoints`; the given density has maximum 1."""
         density = interpolate(self._values, self.mesh, points).astype(np.float64)
         return density if self._texture is None else density * self._texture.at(points)
 
     def _least_density(self, parts):
-        """(Q,): D, and no less than a thousandth, where pieces are as large as may be."""
+        """Return D (Q,), at least 1e-3, which bounds the size of pieces."""
         return np.maximum(self.density_at(parts.centres()), 1e-3)
 
     def moved(self, points: SurfacePoints, places: np.ndarray) -> SurfacePoints:
-        """`SurfacePoints` moved to the domain nearest to places (N, 3).
+        """Move `SurfacePoints` to the points of the domain closest to places (N, 3).
 
-        One that would change sides or islands, find no density, or cross the mirror, stays where it is.
+        Points that would change sides or islands, have zero density, or cross the mirror, do not move.
         """
         if self._mirror is not None:
             places = places - np.minimum(self._heights(places), 0.0)[:, None] * self._mirror.normal
-        # Where they come from is no farther; a part more than that for rounding.
+        # The present point is an upper bound, with a margin for rounding.
         farthest = 1.01 * np.linalg.norm(places - positions(self.mesh, points), axis=1) + 1e-5
         found = self.query.nearest(places, farthest)
         before, after = self.normals[points.triangle], self.normals[found.triangle]
@@ -144,10 +147,10 @@ class Domain:
         )
 
     def samples(self, count: int, random: np.random.Generator | None = None) -> tuple[SurfacePoints, np.ndarray]:
-        """`count` points, as `SurfacePoints`, each of which stands for the same amount, and their parts (count,).
+        """Return `count` sample points of equal amount, as `SurfacePoints`, and their parts (count,).
 
-        They are taken island by island at even steps, so each island has its share; random: where within each step, a
-        generator, or None for the evenest.
+        Samples are stratified over the cumulative amount, sorted by island, so each island has its share; random: a
+        generator for the positions in the strata, None for a low-discrepancy sequence.
         """
         order = np.argsort(self.islands[self.parts.triangle], kind="stable")
         running = np.cumsum(self.amounts[order])
@@ -164,9 +167,9 @@ class Domain:
         return SurfacePoints(self.parts.triangle[part].astype(np.int32), barycentric.astype(np.float32)), part
 
     def symmetric(self, half: SurfacePoints, count: int) -> SurfacePoints:
-        """`count` `SurfacePoints`: one half, (count + 1) // 2 of them, and their images at the nearest place of all.
+        """Return `count` `SurfacePoints`: one half, (count + 1) // 2 points, and their closest images on the surface.
 
-        Of an odd number the one that is nearest to the mirror goes there, and is its own image.
+        For an odd count the point nearest to the mirror moves to it, and is its own image.
         """
         places = positions(self.mesh, half).astype(np.float64)
         heights = self._heights(places)
@@ -177,7 +180,7 @@ class Domain:
             half = half[:-1].joined(between)
         images = (places - 2.0 * heights[:, None] * self._normal)[: count // 2]
         found = self.query.nearest(images) if len(images) else half[:0]
-        # Where only one side has density, guides grow on that side alone: an image there stays on its original.
+        # If the other side has no density, the image coincides with its original.
         is_bare = self.density_at(found) <= 0.0
         triangle = np.where(is_bare, half.triangle[: count // 2], found.triangle)
         barycentric = np.where(is_bare[:, None], half.barycentric[: count // 2], found.barycentric)
@@ -185,17 +188,17 @@ class Domain:
 
     @property
     def _normal(self):
-        """(3,) of the mirror, towards the side that sites are on."""
+        """The mirror's normal (3,), towards the side of the sites."""
         if self._mirror is None:
             raise ValueError("This domain has no mirror.")
         return self._mirror.normal
 
     def _heights(self, places):
-        """(N,) heights of places above the mirror, at unit size."""
+        """Return the heights (N,) of places above the mirror, at unit size."""
         return (places + self.origin / self.size) @ self._normal
 
     def _heavier_side(self, parts):
-        """The parts above the mirror, cut along it; the mirror is flipped if its lower side has more."""
+        """Return the parts above the mirror, cut along it; flips the mirror if its lower side has a larger amount."""
         above, below = (self._cut_at_mirror(parts, sign) for sign in (1.0, -1.0))
         above_amount, below_amount = ((side.areas * self.density_at(side.centres())).sum() for side in (above, below))
         if self._mirror is not None and below_amount > above_amount * (1.0 + 1e-6):
@@ -208,7 +211,7 @@ class Domain:
         heights[np.abs(heights) < 1e-6] = 0.0
         lowest = heights.min(axis=1)
         pieces = [parts.chosen((lowest >= 0.0) & (heights.max(axis=1) > 0.0))]
-        # The corner that is alone on its side comes first; the plane crosses the two edges that meet there.
+        # The corner that is alone on its side comes first; the plane crosses its two edges.
         above_count = np.count_nonzero(heights > 0.0, axis=1)
         for alone, count in ((1.0, 1), (-1.0, 2)):
             crossed = np.flatnonzero((above_count == count) & (lowest < 0.0))
@@ -237,17 +240,17 @@ class Domain:
 
 
 def _spacing(amount, count):
-    """Of so many sites on an area, at unit size; no less than leaves a sliver's pieces to a dozen sites in a row.
+    """Return the spacing of sites on an area, at unit size, with a lower limit for slivers.
 
-    Else slivers alone would be cut to bits of their width, millions of them.
+    Without the limit, slivers alone would be cut into millions of pieces of their width.
     """
     return max(np.sqrt(amount / count), 8.0 / count)
 
 
 def cut(parts: Parts, longest: float, density_of: Callable[[Parts], np.ndarray | float]) -> Parts:
-    """Parts none of which has an edge longer than `longest`, where the density is one.
+    """Cut parts until no edge is longer than `longest` / sqrt(density).
 
-    They are halved across their longest edges, and slivers sliced across both of theirs.
+    Parts are halved across their longest edge; slivers are sliced across both long edges.
     """
     done = []
     while len(parts.areas):
@@ -257,7 +260,7 @@ def cut(parts: Parts, longest: float, density_of: Callable[[Parts], np.ndarray |
         is_long = squares.max(axis=1) > limits
         done.append(parts.chosen(~is_long))
         parts, squares, limits = parts.chosen(is_long), squares[is_long], limits[is_long]
-        # With each halving of its length a sliver would become three, of which two are halved slivers again.
+        # Halving the length of a sliver would give three parts, two of which are slivers again.
         lengths = np.sqrt(squares / limits[:, None])
         is_sliver = (lengths.max(axis=1) > SLIVER_LENGTH) & (lengths.min(axis=1) <= SLIVER_WIDTH)
         halved = _halved(parts.chosen(~is_sliver), squares[~is_sliver].argmax(axis=1))
@@ -266,18 +269,18 @@ def cut(parts: Parts, longest: float, density_of: Callable[[Parts], np.ndarray |
 
 
 def _sliced(parts, lengths):
-    """Each sliver as slices, of two triangles but for the tip's; lengths (Q, 3): of edges, by the longest allowed."""
+    """Cut slivers into slices of two triangles, one at the tip; lengths (Q, 3): of edges relative to the limit."""
     rows, base = np.arange(len(lengths)), lengths.argmin(axis=1)
     length, width = lengths.max(axis=1), lengths[rows, base]
-    counts = np.minimum(np.ceil(length / (1.0 - width)), MOST_SLICES).astype(int)  # so that no diagonal is too long
+    counts = np.minimum(np.ceil(length / (1.0 - width)), MOST_SLICES).astype(int)  # no diagonal becomes too long
     of_part = np.repeat(rows, counts)
     slices = np.arange(len(of_part)) - np.repeat(np.cumsum(counts) - counts, counts)
     near, far = slices / counts[of_part], (slices + 1) / counts[of_part]
     pieces = [[], []]
     for corners in (parts.barycentric, parts.corners):
         one, other, tip = (corners[rows, (base + turn) % 3][of_part] for turn in range(3))
-        ways = [(end - tip).astype(np.float64) for end in (one, other)]
-        ends = [[(tip + at[:, None] * way).astype(corners.dtype) for way in ways] for at in (near, far)]
+        sides = [(end - tip).astype(np.float64) for end in (one, other)]
+        ends = [[(tip + at[:, None] * side).astype(corners.dtype) for side in sides] for at in (near, far)]
         (near_one, near_other), (far_one, far_other) = ends
         pieces[0].append(np.stack([near_one, far_one, far_other], axis=1))
         pieces[1].append(np.stack([near_one, far_other, near_other], axis=1)[slices > 0])
@@ -289,7 +292,7 @@ def _sliced(parts, lengths):
 
 
 def _halved(parts, edge):
-    """Each part as two, cut from the middle of its edge that begins at corner `edge` (Q,)."""
+    """Cut each part into two at the midpoint of the edge that begins at corner `edge` (Q,)."""
     rows = np.arange(len(edge))
     first, second = [], []
     for corners in (parts.barycentric, parts.corners):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Exact restricted Voronoi cells.
 
-Every triangle is clipped by the planes between the sites that can reach it: cells that share it are found from
-neighbours whose border crosses it [Yan09].
+Each triangle is clipped by the bisecting planes of the sites that can reach it. The cells that share a triangle are
+found by propagation across borders that cross it [Yan09].
 """
 
 import numpy as np
@@ -22,11 +22,11 @@ from .voronoi import (
     sum_cells,
 )
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-MOST_CORNERS = 16  # of a triangle's part that lies in one cell
-MOST_CELLS = 32  # that one triangle is shared among: pieces are cut no larger than cells
+MOST_CORNERS = 16  # of the part of a triangle in one cell
+MOST_CELLS = 32  # that share one triangle: pieces are no larger than cells
 
 ring = wp.types.vector(length=MOST_CORNERS, dtype=float)
 labels = wp.types.vector(length=MOST_CORNERS, dtype=int)
@@ -35,7 +35,7 @@ cell_list = wp.types.vector(length=MOST_CELLS, dtype=int)
 
 @wp.struct
 class Pieces:
-    """Triangles: corners in a plane of their own about `centres`; how far away the far side is (squared)."""
+    """Triangles: corners in plane coordinates about `centres`; detours: squared distance offset of the other side."""
 
     centres: wp.array[wp.vec3]
     first_axes: wp.array[wp.vec3]
@@ -52,13 +52,13 @@ class Pieces:
 class CutCells:
     """The cells of sites on a `Domain`, cut exactly out of its parts.
 
-    site_count: says how near the far side is; weights (Q,): densities that masses are of, None for ρ.
+    site_count: for `detours`; weights (Q,): densities of the masses, None for ρ.
     """
 
     def __init__(
         self, domain: Domain, site_count: int, device: wp.DeviceLike, weights: np.ndarray | None = None
     ) -> None:
-        self._ground, parts, self._device = domain, domain.parts, device
+        self._domain, parts, self._device = domain, domain.parts, device
         corners = parts.corners
         centres = corners.mean(axis=1)
         first_axes = corners[:, 1] - corners[:, 0]
@@ -84,11 +84,11 @@ class CutCells:
         self._cells, self._site_count = None, 0
 
     def sums(self, sites: Sites) -> Sums:
-        """`Sums` for `Sites`."""
-        # Cells begin with the sites that they had: with fewer sites, an index may be past the last.
+        """Return `Sums` for `Sites`."""
+        # The search starts at the previous sites, whose indices are invalid if the number of sites has changed.
         if self._cells is None or self._site_count != len(sites.places):
             self._site_count = len(sites.places)
-            self._cells = some_sites(self._ground, sites, self._pieces.centres)
+            self._cells = some_sites(self._domain, sites, self._pieces.centres)
         return sum_cells(_cells, len(self._pieces.centres), [self._pieces, sites], [self._cells], sites, self._device)
 
 
@@ -103,9 +103,9 @@ def _add_cut(
     out_moments: wp.array2d[wp.int64],
     out_energies: wp.array[wp.int64],
 ):
-    """Add a piece to the cells that share it, of which `nearest` is one.
+    """Add a piece to the cells that share it; `nearest` is one of them.
 
-    A function of its own: what it keeps for itself is made only for pieces that come here.
+    A separate function, so that its local arrays are initialized only for pieces that are cut.
     """
     centre = pieces.centres[piece]
     e1 = pieces.first_axes[piece]
@@ -129,7 +129,7 @@ def _add_cut(
 
         xs = ring()
         ys = ring()
-        across = labels()  # the site beyond the edge that begins at a corner
+        across = labels()  # the site beyond the edge that starts at each corner
         count = int(3)
         farthest = float(0.0)
         for corner in range(3):
@@ -158,7 +158,7 @@ def _add_cut(
                     - power
                 )
                 if nx == 0.0 and ny == 0.0 and level == 0.0 and other < site:
-                    count = 0  # of sites in one place the first has the cell
+                    count = 0  # of coincident sites, the first one gets the cell
                 worst = float(-1.0)
                 for corner in range(count):
                     worst = wp.max(worst, xs[corner] * nx + ys[corner] * ny - level)
@@ -223,7 +223,7 @@ def _add_cut(
                 second += part * (x0 * x0 + y0 * y0 + x1 * x1 + y1 * y1 + x2 * x2 + y2 * y2 + x * x + y * y)
             height = wp.dot(offset, normal)
             mass = weight * area
-            # From the site to the cell's part: in the plane, and down to the plane.
+            # From the site to the part of its cell: within the plane, and perpendicular to it.
             moment = weight / 3.0 * (mx * e1 + my * e2) - mass * height * normal
             wp.atomic_add(out_masses, site, fixed(mass))
             for axis in range(3):
@@ -245,7 +245,7 @@ def _cells(
     pieces: Pieces,
     sites: Sites,
     first_piece: int,
-    # outputs; cells hold the sites to begin with, any at all; sums are added to
+    # outputs; cells contain any initial sites for the search; sums are accumulated
     out_cells: wp.array[int],
     out_masses: wp.array[wp.int64],
     out_moments: wp.array2d[wp.int64],
@@ -260,7 +260,7 @@ def _cells(
     nearest = nearest_site(centre, normal, island, detour, sites, out_cells[piece])
     out_cells[piece] = nearest
 
-    # A piece whose circle no border crosses is its nearest site's as a whole.
+    # If no border crosses the piece's bounding circle, the whole piece belongs to its nearest site.
     offset = sites.places[nearest] - centre
     radius = pieces.radii[piece]
     square = wp.length_sq(offset)

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Points taken one after the other, each the farthest from all taken before [Gonzalez85], LANES at once in Clang's
-// vectors. Each step removes what the taken point covers and finds the widest gap that is left.
+// Farthest-point sampling [Gonzalez85], LANES points at once in Clang's vectors. Each step updates the gaps that the
+// taken point covers and finds the widest remaining gap.
 //
 // The body of `_take` in farthest.py. Parameters, for Q points (a multiple of LANES):
 //
 //   array_t<float> known        (8, Q) rows: position [m] x y z, unit normal x y z, density, and the width of the gap
-//                               around the point, a squared distance times density; -1 where none is to be taken
+//                               around the point, a squared distance times density; -1 for points not to be taken
 //   array_t<int> islands        (Q,) the island of each point, -1 for padding
-//   array_t<int> wanted         (islands,) how many points each island still needs
+//   array_t<int> wanted         (islands,) number of points that each island still needs
 //   array_t<int> found          (N,) indices of the points taken
 //
 // Constant:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Farthest-point sampling: each point is the farthest from all before [Gonzalez85].
+"""Farthest-point sampling: each point is the farthest from all previous points [Gonzalez85].
 
-A chain of dependent steps, computed on the CPU, eight points at once in vector registers.
+The steps are sequential, and therefore run on the CPU, with eight points at once in vector registers.
 """
 
 import numpy as np
@@ -11,17 +11,17 @@ from ..geometry.mesh import SurfacePoints, positions
 from ..kernels import kernel_cache, native_code
 from .domain import Domain
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 LANES = 8
 
 
 def farthest(domain: Domain, points: SurfacePoints, squares: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Indices of `SurfacePoints` of a `Domain`, each as far as can be from all sites and those before.
+    """Return indices of `SurfacePoints` of a `Domain`, each farthest from all sites and previous points.
 
-    squares (Q,) of distances from sites, which count by the spacing that sites should have there; wanted (islands,):
-    how many each island is to have. They are fewer where points end.
+    squares (Q,): squared distances from sites, which are weighted by the density; wanted (islands,): number of points
+    of each island. Fewer are returned if the points do not suffice.
     """
     count = len(points)
     islands, densities = domain.islands[points.triangle], domain.density_at(points)
@@ -35,8 +35,8 @@ def farthest(domain: Domain, points: SurfacePoints, squares: np.ndarray, wanted:
     its_islands = np.full(known.shape[1], -1, np.int32)
     its_islands[:count] = islands
     arrays = (known, float), (its_islands, int), (wanted.astype(np.int32), int), (found, int)
-    there = [wp.array(values, dtype=kind, device="cpu", copy=False) for values, kind in arrays]
-    kernel_cache.launch(_take_farthest, 1, there, device="cpu")
+    shared = [wp.array(values, dtype=kind, device="cpu", copy=False) for values, kind in arrays]
+    kernel_cache.launch(_take_farthest, 1, shared, device="cpu")
     return found[found >= 0]
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""More sites between others that do not move: the farthest points, then Lloyd's relaxation of the new ones alone.
+"""Insertion of sites between fixed ones: farthest points, then Lloyd's relaxation of the new sites alone.
 
-The energy is that of cvt.py; sites that are fixed take part in it with their cells.
+The energy is that of cvt.py, including the cells of fixed sites.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from .voronoi import sites_on
 SAMPLES_PER_SITE = 64
 LEAST_SAMPLES = 4000
 ROUNDS = 30  # at most
-ENOUGH = 1e-3  # of the distance between sites: new ones that all move by less are at rest
+ENOUGH = 1e-3  # largest step at convergence, relative to the spacing of sites
 
 
 def insert(
@@ -30,12 +30,12 @@ def insert(
     within: np.ndarray | None = None,
     device: str = "cpu",
 ) -> SurfacePoints:
-    """`count` more sites, as `SurfacePoints`, evenly between `fixed` ones, of which there is at least one.
+    """Return `count` new sites, as `SurfacePoints`, placed evenly between at least one `fixed` site.
 
-    mesh: a checked `TriMesh`; density (V,) and texture as in `cvt.place`; around: (F,) bool, which of the fixed sites
-    new ones may be nearest to, None for all; within: (F,) [m], how far from each fixed site they may be before they are
-    relaxed, None for any distance. They are fewer where there is no room. The same arguments give the same
-    sites. Raises `HairError` where the density is zero everywhere.
+    mesh: a checked `TriMesh`; density (V,) and texture as in `cvt.place`; around: (F,) bool, fixed sites to which new
+    ones may be nearest, None for all; within: (F,) [m], largest distance of new sites from each fixed site before
+    relaxation, None for no limit. Fewer sites are returned if there is no room. Deterministic. Raises `HairError` if
+    the density is zero everywhere.
     """
     total = len(fixed) + count
     domain = Domain(mesh, total, density, texture, None, device)
@@ -51,7 +51,7 @@ def insert(
         return points[:0]
     wanted = _shares(domain, fixed, nearest, may_hold, points, count)
     new = candidates[farthest(domain, candidates, squares[may_hold], wanted)]
-    if not may_hold.all():  # cells end at the border, so that new sites stay inside
+    if not may_hold.all():  # cells end at the border, which keeps new sites inside
         cells = SampledCells(domain, candidates, part[may_hold], total, device)
     for _ in range(ROUNDS if len(new) else 0):
         on = sites_on(domain, fixed.joined(new), device)
@@ -65,7 +65,7 @@ def insert(
 
 
 def _shares(domain, fixed, nearest, may_hold, points, count):
-    """(islands,) how many of `count` new sites each island gets: what it lacks of its share of all, by its samples."""
+    """Return (islands,) the number of new sites of each island: its share by samples minus its fixed sites."""
     island_count = int(domain.islands.max()) + 1
     amounts = np.bincount(domain.islands[points.triangle[may_hold]], minlength=island_count).astype(float)
     is_there = np.zeros(len(fixed), bool)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Directions of descent by a limited-memory quasi-Newton method, L-BFGS  [Liu89], algorithm 7.4 of [Nocedal06]."""
+"""Descent directions by a limited-memory quasi-Newton method, L-BFGS  [Liu89], algorithm 7.4 of [Nocedal06]."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ import numpy as np
 
 
 class Memory:
-    """The last few steps and the changes of the gradient."""
+    """The last steps and the changes of the gradient along them."""
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
@@ -17,17 +17,17 @@ class Memory:
         return len(self._pairs)
 
     def clear(self) -> None:
-        """Forget all steps: the next direction is the steepest."""
+        """Discard all steps: the next direction is the preconditioned steepest descent."""
         self._pairs.clear()
 
     def add(self, step: np.ndarray, change: np.ndarray) -> None:
-        """A step (n, 3) and the change of the gradient (n, 3) along it; one that is not bent upwards is passed over."""
+        """Add a step (n, 3) and the change of the gradient (n, 3); steps without positive curvature are ignored."""
         curvature = dot(step, change)
         if self._limit and curvature > 1e-10 * (dot(step, step) * dot(change, change)) ** 0.5:
             self._pairs = [*self._pairs, (step, change, curvature)][-self._limit :]
 
     def direction(self, gradient: np.ndarray, solved: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Where to go from a gradient (n, 3); solved: of moves, which are thought to change a gradient by so much."""
+        """Return the descent direction for a gradient (n, 3); solved: applies the approximate inverse Hessian."""
         direction, parts = gradient, []
         for step, change, curvature in reversed(self._pairs):
             parts.append(dot(step, direction) / curvature)
@@ -39,5 +39,5 @@ class Memory:
 
 
 def dot(first: np.ndarray, second: np.ndarray) -> float:
-    """The sum of products, in an order that no library's threads choose: the same on every run."""
+    """Return the sum of products in a fixed order, independent of a library's threads."""
     return float((first * second).sum())

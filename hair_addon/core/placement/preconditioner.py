@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Approximate Hessian of the energy, as a preconditioner: a network of springs between neighbouring sites.
 
-When two sites approach each other, their border resists in proportion to the mass on both sides; sideways motion is
-free. So the Hessian of the energy [Liu09] is close to that of springs, each as stiff as its part of the two cells'
-masses; the mass of a cell without a spring, along a border of the surface, holds its site in place. Solving with it
-spreads a change over many cells at once, where Lloyd's method propagates it from cell to cell; [Hateley15] use a graph
-Laplacian.
+When two sites approach each other, the energy grows in proportion to the mass on both sides of their border; sideways
+motion is free. The Hessian of the energy [Liu09] is therefore close to that of springs, with stiffnesses in proportion
+to the shares of the two cells' masses. The mass of a cell without springs, along a border of the surface, holds its
+site in place. Solving with this matrix spreads a change over many cells at once, whereas Lloyd's method propagates it
+from cell to cell; [Hateley15] use a graph Laplacian.
 """
 
 import numpy as np
@@ -16,18 +16,18 @@ from ..kernels.checks import require_count
 from .lbfgs import dot
 from .voronoi import Sites
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-NEAR, FAR = 1.2, 1.6  # springs fade out between these spacings: the second ring of a honeycomb is at 1.73
-FEWEST_SPRINGS = 4.5  # a cell with fewer is at a border
-LEAST_HOLD = 0.02  # of a cell's mass: a network without a border could drift
-YIELD = np.float32(1.3)  # measured best: cells give way sideways, springs do not
-ROUNDS = 3  # of conjugate gradients: the preconditioner of a step need not be exact
+NEAR, FAR = 1.2, 1.6  # springs fade out between these spacings; the second ring of a honeycomb is at 1.73
+FEWEST_SPRINGS = 4.5  # cells with fewer springs are at a border
+LEAST_HOLD = 0.02  # of a cell's mass: prevents drift of a network without a border
+YIELD = np.float32(1.3)  # measured optimum: unlike springs, cells yield sideways
+ROUNDS = 3  # of conjugate gradients: a preconditioner need not be exact
 
 
 class Springs:
-    """The springs between `Sites` whose cells have masses (n,) float64."""
+    """Springs between `Sites` whose cells have masses (n,) float64."""
 
     def __init__(self, sites: Sites, masses: np.ndarray, device: wp.DeviceLike) -> None:
         require_count("masses", len(masses), len(sites.places))
@@ -43,7 +43,7 @@ class Springs:
         kernel_cache.launch(_stiffness, len(masses), inputs, [self._stiffness, self._holds], device=device)
 
     def pull(self, moves: np.ndarray) -> np.ndarray:
-        """(n, 3) float32: how the gradient changes where sites make small moves (n, 3) along the surface."""
+        """Return the change of the gradient (n, 3) float32 for small moves (n, 3) of sites along the surface."""
         require_count("moves", len(moves), len(self._masses))
         moves = wp.array(moves, dtype=wp.vec3, device=self._device)
         inputs = [self._sites, self._stiffness, self._holds, moves]
@@ -51,7 +51,10 @@ class Springs:
         return self._pull.numpy()
 
     def moves(self, gradient: np.ndarray) -> np.ndarray:
-        """(n, 3) float32: nearly the moves that change the gradient by (n, 3), by conjugate gradients [Hestenes52]."""
+        """Return approximate moves (n, 3) float32 for a change of the gradient (n, 3), by conjugate gradients.
+
+        [Hestenes52]
+        """
         filled = self._masses > 0.0
         inverse = np.where(filled, 0.5 / np.where(filled, self._masses, 1.0), 0.0).astype(np.float32)[:, None]
         rest = gradient.astype(np.float32)
@@ -78,7 +81,7 @@ def _nearness(sites: Sites, site: int, slot: int):
     other = sites.around[site, slot]
     if other == site or sites.islands[other] != sites.islands[site]:
         return 0.0
-    # The smaller spacing: neighbours by it are mutual.
+    # Neighbourhood by the smaller spacing is symmetric.
     apart = sites.apart[site, slot] / wp.min(sites.spacings[site], sites.spacings[other])
     fade = wp.clamp((FAR - apart) / (FAR - NEAR), 0.0, 1.0)
     facing = wp.clamp(wp.dot(sites.normals[site], sites.normals[other]), 0.0, 1.0)
@@ -116,7 +119,7 @@ def _stiffness(
         if nearness > 0.0:
             apart = sites.apart[site, slot]
             total += nearness * (shares[site] + shares[sites.around[site, slot]])
-            # By the square of the distance, which spares `_pull` from making directions unit.
+            # Divided by the squared distance, so that `_pull` need not normalize directions.
             stiffness = nearness * (shares[site] + shares[sites.around[site, slot]]) / wp.max(apart * apart, 1.0e-30)
         out_stiffness[site, slot] = stiffness
     out_holds[site] = wp.max(2.0 * masses[site] - total, LEAST_HOLD * masses[site])

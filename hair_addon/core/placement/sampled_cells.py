@@ -8,15 +8,15 @@ from ..geometry.mesh import SurfacePoints, positions
 from .domain import Domain
 from .voronoi import Sites, Sums, detour_of, detours, fixed, nearest_site, some_sites, sum_cells
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-MOST_GROWTH = 1.25  # of the number of sites between two sums that begin with the same cells
+MOST_GROWTH = 1.25  # of the number of sites between two sums, for the search to start at the previous cells
 
 
 @wp.struct
 class Samples:
-    """Points that represent pieces of the surface."""
+    """Sample points of the surface."""
 
     places: wp.array[wp.vec3]
     normals: wp.array[wp.vec3]
@@ -26,12 +26,12 @@ class Samples:
 
 
 class SampledCells:
-    """The cells of sites on a `Domain`, of which they get points (`SurfacePoints` of equal amounts) as wholes."""
+    """The cells of sites on a `Domain`, as sets of sample points (`SurfacePoints` of equal amounts)."""
 
     def __init__(
         self, domain: Domain, points: SurfacePoints, part: np.ndarray, site_count: int, device: wp.DeviceLike
     ) -> None:
-        self._ground, self._device = domain, device
+        self._domain, self._device = domain, device
         self.places = positions(domain.mesh, points)
         self.densities = densities = domain.densities[part]
         self._samples = Samples()
@@ -44,27 +44,27 @@ class SampledCells:
         self._seconds = wp.zeros(len(points), dtype=int, device=device)
 
     def sums(self, sites: Sites, with_seconds: bool = False) -> Sums:
-        """`Sums` for `Sites`."""
-        # Cells begin with the sites that they had: with fewer sites, an index may be past the last, and where many have
-        # come, another search is quicker.
+        """Return `Sums` for `Sites`."""
+        # The search starts at the previous sites. With fewer sites their indices may be invalid, and with many new
+        # sites a search by the grid is faster.
         if not self._site_count <= len(sites.places) <= MOST_GROWTH * self._site_count:
-            self._cells = some_sites(self._ground, sites, self._samples.places)
+            self._cells = some_sites(self._domain, sites, self._samples.places)
         self._site_count = len(sites.places)
         inputs, outputs = [self._samples, sites, with_seconds], [self._cells, self._seconds]
         return sum_cells(_nearest_two, len(self.places), inputs, outputs, sites, self._device)
 
     def renumber(self, numbers: np.ndarray) -> None:
-        """Begin the next sums with other numbers (n,) of the sites that the last were of."""
+        """Renumber the sites of the previous sums, at which the next search starts; numbers: (n,)."""
         self._site_count = int(numbers.max()) + 1
         self._cells = wp.array(numbers[self._cells.numpy()], dtype=int, device=self._device)
 
     def nearest(self, sites: Sites) -> np.ndarray:
-        """(Q,) the nearest of `Sites` to each point."""
+        """Return the nearest site (Q,) of each sample."""
         self.sums(sites)
         return self._cells.numpy().astype(np.int64)
 
     def nearest_two(self, sites: Sites) -> tuple[np.ndarray, np.ndarray]:
-        """(Q,) the nearest of `Sites` to each point, and (Q,) the next, -1 for none."""
+        """Return the nearest site (Q,) of each sample, and the second nearest (Q,), -1 for none."""
         self.sums(sites, with_seconds=True)
         return self._cells.numpy().astype(np.int64), self._seconds.numpy().astype(np.int64)
 
@@ -75,7 +75,7 @@ def _nearest_two(
     sites: Sites,
     with_seconds: bool,
     first_sample: int,
-    # outputs; cells hold the sites to begin with, any at all; sums are added to
+    # outputs; cells contain any initial sites for the search; sums are accumulated
     out_cells: wp.array[int],
     out_seconds: wp.array[int],
     out_masses: wp.array[wp.int64],
@@ -101,7 +101,7 @@ def _nearest_two(
     second = int(-1)
     second_square = float(wp.inf)
     for slot in range(sites.counts[site]):
-        # The rest are farther from the sample than the second so far.
+        # All further sites are farther from the sample than the present second one.
         if sites.apart[site, slot] > wp.length(offset) + wp.sqrt(second_square):
             break
         other = sites.around[site, slot]

@@ -8,22 +8,22 @@ from ..geometry.sampling import check_density, corner_masses, sample_surface
 from ..geometry.texture import Texture
 from .domain import Parts, cut
 
-PIECE_COUNT = 10_000  # of equal size that a surface is cut into at least: finer marks on a large triangle are missed
-EDGE_FINENESS = 2.0  # pieces in which the mask varies are so much finer
-LONGEST_EDGE = 1.5  # of a piece, by the square root of its share of the area
+PIECE_COUNT = 10_000  # least number of pieces of a surface: finer details on a large triangle are missed
+EDGE_FINENESS = 2.0  # refinement of pieces in which the mask varies
+LONGEST_EDGE = 1.5  # of a piece, relative to the square root of its share of the area
 
 
 def sample_textured(
     mesh: TriMesh, count: int, seed: int, density: np.ndarray | None, texture: Texture
 ) -> SurfacePoints:
-    """`count` random `SurfacePoints`, distributed as density × texture × area; arguments as in `sample_surface`.
+    """Return `count` random `SurfacePoints` distributed as density × texture × area; arguments as in `sample_surface`.
 
-    texture: `Texture`. The mask is linear inside each of the pieces that triangles are cut into.
+    Triangles are cut into pieces in which density × texture is taken as linear.
     """
     density = check_density(mesh, density)
 
     def mask(parts):
-        """(Q, 3): density × image at the corners of `Parts`."""
+        """Return density × image (Q, 3) at the corners of `Parts`."""
         corners = SurfacePoints(np.repeat(parts.triangle, 3).astype(np.int32), _flat(parts.barycentric))
         values = interpolate(density, mesh, corners) * np.maximum(texture.at(corners), 0.0)
         return values.reshape(-1, 3)
@@ -34,7 +34,7 @@ def sample_textured(
     grown = np.flatnonzero((mesh.areas > 0.0) & corner_masses(mesh, density).any(axis=1))
     whole = Parts(grown, np.broadcast_to(np.eye(3), (len(grown), 3, 3)), mesh.corners[grown], mesh.areas[grown])
     extent = float(np.ptp(_flat(whole.corners), axis=0).max())
-    # A sliver is not cut into bits as short as it is wide.
+    # The lower limit keeps slivers from being cut into pieces of their width.
     spacing = max(np.sqrt(whole.areas.sum() / PIECE_COUNT), 8.0 * extent / PIECE_COUNT)
     parts = cut(whole, LONGEST_EDGE * spacing, fineness)
     vertices = _flat(parts.corners)
@@ -45,5 +45,5 @@ def sample_textured(
 
 
 def _flat(corners):
-    """(Q, 3, 3) → (3 Q, 3) float32."""
+    """Reshape (Q, 3, 3) → (3 Q, 3) float32."""
     return np.ascontiguousarray(corners, np.float32).reshape(-1, 3)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Restricted Voronoi cells: the parts of a surface that are nearest to each site [Yan09].
 
-The two sides of a thin part, and separate islands, are not neighbours: there an offset is added to the squared
+The two sides of a thin part, and separate islands, are not neighbours: between them an offset is added to the squared
 distance, so that the borders of cells remain planes (a power diagram).
 
-Sums are integers, in units far below single precision: they do not depend on the order or the number of threads, so
-results are bit-identical on every run.
+Sums are integers, in units far below single precision, and thus independent of the order and number of threads: results
+are bit-identical on every run.
 """
 
 from dataclasses import dataclass
@@ -20,16 +20,16 @@ from ..kernels import parallel
 from ..kernels.parallel import Rows
 from .domain import Domain
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-SITES_AROUND = 16  # neighbours of a site (itself among them) that are found at once
-MOST_AROUND = 48  # that are looked at before all sites are: a thin part has neighbours on its other side too
-ENOUGH_AROUND = 12  # on the site's own side
+SITES_AROUND = 16  # neighbours of a site, itself included, found in one search
+MOST_AROUND = 48  # neighbours before a search of all sites: a thin part has neighbours on its other side too
+ENOUGH_AROUND = 12  # neighbours on the site's own side
 FIRST_RING = 6  # neighbours in a honeycomb
-EVERYWHERE = 4.0  # a distance that reaches across a surface of unit size
-SEARCH_RADIUS = 2.6  # by the square root of a cell's area: more than SITES_AROUND of a honeycomb
-DETOUR = 2.0  # by which a site on the other side of a thin part counts as farther, in spacings of sites
+EVERYWHERE = 4.0  # a distance larger than a surface of unit size
+SEARCH_RADIUS = 2.6  # relative to the square root of a cell's area: contains more than SITES_AROUND of a honeycomb
+DETOUR = 2.0  # added distance of a site on the other side of a thin part, in spacings of sites
 
 UNIT = wp.constant(wp.float64(2.0**54))  # sums over a surface with a mass of one stay below 2^63
 
@@ -38,10 +38,9 @@ near_keys = wp.types.vector(length=SITES_AROUND, dtype=wp.uint64)
 
 @wp.struct
 class Sites:
-    """Positions of sites, their sides, and `counts` neighbours of each in order of distance.
+    """Positions of sites, their normals and islands, and `counts` neighbours of each in order of distance.
 
-    Of neighbours on a site's own side: the distance of the nearest (`gaps`), and the mean of the first ring's
-    (`spacings`).
+    gaps: distance of the nearest neighbour on the site's own side; spacings: mean distance of the first ring.
     """
 
     places: wp.array[wp.vec3]
@@ -56,16 +55,16 @@ class Sites:
 
 @wp.func
 def detour_of(normal: wp.vec3, island: int, detour: float, site_normal: wp.vec3, site_island: int):
-    """Offset of the squared distance of a site: zero on the same side of the same island."""
+    """Return the offset of a site's squared distance: zero on the same side of the same island."""
     if site_island != island:
         return detour
-    # None up to a right angle and some more: a sharp edge is no other side.
+    # Zero up to somewhat more than a right angle: faces at a sharp edge count as one side.
     return detour * wp.clamp(-1.5 * wp.dot(normal, site_normal) - 0.5, 0.0, 1.0)
 
 
 @wp.func
 def candidate(sites: Sites, site: int, slot: int):
-    """Another site: first those around it, in order of distance, then all."""
+    """Return a candidate site: first the neighbours, in order of distance, then all sites."""
     if slot < sites.counts[site]:
         return sites.around[site, slot]
     return slot - sites.counts[site]
@@ -73,7 +72,7 @@ def candidate(sites: Sites, site: int, slot: int):
 
 @wp.func
 def candidate_count(sites: Sites, site: int):
-    """Number of slots of `candidate`."""
+    """Return the number of slots of `candidate`."""
     if sites.counts[site] < sites.places.shape[0]:
         return sites.counts[site] + sites.places.shape[0]
     return sites.counts[site]
@@ -81,14 +80,14 @@ def candidate_count(sites: Sites, site: int):
 
 @wp.func
 def nearest_site(point: wp.vec3, normal: wp.vec3, island: int, detour: float, sites: Sites, start: int):
-    """The site nearest to a point, detours included; `start` is any site, the nearer the quicker."""
+    """Return the site nearest to a point, detours included; start: any site, a near one is faster."""
     nearest = start
     square = wp.length_sq(sites.places[nearest] - point)
     square += detour_of(normal, island, detour, sites.normals[nearest], sites.islands[nearest])
     searching = bool(True)
     while searching:
         site = nearest
-        # Sites farther from this one than that are farther from the point than the nearest so far [Elkan03].
+        # Triangle inequality: sites beyond this distance are farther from the point than the nearest one [Elkan03].
         reach = wp.length(sites.places[site] - point) + wp.sqrt(square)
         slot = int(0)
         while slot < candidate_count(sites, site):
@@ -102,7 +101,7 @@ def nearest_site(point: wp.vec3, normal: wp.vec3, island: int, detour: float, si
                 if other_square < square:
                     square = other_square
                     nearest = other
-                    # wp.sqrt shrinks the reach from this same site
+                    # The reach shrinks with the new nearest distance.
                     reach = wp.length(sites.places[site] - point) + wp.sqrt(square)
             slot += 1
         searching = nearest != site
@@ -116,9 +115,9 @@ def fixed(value: float):
 
 @dataclass(frozen=True)
 class Sums:
-    """Of every cell: masses (n,), moments (n, 3) of its places about its site, energies (n,); all float64.
+    """Sums over each cell: masses (n,), first moments (n, 3) about its site, energies (n,); all float64.
 
-    spacing: (n,) distance from a site to the next on its side, infinite for one alone.
+    spacing: (n,) distance from each site to the next one on its side, infinite for a single site.
     """
 
     masses: np.ndarray
@@ -128,12 +127,12 @@ class Sums:
 
     @property
     def energy(self) -> float:
-        """The energy of all cells."""
+        """Total energy of all cells."""
         return float(self.energies.sum())
 
 
 def sites_on(domain: Domain, points: SurfacePoints, device: wp.DeviceLike) -> Sites:
-    """`Sites` at `SurfacePoints` of a `Domain`."""
+    """Return `Sites` at `SurfacePoints` of a `Domain`."""
     sites = Sites()
     sites.places = wp.array(positions(domain.mesh, points), dtype=wp.vec3, device=device)
     sites.normals = wp.array(domain.normals[points.triangle], dtype=wp.vec3, device=device)
@@ -159,7 +158,7 @@ def sites_on(domain: Domain, points: SurfacePoints, device: wp.DeviceLike) -> Si
 
 
 def some_sites(domain: Domain, sites: Sites, points: wp.array[wp.vec3]) -> wp.array[int]:
-    """(Q,) int Warp array: a site that is not far from each point, for a search to begin with."""
+    """Return a nearby site (Q,) of each point as a Warp array, at which a search can start."""
     found = wp.empty(len(points), dtype=int, device=points.device)
     radius = float(np.sqrt(domain.parts.areas.sum() / len(sites.places)))
     inputs = [sites, Rows(points), domain.grid.id, radius]
@@ -168,7 +167,7 @@ def some_sites(domain: Domain, sites: Sites, points: wp.array[wp.vec3]) -> wp.ar
 
 
 def detours(domain: Domain, densities: np.ndarray, site_count: int) -> np.ndarray:
-    """(Q,) squared: how much farther a site on the other side counts, twice the spacing that sites have there."""
+    """Return the offsets (Q,) of squared distances for sites on the other side: (`DETOUR` × spacing)²."""
     areas = domain.amounts.sum() / (site_count * densities)
     return np.minimum(DETOUR**2 * areas, EVERYWHERE**2)
 
@@ -176,7 +175,7 @@ def detours(domain: Domain, densities: np.ndarray, site_count: int) -> np.ndarra
 def sum_cells(
     kernel: wp.Kernel, count: int, inputs: list[Any], outputs: list[wp.array], sites: Sites, device: wp.DeviceLike
 ) -> Sums:
-    """`Sums` of a kernel that adds to the masses, moments and energies of cells; every thread adds up its own."""
+    """Run a kernel that adds to masses, moments and energies of cells, with separate sums for each thread → `Sums`."""
     shapes = (len(sites.places), (len(sites.places), 3), len(sites.places))
     sums = [
         [wp.zeros(shape, dtype=wp.int64, device=device) for shape in shapes]
@@ -206,7 +205,7 @@ def _some_site(
     while found < 0:
         for site in wp.hash_grid_query(grid, place, radius):
             apart = wp.length_sq(sites.places[site] - place)
-            # The order of a grid's points is not the same everywhere.
+            # The order of a grid's points depends on the device.
             if apart < nearest or (apart == nearest and site < found):
                 nearest = apart
                 found = site
@@ -234,7 +233,7 @@ def _find_around(
 ):
     site = wp.tid()
     place = own_places[site]
-    last = wp.uint64(0)  # the farthest of those that are known
+    last = wp.uint64(0)  # key of the farthest known neighbour
     radius = first_radius
     known = int(0)
     own_count = int(0)
@@ -253,7 +252,7 @@ def _find_around(
                 if square <= radius * radius:
                     key = key_of(square, other)
                     if known == 0 or key > last:
-                        # Insert in order and drop the last, without an unpredictable branch.
+                        # Insert in order and drop the last key, without branches.
                         for slot in range(wp.static(SITES_AROUND)):
                             kept = nearest[slot]
                             nearest[slot] = wp.min(kept, key)
@@ -276,7 +275,7 @@ def _find_around(
         last = nearest[wanted - 1]
         known += wanted
     out_counts[site] = known
-    if ring == 0.0 and known > 1:  # all that are near are on the other side
+    if ring == 0.0 and known > 1:  # all near sites are on the other side
         gap = out_apart[site, known - 1]
         total = gap
     out_gaps[site] = gap
