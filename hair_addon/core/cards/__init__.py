@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair for games: clumps of strands as cards with an atlas of their pictures, and strands as tubes."""
+"""Hair for games: clumps of strands as cards with a texture atlas, and strands as tubes."""
 
 from typing import TYPE_CHECKING
 

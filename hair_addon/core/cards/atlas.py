@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The places of cards' pictures in a texture, and which cards share one."""
+"""Layout of cards' pictures in a texture, and the sharing of pictures between cards."""
 
 from dataclasses import dataclass
 
@@ -9,16 +9,17 @@ from ..errors import HairError
 from ..geometry import clusters
 from .outlines import Outlines
 
-_BORDER = 2.0  # texels that stay empty around a picture
+_BORDER = 2.0  # empty texels around a picture
 _TRIALS = 40
-_STATIONS = 8  # along a card, where its outline is compared
+_STATIONS = 8  # along a card, at which outlines are compared
 
 
 @dataclass(frozen=True)
 class Atlas:
-    """Pictures of K cards in a square texture: their cards (K,), the picture of each of C cards (C,).
+    """Pictures of K cards in a square texture. shown: (K,) the card of each picture; picture_of: (C,) of each card.
 
-    corners (K, 2): of pictures, from 0 to 1; scale: of all of them, parts of the texture's side per unit of length.
+    corners (K, 2): of pictures, from 0 to 1; scale: of all pictures, in fractions of the texture's side per unit of
+    length.
     """
 
     shown: np.ndarray
@@ -28,7 +29,7 @@ class Atlas:
     scale: float
 
     def placed(self, flat: np.ndarray, radii: np.ndarray, labels: np.ndarray, boxes: np.ndarray) -> tuple:
-        """Flattened strands of the cards that are shown, where they are in the texture.
+        """Place the flattened strands of the shown cards in the texture.
 
         Returns (indices of the strands, (M, P, 3) places from 0 to 1 with heights in the same unit, (M, P) radii).
         """
@@ -42,9 +43,9 @@ class Atlas:
         return strands, places.astype(np.float32), (radii[strands] * self.scale).astype(np.float32)
 
     def uvs(self, found: Outlines) -> np.ndarray:
-        """(C, n, 2, 2) UV coordinates of the low and high edges of cards.
+        """Return UV coordinates (C, n, 2, 2) of the low and high edges of cards.
 
-        A card that is shown cuts its picture out along its outline; others stretch a whole picture over theirs.
+        Shown cards cut their picture along their outline; other cards stretch the whole picture over their outline.
         """
         boxes = found.boxes
         edges = np.stack([found.low, found.high], axis=-1)
@@ -59,10 +60,10 @@ class Atlas:
 
 
 def atlas(found: Outlines, strand_counts: np.ndarray, picture_count: int, texture_size: int) -> Atlas:
-    """Arrange pictures of at most so many cards, 0 for all, in a texture of so many texels a side.
+    """Arrange the pictures of cards in a texture; picture_count: limit of pictures, 0 for one for each card.
 
-    strand_counts: (C,) strands of each card: those that share a picture are alike in this and in shape.
-    Raises `HairError` where pictures would have no texels.
+    strand_counts: (C,) strands of each card; cards that share a picture are similar in shape and in number of strands;
+    texture_size: texels along a side. Raises `HairError` if pictures do not fit.
     """
     boxes = found.boxes
     if 0 < picture_count < len(boxes):
@@ -93,7 +94,7 @@ def _features(found, strand_counts):
 
 
 def _shelves(sizes, border):
-    """((K, 2) corners, scale) of rectangles on shelves, the longest first, as large as the unit square takes."""
+    """Pack rectangles on shelves, longest first, at the largest scale that fits: ((K, 2) corners, scale)."""
     order = np.argsort(-sizes[:, 1], kind="stable")
     low, high = 0.0, min(1.0 / np.sqrt(sizes.prod(axis=1).sum()), *((1.0 - 2.0 * border) / sizes.max(axis=0)))
     best = None
@@ -112,7 +113,7 @@ def _shelves(sizes, border):
 
 
 def _stacked(sizes):
-    """(K, 2) lower left corners of rectangles in rows from the bottom; None where the unit square is too small."""
+    """Return lower left corners (K, 2) of rectangles in rows from the bottom; None if the unit square is too small."""
     corners, sums = np.empty(sizes.shape), np.concatenate([[0.0], np.cumsum(sizes[:, 0])])
     first, height = 0, 0.0
     while first < len(sizes):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of cards and tubes, and how many polygons they ask for."""
+"""Settings of cards and tubes, and the resulting numbers of polygons."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ MOST_TRIANGLES = 5_000_000  # of a mesh: beyond it, Blender's own tools stall
 
 @dataclass(frozen=True)
 class Level:
-    """A level of detail that was asked for: number of cards, segments of each, side of the textures [pixels]."""
+    """A level of detail: number of cards, segments of each, side of the textures [pixels]."""
 
     card_count: int
     segment_count: int
@@ -19,18 +19,18 @@ class Level:
 
     @property
     def triangle_count(self) -> int:
-        """Triangles of the level."""
+        """Number of triangles of the level."""
         return 2 * self.card_count * self.segment_count
 
     @property
     def vertex_count(self) -> int:
-        """Vertices of the level."""
+        """Number of vertices of the level."""
         return 2 * self.card_count * (self.segment_count + 1)
 
 
 @dataclass(frozen=True)
 class CardSettings(Settings):
-    """Ribbons in place of clumps of strands, and textures of the strands."""
+    """Settings of cards: ribbons that represent clumps of strands, with textures of the strands."""
 
     card_count: int = param(
         600, "Number of cards; more cards follow the hair more closely", label="Cards", low=1, high=50_000
@@ -40,14 +40,14 @@ class CardSettings(Settings):
     )
     level_count: int = param(
         1,
-        "Levels of detail; each has half the cards of the one before, with half the segments and half the texture size",
+        "Levels of detail; each has half the cards, segments and texture size of the previous one",
         label="Levels",
         low=1,
         high=8,
     )
     picture_count: int = param(
         0,
-        "Number of pictures in the textures; similar cards share one. With zero each card has its own",
+        "Number of pictures in the textures; similar cards share one. Zero gives each card its own",
         label="Pictures",
         low=0,
         high=50_000,
@@ -57,7 +57,7 @@ class CardSettings(Settings):
     )
 
     def levels(self, strand_count: int) -> list[Level]:
-        """What is asked for of so many strands, the finest first. A card has a strand at least."""
+        """Return the levels for a number of strands, finest first. Each card has at least one strand."""
         found = []
         for index in range(self.level_count):
             cards = max(min(self.card_count, strand_count) >> index, 1)
@@ -66,13 +66,13 @@ class CardSettings(Settings):
         return found
 
     def require_size(self, strand_count: int) -> None:
-        """Raise `HairError` where a mesh would have too many triangles."""
+        """Raise `HairError` if a mesh would have too many triangles."""
         _require(self.levels(strand_count)[0].triangle_count)
 
 
 @dataclass(frozen=True)
 class TubeSettings(Settings):
-    """Strands as tubes."""
+    """Settings of tubes around strands."""
 
     tube_count: int = param(
         2000, "Number of strands to convert, evenly chosen; zero converts all", label="Tubes", low=0, soft_high=20_000
@@ -91,20 +91,20 @@ class TubeSettings(Settings):
     )
 
     def count_of(self, strand_count: int) -> int:
-        """Number of tubes of so many strands."""
+        """Return the number of tubes for a number of strands."""
         return min(self.tube_count or strand_count, strand_count)
 
     def vertex_count(self, strand_count: int) -> int:
-        """Vertices of all tubes."""
+        """Return the number of vertices of all tubes."""
         return self.count_of(strand_count) * self.side_count * self.point_count
 
     def triangle_count(self, strand_count: int) -> int:
-        """Triangles of all tubes, with their ends."""
+        """Return the number of triangles of all tubes, ends included."""
         of_one = 2 * self.side_count * (self.point_count - 1) + 2 * (self.side_count - 2)
         return self.count_of(strand_count) * of_one
 
     def require_size(self, strand_count: int) -> None:
-        """Raise `HairError` where the mesh would have too many triangles."""
+        """Raise `HairError` if the mesh would have too many triangles."""
         _require(self.triangle_count(strand_count))
 
 

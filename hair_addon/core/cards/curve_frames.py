@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many curves at once: points by curvature, frames that do not twist."""
+"""Resampling of curves by curvature, and rotation-minimizing frames along them."""
 
 import numpy as np
 
@@ -7,21 +7,21 @@ _TINY = 1e-12
 
 
 def unit(vectors: np.ndarray, otherwise: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> np.ndarray:
-    """(..., 3) vectors of length one; `otherwise` in place of those without a direction."""
+    """Normalize vectors (..., 3); `otherwise` replaces vectors of zero length."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.where(lengths > _TINY, vectors / np.maximum(lengths, _TINY), otherwise)
 
 
 def perpendicular(vectors: np.ndarray) -> np.ndarray:
-    """(..., 3) unit vectors → (..., 3) unit vectors across them."""
+    """Return unit vectors (..., 3) perpendicular to unit vectors (..., 3)."""
     smallest = np.argmin(np.abs(vectors), axis=-1)
     return unit(np.cross(vectors, np.eye(3)[smallest]))
 
 
 def resample_by_curvature(curves: np.ndarray, point_count: int) -> np.ndarray:
-    """(C, P, 3) curves → (C, point_count, 3) float64 on them, closer together where they bend.
+    """Resample curves (C, P, 3) → (C, point_count, 3) float64, with points closer together in bends.
 
-    A half turn counts as much as the whole length. The ends stay.
+    A turn by 180° weighs as much as the whole length. The ends are kept.
     """
     curves = np.asarray(curves, np.float64)
     edges = np.diff(curves, axis=1)
@@ -31,7 +31,7 @@ def resample_by_curvature(curves: np.ndarray, point_count: int) -> np.ndarray:
     if edges.shape[1] > 1:
         cosines = np.einsum("cpi,cpi->cp", directions[:, 1:], directions[:, :-1])
         angles = np.arccos(np.clip(cosines, -1.0, 1.0))
-        turns[:, 1:] += 0.5 * angles  # of the corner between two edges, half to each
+        turns[:, 1:] += 0.5 * angles  # the angle between two edges is divided between them
         turns[:, :-1] += 0.5 * angles
     share = lengths / np.maximum(lengths.sum(axis=1, keepdims=True), _TINY)
     steps = np.where(lengths > 0.0, share + turns / np.pi, 0.0)
@@ -46,16 +46,16 @@ def resample_by_curvature(curves: np.ndarray, point_count: int) -> np.ndarray:
 
 
 def tangents(curves: np.ndarray) -> np.ndarray:
-    """(C, P, 3) unit tangents: at inner points the mean of the two edges' directions."""
+    """Return unit tangents (C, P, 3): at inner points the mean of the two edges' directions."""
     directions = unit(np.diff(curves, axis=1))
     inner = unit(directions[:, 1:] + directions[:, :-1])
     return np.concatenate([directions[:, :1], inner, directions[:, -1:]], axis=1)
 
 
 def steady_normals(curves: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
-    """(C, P, 3) unit normals that turn around the curves as little as may be: double reflection [Wang08].
+    """Return rotation-minimizing unit normals (C, P, 3), by double reflection [Wang08].
 
-    first: (C, 3) unit normals at the first point, across its tangent; None for any.
+    first: (C, 3) unit normals at the first point, perpendicular to the tangents; None for arbitrary ones.
     """
     along = tangents(curves)
     normals = np.empty(curves.shape)
@@ -71,6 +71,6 @@ def steady_normals(curves: np.ndarray, first: np.ndarray | None = None) -> np.nd
 
 
 def _reflected(vectors, axes):
-    """(C, 3) vectors at planes across (C, 3) axes; as they are where an axis has no length."""
+    """Reflect vectors (C, 3) in planes perpendicular to axes (C, 3); unchanged for axes of zero length."""
     squares = np.maximum(np.einsum("ci,ci->c", axes, axes), _TINY**2)
     return vectors - (2.0 * np.einsum("ci,ci->c", axes, vectors) / squares)[:, None] * axes

@@ -17,7 +17,7 @@ class PolygonMesh:
     uvs: np.ndarray
 
     def transformed(self, axes: np.ndarray) -> "PolygonMesh":
-        """The same by (3, 3) axes of other coordinates; faces go around the other way where these are mirrored."""
+        """Return the mesh transformed by axes (3, 3); faces are flipped if these mirror."""
         vertices = (self.vertices @ axes.T).astype(np.float32)
         if np.linalg.det(axes) > 0.0:
             return replace(self, vertices=vertices)
@@ -30,5 +30,5 @@ class PolygonMesh:
 
     @property
     def triangle_count(self) -> int:
-        """Triangles that the polygons are cut into."""
+        """Number of triangles after triangulation."""
         return int((np.diff(self.faces.starts) - 2).sum())

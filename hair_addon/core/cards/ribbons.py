@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clumps of strands → the ribbons that stand for them, and the strands laid flat onto those."""
+"""Ribbons that represent clumps of strands, and the flattening of strands onto them."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,14 @@ from ..geometry import clusters
 from ..geometry.mesh import TriMesh, interpolate
 from . import curve_frames
 
-_OUTWARD = 2.0  # what facing away from the surface weighs beside lying along the spread of a clump
-_WINDOW = 0.3  # of the length: strands follow the ribbon from root to tip, also where it comes back to itself
+_OUTWARD = 2.0  # weight of facing away from the surface, relative to following the spread of a clump
+_WINDOW = 0.3  # of the length: keeps strands in order along ribbons that return to themselves
 _TINY = 1e-9
 
 
 @dataclass(frozen=True)
 class Axes:
-    """The middle lines of C ribbons of n points: centres, tangents, normals, (C, n, 3) each, and distances (C, n)."""
+    """Middle lines of C ribbons of n points: centres, tangents, normals, (C, n, 3) each."""
 
     centres: np.ndarray
     tangents: np.ndarray
@@ -25,26 +25,26 @@ class Axes:
 
     @property
     def binormals(self) -> np.ndarray:
-        """(C, n, 3) unit vectors across the ribbons: with tangents and normals a right-handed frame."""
+        """Unit vectors (C, n, 3) across the ribbons: tangents × normals."""
         return np.cross(self.tangents, self.normals)
 
     @property
     def distances(self) -> np.ndarray:
-        """(C, n) from the first point, along the lines."""
+        """Arc lengths (C, n) from the first point."""
         lengths = np.linalg.norm(np.diff(self.centres, axis=1), axis=-1)
         return np.concatenate([np.zeros((len(lengths), 1)), np.cumsum(lengths, axis=1)], axis=1)
 
     def turned(self, angles: np.ndarray) -> "Axes":
-        """The same with normals turned around the tangents by (C,) angles [rad]."""
+        """Return the axes with normals rotated around the tangents by angles (C,) [rad]."""
         cosines, sines = np.cos(angles)[:, None, None], np.sin(angles)[:, None, None]
         return Axes(self.centres, self.tangents, cosines * self.normals + sines * self.binormals)
 
 
 def axes_of(points: np.ndarray, labels: np.ndarray, count: int, segment_count: int, surface: TriMesh) -> Axes:
-    """The middle lines of `count` clumps of (S, P, 3) strands; labels (S,): the clump of each strand.
+    """Return the middle lines of `count` clumps of strands (S, P, 3); labels (S,): the clump of each strand.
 
-    Lines are the means of their strands, with points where they bend. Normals lie where strands spread least, and face
-    away from the surface.
+    Lines are the means of their strands, resampled by curvature. Normals point in the direction of least spread, away
+    from the surface.
     """
     means = clusters.cluster_means(points, labels, count)
     centres = curve_frames.resample_by_curvature(means, segment_count + 1)
@@ -53,13 +53,13 @@ def axes_of(points: np.ndarray, labels: np.ndarray, count: int, segment_count: i
 
 
 def _away(places, surface):
-    """(C, n, 3) unit normals of the surface where it is nearest to places."""
+    """Return unit normals (C, n, 3) of the surface at the points closest to places."""
     nearest = geometry.closest_point.SurfaceQuery(surface).nearest(places.reshape(-1, 3).astype(np.float32))
     return curve_frames.unit(interpolate(surface.vertex_normals, surface, nearest)).reshape(places.shape)
 
 
 def _angles(points, labels, count, axes, away):
-    """(C,) angles [rad] by which normals turn: the least eigenvector of the spread less what faces away."""
+    """Return rotation angles (C,) [rad] of normals: the least eigenvector of spread minus outward facing."""
     flat = flattened(points, labels, axes)
     across = flat[..., [2, 0]].astype(np.float64)  # along the normal and the binormal
     moments = np.einsum("spi,spj->sij", across, across)
@@ -73,10 +73,10 @@ def _angles(points, labels, count, axes, away):
 
 
 def flattened(points: np.ndarray, labels: np.ndarray, axes: Axes) -> np.ndarray:
-    """(S, P, 3) strands → (S, P, 3) float32 on the ribbons of their clumps: across, along, and above them.
+    """Map strands (S, P, 3) to ribbon coordinates (S, P, 3) float32 of their clumps: across, along, and above.
 
-    Each point goes to the nearest of the ribbon's middle line, not far from its own part of the length;
-    beyond the ends, and at the outside of bends, it goes on straight.
+    Each point is projected to the closest point of the ribbon's middle line near the same fraction of the length.
+    Beyond the ends, and on the outside of bends, the ribbon is extended straight.
     """
     points = np.asarray(points, np.float32)
     distances, parts = axes.distances.astype(np.float32), np.linspace(0.0, 1.0, points.shape[1], dtype=np.float32)
@@ -89,7 +89,7 @@ def flattened(points: np.ndarray, labels: np.ndarray, axes: Axes) -> np.ndarray:
         offsets = points - centres[labels, segment][:, None]
         along = np.einsum("spi,si->sp", offsets, direction[labels])
         on_line = np.clip(along, 0.0, length[labels][:, None])
-        # Of a point beside its foot on the line: Pythagoras.
+        # Squared distance from the projection on the segment: Pythagoras.
         square = np.einsum("spi,spi->sp", offsets, offsets) - along**2 + (along - on_line) ** 2
         away = np.abs((distances[labels, segment][:, None] + on_line) / lengths - parts) - _WINDOW
         cost = square + (np.maximum(away, 0.0) * lengths) ** 2
@@ -99,14 +99,14 @@ def flattened(points: np.ndarray, labels: np.ndarray, axes: Axes) -> np.ndarray:
 
 
 def _edges(centres, segment):
-    """((C, 3) unit direction, (C,) length) of a segment."""
+    """Return ((C, 3) unit directions, (C,) lengths) of a segment of each ribbon."""
     edges = centres[:, segment + 1] - centres[:, segment]
     lengths = np.maximum(np.linalg.norm(edges, axis=1), np.float32(_TINY))
     return edges / lengths[:, None], lengths
 
 
 def _components(points, labels, axes, nearest, on_line):
-    """(S, P, 3) across, along and above, of points whose foot lies on a segment at a distance from its start."""
+    """Return ribbon coordinates (S, P, 3); nearest: segment of the projection, on_line: distance from its start."""
     centres, normals, distances = (array.astype(np.float32) for array in (axes.centres, axes.normals, axes.distances))
     edges = np.diff(centres, axis=1)
     lengths = np.maximum(np.linalg.norm(edges, axis=-1), np.float32(_TINY))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Textures of cards: means over the samples of each texel of what strands are there."""
+"""Textures of cards: means of strand attributes over the samples of each texel."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ NO_STRAND = -1
 
 @dataclass(frozen=True)
 class PlacedStrands:
-    """Strands in a texture: places (M, P, 3) from 0 to 1 and heights, radii (M, P), colors linear (M, P, 3), ids (M,).
+    """Strands in a texture: places (M, P, 3) from 0 to 1 with heights, radii (M, P), linear colors (M, P, 3), ids (M,).
 
     heights: (lowest, highest) in the same unit, of depth 0 and 1.
     """
@@ -24,7 +24,7 @@ class PlacedStrands:
 
 
 class TexelSums:
-    """Sums over samples of square textures of `size` texels a side."""
+    """Sums over samples for square textures with `size` texels along a side."""
 
     def __init__(self, size: int) -> None:
         self.size, self._sample_count = size, 0
@@ -32,10 +32,10 @@ class TexelSums:
         self._sums = np.zeros((9, size * size), np.float32)
 
     def add(self, segments: np.ndarray, strands: PlacedStrands, per_side: int, shift: np.ndarray, rows: range) -> None:
-        """Add a pass of per_side² samples a texel, of some rows of texels.
+        """Add a pass of per_side² samples per texel, for some rows of texels.
 
-        segments: (len(rows) · per_side, size · per_side) segment M · (P - 1) + piece that a sample shows, `NO_STRAND`
-        for none, the first row at the bottom; shift: (2,) [samples] how far the picture was moved.
+        segments: (len(rows) · per_side, size · per_side) visible segment strand · (P - 1) + piece of each sample,
+        `NO_STRAND` for none, bottom row first; shift: (2,) [samples] offset of the picture.
         """
         if rows.start == 0:
             self._sample_count += per_side**2
@@ -52,10 +52,10 @@ class TexelSums:
             sums += np.bincount(texels, weights=value, minlength=len(self._covered))
 
     def maps(self) -> dict[str, np.ndarray]:
-        """{map: (size, size) or (size, size, 3) float32} of `MAPS`, from 0 to 1, the first row at the bottom.
+        """Return {map: (size, size) or (size, size, 3) float32} of `MAPS`, from 0 to 1, bottom row first.
 
-        Color is linear RGB, and normals are coded as tangent space from -1 to 1. Where there is no strand, they are
-        as near by.
+        Colors are linear RGB; normals are in tangent space, mapped from [-1, 1]. Texels without strands are filled from
+        their surroundings.
         """
         side = self.size, self.size
         alpha = (self._covered / self._sample_count).reshape(side).astype(np.float32)
@@ -66,9 +66,9 @@ class TexelSums:
 
 
 def _sampled(strands, segments, centres, texel):
-    """(9, N) color, normal, depth, part from root to tip and identity of samples at (N, 2) centres.
+    """Return (9, N) color, normal, depth, fraction from root to tip and ID of samples at centres (N, 2).
 
-    texel: the width of one. Strands thinner than that are flat: their two sides fall into one texel.
+    texel: its width. Thinner strands are shaded as flat, because both sides fall into one texel.
     """
     pieces = strands.places.shape[1] - 1
     strand, piece = np.divmod(segments, pieces)
@@ -90,17 +90,17 @@ def _sampled(strands, segments, centres, texel):
 
 
 def _normals(edges, across):
-    """(N, 3) unit normals of fibres that are seen from above, at a part from -1 to 1 of their width."""
+    """Return unit normals (N, 3) of fibres seen from above, at positions `across` their width in [-1, 1]."""
     tangents = edges / np.maximum(np.linalg.norm(edges, axis=1, keepdims=True), 1e-12)
     facing = np.array([0.0, 0.0, 1.0]) - tangents[:, 2:] * tangents
     length = np.linalg.norm(facing, axis=1, keepdims=True)
     facing = np.where(length > 1e-6, facing / np.maximum(length, 1e-6), (0.0, 0.0, 1.0))
-    side = np.cross(facing, tangents)  # towards growing `across`
+    side = np.cross(facing, tangents)  # direction of increasing `across`
     return np.sqrt(1.0 - across**2)[:, None] * facing + across[:, None] * side
 
 
 def _filled(sums, weights):
-    """(n, n, k) means; those without weight from the next coarser level of a pyramid that has some."""
+    """Return means (n, n, k); texels without weight are filled from a pyramid's next coarser level (pull-push)."""
     means = sums / np.maximum(weights, 1e-12)[..., None]
     if len(sums) == 1 or not (weights == 0.0).any():
         return means
@@ -115,6 +115,6 @@ def _filled(sums, weights):
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:
-    """Linear values → sRGB's transfer function (IEC 61966-2-1), from 0 to 1."""
+    """Apply sRGB's transfer function (IEC 61966-2-1) to linear values, clipped to [0, 1]."""
     linear = np.clip(linear, 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands → closed tubes around them."""
+"""Closed tubes around strands."""
 
 import numpy as np
 
@@ -9,18 +9,18 @@ from . import curve_frames
 from .card_settings import TubeSettings
 from .polygon_mesh import PolygonMesh
 
-_LEAST_RADIUS = 0.01  # of the strand's own: rings of the tip keep an area
+_LEAST_RADIUS = 0.01  # of the strand's own: keeps the tip's ring from collapsing
 
 
 def chosen_strands(strand_count: int, tube_count: int) -> np.ndarray:
-    """(tube_count,) indices of strands, evenly spread over all."""
+    """Return indices (tube_count,) of evenly spaced strands."""
     return np.arange(tube_count) * strand_count // max(tube_count, 1)
 
 
 def tubes(points: np.ndarray, radii: np.ndarray, settings: TubeSettings) -> PolygonMesh:
-    """Make a tube of each strand: (S, P, 3) points, resampled by curvature, and (S, P) radii in the same unit.
+    """Return tubes around the chosen strands: points (S, P, 3), resampled by curvature, radii (S, P) in the same unit.
 
-    Both ends are closed. U goes around, V from root 0 to tip 1; the ends have the coordinates of their rings.
+    Both ends are closed. U runs around the tube, V from root 0 to tip 1; end caps have the coordinates of their rings.
     Raises `HairError`.
     """
     if not np.isfinite(points).all():
@@ -38,20 +38,20 @@ def tubes(points: np.ndarray, radii: np.ndarray, settings: TubeSettings) -> Poly
     across = np.cos(turns)[:, None] * normals[:, :, None] + np.sin(turns)[:, None] * binormals[:, :, None]
     vertices = curves[:, :, None] + widths[:, :, None, None] * across
     faces, uvs = _topology(len(chosen), settings.point_count, settings.side_count)
-    rows = np.clip(uvs[:, 1].astype(int), 0, None)  # V is a row of points until here
+    rows = np.clip(uvs[:, 1].astype(int), 0, None)  # V is an index of points up to here
     uvs[:, 1] = along.ravel()[rows]
     return PolygonMesh(vertices.reshape(-1, 3).astype(np.float32), faces, uvs.astype(np.float32))
 
 
 def _parts(curves):
-    """(C, P) part of the length up to each point."""
+    """Return normalized arc lengths (C, P)."""
     lengths = np.linalg.norm(np.diff(curves, axis=1), axis=-1)
     sums = np.concatenate([np.zeros((len(curves), 1)), np.cumsum(lengths, axis=1)], axis=1)
     return sums / np.maximum(sums[:, -1:], 1e-12)
 
 
 def _topology(count, points, sides):
-    """(faces, (corners, 2) U and row of points): quadrilaterals of each tube, then its two ends."""
+    """Return (faces, (corners, 2) U and point index): quads of each tube, then its two end caps."""
     ring, side = (grid.ravel() for grid in np.meshgrid(np.arange(points - 1), np.arange(sides), indexing="ij"))
     after = (side + 1) % sides
     quads = np.stack(

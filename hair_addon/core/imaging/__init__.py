@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images: pixel sampling, environment lighting, detection of truncated files."""
+"""Images: pixel sampling, cameras, environment lighting, detection of truncated files."""
 
 from typing import TYPE_CHECKING
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Decomposition of environment light: a few bright lobes with shadows and highlights, and an ambient cube for the rest.
+"""Decomposition of environment light into a few bright lobes with shadows and highlights, and an ambient cube.
 
-An environment image (H, W, 3) has the azimuth in its columns, u = (k + 0.5) / W, from pi to -pi, and the
-height in its rows, v = (j + 0.5) / H, from -pi/2 to pi/2; x is at azimuth 0, z at the top.
+An environment image (H, W, 3) has the azimuth in its columns, u = (k + 0.5) / W, from pi to -pi, and the elevation in
+its rows, v = (j + 0.5) / H, from -pi/2 to pi/2; x is at azimuth 0, z at the top.
 """
 
 from dataclasses import dataclass
@@ -12,18 +12,18 @@ import numpy as np
 from . import ambient_cube
 
 _LOBE_LIMIT = 4
-_LEAST_PART = 0.08  # of all light: dimmer lobes are left in the ambient cube
-_WINDOW, _RING = np.cos(np.radians([30.0, 45.0]))  # maximum width of a lobe, and the ring where its background is read
-_SHARPNESS = 20.0  # of the kernel that the brightest place is found with
+_LEAST_PART = 0.08  # of all light: dimmer lobes remain in the ambient cube
+_WINDOW, _RING = np.cos(np.radians([30.0, 45.0]))  # maximum radius of a lobe, and outer radius of its background ring
+_SHARPNESS = 20.0  # of the kernel for finding the brightest point
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True)
 class Lobe:
-    """A bright part of the surroundings: unit direction towards it, irradiance (3,) of a small ball [W/m²].
+    """A bright part of the environment: unit direction towards it, irradiance (3,) of a small ball [W/m²].
 
-    variance: of its light about the direction, along each of two axes [rad²]; a plane that faces it receives one minus
-    that part.
+    variance: of its light about the direction, along each of two axes [rad²]; a plane that faces it receives the
+    fraction 1 - variance.
     """
 
     direction: np.ndarray
@@ -32,7 +32,7 @@ class Lobe:
 
 
 def split(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
-    """([`Lobe`, ...], (6, 3) mean radiance of the sides without them) of a picture of the surroundings."""
+    """Split an environment image into ([`Lobe`, ...], (6, 3) mean radiance of the cube's sides without the lobes)."""
     directions, solid_angles = _texels(*radiance.shape[:2])
     left = np.maximum(radiance.reshape(-1, 3), 0.0).astype(float)
     least = _LEAST_PART * float((left @ _LUMINANCE) @ solid_angles)
@@ -51,7 +51,7 @@ def split(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
 
 
 def _brightest(radiance, directions, solid_angles):
-    """Indices (M,) of the texels around the brightest point, and their radiance (M, 3) above the surroundings."""
+    """Return indices (M,) of the texels around the brightest point, and their radiance (M, 3) above the background."""
     centres = _spread_out(400)
     kernel = np.exp(_SHARPNESS * (centres @ directions.T - 1.0))
     peak = centres[np.argmax(kernel @ ((radiance @ _LUMINANCE) * solid_angles))]
@@ -62,7 +62,7 @@ def _brightest(radiance, directions, solid_angles):
 
 
 def _texels(height, width):
-    """Unit directions (H W, 3) of a picture's texels, and their solid angles (H W,)."""
+    """Return unit directions (H W, 3) of an image's texels, and their solid angles (H W,)."""
     edges = np.sin(np.pi * (np.arange(height + 1) / height - 0.5))
     theta = np.pi * ((np.arange(height) + 0.5) / height - 0.5)[:, None]
     phi = np.pi * (1.0 - 2.0 * (np.arange(width) + 0.5) / width)[None]
@@ -72,7 +72,7 @@ def _texels(height, width):
 
 
 def _spread_out(count):
-    """(N, 3) unit vectors all around, evenly: a spiral turned by the golden angle [Vogel79]."""
+    """Return evenly distributed unit vectors (N, 3), on a spiral with the golden angle [Vogel79]."""
     heights = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     turns = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
     across = np.sqrt(1.0 - heights**2)

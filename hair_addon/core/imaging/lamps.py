@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps by importance: those that are drawn one by one, and an ambient cube of the light of all others.
+"""Selection of lamps by importance: the most important are drawn individually, the others form an ambient cube.
 
 A lamp is a record with the fields of `Light` in shaders/light/lights.glsl.
 """
@@ -10,11 +10,11 @@ from . import ambient_cube
 
 SUN, POINT, SPOT, AREA = range(4)  # kinds
 
-_FADE = 0.25  # how much more important than the first lamp that is left out one is that counts in full
+_FADE = 0.25  # relative excess over the importance of the first omitted lamp at which a lamp has full weight
 
 
 def directions_to(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """(N, P, 3) unit vectors from places (P, 3) to lamps (N,)."""
+    """Return unit vectors (N, P, 3) from places (P, 3) to lamps (N,)."""
     offsets = lamps["position"][:, None, :3].astype(float) - places
     offsets /= np.maximum(np.linalg.norm(offsets, axis=-1, keepdims=True), 1e-12)
     suns = -lamps["axis"][:, None, :3].astype(float)
@@ -22,7 +22,7 @@ def directions_to(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def irradiance(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """(N, P, 3) irradiance [W/m²] of a small ball at points (P, 3) from lamps (N,): as in light/lights.glsl."""
+    """Return the irradiance (N, P, 3) [W/m²] of a small ball at places (P, 3) from lamps (N,), as light/lights.glsl."""
     kind = lamps["kind"][:, None]
     offsets = places - lamps["position"][:, None, :3].astype(float)
     squared = np.maximum(np.sum(np.square(offsets), axis=-1), 1e-8)
@@ -39,7 +39,7 @@ def irradiance(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _disk_irradiance(height, beside, radius):
-    """Of a small ball by a Lambertian disk that sends 1 W/sr along its axis: disk_irradiance of light/lights.glsl."""
+    """Return the irradiance of a small ball by a Lambertian disk with 1 W/sr along its axis: see light/lights.glsl."""
     outside = height**2 + beside**2 - radius**2
     root = np.maximum(np.sqrt(outside**2 + 4.0 * height**2 * radius**2), 1e-12)
     far = 2.0 * height**2 / (root * np.maximum(root + outside, 1e-12))
@@ -68,9 +68,9 @@ def _smooth(values):
 
 
 def shares(importance: np.ndarray, count: int) -> np.ndarray:
-    """(N,) parts from 0 to 1 of the light of lamps (N,) that are drawn one by one: not zero for `count` at most.
+    """Return the fractions (N,) in [0, 1] of lamps' light that are drawn individually, positive for at most `count`.
 
-    They are continuous in the importance: a lamp has faded out before another takes its place.
+    Fractions are continuous in the importance (N,): a lamp has faded out before another one replaces it.
     """
     if len(importance) <= count:
         return np.ones(len(importance))
@@ -79,10 +79,10 @@ def shares(importance: np.ndarray, count: int) -> np.ndarray:
 
 
 def ambient_sides(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """(6, 3) mean radiance of the sides of an ambient cube with the light of lamps (N,), the mean over places (P, 3).
+    """Return the mean radiance (6, 3) of an ambient cube's sides for lamps (N,), averaged over places (P, 3).
 
-    A plane that is turned anyhow receives E / 4 from a lamp of the irradiance E in the mean, and π/6 of the sum of the
-    sides' radiance from an ambient cube: the sides have 3 E / (2 π) in all.
+    Averaged over orientations, a plane receives E / 4 from a lamp of irradiance E, and π/6 of the sum of the sides'
+    radiance from an ambient cube: the sides sum to 3 E / (2 π).
     """
     sides = ambient_cube.side_shares(directions_to(lamps, places))
     return 1.5 / np.pi * np.einsum("nps,npc->sc", sides, irradiance(lamps, places)) / len(places)

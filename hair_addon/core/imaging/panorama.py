@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panoramic pictures: the direction of each pixel, and its place on the faces of a cube around the camera.
 
-Directions are in the camera's axes: it looks along -Z, Y is up. Projections are Cycles' (kernel/camera/projection.h).
+Directions are in the camera's axes, with the view along -Z and Y up. Projections are Cycles'
+(kernel/camera/projection.h).
 """
 
 import math
@@ -9,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-MARGIN = 2  # texels of a face around what is seen on it, for interpolation
-_FINER = 1.25  # than pixels are texels of a face at its middle
-_PER_SIDE = 2  # places on the faces that a pixel is the mean of, along each side
-_SOME = 64  # pixels along each side of a picture, whose size stands for that of all
-_AT_ONCE = 1 << 18  # pixels that are looked up together
+MARGIN = 2  # texels around the visible part of a face, for interpolation
+_FINER = 1.25  # resolution of a face at its center relative to the pixels
+_PER_SIDE = 2  # samples of a pixel along each side
+_SOME = 64  # pixels sampled along each side of a picture to estimate their size
+_AT_ONCE = 1 << 18  # pixels in a batch
 
-# (6, 3, 3) from the camera's axes to those of faces, which look along their own -Z: ahead, right, left, back, up, down.
+# (6, 3, 3) rotations from the camera to the faces, which look along their own -Z: ahead, right, left, back, up, down.
 FACES = np.array(
     [
         [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -33,18 +34,18 @@ FACES = np.array(
 class Panorama:
     """A panoramic camera by Blender's settings; angles [rad], lengths of lens and sensor [mm]."""
 
-    kind: str  # of Blender's panorama_type
-    shift: tuple = (0.0, 0.0)  # parts of the picture
-    sensor: tuple = (36.0, 36.0)  # width and height, as much of it as the picture has
+    kind: str  # Blender's panorama_type
+    shift: tuple = (0.0, 0.0)  # in fractions of the picture
+    sensor: tuple = (36.0, 36.0)  # width and height of the used part
     fov: float = math.pi
     lens: float = 10.5
     latitudes: tuple = (-0.5 * math.pi, 0.5 * math.pi)
     longitudes: tuple = (-math.pi, math.pi)
     polynomial: tuple = (0.0, 0.0, 0.0, 0.0, 0.0)
-    cylinder: tuple = (-math.pi, math.pi, -1.0, 1.0)  # least and greatest angle, and height by radius
+    cylinder: tuple = (-math.pi, math.pi, -1.0, 1.0)  # least and greatest angle, then height / radius
 
     def directions(self, places: np.ndarray) -> np.ndarray:
-        """(..., 3) unit directions of places (..., 2) in the picture, from 0 to 1; zero where nothing is seen."""
+        """Return unit directions (..., 3) of places (..., 2) in the picture in [0, 1]; zero outside the projection."""
         u, v = np.moveaxis(places + np.array(self.shift), -1, 0)
         found = _PROJECTIONS[self.kind](self, u, v)
         return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-12)
@@ -65,7 +66,7 @@ def _cube_face(_panorama, u, v):
 def _mirror_ball(_panorama, u, v):
     x, y = 2.0 * u - 1.0, 2.0 * v - 1.0
     squared = x * x + y * y
-    z = -np.sqrt(np.maximum(1.0 - squared, 0.0))  # of the ball, which is seen along its +Z
+    z = -np.sqrt(np.maximum(1.0 - squared, 0.0))  # of the ball, viewed along its +Z
     reflected = np.stack([-2.0 * z * x, -2.0 * z * y, 1.0 - 2.0 * z * z], axis=-1)
     return np.where((squared <= 1.0)[..., None], reflected, 0.0)
 
@@ -96,7 +97,7 @@ def _cylindrical(panorama, u, v):
 
 
 def _around(x, y, theta, is_seen):
-    """Directions at an angle theta from the axis, towards (x, y)."""
+    """Return directions at an angle theta from the axis, towards (x, y)."""
     radius = np.maximum(np.hypot(x, y), 1e-12)
     across = np.sin(theta) / radius
     found = np.stack([across * x, across * y, -np.cos(theta)], axis=-1)
@@ -115,19 +116,19 @@ _PROJECTIONS = {
 
 
 class FaceLookup:
-    """Where the pixels of a window of a picture lie on the faces of a cube.
+    """Lookup of a picture's pixels on the faces of a cube.
 
-    size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of the part.
+    size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of the rendered part.
     """
 
     def __init__(self, panorama: Panorama, size: tuple[int, int], window: tuple[int, int, int, int]) -> None:
         self._panorama, self._size, self._window = panorama, size, window
         self.side = self._face_side()  # texels along a side of a face
-        self.half_width = self.side / (self.side - 2.0 * MARGIN)  # tangent of half the angle that a face is seen in
-        self.windows = self._face_windows()  # {face: (left, bottom, width, height) of what is seen on it [texels]}
+        self.half_width = self.side / (self.side - 2.0 * MARGIN)  # tangent of half the field of view of a face
+        self.windows = self._face_windows()  # {face: (left, bottom, width, height) of its visible part [texels]}
 
     def _face_side(self):
-        """So that texels are as fine as pixels, the median of them: of a pixel, the mean of its width and height."""
+        """Return the texels along a side, by the median over pixels of the geometric mean of width and height."""
         left, bottom, width, height = self._window
         x = left + np.arange(0, width, -(-width // _SOME))
         y = bottom + np.arange(0, height, -(-height // _SOME))
@@ -149,21 +150,21 @@ class FaceLookup:
                 highest[face] = np.maximum(highest.get(face, -np.inf), here.max(axis=0))
         found = {}
         for face in sorted(lowest):
-            # Around the middles of pixels is the rest of them.
+            # Places are centers of pixels, which extend beyond them.
             start = np.maximum(np.floor(lowest[face]).astype(int) - 2 * MARGIN, 0)
             end = np.minimum(np.floor(highest[face]).astype(int) + 2 + 2 * MARGIN, self.side)
             found[int(face)] = (*start.tolist(), *(end - start).tolist())
         return found
 
     def _rows(self):
-        """(first, last) of rows of the window that are looked up together."""
+        """Return [(first, last)] batches of the window's rows."""
         step = max(_AT_ONCE // self._window[2], 1)
         return [(first, min(first + step, self._window[3])) for first in range(0, self._window[3], step)]
 
     def _places(self, first, last, per_side=_PER_SIDE):
-        """(faces, places on them, distances by depths, whether anything is seen) of samples (rows, width, N) of pixels.
+        """Return (faces, places, distance / depth, visibility) of samples (rows, width, N) of pixels.
 
-        Places (..., 2) are in texels from the middle of the first.
+        Places (..., 2) on faces are in texels from the center of the first one.
         """
         left, bottom, width, _height = self._window
         along = (np.arange(per_side) + 0.5) / per_side
@@ -179,9 +180,9 @@ class FaceLookup:
         return faces, places, 1.0 / depth, np.abs(ahead) > 0.0
 
     def means(self, pictures: dict[int, np.ndarray], unseen: tuple[float, ...]) -> np.ndarray:
-        """(height, width, C) float32 of the window: means over pixels of what {face: array of its window} shows.
+        """Return pixel means (height, width, C) float32 of the window from pictures {face: array of its window}.
 
-        unseen: (C,) values where nothing is seen.
+        unseen: (C,) values outside the projection.
         """
         channels = len(unseen)
         found = np.zeros((self._window[3], self._window[2], channels), np.float32)
@@ -195,7 +196,7 @@ class FaceLookup:
         return found
 
     def distances(self, pictures: dict[int, np.ndarray], far: float) -> np.ndarray:
-        """(height, width, 1) float32 distances in the middles of pixels, from depths {face: array}; `far` without."""
+        """Return distances (height, width, 1) float32 at pixel centers from depths {face: array}; `far` if unseen."""
         found = np.full((self._window[3], self._window[2], 1), far, np.float32)
         for first, last in self._rows():
             faces, places, stretch, is_seen = (values[:, :, 0] for values in self._places(first, last, 1))
@@ -208,7 +209,7 @@ class FaceLookup:
 
 
 def _between_texels(picture, places):
-    """(N, C) of an array (H, W, C) at places (N, 2) in texels: bilinear."""
+    """Interpolate an array (H, W, C) bilinearly at places (N, 2) in texels → (N, C)."""
     lowest = np.floor(places).astype(int)
     part = (places - lowest).astype(np.float32)
     x, y = (np.clip(lowest[:, axis], 0, picture.shape[1 - axis] - 2) for axis in (0, 1))

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Completeness checks of image files by their structure: pixels are not decoded, so thousands are checked in a second.
+"""Completeness checks of image files by their structure, without decoding pixels: thousands in a second.
 
-A truncated file lacks what its format writes last: a PNG its end chunk, an OpenEXR its table of chunk offsets, or the
-last chunks.
+A truncated PNG lacks its end chunk, a truncated OpenEXR its table of chunk offsets or its last chunks.
 """
 
 import os
@@ -22,18 +21,18 @@ _SIGNATURES = {".png": _PNG, ".exr": _EXR}
 # Bits of the version of an OpenEXR file.
 _IS_TILED, _IS_DEEP, _HAS_PARTS = 0x200, 0x800, 0x1000
 
-# Rows of pixels in a chunk, by OpenEXR's number of a compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, ….
+# Rows of pixels in a chunk, by OpenEXR's compression number: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, ….
 _ROWS = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256, 256, 32)
 
 
 def require_whole(path: str | Path, name: str) -> None:
-    """Raise `HairError`, which calls it by a name, unless a file is a whole picture."""
+    """Raise `HairError` unless a file is a complete picture; name: for the message."""
     if not is_whole(path):
         raise HairError(f"{name} is incomplete: the disk may be full.")
 
 
 def is_whole(path: str | Path) -> bool:
-    """Whether there is a whole .png or .exr at a path, by its ending."""
+    """Return whether a path is a complete .png or .exr file, according to its suffix."""
     size, head, tail = _ends(path)
     if not head.startswith(_SIGNATURES[Path(path).suffix.lower()]):
         return False
@@ -46,7 +45,7 @@ def is_whole(path: str | Path) -> bool:
 
 
 def is_broken(path: str | Path) -> bool:
-    """Whether there is a file at a path that is empty, or the beginning of a picture and no more."""
+    """Return whether a path is an empty file or a truncated picture."""
     size, head, _tail = _ends(path)
     if size is None:
         return False
@@ -54,9 +53,9 @@ def is_broken(path: str | Path) -> bool:
 
 
 def _ends(path):
-    """(bytes in all, the first of them, the last); (None, b"", b"") where there is no plain file that can be read."""
+    """Return (size, first bytes, last bytes) of a plain file; (None, b"", b"") if it cannot be read."""
     try:
-        # Not blocking: opening a pipe without a writer would block.
+        # O_NONBLOCK: opening a pipe without a writer would block.
         flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
         with open(path, "rb", opener=lambda name, _flags: os.open(name, flags)) as file:
             status = os.fstat(file.fileno())
@@ -70,7 +69,7 @@ def _ends(path):
 
 
 def _is_whole_exr(path, size, head):
-    """Whether each chunk of pixels that an OpenEXR file's table names lies within the file."""
+    """Return whether all chunks in an OpenEXR file's offset table lie within the file."""
     while True:
         try:
             counts, place, version = _chunk_counts(head)
@@ -88,7 +87,7 @@ def _is_whole_exr(path, size, head):
     offsets = np.frombuffer(head, "<u8", sum(counts), place)
     if not len(offsets) or offsets.min() < end or offsets.max() >= size:
         return False
-    last, before = int(offsets.max()), 8 if version & _HAS_PARTS else 4  # the numbers of a chunk's part and first row
+    last, before = int(offsets.max()), 8 if version & _HAS_PARTS else 4  # bytes of a chunk's part number and first row
     with open(path, "rb") as file:
         file.seek(last + before)
         length = struct.unpack("<i", file.read(4))[0]
@@ -96,11 +95,11 @@ def _is_whole_exr(path, size, head):
 
 
 def _chunk_counts(head):
-    """([chunks of each part], where their table begins, version and bits); raises an error where the head ends."""
+    """Return ([chunks of each part], start of the offset table, version field); raises if the head is too short."""
     version, place, counts = struct.unpack_from("<I", head, 4)[0], 8, []
     while True:
         attributes, place = _attributes(head, place)
-        if not attributes:  # the empty header after the last of several
+        if not attributes:  # the empty header that ends a multi-part list
             return counts, place, version
         counts.append(_chunk_count(attributes))
         if not version & _HAS_PARTS:
@@ -108,7 +107,7 @@ def _chunk_counts(head):
 
 
 def _attributes(head, place):
-    """({name: bytes} of a part's header, where that ends)."""
+    """Return ({name: bytes} of a part's header, its end)."""
     found = {}
     while head[place]:
         name_end = head.index(b"\0", place)

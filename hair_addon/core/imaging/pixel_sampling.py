@@ -11,7 +11,7 @@ from ..params import Settings, param
 FIRST_FRAME, LAST_FRAME = -1_048_574, 1_048_574  # Blender's MINAFRAME and MAXFRAME
 
 _MOST_PER_SIDE = 4
-LENS_PASSES = 32  # of a picture with depth of field, at least: each looks through one point of the lens
+LENS_PASSES = 32  # least number of passes with depth of field: each uses one point of the lens
 
 
 @dataclass(frozen=True)
@@ -35,26 +35,26 @@ class RenderSettings(Settings):
     )
     multiple_scattering: str = param(
         "GRID",
-        "How renders find light that comes to hair from other hair and from surfaces",
+        "How renders compute light that reaches hair from other hair and from surfaces",
         label="Multiple Scattering",
-        choices=(  # files keep the place of a choice
+        choices=(  # .blend files store the index of a choice
             (
                 "DUAL",
                 "Dual Scattering",
-                "As in the viewport: by how much hair is before and behind each strand. Fast and without noise: for "
-                "previews, and for animations on slow computers",
+                "As in the viewport, from the amount of hair in front of and behind each strand. Fast and without "
+                "noise; for previews, and for animations on slow computers",
             ),
             (
                 "GRID",
                 "Light Grid",
-                "By paths of light through hair, closest to Cycles. Takes seconds longer for each frame; viewports "
-                "do not have it",
+                "Light paths through the hair, closest to Cycles. Takes seconds longer for each frame; not available "
+                "in viewports",
             ),
         ),
     )
     is_hair_only: bool = param(
         False,
-        "Render hair without surfaces: they hide it and cast shadows on it, and leave the picture empty",
+        "Render hair without surfaces: they still hide it and cast shadows on it, but are not visible",
         label="Hair Only",
     )
     has_preview_shadow: bool = param(
@@ -65,7 +65,7 @@ class RenderSettings(Settings):
         "How hair darkens surfaces that another engine renders",
         label="Surface Shadow",
         choices=(
-            ("PASS", "Pass", "Multiply the surfaces by the light that Vellus finds hair to leave on them"),
+            ("PASS", "Pass", "Multiply the surfaces by the fraction of light that hair lets through"),
             ("ENGINE", "Engine", "Cycles or EEVEE renders the shadows, reflections and light of its own hair"),
             ("NONE", "None", "Hair casts no shadow on surfaces"),
         ),
@@ -74,7 +74,7 @@ class RenderSettings(Settings):
 
 @dataclass(frozen=True)
 class PictureSettings(Settings):
-    """Of a picture: drawn at once, in the memory of the graphics card, or a frame that is rendered into a file."""
+    """Settings of a picture: drawn at once in the memory of the graphics card, or a frame rendered into a file."""
 
     width: int = param(1280, "Width of the image in pixels", low=1, high=65536)
     height: int = param(720, "Height of the image in pixels", low=1, high=65536)
@@ -88,8 +88,8 @@ class PictureSettings(Settings):
     has_passes: bool = param(False, "Write all passes as layers of a multilayer EXR")
 
 
-DRAWING_FIELDS = ("samples_per_side",)  # of a picture that is drawn at once, and not of frames
-FRAME_FIELDS = ("sample_count", "has_passes")  # of frames, and not of a picture that is drawn at once
+DRAWING_FIELDS = ("samples_per_side",)  # only for pictures that are drawn at once
+FRAME_FIELDS = ("sample_count", "has_passes")  # only for rendered frames
 MOST_DRAWN = 16384  # pixels along a side of a picture that is drawn at once
 
 
@@ -100,36 +100,36 @@ class PassSettings(Settings):
     has_hair_mask: bool = param(False, "Coverage of each pixel by hair", label="Hair Mask")
     has_lobes: bool = param(
         False,
-        "Lighting of hair as passes that add up to it: reflection (R), transmission (TT), internal reflection (TRT), "
-        "multiple scattering, and world light",
+        "Lighting of hair as passes whose sum is the image: reflection (R), transmission (TT), internal reflection "
+        "(TRT), multiple scattering, and world light",
         label="Hair Lobes",
     )
     has_hair_shadow: bool = param(
         False,
-        "Part of the light on surfaces that hair lets through: they are multiplied by it",
+        "Fraction of the light on surfaces that hair lets through, by which they are multiplied",
         label="Hair Shadow",
     )
 
 
 def samples_per_side(sample_count: int, least_passes: int = 1) -> int:
-    """Along each side of a pixel in each pass over a picture: as many as make up the samples in whole passes.
+    """Return the samples along each side of a pixel in a pass, such that whole passes give the sample count.
 
-    least_passes: how many passes there are at least, if there are that many samples.
+    least_passes: minimum number of passes, if there are that many samples.
     """
     sides = range(_MOST_PER_SIDE, 1, -1)
     return next((n for n in sides if sample_count % n**2 == 0 and sample_count >= least_passes * n**2), 1)
 
 
 def filter_margin(side: int, width: float) -> int:
-    """Samples around a pixel of side × side that `filter_weights` takes into account."""
+    """Return the number of samples around a pixel of side × side samples that `filter_weights` includes."""
     return 0 if width <= 1.0 else math.ceil((0.5 * width - 0.5) * side + 0.5)
 
 
 def filter_weights(side: int, width: float, shift: float) -> np.ndarray:
-    """(side + 2 `filter_margin`,) weights of samples along an axis for a pixel: a Blackman-Harris window [Harris78].
+    """Return pixel filter weights (side + 2 `filter_margin`,) along an axis: a Blackman-Harris window [Harris78].
 
-    side: samples along the pixel's side; width: of the window [pixels], up to one a box of a pixel; shift: by which the
-    picture is moved against the samples [samples], up to half of one.
+    side: samples along the pixel's side; width: of the window [pixels], a box filter for at most 1; shift: offset of
+    the picture relative to the samples [samples], at most 0.5.
     """
     margin = filter_margin(side, width)
     if margin == 0:
@@ -141,10 +141,10 @@ def filter_weights(side: int, width: float, shift: float) -> np.ndarray:
 
 
 def moments(shutter: float, position: str, count: int, openings: np.ndarray | None = None) -> np.ndarray:
-    """(count,) times [frames] from a frame, in the middles of parts of its exposure with equal light.
+    """Return motion sample times (count,) [frames] relative to a frame, at the centers of intervals of equal exposure.
 
-    shutter: how long it is open [frames]; position: START, CENTER or END: which moment of the exposure the frame is;
-    openings: (N,) how far the shutter is open at the middles of N equal parts of that time; None, or all zero: evenly.
+    shutter: time that it is open [frames]; position: START, CENTER or END, the place of the frame in the exposure;
+    openings: (N,) shutter opening at the centers of N equal intervals; None or all zero for a constant one.
     """
     before = {"START": 0.0, "CENTER": 0.5, "END": 1.0}[position]
     parts = (np.arange(count) + 0.5) / count
@@ -155,7 +155,7 @@ def moments(shutter: float, position: str, count: int, openings: np.ndarray | No
 
 
 def tiles(window: tuple[int, int, int, int], side: int) -> list[tuple[int, int, int, int]]:
-    """[(left, bottom, width, height)] that a window of such numbers [pixels] falls into, `side` long at most."""
+    """Divide a window (left, bottom, width, height) [pixels] into tiles of at most `side` pixels along each side."""
     left, bottom, width, height = window
     return [
         (left + x, bottom + y, min(side, width - x), min(side, height - y))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sides of textures that hold data: none is a power of two.
+"""Sizes of data textures that are not powers of two.
 
-Software drivers compile a program once for textures whose sides are powers of two, and again for others.
+Software drivers compile a program separately for textures whose sides are powers of two and for others.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ import numpy as np
 
 
 def beside_powers(lengths: Sequence[int] | np.ndarray | int) -> np.ndarray:
-    """The least lengths, at least as great as these whole numbers above zero, of which none is a power of two."""
+    """Return the smallest lengths, at least the given positive integers, that are not powers of two."""
     found = np.array(lengths)
     while (is_power := found & (found - 1) == 0).any():
         found += is_power
