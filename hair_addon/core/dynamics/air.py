@@ -18,7 +18,7 @@ from ..errors import HairError
 from ..kernels import kernel_cache, parallel
 from ..kernels.checks import require_count
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 KINDS = ("WIND", "TURBULENCE", "FORCE", "VORTEX", "DRAG")

@@ -29,7 +29,7 @@ from ..kernels import kernel_cache, native_code, parallel
 from ..kernels.checks import require_count, require_indices
 from .hair_cells import Grid, cell_of, part_of, rubbed
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 LEAST_CELL = 0.004  # [m]

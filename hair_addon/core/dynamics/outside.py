@@ -19,7 +19,7 @@ from .collision.distance_grid import DistanceGrid, distance_grid, least_distance
 from .collision.nearest_surface import Surface, nearest
 from .simulation import Obstacle
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _RETURN = wp.constant(0.15)  # of the way back, that a strand takes on the length of a segment

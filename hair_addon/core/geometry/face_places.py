@@ -154,7 +154,7 @@ def _of_each(flat, corners):
 
 
 def _nearest(triangles, places):
-    """Return (barycentric coordinates (N, 3), distance² (N,)) of the points of triangles (N, 3, 3) closest to places."""
+    """Return (barycentric (N, 3), distance² (N,)) of the points of triangles (N, 3, 3) closest to places (N, 3)."""
     inside = _barycentric(triangles, places)
     best, least = inside, np.where((inside >= 0.0).all(axis=1), _apart(triangles, inside, places), np.inf)
     for corner in range(3):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Checks of counts and indices before kernel launches.
 
-Kernels do not check their indices. Reading past the end of an array crashes Blender.
+Kernels do not check indices: reading past the end of an array crashes Blender.
 """
 
 import numpy as np
@@ -11,14 +11,14 @@ from ..errors import HairError
 
 
 def require_count(name: str, count: int, wanted: int) -> None:
-    """Raise `HairError` unless two counts that belong together are equal."""
+    """Raise `HairError` unless a count of items has the expected value; name: of the items."""
     if count != wanted:
         sentence = "Hair data does not match: {count} {name} instead of {wanted}. Regenerate the strands."
         raise HairError(sentence, name=name, count=count, wanted=wanted)
 
 
 def require_indices(name: str, indices: ArrayLike, count: int) -> None:
-    """Raise `HairError` unless every index (any shape, NumPy) is at least 0 and below a count."""
+    """Raise `HairError` unless all indices, of any shape, are in [0, count)."""
     indices = np.asarray(indices)
     if not indices.size:
         return

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Precompiled kernels of the extension; if none fit, Warp compiles them on first use as usual.
+"""Precompiled kernels of the extension; if none match, Warp compiles them on first use.
 
-`tools/compile_kernels.py` writes the folder: an index, and an object file for each Warp module and kind of processor. A
-module is loaded from it only if Warp and its compiler have the same version, the processor has every feature that the
-file was compiled for, and Warp's hash of the module's sources and options is the same. Nothing is written.
+`tools/compile_kernels.py` writes the folder: an index, and an object file for each Warp module and processor type. A
+module is loaded only if the versions of Warp and its compiler match, the processor supports all features that the file
+was compiled for, and Warp's hash of the module's sources and options matches. The folder is only read.
 """
 
 import hashlib
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import warp as wp
 
-VARIABLE = "VELLUS_KERNELS"  # of the environment: names another folder, as of a checkout, whose build has one
+VARIABLE = "VELLUS_KERNELS"  # environment variable with another folder, for example of a checkout's build
 FOLDER = Path(os.environ.get(VARIABLE) or Path(__file__).resolve().parents[3] / "kernels")
 INDEX = "index.json"
 
@@ -24,7 +24,7 @@ _PACKAGE = __name__.removesuffix("core.kernels.compiled_kernels")  # prefix of W
 
 
 def load(module: "wp.Module", device: "wp.Device") -> bool:
-    """Load a Warp module's compiled kernels on the processor; whether there were any that fit."""
+    """Load a Warp module's precompiled kernels on the CPU; returns whether there were matching ones."""
     if not device.is_cpu:
         return False
     processor, modules = _fitting(FOLDER)
@@ -34,7 +34,7 @@ def load(module: "wp.Module", device: "wp.Device") -> bool:
     binary, meta = (FOLDER / path for path in file_names(short_name(module), processor))
     if digests.get(processor, "") != digest(binary, meta):
         return False
-    # One thread is a block on the processor.
+    # On the CPU a block has one thread.
     module.load(device, block_dim=1, binary_path=binary, meta_path=meta)
     return True
 
@@ -45,20 +45,20 @@ def short_name(module: "wp.Module") -> str:
 
 
 def file_names(module_name: str, processor: str) -> tuple[str, str]:
-    """Paths in the folder of a module's object file and of its metadata."""
+    """Return the relative paths of a module's object file and metadata."""
     return f"{processor}/{module_name}.o", f"{module_name}.meta"
 
 
 def digest(binary: Path, meta: Path) -> str | None:
-    """SHA-256 of a module's two files in hexadecimal digits, or None where one of them is missing."""
+    """Return the SHA-256 of a module's two files in hexadecimal digits, None if a file is missing."""
     try:
         return hashlib.sha256(binary.read_bytes() + meta.read_bytes()).hexdigest()
-    except (OSError, ValueError):  # ValueError: a name that no file can have
+    except (OSError, ValueError):  # ValueError: an invalid file name
         return None
 
 
 def compiler() -> dict[str, Any]:
-    """What must be the same where kernels are compiled and where they are loaded."""
+    """Return the versions that must match between compiling and loading kernels."""
     import warp as wp
 
     context = _warp_context()
@@ -70,29 +70,28 @@ def compiler() -> dict[str, Any]:
 
 
 def processor_features() -> set[str]:
-    """Names of the features of this machine's processor, as LLVM calls them."""
+    """Return LLVM's names of this processor's features."""
     return _warp_context()._get_cpu_feature_set()
 
 
 def _warp_context():
-    # Not public, and without a public alternative. The bundled version is pinned, and `_fitting` asks
-    # for it before anything else.
+    # A private API without a public alternative. The bundled version is pinned, and `_fitting` checks it first.
     import warp as wp
     from warp._src import context
 
-    wp.init()  # neither is known before
+    wp.init()  # versions and features are unknown before
     return context
 
 
 @cache
 def _fitting(folder):
-    """(best kind of processor that this one is, {module: (hash, {processor: digest})}); ("", {}) for none."""
+    """Return (best matching processor type, {module: (hash, {processor: digest})}); ("", {}) for none."""
     import warp as wp
 
     try:
         made_by, processors, modules = _read_index(folder)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        return "", {}  # there is none, or what there is was not written by tools/compile_kernels.py
+        return "", {}  # missing, or not written by tools/compile_kernels.py
     if made_by.get("warp") != wp.config.version or made_by != compiler():
         return "", {}
     features = processor_features()
@@ -103,7 +102,7 @@ def _fitting(folder):
 
 
 def _read_index(folder):
-    """(compiler, [(processor, its features)], {module: (hash, digests)}); raises what another shape brings about."""
+    """Return (compiler, [(processor, its features)], {module: (hash, digests)}); raises for invalid content."""
     index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
     processors = [(str(kind["name"]), frozenset(kind["features"])) for kind in index["processors"]]
     entries = {name: (str(entry["hash"]), dict(entry["files"])) for name, entry in index["modules"].items()}

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays that another program owns, by their address."""
+"""Arrays in memory of another program, by address."""
 
 import numpy as np
 import warp as wp
 
 
 def at(address: int, count: int) -> np.ndarray:
-    """(count,) float32 in the processor's memory from an address on, where as many must have their place.
+    """Return a view (count,) float32 of CPU memory at an address, which must be valid for `count` numbers.
 
-    It is valid as long as the other program leaves that memory where it is.
+    The view is valid until the other program moves or frees the memory.
     """
     if not count:
         return np.empty(0, np.float32)

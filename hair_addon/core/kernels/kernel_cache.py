@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Loading and launching of Warp kernels, with a cache of compiled kernels that may be damaged, read-only or full.
 
-Precompiled kernels of the extension are used if they fit, then those of the cache that are whole
-(`kernel_entries`). If Warp's own folder is not writable, a folder of the user in the system's temporary folder is
-used. The cache holds native code: its folder never comes from a .blend.
+Matching precompiled kernels of the extension are preferred, then intact entries of the cache (`kernel_entries`). If
+Warp's own folder is not writable, a private folder in the system's temporary folder is used. The cache contains native
+code: its folder is never taken from a .blend file.
 """
 
 import contextlib
@@ -21,12 +21,12 @@ import warp as wp
 from ..errors import HairError
 from . import compiled_kernels, kernel_entries
 
-# Free bytes required in a folder before kernels are compiled into it, several times the size of all: Warp's
-# compiler crashes on a full disk.
+# Free bytes required before compiling into a folder, several times the size of all kernels: Warp's compiler crashes
+# on a full disk.
 ROOM = 16 * 2**20
 
 _locks = defaultdict(threading.Lock)  # (module name, device alias) → held while the module is loaded
-_choosing = threading.Lock()  # held while another cache folder is chosen
+_choosing = threading.Lock()  # held while a cache folder is chosen
 _loaded = set()  # (module name, device alias)
 
 
@@ -38,7 +38,7 @@ def launch(
     device: wp.DeviceLike = None,
     block_dim: int = 256,
 ) -> None:
-    """`wp.launch` of a kernel whose module is loaded by `load`. Raises `HairError` as that does."""
+    """`load` a kernel's module and call `wp.launch`. Raises `HairError` like `load`."""
     load(device, kernel.module)
     wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device=device, block_dim=block_dim)
 
@@ -46,15 +46,15 @@ def launch(
 def prepared(
     kernel: wp.Kernel, dim: int | Sequence[int], inputs: Sequence[Any], device: wp.DeviceLike = None
 ) -> wp.Launch:
-    """`launch` with everything done but the launch itself, whose method `launch` takes some microseconds of Python."""
+    """Prepare a launch; the returned object's `launch` method takes a few microseconds of Python."""
     load(device, kernel.module)
     return wp.launch(kernel, dim, inputs=inputs, device=device, record_cmd=True)
 
 
 def load(device: wp.DeviceLike, *modules: wp.Module) -> None:
-    """Load Warp modules on a device: seconds where they must be compiled, microseconds where they are loaded.
+    """Load Warp modules on a device: takes seconds if they must be compiled, microseconds if they are loaded.
 
-    Raises `HairError` where they can be neither loaded nor compiled.
+    Raises `HairError` if they can be neither loaded nor compiled.
     """
     device = wp.get_device(device)
     for module in modules:
@@ -64,7 +64,7 @@ def load(device: wp.DeviceLike, *modules: wp.Module) -> None:
 
 
 def is_loaded(device: wp.Device, module: wp.Module) -> bool:
-    """Whether `load` has loaded a module."""
+    """Return whether `load` has loaded a module."""
     return (module.name, device.alias) in _loaded
 
 
@@ -74,7 +74,7 @@ def lock_of(device: wp.Device, module: wp.Module) -> threading.Lock:
 
 
 def load_locked(device: wp.Device, module: wp.Module, compiling: Callable[[], None] = lambda: None) -> None:
-    """`load` of one module whose lock the caller holds; compiling: called before it is compiled, if it must be."""
+    """Load a module whose lock the caller holds; compiling: called before a compilation."""
     if is_loaded(device, module):
         return
     if not compiled_kernels.load(module, device) and not kernel_entries.load(device, module):
@@ -86,7 +86,7 @@ def load_locked(device: wp.Device, module: wp.Module, compiling: Callable[[], No
 def _compile(device, module):
     with _choosing:
         _find_room()
-    # Where the folder has just been left for another one, an earlier process may have compiled them there.
+    # If the folder has just changed, an earlier process may have compiled the kernels there.
     if kernel_entries.load(device, module):
         return
     try:
@@ -100,13 +100,13 @@ def _compile(device, module):
 
 
 def _find_room():
-    """Leave the cache folder for the temporary one unless kernels can be written there. Raises `HairError`."""
+    """Switch to the temporary folder if kernels cannot be written to the cache folder. Raises `HairError`."""
     if not _has_room(wp.config.kernel_cache_dir):
         _use_temporary_folder()
 
 
 def _has_room(folder):
-    """Whether a folder, made if missing, takes `ROOM` bytes. Quotas are known to no other question."""
+    """Return whether `ROOM` bytes can be written to a folder, created if missing; only writing detects quotas."""
     try:
         os.makedirs(folder, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
@@ -119,7 +119,7 @@ def _use_temporary_folder():
     before = wp.config.kernel_cache_dir
     try:
         folder = str(temporary_folder() / wp.config.version)
-    except OSError:  # there is no temporary folder either
+    except OSError:  # no temporary folder
         folder = before
     if folder == before or not _has_room(folder):
         raise HairError(
@@ -130,7 +130,7 @@ def _use_temporary_folder():
 
 
 def temporary_folder() -> Path:
-    """A folder that only this user can write, the same for each process; a new one if another user created that."""
+    """Return a folder that only this user can write, the same for all processes; a new one if it is not our own."""
     folder = Path(tempfile.gettempdir()) / f"vellus_kernels_{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
     with contextlib.suppress(FileExistsError):
         folder.mkdir(mode=0o700)
@@ -140,17 +140,17 @@ def temporary_folder() -> Path:
 
 
 def _initialize():
-    """Initialize Warp, which makes its cache folder and fails where it cannot."""
+    """Initialize Warp, which creates its cache folder, with the temporary folder as a fallback."""
     try:
         wp.init()
     except OSError:
         try:
-            wp.config.kernel_cache_dir = str(temporary_folder())  # to which Warp adds its version
+            wp.config.kernel_cache_dir = str(temporary_folder())  # Warp appends its version
             wp.init()
         except OSError as error:
             raise HairError("Kernels cannot be compiled: no folder for them can be written.") from error
-    # Warp asks its compiler once, on first use. Of two threads that ask together one may be given empty names,
-    # and compiles kernels again under another file name.
+    # Warp queries its compiler on first use, which is not thread-safe: a second thread may get empty names, and would
+    # compile kernels again under another file name.
     compiled_kernels.compiler()
     compiled_kernels.processor_features()
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Entries of Warp's cache: a module's compiled kernels beside a digest of them.
+"""Entries of Warp's cache: a module's compiled kernels with a digest.
 
-Kernels are native code: where a bit of them is another one they may end the process, or compute anything. So an entry
-is loaded if its digest is that of its files, and compiled again otherwise, as is one without a digest. A digest
-guards against damage alone: who may write the cache is trusted.
+Kernels are native code: a damaged file may crash the process or compute wrong results. An entry is therefore loaded
+only if its digest matches its files; otherwise, and without a digest, it is compiled again. The digest guards against
+damage only: users with write access to the cache are trusted.
 
-A module is compiled into a folder of its own, loaded from there, and then moved to its place, file by file, the digest
-last. No process removes what another may be about to load.
+A module is compiled into a temporary folder, loaded from there, and then moved to its place, file by file, the digest
+last. No process removes files that another one may be about to load.
 """
 
 import tempfile
@@ -16,16 +16,16 @@ import warp as wp
 
 from . import compiled_kernels
 
-_DIGEST = ".sha256"  # beside the compiled file, whose name tells its processor, its GPU and its compiler
+_DIGEST = ".sha256"  # appended to the compiled file's name, which includes processor or GPU, and compiler
 
 
 def is_whole(device: wp.Device, module: wp.Module) -> bool:
-    """Whether the cache has kernels of a module as they were compiled for a device."""
+    """Return whether the cache has intact kernels of a module for a device."""
     return _is_whole(*_files(device, module, _place(device, module)))
 
 
 def load(device: wp.Device, module: wp.Module) -> bool:
-    """Load a module's kernels from the cache; whether it had any, whole, that Warp takes."""
+    """Load a module's kernels from the cache; returns whether there were intact ones that Warp accepts."""
     files = _files(device, module, _place(device, module))
     if not _is_whole(*files):
         return False
@@ -38,34 +38,34 @@ def load(device: wp.Device, module: wp.Module) -> bool:
 
 
 def compile_anew(device: wp.Device, module: wp.Module) -> None:
-    """Compile a module, load it, and put it into the cache if that takes it. Raises whatever Warp does."""
+    """Compile a module, load it, and move it to the cache if possible. Raises Warp's exceptions."""
     place = _place(device, module)
     with tempfile.TemporaryDirectory(dir=place.parent, prefix="vellus_", ignore_cleanup_errors=True) as folder:
-        made = Path(folder) / place.name
-        binary, meta = _files(device, module, made)
+        temporary = Path(folder) / place.name
+        binary, meta = _files(device, module, temporary)
         try:
-            # `force_load` would compile into the place itself, which another process may be reading.
+            # `force_load` would compile into the final place, which another process may be reading.
             module._compile(
-                device, made, binary.name, module._get_compile_arch(device), options=_options(device, module)
+                device, temporary, binary.name, module._get_compile_arch(device), options=_options(device, module)
             )
             _digest_of(binary).write_text(compiled_kernels.digest(binary, meta) or "", encoding="ascii")
             _load(device, module, binary, meta)
         except Exception:
-            module.unload()  # it keeps the failure, and would raise it again once the cause is gone
+            module.unload()  # otherwise the module would raise the same error again after the cause is gone
             raise
-        _publish(made, place)
+        _publish(temporary, place)
 
 
-def _publish(made, place):
-    """Move files to where other processes find them; they stay where they are if they cannot be moved."""
+def _publish(temporary, place):
+    """Move files to their place in the cache, if possible."""
     try:
         if place.is_symlink() or (place.exists() and not place.is_dir()):
             place.unlink()
         place.mkdir(exist_ok=True)
-        for path in sorted(made.iterdir(), key=lambda path: path.suffix == _DIGEST):
+        for path in sorted(temporary.iterdir(), key=lambda path: path.suffix == _DIGEST):
             path.replace(place / path.name)
     except OSError:
-        return  # they are loaded; the next process compiles them again
+        return  # the kernels are loaded; the next process compiles them again
 
 
 def _load(device, module, binary, meta):
@@ -87,12 +87,12 @@ def _is_whole(binary, meta):
 
 
 def _place(device, module):
-    """The folder of a module's compiled kernels, of all devices that have blocks of the same size."""
+    """Return the folder of a module's compiled kernels, shared by devices with the same block size."""
     return Path(wp.config.kernel_cache_dir) / module.get_module_identifier(_block_dim(device, module))
 
 
 def _files(device, module, folder):
-    """Paths of the compiled file and of its metadata in a module's folder."""
+    """Return the paths of the compiled file and of its metadata in a module's folder."""
     block_dim = _block_dim(device, module)
     return folder / module._get_compile_output_name(device, block_dim=block_dim), folder / module._get_meta_name(
         block_dim
@@ -104,10 +104,10 @@ def _digest_of(binary):
 
 
 def _options(device, module):
-    module.get_module_hash(_block_dim(device, module))  # which resolves them
+    module.get_module_hash(_block_dim(device, module))  # resolves the options
     return module.resolved_options[_block_dim(device, module)]
 
 
 def _block_dim(device, module):
-    # One thread is a block on the processor.
+    # On the CPU a block has one thread.
     return 1 if device.is_cpu else module.options["block_dim"]

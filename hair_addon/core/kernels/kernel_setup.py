@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Loading of several Warp modules: compiled on several threads if needed, each module once.
+"""Loading of several Warp modules, compiled on several threads if needed, each module once.
 
-Warp's compiler releases the GIL. Callers on different threads share the work: they wait for modules that another
-thread is compiling, after all others.
+Warp's compiler releases the GIL. Concurrent callers share the work: each compiles free modules first, and waits for the
+modules of other threads last.
 """
 
 import atexit
@@ -35,11 +35,10 @@ def load(
     progress: Progress = no_progress,
     most_threads: int = MOST_THREADS,
 ) -> None:
-    """Load Warp modules on a device: seconds where they must be compiled, microseconds where they are loaded already.
+    """Load Warp modules on a device: takes seconds if they must be compiled, microseconds if they are loaded.
 
-    progress(step, part): told which part of the modules is loaded; may raise to stop, which ends the threads after the
-    module that each of them has begun. Raises `HairError` as `kernel_cache.load` does, and `Stopped` where Python ends
-    meanwhile.
+    progress(step, part): receives the fraction of loaded modules; may raise to cancel, which ends the threads after
+    their present modules. Raises `HairError` like `kernel_cache.load`, and `Stopped` if Python exits meanwhile.
     """
     import warp as wp
 
@@ -47,7 +46,7 @@ def load(
     missing = [module for module in modules if not kernels.kernel_cache.is_loaded(device, module)]
     if not missing:
         return
-    if not device.is_cpu:  # NVIDIA's compiler, on this thread, whose context it needs
+    if not device.is_cpu:  # NVIDIA's compiler needs the context of this thread
         are_compiled = all(kernels.kernel_entries.is_whole(device, module) for module in missing)
         progress(LOADING if are_compiled else COMPILING, 0.0)
         kernels.kernel_cache.load(device, *missing)
@@ -61,30 +60,30 @@ def load(
         loading.end()
     if loading.errors:
         raise loading.errors[0]
-    if loading.part < 1.0:  # Python ends
+    if loading.part < 1.0:  # Python exits
         raise Stopped
 
 
 def is_under_way() -> bool:
-    """Whether modules are being loaded."""
+    """Return whether modules are being loaded."""
     return bool(_under_way)
 
 
 def processor_count() -> int:
-    """Number of CPUs that this process may use, at least one."""
+    """Return the number of CPUs available to this process, at least one."""
     if hasattr(os, "process_cpu_count"):  # since Python 3.13
         return os.process_cpu_count() or 1
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _thread_count(most):
-    """Number of threads to start: as many as CPUs, minus those already loading; at least one."""
+    """Return the number of threads to start: one for each CPU, minus threads already loading; at least one."""
     others = sum(loading.thread_count for loading in tuple(_under_way))
     return max(1, min(most, processor_count() - others))
 
 
 class _Loading:
-    """Modules that are being loaded by some threads."""
+    """Modules that are loaded by several threads."""
 
     def __init__(self, modules, device):
         self.errors = []
@@ -97,7 +96,7 @@ class _Loading:
 
     @property
     def part(self):
-        """The part of the modules that is loaded."""
+        """Fraction of the modules that are loaded."""
         return len(self._done) / self._count
 
     @property
@@ -107,21 +106,21 @@ class _Loading:
 
     def begin(self, thread_count):
         _under_way.add(self)
-        # Daemons: Blender does not wait for them before it asks them to end.
+        # Daemon threads: Blender would wait for others before it runs `_end_all`.
         for _ in range(thread_count):
             thread = threading.Thread(target=self._run, name="vellus", daemon=True)
             thread.start()
             self._threads.append(thread)
 
     def is_running(self, seconds):
-        """Wait for the threads with a timeout [s]; returns whether any is still running."""
+        """Wait for a thread with a timeout [s]; returns whether any was still running."""
         running = next((thread for thread in self._threads if thread.is_alive()), None)
         if running is not None:
             running.join(seconds)
         return running is not None
 
     def end(self):
-        """Start no other module, and wait for the threads."""
+        """Start no further module, and wait for the threads."""
         self._is_stopped.set()
         for thread in self._threads:
             thread.join()
@@ -131,16 +130,16 @@ class _Loading:
         try:
             for module, lock in self._free_ones_first():
                 with lock:
-                    if self._is_stopped.is_set():  # while this thread waited for the one that has the module
+                    if self._is_stopped.is_set():  # while waiting for the lock
                         return
-                    kernels.kernel_cache.load_locked(self._device, module, self._say_compiling)
+                    kernels.kernel_cache.load_locked(self._device, module, self._set_compiling)
                 self._done.append(module)
         except Exception as error:  # re-raised in the caller of `load`
             self.errors.append(error)
             self._is_stopped.set()
 
     def _free_ones_first(self):
-        """Modules that no thread has begun, each with its lock; those that others are loading come last."""
+        """Yield modules with their locks: first free ones, then modules that other threads are loading."""
 
         busy = []
         while self._pending and not self._is_stopped.is_set():
@@ -155,12 +154,12 @@ class _Loading:
                 yield module, lock
         yield from busy
 
-    def _say_compiling(self):
+    def _set_compiling(self):
         self.is_compiling = True
 
 
 @atexit.register
 def _end_all():
-    """Stop before Python exits: the compiler must not run when its library is unloaded."""
+    """Stop all threads before Python exits: the compiler must not run when its library is unloaded."""
     for loading in tuple(_under_way):
         loading.end()

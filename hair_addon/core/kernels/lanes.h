@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Vectors that one source is compiled with for both kinds of device: WIDTH numbers in Clang's vectors on a processor,
-// whose threads are few; one number on a GPU, whose threads are lanes of a vector already.
+// Vector types for code that is compiled for CPU and GPU: WIDTH numbers in Clang's vectors on the CPU; one number on a
+// GPU, whose threads are lanes of a vector already.
 //
-// Included at the head of a function's body, so all of it is local to that function. Operators and `?:` act on each
-// lane. WIDTH, of numbers in a vector, stands before it.
+// Included at the top of a function's body, so that everything is local to the function. Operators and `?:` act on
+// each lane. WIDTH must be defined before.
 //
-// A lane's result is the same bits in any company and on any processor. So no compiler may fuse a multiplication and an
-// addition as it likes (`fp contract` stays off): where it saves time, `fused(a, b, c)` is a b + c, rounded once. It is
-// an instruction of GPUs and of processors since 2013; on older ones it takes ten times as long as the two.
+// A lane's result is bit-identical for any contents of other lanes and on any processor. Compilers may therefore not
+// fuse multiplications and additions (`fp contract` stays off). Where it saves time, `fused(a, b, c)` is a b + c,
+// rounded once: an instruction of GPUs and of CPUs since 2013, ten times slower than two instructions on older ones.
 
 #if defined(__CUDA_ARCH__)
   constexpr int LANES = 1;
@@ -22,7 +22,7 @@
   const auto sqrt_of = [](lanes value) { return sqrtf(value); };
   const auto inverse_root_of = [](lanes value) { return rsqrtf(value); };
   const auto abs_of = [](lanes value) { return fabsf(value); };
-  // Rounded to the nearest, also where a module's option `fast_math` approximates roots and divisions.
+  // Correctly rounded, even if a module's option `fast_math` approximates roots and divisions.
   const auto exact_sqrt_of = [](lanes value) { return __fsqrt_rn(value); };
   const auto exact_quotient_of = [](lanes a, lanes b) { return __fdiv_rn(a, b); };
   const auto fused = [](lanes a, lanes b, lanes c) { return __fmaf_rn(a, b, c); };
@@ -49,8 +49,8 @@
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
   const auto fused = [](lanes a, lanes b, lanes c) { return __builtin_elementwise_fma(a, b, c); };
 #else
-  // In double precision the product is exact and the sum is rounded once. To round it again gives another number only
-  // where the sum is halfway between two floats, or too small for a float's 24 bits: then slowly, as it is exact.
+  // In double precision the product is exact and the sum is rounded once. A second rounding, to single precision, can
+  // differ only if the sum is halfway between two floats or subnormal: these rare cases use the exact, slow function.
   typedef float four_floats __attribute__((ext_vector_type(4)));
   typedef double four_doubles __attribute__((ext_vector_type(4)));
   typedef long long four_longs __attribute__((ext_vector_type(4)));

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""C++ and CUDA that Warp compiles into kernels, read from files beside the modules that declare the functions.
+"""C++ and CUDA source of Warp's native functions, read from files beside the modules that declare them.
 
-Warp writes a native function's signature from its Python declaration, so a file holds the body alone; its head lists
-the parameters. A body for the processor ends in `.cpp`, one for the GPU in `.cu`, what bodies share in `.h`.
+Warp generates a native function's signature from its Python declaration, so a file contains only the body; a comment
+at its top lists the parameters. Files for the CPU end in `.cpp`, for the GPU in `.cu`, shared headers in `.h`.
 """
 
 import re
@@ -16,9 +16,9 @@ _FUNCTION = re.compile(r"^(\w+) (\w+)\(([^)]*)\)\n\{$", re.MULTILINE)
 def body(module_file: str, name: str, texts: Mapping[str, str] | None = None, /, **constants: int | float) -> str:
     """Return the source of a function's body for `wp.func_native`.
 
-    module_file: the `__file__` of the module that declares it; name: of the file beside it. constants (int or float)
-    stand before it under their names, as `constexpr`. `#include "x.h"` is replaced by that file, of the module's folder
-    or of this one, or by a text of `texts`; a .strand file once, its functions as lambdas (strand_language.h).
+    module_file: `__file__` of the declaring module; name: of the file beside it; constants: prepended as `constexpr`.
+    `#include "x.h"` is replaced by an entry of `texts`, or by the file in the module's folder or in this one. A .strand
+    file is included once, with its functions converted to lambdas (strand_language.h).
     """
     folders = Path(module_file).parent, Path(__file__).parent
     texts, seen = texts or {}, set()
@@ -38,10 +38,10 @@ def body(module_file: str, name: str, texts: Mapping[str, str] | None = None, /,
 
 
 def _lambda(function):
-    """C++ of the head of a function that is written as in GLSL."""
+    """Convert the head of a GLSL function to a C++ lambda."""
     kind, name, parameters = function.groups()
-    there = ", ".join(_parameter(parameter.strip()) for parameter in parameters.split(",") if parameter.strip())
-    return f"const auto {name} = [&]({there}) ALWAYS_INLINE -> {kind} {{"
+    converted = ", ".join(_parameter(parameter.strip()) for parameter in parameters.split(",") if parameter.strip())
+    return f"const auto {name} = [&]({converted}) ALWAYS_INLINE -> {kind} {{"
 
 
 def _parameter(text):
@@ -52,5 +52,5 @@ def _parameter(text):
 
 
 def _declaration(name, value):
-    """C++ of a constant: `constexpr int LANES = 8;`."""
+    """Return the C++ declaration of a constant, such as `constexpr int LANES = 8;`."""
     return f"constexpr int {name} = {value};" if isinstance(value, int) else f"constexpr float {name} = {value!r}f;"

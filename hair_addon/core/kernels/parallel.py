@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kernels on all cores of the processor, and memory that is quick to fill.
+"""Kernel launches on all cores of the CPU, and arrays that are fast to fill.
 
-A launch of Warp on the processor is a loop on one core, during which Python's other threads may run. So rows are shared
-among threads, each with a launch of its own. `launch` is for rows that do not depend on each other, `launch_shares` for
-sums over rows. On a GPU either is one launch.
+A Warp launch on the CPU is a loop on one core, which releases the GIL. Rows are therefore divided among threads, each
+with its own launch. `launch` is for independent rows, `launch_shares` for sums over rows. On a GPU both are one launch.
 """
 
 import itertools
@@ -18,20 +17,20 @@ import warp as wp
 from . import kernel_cache, kernel_setup
 from .checks import require_count
 
-PARTS_PER_CORE = 2  # for load balancing, as one core may have other work
-UNEVEN_PARTS_PER_CORE = 4  # where some parts may take longer than others
+PARTS_PER_CORE = 2  # for load balancing, because a core may have other work
+UNEVEN_PARTS_PER_CORE = 4  # if parts may take unequal times
 LEAST_ROWS = 4096  # fewer are not worth a thread
-MOST_SHARES = 8  # of sums, each in memory of its own
+MOST_SHARES = 8  # of sums, each in its own memory
 
 
 @dataclass(frozen=True)
 class Rows:
-    """An array of which thread i of a kernel touches row i alone."""
+    """An array of which thread i of a kernel accesses only row i."""
 
     array: wp.array
 
     def part(self, first: int, end: int) -> wp.array:
-        """Some of the rows."""
+        """Return the rows from `first` to `end`."""
         return self.array if end - first == len(self.array) else self.array[first:end]
 
 
@@ -46,35 +45,34 @@ def launch(
 ) -> None:
     """Run a kernel, one thread per row. inputs: `Rows`, and arguments shared by all threads; outputs: arrays of rows.
 
-    least_rows: fewer are not worth a thread of the processor. under_way: called when all threads are about to begin,
-    which need nothing of Python from then on until the end: whoever holds the interpreter does not keep them waiting.
-    Raises `HairError` where an array has another number of rows.
+    least_rows: fewer are not worth a CPU thread; under_way: called when all threads are about to begin; from then on
+    they do not need the GIL until the end. Raises `HairError` if an array has another number of rows.
     """
     device = wp.get_device(device)
-    given = [*inputs, *map(Rows, outputs)]
-    for rows in given:
+    values = [*inputs, *map(Rows, outputs)]
+    for rows in values:
         if isinstance(rows, Rows):
             require_count("rows", len(rows.array), row_count)
     if row_count == 0:
         return
     core_count = _core_count(device)
-    # A thread that takes a second part has to come back to Python for it.
+    # A thread needs the GIL to take a second part.
     most = core_count * (PARTS_PER_CORE if under_way is None else 1)
     part_count = min(most, row_count // least_rows) if core_count > 1 else 1
 
     def arguments(_part, first, end):
-        return [value.part(first, end) if isinstance(value, Rows) else value for value in given]
+        return [value.part(first, end) if isinstance(value, Rows) else value for value in values]
 
     _launch_parts(kernel, arguments, row_count, max(1, part_count), device, under_way)
 
 
 def share_count(row_count: int, device: wp.DeviceLike, least_rows: int = LEAST_ROWS) -> int:
-    """How many shares `launch_shares` should be given outputs for."""
+    """Return the number of shares, each with its own outputs, for `launch_shares`."""
     return max(1, min(_core_count(wp.get_device(device)), MOST_SHARES, row_count // least_rows))
 
 
 def part_count(row_count: int, device: wp.DeviceLike, least_rows: int = LEAST_ROWS) -> int:
-    """How many shares `launch_shares` should have where it has no outputs of each, and rows may take unlike times."""
+    """Return the number of shares for `launch_shares` with common outputs, if rows may take unequal times."""
     core_count = _core_count(wp.get_device(device))
     most = core_count * UNEVEN_PARTS_PER_CORE if core_count > 1 else 1
     return max(1, min(most, row_count // least_rows))
@@ -83,9 +81,9 @@ def part_count(row_count: int, device: wp.DeviceLike, least_rows: int = LEAST_RO
 def launch_shares(
     kernel: wp.Kernel, row_count: int, inputs: list[Any], outputs: list[list[Any]], device: wp.DeviceLike
 ) -> None:
-    """Run a kernel that adds to its outputs, on as many shares of rows as there are lists of output arrays.
+    """Run a kernel that adds to its outputs, with one share of rows for each list of output arrays.
 
-    The kernel's last input is the first row of its share; its thread i is row i of the share.
+    The kernel's last input is the first row of its share; thread i processes row i of the share.
     """
 
     def arguments(share, first, _end):
@@ -95,12 +93,12 @@ def launch_shares(
 
 
 def _core_count(device):
-    """How many launches run at once on a device."""
+    """Return the number of simultaneous launches on a device."""
     return kernel_setup.processor_count() if device.is_cpu else 1
 
 
 def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=None):
-    """Launch a kernel on parts of the rows, on as many threads as cores; arguments(part, first, end) are a part's."""
+    """Launch a kernel on parts of the rows, with a thread for each core; arguments(part, first, end): of a part."""
     if part_count == 1:
         if under_way is not None:
             under_way()
@@ -112,7 +110,7 @@ def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=No
         first, end = bounds[part : part + 2]
         kernel_cache.launch(kernel, dim=end - first, inputs=arguments(part, first, end), device=device)
 
-    kernel_cache.load(device, kernel.module)  # once, not by each thread
+    kernel_cache.load(device, kernel.module)  # once, before the threads start
     if under_way is not None:
         parts = zip(range(part_count), bounds, bounds[1:], strict=False)
         prepared = [
@@ -130,7 +128,7 @@ def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=No
 
 
 def _on_threads(run, part_count, thread_count):
-    """Call run(part) for each part on so many threads. This is one of them, as another takes long to begin."""
+    """Call run(part) for each part on several threads, including the present one, because threads start slowly."""
     parts = itertools.count()
 
     def run_parts():
@@ -141,11 +139,11 @@ def _on_threads(run, part_count, thread_count):
         others = [pool.submit(run_parts) for _ in range(thread_count - 1)]
         run_parts()
     for other in others:
-        other.result()  # where its exception is raised again
+        other.result()  # re-raises the thread's exception
 
 
 def empty_vectors(shape: tuple[int, ...], device: wp.DeviceLike) -> wp.array:
-    """`wp.empty` of vec3; on the processor in NumPy's memory, which comes in large pages: filling it takes a third."""
+    """`wp.empty` of vec3; on the CPU in NumPy's memory with large pages, which is filled in a third of the time."""
     device = wp.get_device(device)
     if not device.is_cpu:
         return wp.empty(shape, dtype=wp.vec3, device=device)
@@ -153,7 +151,7 @@ def empty_vectors(shape: tuple[int, ...], device: wp.DeviceLike) -> wp.array:
 
 
 def empty_for_results(shape: tuple[int, ...], device: wp.DeviceLike) -> wp.array:
-    """An array of vec3 in the processor's memory for a device's results: pinned, which a GPU fills faster."""
+    """Return an array of vec3 in CPU memory for a device's results: pinned for a GPU, for faster transfers."""
     if wp.get_device(device).is_cpu:
         return empty_vectors(shape, "cpu")
     return wp.empty(shape, dtype=wp.vec3, device="cpu", pinned=True)

@@ -1,29 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Launches that come again as they were: a GPU records them once, as a CUDA graph, and repeats them by one call.
+"""Recording of repeated kernel launches as a CUDA graph, which is replayed by one call.
 
-From Python a launch takes longer than many a kernel does.
+A launch from Python takes longer than many kernels.
 """
 
 from collections.abc import Callable, Hashable
 
 import warp as wp
 
-_MOST = 64  # sequences that are kept, before all are forgotten
+_MOST = 64  # sequences, beyond which the cache is cleared
 
 
 class Replays:
-    """Sequences of launches on one device, each under a key that says all that it depends on."""
+    """Recorded sequences of launches on one device, by keys that include all that a sequence depends on."""
 
     def __init__(self, device: wp.DeviceLike) -> None:
         self._device = wp.get_device(device)
-        self._is_refused = False  # by the driver
+        self._is_refused = False  # whether the driver rejected a recording
         self._known: dict[Hashable, wp.Graph | None] = {}  # None for a sequence that has run once
 
     def run(self, key: Hashable, launch: Callable[[], None]) -> None:
-        """Run a sequence of launches: from the third time on, repeat what the second one recorded.
+        """Run a sequence of launches: the second run is recorded, further runs replay the recording.
 
-        key: equal only where `launch` would launch the same kernels with the same values and arrays, whose contents may
-        be others. launch: launches kernels that are loaded, and neither allocates nor copies between devices.
+        key: equal only if `launch` launches the same kernels with the same values and arrays, whose contents may
+        differ; launch: launches loaded kernels, and neither allocates nor copies between devices.
         """
         graph = self._known.get(key)
         if graph is None:
@@ -38,11 +38,11 @@ class Replays:
 
     @property
     def is_recording(self) -> bool:
-        """Whether launches are recorded: on a GPU whose driver does not refuse to."""
+        """Whether launches are recorded: on a GPU whose driver supports it."""
         return self._device.is_cuda and not self._is_refused
 
     def _recorded(self, launch):
-        """The launches as a graph, none of which has run; None where the driver does not record them."""
+        """Record launches as a graph without running them; returns None if the driver does not support it."""
         try:
             wp.capture_begin(self._device, force_module_load=False)
         except RuntimeError:

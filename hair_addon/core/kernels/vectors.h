@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Vectors of three numbers a lane. Stands after lanes.h in a function's body.
+// Vectors of three numbers per lane. To be included after lanes.h in a function's body.
 
 struct vector {
   lanes x, y, z;

@@ -21,7 +21,7 @@ from ...kernels.parallel import Rows
 from .closed_parts import outward, rims
 from .rigid_motion import STILL, RigidMotion, largest
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 FARTHEST = 1.0e6  # [m] from the origin

@@ -11,7 +11,7 @@ import warp as wp
 from ...kernels import native_code
 from .nearest_surface import BACK, Hit, Surface, crossed, nearest
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 BLOCK = 64  # threads of a GPU: of 256, which look for as long as the slowest, a multiprocessor has few at once
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "block_dim": BLOCK})
 

@@ -23,7 +23,7 @@ from ...kernels.parallel import Rows
 from . import rod_solver
 from .rods import Rods
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 SHORTEST = 1e-5  # [m] of a guide that is simulated with a shape of its own

@@ -19,7 +19,7 @@ from .material import Material
 from .rod_solver import RodArrays, Step, Surroundings
 from .settings import DynamicsSettings
 
-# Nothing differentiates this kernel, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 # What a substep reads and the groom, material and roots do not say.
