@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pipeline as functions of arrays: guide distribution and growth, hair generation."""
+"""The grooming pipeline as functions of arrays: guide distribution and growth, guide tools, hair generation."""
 
 from typing import TYPE_CHECKING
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides derived from hair: strands that stand for the others, fitted so that interpolation reproduces the hair."""
+"""Guides derived from hair: representative strands, fitted so that interpolation reproduces the hair."""
 
 from dataclasses import dataclass, replace
 
@@ -15,13 +15,13 @@ from ..params import Settings, param
 from . import following, groom
 from .groom import HairSettings
 
-_STEPS = 4  # of the fit: lengths that are kept, and guides that are left out, are no linear matter
-_MOST_FITTED = 30_000  # strands that the fit looks at, evenly chosen
+_STEPS = 4  # of the fit: preserved lengths and excluded guides make it nonlinear
+_MOST_FITTED = 30_000  # strands in the fit, evenly chosen
 
 
 @dataclass(frozen=True)
 class DerivationSettings(Settings):
-    """Guides for hair that is there."""
+    """Settings of guides derived from existing hair."""
 
     guide_count: int = param(
         400,
@@ -35,12 +35,11 @@ class DerivationSettings(Settings):
 
 @dataclass(frozen=True)
 class DerivedGuides:
-    """Guides of some hair, and how closely they reproduce it.
+    """Guides of existing hair, and the errors of its reproduction.
 
-    guides: `Strands` (G, P) on the processor; sources: (G,) the strands that they stand at, none of guides that came
-    with the hair; binding: of all strands to
-    them; guide_map: (S, k) int32 guides, -1 for none, and float32 weights of each strand; errors: (S,) root mean square
-    distance between the points of a strand and of its reproduction, as a part of the strand's length.
+    guides: `Strands` (G, P) on the CPU; sources: (G,) strands at whose roots they are, empty for given guides; binding:
+    of all strands to the guides; guide_map: (S, k) int32 guides, -1 for none, and float32 weights of each strand;
+    errors: (S,) root mean square distance between the points of a strand and its reproduction, relative to its length.
     """
 
     guides: Strands
@@ -51,12 +50,12 @@ class DerivedGuides:
 
     @property
     def mean_error(self) -> float:
-        """The root mean square of all errors."""
+        """Root mean square of all errors."""
         return float(np.sqrt(np.mean(np.square(self.errors))))
 
     @property
     def high_error(self) -> float:
-        """The error that 95 % of the strands stay below."""
+        """The 95th percentile of the errors."""
         return float(np.percentile(self.errors, 95.0))
 
 
@@ -70,10 +69,10 @@ def derive(
     is_mirrored: bool = False,
     progress: Progress = no_progress,
 ) -> DerivedGuides:
-    """`DerivedGuides` of strands (S, P, 3) float32 [m] with a length, rooted at S `SurfacePoints` of a checked mesh.
+    """Derive guides from strands (S, P, 3) float32 [m] of positive length, rooted at `SurfacePoints` of a checked mesh.
 
-    settings: completed, by which hair is interpolated; is_mirrored: as of `groom.bind_hair`. Strands that begin off the
-    surface are reproduced from their roots on it.
+    settings: completed, for the interpolation; is_mirrored: as in `groom.bind_hair`. Strands that begin off the surface
+    are reproduced from their roots on it. Returns `DerivedGuides`. Raises `HairError`.
     """
     groom.load_kernels("cpu", part_of(progress, 0.0, 0.1))
     progress("Choosing guides", 0.1)
@@ -97,7 +96,7 @@ def derive(
     for step in range(_STEPS):
         fitting("Fitting guides", step / _STEPS)
         stretches = found.stretches
-        if not np.isfinite(stretches).all():  # single precision does not hold them so far from the surface
+        if not np.isfinite(stretches).all():  # single precision overflows far from the surface
             raise HairError("The curves are too small or too far away for the surface: check the scales of both.")
         present = interpolation.guide_fitting.fitted(binding, found.weights, rooted, present, chosen, stretches)
         found = _Reproduction(binding, guides_of(present), points, scale)
@@ -116,7 +115,7 @@ def reproduced(
     is_mirrored: bool = False,
     progress: Progress = no_progress,
 ) -> DerivedGuides:
-    """`DerivedGuides` of strands that came with guides, which stay as they are; other arguments as of `derive`."""
+    """Return `DerivedGuides` with given guides, which are not changed; other arguments as in `derive`."""
     groom.load_kernels("cpu", part_of(progress, 0.0, 0.5))
     binding = groom.bind_hair(mesh, guides, settings, roots=roots, is_mirrored=is_mirrored)
     found = _Reproduction(binding, guides, points, lengths(points))
@@ -124,7 +123,7 @@ def reproduced(
 
 
 class _Reproduction:
-    """What interpolation makes of guides, beside the strands (S, P, 3) that it is to be; scale: (S,) their lengths."""
+    """Strands interpolated from guides, compared to the strands (S, P, 3) to be reproduced; scale: (S,) lengths."""
 
     def __init__(self, binding, guides, strands, scale):
         self._binding, self.guides = binding, guides
@@ -136,7 +135,7 @@ class _Reproduction:
 
     @property
     def stretches(self):
-        """(S,) float64: how much longer strands are for their kept lengths."""
+        """Factors (S,) float64 by which `keep_length` stretches the strands."""
         binding = replace(self._binding, keep_length=0.0)
         plain = lengths(following.strands_now(binding, self.guides, self.weights).numpy())
         with np.errstate(invalid="ignore"):

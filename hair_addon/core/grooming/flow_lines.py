@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flow lines: polylines on a surface whose direction guides begin along.
+"""Flow lines: polylines on a surface that determine the initial direction of guides.
 
-The direction at a root is a mean of the lines' directions with the weights of Eq. 9 [Report12], sigma being the
-distance to the nearest line. So on a line its own direction holds, and between lines it changes without a step. Where
-lines oppose each other, and far from all lines, guides turn to the surface normal. How far a line acts follows from the
-lines' spacing.
+The direction at a root is a mean of the lines' directions with the weights of Eq. 9 [Report12], with the distance to
+the nearest line as sigma. On a line, guides follow the line; between lines, the direction is continuous. Where lines
+oppose each other, and far from all lines, guides follow the surface normal. The reach of a line depends on the spacing
+of lines.
 """
 
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from ..geometry import closest_point
 from ..geometry.mesh import TriMesh, positions
 from ..interpolation import part_lines
 
-_PIECES = 64  # to the square root of the surface's area: how finely a line is laid on it
-_DECIDED = 0.5  # length of the mean direction, 1 where lines agree, from which guides are turned all the way
-_ROOM = 1 << 20  # distances that are computed at a time
+_PIECES = 64  # resolution of lines: pieces per square root of the surface's area
+_DECIDED = 0.5  # length of the mean direction (1 where lines agree) above which guides turn completely
+_ROOM = 1 << 20  # distances in a batch
 
 
 @dataclass(frozen=True)
 class FlowLines:
     """Pieces of lines on a surface.
 
-    starts, ends: (N, 3) float64 [m]; reaches: (N,) [m], distance up to which each acts in full, and to twice which it
-    acts at all; step: length [m] of the longest pieces.
+    starts, ends: (N, 3) float64 [m]; reaches: (N,) [m], distance of full effect, which fades to zero at twice the
+    distance; step: length [m] of the longest pieces.
     """
 
     starts: np.ndarray
@@ -40,10 +40,10 @@ class FlowLines:
 def lay(
     mesh: TriMesh, segments: ArrayLike, device: wp.DeviceLike = "cpu", drawn_on: np.ndarray | None = None
 ) -> FlowLines:
-    """The `FlowLines` of segments (L, 2, 3) [m] near a checked mesh; one that begins where the last ended goes on.
+    """Project segments (L, 2, 3) [m] onto a checked mesh → `FlowLines`; consecutive segments that touch form a line.
 
-    drawn_on: the vertices (V, 3) that the segments are near to, if others than the mesh's: the surface as it is posed.
-    Raises `HairError`.
+    drawn_on: (V, 3) vertices of the posed surface on which the segments were drawn, None for the mesh's own. Raises
+    `HairError`.
     """
     segments = np.asarray(segments, np.float64)
     if segments.ndim != 3 or segments.shape[1:] != (2, 3) or not len(segments):
@@ -68,9 +68,9 @@ def lay(
 
 
 def axes(lines: FlowLines, places: np.ndarray, normals: np.ndarray, lift: float) -> np.ndarray:
-    """Unit (G, 3) directions that guides begin in: at roots (G, 3) [m] with unit normals (G, 3).
+    """Return the initial unit directions (G, 3) of guides at roots (G, 3) [m] with unit normals (G, 3).
 
-    lift: angle [rad] to the surface near lines, from 0 to a right angle; elsewhere guides begin along their normals.
+    lift: angle [rad] to the surface near lines, in [0, π/2]; far from lines guides start along their normals.
     """
     normals = normals.astype(np.float64)
     mean, share = _mean_directions(lines, places.astype(np.float64))
@@ -82,8 +82,8 @@ def axes(lines: FlowLines, places: np.ndarray, normals: np.ndarray, lift: float)
 
 
 def _mean_directions(lines, places):
-    """((G, 3) weighted means of unit directions, (G,) share from 0 to 1 of the lines in each guide's direction)."""
-    along = lines.ends - lines.starts  # unit directions, times the length that weighs them
+    """Return ((G, 3) weighted means of unit directions, (G,) influence of the lines on each guide, in [0, 1])."""
+    along = lines.ends - lines.starts  # unit directions weighted by length
     lengths = np.linalg.norm(along, axis=1)
     mean, share = np.empty((len(places), 3)), np.empty(len(places))
     for rows in _blocks(len(places), len(lengths)):
@@ -99,35 +99,35 @@ def _mean_directions(lines, places):
 
 
 def _reaches(lines, step):
-    """(L,) [m]: how far each line is from the others where it is farthest, but no more than its own length."""
+    """Return the reach (L,) [m] of each line: its largest distance to other lines, at most its own length."""
     reaches = []
     for number, (starts, ends) in enumerate(lines):
         reach = np.linalg.norm(ends - starts, axis=1).sum()
         others = lines[:number] + lines[number + 1 :]
         if others:
-            there = np.concatenate(others, axis=1)
-            nearest = [_distances(starts[rows], *there).min(axis=1) for rows in _blocks(len(starts), there.shape[1])]
+            pieces = np.concatenate(others, axis=1)
+            nearest = [_distances(starts[rows], *pieces).min(axis=1) for rows in _blocks(len(starts), pieces.shape[1])]
             reach = min(reach, max(part.max() for part in nearest))
         reaches.append(max(reach, 2.0 * step))
     return np.array(reaches)
 
 
 def _distances(places, starts, ends):
-    """(G, N) distances from places (G, 3) to segments."""
+    """Return distances (G, N) from places (G, 3) to segments."""
     along = ends - starts
     squared = np.einsum("ni,ni->n", along, along)
-    center = starts.mean(axis=0)  # so that nothing is lost far from the origin
+    center = starts.mean(axis=0)  # preserves precision far from the origin
     places, starts = places - center, starts - center
     progress = places @ along.T - np.einsum("ni,ni->n", starts, along)
     part = np.clip(progress / squared, 0.0, 1.0)
     to_starts = np.einsum("gi,gi->g", places, places)[:, None] - 2.0 * places @ starts.T
     to_starts += np.einsum("ni,ni->n", starts, starts)
-    # |x - s - part a|², without a table of vectors
+    # |x - s - part a|², without an array of vectors
     return np.sqrt(np.maximum(to_starts + part * (part * squared - 2.0 * progress), 0.0))
 
 
 def _blocks(row_count, column_count):
-    """Slices of rows, of which a table with these columns takes little memory."""
+    """Return slices of rows that limit the memory of a table with a number of columns."""
     size = max(_ROOM // column_count, 1)
     return [slice(first, first + size) for first in range(0, row_count, size)]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands computed from their guides: all of them, in other threads, or some. Combing repeats this without a search.
+"""Evaluation of strands from their guides: all strands, in other threads, or some. Combing repeats only this.
 
 Warp is imported late, because the import is slow.
 """
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from ..interpolation.guide_weights import GuideWeights
     from ..styling.stack import Styling
 
-# Seconds for other threads to prepare their kernels at most, and to start them, before this one takes the GIL again:
-# what it does then may hold the GIL for longer than the kernels take.
+# Maximum time for other threads to prepare their kernels, and time to start them [s], before this thread takes the GIL
+# again, which it may hold for longer than the kernels run.
 PREPARATION, HEAD_START = 0.02, 0.0005
 
-_AS_BOUND = np.eye(3)  # the axes of a binding itself
+_AS_BOUND = np.eye(3)  # the binding's own axes
 
 
 def strands_now(
@@ -39,13 +39,12 @@ def strands_now(
     out: "wp.array2d[wp.vec3] | None" = None,
     under_way: Callable[[], None] | None = None,
 ) -> "wp.array2d[wp.vec3]":
-    """Return (S, P) vec3 [m] on the binding's device: strands for the guides as combed now.
+    """Return strands (S, P) vec3 [m] on the binding's device for the present guides: weighted sums, then styles.
 
-    It computes the weighted sum, and applies styles to it. `follow_some` does the same for some of the strands.
+    `follow_some` does the same for some of the strands.
 
-    guides: as strands follow them, which are those of `Styling.guides` for styled strands; weights: from `weights_now`
-    for the same guides; out: array to fill and return, None for a new one; under_way: called when the strands' kernels
-    run, before styles.
+    guides: from `Styling.guides` for styled strands; weights: from `weights_now` for the same guides; out: array to
+    fill and return, None for a new one; under_way: called when the kernels of the weighted sums run.
     """
     points = _weighted_sum(binding, guides, weights, out, under_way)
     if styling is not None:
@@ -55,7 +54,7 @@ def strands_now(
 
 
 def _weighted_sum(binding, guides, weights, out=None, under_way=None):
-    # A kernel given memory of another device reads garbage, or causes an error that affects its whole device.
+    # Memory of another device would give wrong results, or an error that affects the whole device.
     guide_points = guides.points.to(binding.positions.device)
     return interpolation.interpolation.interpolate(
         binding.positions,
@@ -70,18 +69,18 @@ def _weighted_sum(binding, guides, weights, out=None, under_way=None):
 
 
 def combed(guides: Strands, before: Strands) -> np.ndarray | None:
-    """Indices (M,) of guides that were combed since; None where they are others, or rooted elsewhere."""
+    """Return the indices (M,) of guides that changed since `before`; None if counts or roots differ."""
     has_same_roots = guides.roots is before.roots or guides.roots.is_same(before.roots)
     if guides.points.shape != before.points.shape or not has_same_roots:
         return None
     is_other = guides.numpy() != before.numpy()
     if np.count_nonzero(is_other) > len(is_other):
         return np.flatnonzero(is_other.any(axis=(1, 2)))
-    return np.unique(np.flatnonzero(is_other) // is_other[0].size)  # for few: half the time
+    return np.unique(np.flatnonzero(is_other) // is_other[0].size)  # half the time for few changes
 
 
 def follow_guides(binding: HairBinding, guides: Strands, styling: "Styling | None" = None) -> Strands:
-    """Strands of a binding for the guides as they are combed now, with styles."""
+    """Return the strands of a binding for the present guides, with styles."""
     guides = guides if styling is None else styling.guides(guides)
     return Strands(strands_now(binding, guides, weights_now(binding, guides), styling), binding.roots)
 
@@ -94,39 +93,38 @@ def growing_points(
     out: np.ndarray | None = None,
     styling: "Styling | None" = None,
 ) -> Future[np.ndarray]:
-    """A future of the points of `follow_guides`, (S, P, 3) float32 in the processor's memory.
+    """Return a future of the points of `follow_guides`, (S, P, 3) float32 in CPU memory.
 
-    They are computed in other threads, so that this one can do what it has to do with something else. guides, weights
-    and styling: as in `strands_now`; axes: (3, 3) by which points are multiplied; out: such an array to fill, None for
-    a new one.
+    They are computed in other threads. guides, weights and styling: as in `strands_now`; axes: (3, 3) matrix by which
+    points are multiplied; out: array to fill, None for a new one.
     """
     import warp as wp
 
     strand_count, device = len(binding.positions), binding.positions.device
     if out is None:
-        there = kernels.parallel.empty_for_results((strand_count, guides.point_count), device)
-        out = there.numpy()
+        result = kernels.parallel.empty_for_results((strand_count, guides.point_count), device)
+        out = result.numpy()
     else:
         require_count("points", out.size, 3 * strand_count * guides.point_count)
-        there = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)
+        result = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)
 
     is_under_way = threading.Event()
 
     def grow():
         if device.is_cpu:
-            strands_now(binding, guides, weights, styling, there, is_under_way.set)
+            strands_now(binding, guides, weights, styling, result, is_under_way.set)
         else:
-            made = strands_now(binding, guides, weights, styling)
+            on_device = strands_now(binding, guides, weights, styling)
             is_under_way.set()
-            wp.copy(there, made)
+            wp.copy(result, on_device)
             wp.synchronize_device(device)
         geometry.transform.transformed(out, axes, out)
         return out
 
-    with_a_thread = ThreadPoolExecutor(1, "vellus")
-    growing = with_a_thread.submit(grow)
-    with_a_thread.shutdown(wait=False)  # its thread ends with its work
-    growing.add_done_callback(lambda _done: is_under_way.set())  # after an error, too
+    executor = ThreadPoolExecutor(1, "vellus")
+    growing = executor.submit(grow)
+    executor.shutdown(wait=False)  # the thread ends with its work
+    growing.add_done_callback(lambda _done: is_under_way.set())  # also after an error
     is_under_way.wait(PREPARATION)
     time.sleep(HEAD_START)
     return growing
@@ -139,10 +137,10 @@ def follow_some(
     axes: np.ndarray = _AS_BOUND,
     styling: "Styling | None" = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(M, P, 3) float32, the points that `growing_points` gives some strands, and (M, k) float32, their weights.
+    """Return points (M, P, 3) float32 of some strands, as `growing_points`, and their weights (M, k) float32.
 
-    No others are computed but the centres of their clumps. guides and styling: as in `strands_now`; chosen: (M,)
-    indices of strands, such as `guide_weights.Reach` finds for the guides that moved.
+    Only these strands and the centres of their clumps are computed. guides and styling: as in `strands_now`; chosen:
+    (M,) indices of strands, for example from `guide_weights.Reach` for moved guides.
     """
     read = [] if styling is None else styling.centres_of(chosen)
     levels = [] if styling is None else styling.levels
@@ -155,7 +153,7 @@ def follow_some(
 
 
 def weights_now(binding: HairBinding, guides: Strands) -> "GuideWeights":
-    """The `GuideWeights` by which strands follow the guides as combed now."""
+    """Return the `GuideWeights` of strands for the present guides."""
     _require_guides(binding, guides)
     guide_points = guides.points.to(binding.positions.device)
     return interpolation.guide_weights.limited(
@@ -171,10 +169,10 @@ def _require_guides(binding, guides):
 
 
 def _sums_of_some(parts, guides):
-    """Weighted sums for some strands of bindings to the same guides by the same settings, all in one pass.
+    """Compute weighted sums for some strands of several bindings to the same guides and settings in one pass.
 
-    parts: pairs of a binding and (M,) indices of its strands. Returns a list of (M, P) vec3, one of each part, and the
-    weights of the guides of all, float32.
+    parts: pairs of a binding and (M,) indices of its strands. Returns a list of (M, P) vec3, one for each part, and
+    the guide weights of all strands, float32.
     """
     import warp as wp
 
@@ -189,11 +187,11 @@ def _sums_of_some(parts, guides):
         rows = [rows_here(array_of(own), chosen) for own, chosen in parts]
         return wp.array(np.concatenate(rows), dtype=kind, device=device, copy=False)
 
-    # Few strands have no need of all guides.
+    # Few strands need only some of the guides.
     indices = np.concatenate([rows_here(own.guide_weights.indices, chosen) for own, chosen in parts])
     is_followed = np.zeros(len(guides) + 1, bool)
     is_followed[indices] = True
-    is_followed[-1] = False  # where there is none, index -1
+    is_followed[-1] = False  # index -1 stands for no guide
     followed, places = np.flatnonzero(is_followed), (np.cumsum(is_followed) - 1)[indices]
     places[indices < 0] = -1
     guide_points, guide_normals = (
@@ -225,7 +223,7 @@ def _sums_of_some(parts, guides):
 
 
 def _rows_between(points, first, end):
-    """Some rows of a Warp array, which Warp itself gives if there are any."""
+    """Return a range of rows of a Warp array; Warp's slices may not be empty."""
     import warp as wp
 
     none = wp.empty((0, points.shape[1]), dtype=wp.vec3, device=points.device)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Section 2 of [Report12] as two functions: `distribute_guides` and `bind_hair`, with their settings.
 
-`bind_hair` is all that depends on where guides are rooted: roots, neighbours, weights. `following.follow_guides` makes
-strands of it, and is what combing repeats. The stages need Warp, which takes long to import, so they are imported late.
+`bind_hair` computes everything that depends on the guides' roots: strand roots, neighbours, weights.
+`following.follow_guides` evaluates strands, and is repeated by combing. Warp is slow to import, so the stages are
+imported late.
 """
 
 import math
@@ -33,7 +34,7 @@ POINT_COUNT = 41  # [Report12] section 2.2
 
 @dataclass(frozen=True)
 class GuideSettings(Settings):
-    """Distribution and growth of guides."""
+    """Settings of the distribution and growth of guides."""
 
     guide_count: int = param(
         400,
@@ -108,14 +109,12 @@ class GuideSettings(Settings):
         unit="ROTATION",
         subtype="ANGLE",
     )
-    drape: bool = param(
-        False, "Let the guides fall as they grow, until they rest on the surface; it takes up to a second"
-    )
+    drape: bool = param(False, "Let the guides fall as they grow until they rest on the surface; takes up to a second")
 
 
 @dataclass(frozen=True)
 class HairSettings(Settings):
-    """Number of strands between the guides, and their interpolation."""
+    """Settings of strands: their number and their interpolation between guides."""
 
     strand_count: int = param(
         60_000,
@@ -234,15 +233,15 @@ def distribute_guides(
     device: str = "cpu",
     progress: Progress = no_progress,
 ) -> Strands:
-    """Guides, evenly placed and grown: (guide_count, POINT_COUNT) strands; `dynamics.draped_growth` lets them fall.
+    """Place guides evenly and grow them: (guide_count, POINT_COUNT) `Strands`; `dynamics.draped_growth` drapes them.
 
-    mesh: `TriMesh` [m]; settings: `GuideSettings`; those that are None follow from the mesh (groom_defaults.py);
-    density: (V,) per vertex, at least 0, or None for uniform; texture: `Texture` that multiplies it, or None;
-    mirror: by which symmetric guides are; shape: `TriMesh` that was turned and
-    scaled evenly to be `mesh`, its mirror across the X axis: guides are placed on it, and so in the same places however
-    it was turned and scaled; None where there is none; roots: `SurfacePoints` that guides have already, None to place
-    them; flow: (L, 2, 3) segments [m] of flow lines and drawn_on (V, 3), as lines and drawn_on of `bind_hair`;
-    progress(step, part): told how far the work is, and may raise to stop it.
+    mesh: `TriMesh` [m]; settings: `GuideSettings`; values of None are computed from the mesh (groom_defaults.py);
+    density: (V,) of vertices, at least 0, None for uniform; texture: `Texture` that is multiplied with it, or None;
+    mirror: for symmetric guides; shape: `TriMesh` of which `mesh` is a rotated and uniformly scaled copy, mirrored
+    across the X axis: guides are placed on it, and thus in the same places for any rotation and scale, None for `mesh`;
+    roots: existing `SurfacePoints` of guides, None to place them; flow: (L, 2, 3) segments [m] of flow lines, and
+    drawn_on (V, 3): as lines and drawn_on of `bind_hair`; progress(step, part): callback, may raise to cancel. Raises
+    `HairError`.
     """
     check_mesh(mesh)
     load_kernels(device, part_of(progress, 0.0, 0.1))
@@ -301,15 +300,15 @@ def bind_hair(
     device: str = "cpu",
     progress: Progress = no_progress,
 ) -> HairBinding:
-    """Roots of the strands and the guides that each follows; depends on the guides' roots, not on their shape.
+    """Place strands and bind them to guides; the result depends on the guides' roots, not on their shapes.
 
-    mesh: `TriMesh` [m] with the guides' roots on it; settings: `HairSettings`; density and texture as in
-    `distribute_guides`, and of the strands alone: those that the guides were placed by are not known here;
-    regions: tuple of `Regions` that no strand mixes guides of; lines: (L, 2, 3) segments [m] near the surface that no
-    strand mixes guides across, one that begins where the last ended going on, or None; drawn_on: (V, 3) vertices that
-    the part lines are near to, if not the mesh's own; shape as in `distribute_guides`; roots: `SurfacePoints` that
-    strands have already, None to place them; is_mirrored: whether the mesh's triangles are wound the other way than
-    where roots are stored, by which strands are known.
+    mesh: `TriMesh` [m] with the guides' roots on it; settings: `HairSettings`; density and texture: of strands, as in
+    `distribute_guides`; regions: `Regions` across which strands do not blend guides; lines: (L, 2, 3) segments [m] of
+    part lines near the surface, across which strands do not blend guides (consecutive segments that touch form a line),
+    or None; drawn_on: (V, 3) vertices of the posed surface on which the part lines were drawn, None for the mesh's own;
+    shape: as in `distribute_guides`; roots: existing `SurfacePoints` of strands, None to place them; is_mirrored:
+    whether the mesh's triangles are wound opposite to those of the stored roots, which identify strands. Raises
+    `HairError`.
     """
     check_mesh(mesh)
     check_points(mesh, guides.roots)
@@ -339,7 +338,7 @@ def laid_lines(
     device: str = "cpu",
     progress: Progress = no_progress,
 ) -> "PartLines | None":
-    """`PartLines` of segments near a surface, None for none; arguments as in `bind_hair`."""
+    """Return the `PartLines` of segments near a surface, None without segments; arguments as in `bind_hair`."""
     if lines is None:
         return None
     _load_kernels(device, [interpolation.part_lines], progress)
@@ -347,9 +346,9 @@ def laid_lines(
 
 
 def load_kernels(device: str, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS) -> None:
-    """Load the kernels that guides and hair without styles launch, which are compiled where they never were.
+    """Load the kernels of guides and of hair without styles, which are compiled on first use.
 
-    device, progress: as in `distribute_guides`; most_threads: that compile at once. Microseconds once they are loaded.
+    device, progress: as in `distribute_guides`; most_threads: of compilation. Takes microseconds if they are loaded.
     """
     progress(kernel_setup.LOADING, 0.0)
     on_device = [
@@ -382,7 +381,7 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
 def load_later_kernels(
     device: str, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS
 ) -> None:
-    """Load the kernels that styles and moving surfaces launch, as `load_kernels` does; same arguments."""
+    """Load the kernels of styles and moving surfaces; arguments as in `load_kernels`."""
     later = [styling.steps, styling.stack, styling.guide_lean, geometry.transform]
     _load_kernels(device, later, progress, most_threads)
 
@@ -394,6 +393,6 @@ def _load_kernels(device, modules, progress, most_threads=kernel_setup.MOST_THRE
 
 
 def strand_radii(settings: HairSettings) -> np.ndarray:
-    """(point_count,) float32 [m]: radius along every strand, from `radius` at the root to its `tip_taper` part."""
+    """Return the radii (point_count,) float32 [m] along each strand, from `radius` to `radius` × `tip_taper`."""
     radius = groom_defaults.known(settings.radius)
     return np.linspace(radius, radius * settings.tip_taper, settings.point_count, dtype=np.float32)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The size of new hair where its settings do not give it: lengths, and gravity, that follow from the surface.
+"""Default lengths and gravity of new hair, computed from the surface.
 
-All lengths are fractions of the square root of the area that hair grows on, so a surface of twice the size gets hair
-of twice the length and thickness, and looks the same. The shape of that area sets the fractions. Closed surfaces
-(a sphere, an animal) and flat ones (a plane) get fur: short, thick and stiff. A dome (a scalp) gets long and thin hair,
-which hangs, as on a human head. Numbers of guides and strands follow from nothing: as all lengths are fractions of one
-size, the same number covers a surface of any size equally. Strands are thicker where there are fewer, so that 600 in
-brows are seen: as thick as in proportion to the mean distance of their roots. DECISIONS.md has the figures.
+All lengths are fractions of the square root of the area that hair grows on: a surface of twice the size gets hair of
+twice the length and thickness, and looks the same. The fractions depend on the shape of the area. Closed surfaces (a
+sphere, an animal) and flat ones (a plane) get fur: short, thick and stiff. A dome (a scalp) gets long, thin, hanging
+hair, as on a human head. The numbers of guides and strands are constant: because all lengths scale with the surface,
+the same number covers a surface of any size equally. Fewer strands are thicker, in proportion to the mean distance of
+their roots, so that 600 strands of brows are visible. DECISIONS.md has the figures.
 """
 
 from dataclasses import dataclass, replace
@@ -28,18 +28,18 @@ FUR_RADIUS, DOME_RADIUS = 6.0e-4, 1.65e-4
 FUR_GRAVITY, DOME_GRAVITY = 0.3, 0.75
 
 TYPICAL_GUIDE_COUNT = 400
-TYPICAL_STRAND_COUNT = 60_000  # that the radii above are for
-MOST_THICKENED = 10.0  # how many times thicker few strands are
-STOUTEST = 1.0 / 50.0  # radius by length: even few strands stay slender
-INFLUENCE = 2.0  # by the mean spacing of guides
+TYPICAL_STRAND_COUNT = 60_000  # of the radii above
+MOST_THICKENED = 10.0  # largest factor of thickness for few strands
+STOUTEST = 1.0 / 50.0  # largest radius / length
+INFLUENCE = 2.0  # in mean spacings of guides
 
-_MASK_SAMPLES = 20_000  # points at which an image is read to find how much of a surface it leaves
-_SMALLEST, _LARGEST = 1e-7, 1e3  # [m]: what Blender's properties of these settings can hold
+_MASK_SAMPLES = 20_000  # samples of an image for the fraction of the surface that it covers
+_SMALLEST, _LARGEST = 1e-7, 1e3  # [m]: range of Blender's properties of these settings
 
 
 @dataclass(frozen=True)
 class HairSize:
-    """What follows from a surface, by the names of the settings: lengths [m], and gravity from 0 to 1."""
+    """Defaults computed from a surface, with the names of settings: lengths [m], and gravity in [0, 1]."""
 
     length: float
     gravity: float
@@ -54,19 +54,18 @@ def hair_size(
     guide_count: int = TYPICAL_GUIDE_COUNT,
     strand_count: int = TYPICAL_STRAND_COUNT,
 ) -> HairSize:
-    """The `HairSize` for a surface.
+    """Return the `HairSize` for a surface.
 
-    mesh: `TriMesh` [m], as it stands in the world; density: (V,) weights per vertex, or None; texture: `Texture` that
-    multiplies them, or None. Together they are the mask: a weight of one half counts for half of the area.
-    guide_count: the number of guides, for the influence distance; strand_count: of strands, for the radius. Raises
-    `HairError` where the mesh or what is left of it has no area.
+    mesh: `TriMesh` [m] in world space; density: (V,) weights of vertices, or None; texture: `Texture` that is
+    multiplied with them, or None; a mask weight of 0.5 counts half of the area; guide_count: for the influence
+    distance; strand_count: for the radius. Raises `HairError` if the masked mesh has no area.
     """
     check_mesh(mesh)
     weights = _mean_weights(mesh, density, texture)
     area = float(weights @ mesh.areas)
     if not area > 0.0:
         raise HairError("The density is zero on every face: paint weight where hair should grow.")
-    # One for a plane, one half for a hemisphere, zero for a closed surface.
+    # 1 for a plane, 0.5 for a hemisphere, 0 for a closed surface.
     flatness = min(float(np.linalg.norm(weights @ mesh.scaled_normals)) / (2.0 * area), 1.0)
     dome = (4.0 * flatness * (1.0 - flatness)) ** 2
     size = np.sqrt(area)
@@ -82,7 +81,7 @@ def hair_size(
 
 
 def grown_area(mesh: TriMesh, density: np.ndarray | None = None, texture: Texture | None = None) -> float:
-    """The area [m²] that hair grows on; arguments as in `hair_size`."""
+    """Return the area [m²] that hair grows on; arguments as in `hair_size`."""
     return float(_mean_weights(mesh, density, texture) @ mesh.areas)
 
 
@@ -93,7 +92,7 @@ def complete(
     texture: Texture | None = None,
     guide_count: int = TYPICAL_GUIDE_COUNT,
 ) -> S:
-    """`GuideSettings` or `HairSettings` with open settings computed by `hair_size`; same arguments."""
+    """Return `GuideSettings` or `HairSettings` with values of None computed by `hair_size`; same arguments."""
     missing = [name for name in from_surface(type(settings)) if getattr(settings, name) is None]
     if not missing:
         return settings
@@ -103,14 +102,14 @@ def complete(
 
 
 def known(value: float | None) -> float:
-    """A setting that `complete` has found by the surface. Raises `HairError` where it has yet to."""
+    """Return a setting that `complete` has computed. Raises `HairError` for None."""
     if value is None:
         raise HairError("Length, gravity or radius is not set: call groom_defaults.complete first.")
     return value
 
 
 def _mean_weights(mesh, density, texture):
-    """(F,) in [0, 1]: the mean of the mask over each triangle."""
+    """Return the mean (F,) of the mask over each triangle, in [0, 1]."""
 
     density = np.minimum(geometry.sampling.check_density(mesh, density), 1.0)
     if texture is None:
@@ -124,7 +123,7 @@ def _mean_weights(mesh, density, texture):
 
 
 def _centers_of_pieces(n):
-    """(n², 3) float32 barycentric coordinates: the centers of the equal triangles that n - 1 cuts a side make."""
+    """Return barycentric coordinates (n², 3) float32 of the centers of n² equal parts of a triangle."""
     i, j = (grid.ravel() for grid in np.indices((n, n)))
     upright, inverted = i + j < n, i + j < n - 1
     first = np.concatenate([i[upright] + 1 / 3, i[inverted] + 2 / 3]) / n
@@ -137,5 +136,5 @@ def _between(low, high, part):
 
 
 def _rounded(value):
-    """To three digits: single precision, in which Blender keeps it, gives them back exactly."""
+    """Round to three digits, which survive Blender's storage in single precision."""
     return float(f"{min(max(value, _SMALLEST), _LARGEST):.2e}")

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a groom passes from the surface that it was saved with to another one: which way suits the two, and its masks.
+"""Transfer of a saved groom to another surface: choice of the method, and transfer of masks.
 
-A copy of the surface, turned, scaled and moved, takes its guides exactly. Otherwise roots keep their UV coordinates,
-where both surfaces have a UV map and these agree about what is where; or they go to the nearest surface when the boxes
-around both are laid over each other.
+A similar copy of the surface takes the guides exactly. Otherwise roots keep their UV coordinates if both surfaces have
+UV maps of the same layout; else they move to the nearest surface after alignment of the bounding boxes.
 """
 
 from dataclasses import dataclass
@@ -19,18 +18,18 @@ from .groom_transfer import Ground, Places
 
 METHODS = ("AUTO", "UV", "NEAREST")
 
-_SAME = 1e-3  # of the surface's size: how far vertices of a copy may be from where a similarity takes them
-_LEAST_KEPT = 0.9  # part of the guides that UV maps of the same layout place
-_MOST_STRETCH = 0.25  # of the roots' spread: how far they may be from any similarity where the layouts agree
-_REACH = 0.05  # of the surface's size: how far a root, or a mask, may be from it
+_SAME = 1e-3  # largest deviation of a copy from a similarity, relative to the surface's size
+_LEAST_KEPT = 0.9  # least fraction of guides that UV maps of the same layout place
+_MOST_STRETCH = 0.25  # largest RMS deviation from a similarity for UV maps that agree, relative to the roots' spread
+_REACH = 0.05  # largest distance of a root or a mask from the surface, relative to the surface's size
 _OUTSIDE = 1e-3  # of a UV layout's size
 
 
 @dataclass(frozen=True)
 class Passage:
-    """The `Places` of guides on another surface, and how they were found.
+    """The `Places` of guides on another surface, and the method of the transfer.
 
-    method: "COPY", "UV" or "NEAREST"; warp: of space, from the source to the target, None by UV.
+    method: "COPY", "UV" or "NEAREST"; warp: from the source's to the target's space, None for "UV".
     """
 
     method: str
@@ -39,9 +38,9 @@ class Passage:
 
 
 def passage(source: Ground, target: Ground, roots: SurfacePoints, method: str = "AUTO") -> Passage:
-    """The `Passage` of guides with roots (G) on the source; method: one of `METHODS`. Raises `HairError`.
+    """Return the `Passage` of guides with roots (G) on the source; method: one of `METHODS`. Raises `HairError`.
 
-    "AUTO" takes the first that applies: a copy, UV maps that agree, the nearest surface.
+    "AUTO" uses the first method that applies: a copy, UV maps that agree, the nearest surface.
     """
     if method not in METHODS:
         raise HairError(f"method must be one of {', '.join(METHODS)}, not {method}.")
@@ -57,7 +56,7 @@ def passage(source: Ground, target: Ground, roots: SurfacePoints, method: str = 
 
 
 def _copied(source, target, roots):
-    """The `Passage` to a mesh of the same triangles that is turned, scaled and moved; None to any other."""
+    """Return the `Passage` to a similar mesh with the same triangles; None for another mesh."""
     if not np.array_equal(source.mesh.triangles, target.mesh.triangles):
         return None
     if len(source.mesh.vertices) != len(target.mesh.vertices):
@@ -72,7 +71,7 @@ def _copied(source, target, roots):
 
 
 def _by_agreeing_uv(source, target, roots):
-    """The `Passage` by UV maps; None where there is none, or they are of unlike layouts."""
+    """Return the `Passage` by UV maps; None if one is missing or the layouts differ."""
     if source.corner_uvs is None or target.corner_uvs is None:
         return None
     try:
@@ -92,10 +91,10 @@ def _by_agreeing_uv(source, target, roots):
 def carried_weights(
     source: Ground, target: Ground, weights: np.ndarray, warp: Warp | None, reach: float = _REACH
 ) -> np.ndarray:
-    """(W, K) float32 in [0, 1]: masks (V, K) of the source's vertices at the target's W vertices, 0 off the source.
+    """Transfer masks (V, K) of the source's vertices to the target's W vertices: (W, K) float32 in [0, 1].
 
-    warp: of space, from the source to the target, None by UV; reach: of the target's size, how far a vertex may be from
-    the source where that takes it.
+    warp: from the source's to the target's space, None for UV; reach: largest distance of a vertex from the warped
+    source, relative to the target's size; masks are 0 beyond it.
     """
     if warp is None:
         wanted, ground = _uv_places(target), _layout(source)
@@ -107,19 +106,19 @@ def carried_weights(
         reach *= float(np.ptp(target.mesh.vertices, axis=0).max())
     nearest = geometry.closest_point.SurfaceQuery(ground).nearest(wanted)
     is_near = np.linalg.norm(positions(ground, nearest) - wanted, axis=1) <= reach
-    there = interpolate(weights.astype(np.float32), ground, nearest)
-    return np.clip(np.where(is_near[:, None], there, 0.0), 0.0, 1.0).astype(np.float32)
+    sampled = interpolate(weights.astype(np.float32), ground, nearest)
+    return np.clip(np.where(is_near[:, None], sampled, 0.0), 0.0, 1.0).astype(np.float32)
 
 
 def _layout(ground):
-    """The UV map as a flat `TriMesh` with corners of its own."""
+    """Return the UV map as a flat `TriMesh` with separate corners."""
     flat = np.zeros((3 * len(ground.corner_uvs), 3), np.float32)
     flat[:, :2] = ground.corner_uvs.reshape(-1, 2)
     return TriMesh(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
 
 
 def _uv_places(ground):
-    """(V, 3) float32: the UV coordinates of a corner of each vertex, flat; far away for vertices of no face."""
+    """Return the UV coordinates (V, 3) float32 of a corner of each vertex, with z = 0; far away for loose vertices."""
     places = np.full((len(ground.mesh.vertices), 3), 1e6, np.float32)
     places[ground.mesh.triangles.ravel(), :2] = ground.corner_uvs.reshape(-1, 2)
     places[ground.mesh.triangles.ravel(), 2] = 0.0

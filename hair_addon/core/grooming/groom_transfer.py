@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides moved to another mesh of any topology: new roots by UV, by nearest surface or by landmarks.
+"""Transfer of guides to another mesh of any topology: new roots by UV, by nearest surface or by landmarks.
 
-A map of one surface to the other has a Jacobian J at each root. Guides are turned by the orthogonal part of J, a
-reflection where the map is one, and by the least rotation to the normal of the other surface. So a copy that is turned,
-scaled or mirrored carries the same groom.
+The map between the surfaces has a Jacobian J at each root. Guides are rotated by the orthogonal factor of J, which may
+be a reflection, and by the least rotation to the normal of the other surface. A rotated, scaled or mirrored copy
+thus gets the same groom.
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from ..geometry.landmark_warp import Warp
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, check_points, normals, positions
 from .guide_segments import rotations
 
-_OUTSIDE = 1e-3  # of a UV layout's size: a coordinate this far off all faces has still a place, on their border
+_OUTSIDE = 1e-3  # tolerance for coordinates outside all faces, relative to the UV layout's size
 
 
 @dataclass(frozen=True)
 class Ground:
-    """A mesh that guides leave or come to: `TriMesh` [m] and UV coordinates (F, 3, 2) of its corners, None for none."""
+    """The source or target mesh of a transfer: `TriMesh` [m] and UV coordinates (F, 3, 2) of its corners, or None."""
 
     mesh: TriMesh
     corner_uvs: np.ndarray | None = None
@@ -29,10 +29,10 @@ class Ground:
 
 @dataclass(frozen=True)
 class Places:
-    """New roots of guides, M of G that have found one.
+    """New roots of M of G guides.
 
-    kept: (M,) indices in rising order; roots: M `SurfacePoints`; turns: (M, 3, 3) orthogonal; scale: factor of lengths;
-    far_count: guides left out as no surface is near; other_side_count: as the surface there faces the other way.
+    kept: (M,) ascending indices; roots: M `SurfacePoints`; turns: (M, 3, 3) orthogonal; scale: factor of lengths;
+    far_count: guides dropped because no surface is near; other_side_count: because the surface faces the other way.
     """
 
     kept: np.ndarray
@@ -49,9 +49,10 @@ class Places:
 
 
 def places_by_uv(source: Ground, target: Ground, roots: SurfacePoints, scales: bool = True) -> Places:
-    """`Places` of the same UV coordinates; roots: G `SurfacePoints` of the source; scales: lengths with the surface.
+    """Return `Places` with equal UV coordinates; roots: G `SurfacePoints` of the source.
 
-    A coordinate in no face of the target has no place; of faces that overlap any may be found. Raises `HairError`.
+    scales: whether lengths scale with the surface. Coordinates outside the target's layout have no place; of
+    overlapping faces, any may be found. Raises `HairError`.
     """
     _check(source.mesh, target.mesh, roots)
     if source.corner_uvs is None or target.corner_uvs is None:
@@ -71,16 +72,16 @@ def places_by_uv(source: Ground, target: Ground, roots: SurfacePoints, scales: b
 def places_by_warp(
     source: TriMesh, target: TriMesh, roots: SurfacePoints, warp: Warp, reach: float = 0.05, scales: bool = True
 ) -> Places:
-    """`Places` nearest to where a `Warp` of space takes the roots; arguments as of `places_by_uv`.
+    """Return the `Places` closest to the roots mapped by a `Warp`; arguments as in `places_by_uv`.
 
-    reach: of the target's size, how far from it a root may be that finds a place. Raises `HairError`.
+    reach: largest distance of a mapped root from the target, relative to the target's size. Raises `HairError`.
     """
     _check(source, target, roots)
     at_roots = positions(source, roots)
     wanted = warp.places(at_roots)
     farthest = 0.1 * geometry.closest_point.FARTHEST
     if not np.abs(wanted).max() < farthest:  # also refuses NaN
-        raise HairError("The meshes cannot be laid over each other: check their scale and their landmarks.")
+        raise HairError("The meshes cannot be aligned: check their scale and their landmarks.")
     found = geometry.closest_point.SurfaceQuery(target).nearest(wanted)
     apart = np.linalg.norm(positions(target, found) - wanted, axis=1)
     is_near = apart <= reach * float(np.ptp(target.vertices, axis=0).max())
@@ -90,10 +91,10 @@ def places_by_warp(
 def carried(
     source: TriMesh, target: TriMesh, roots: SurfacePoints, points: np.ndarray, counts: np.ndarray, places: Places
 ) -> np.ndarray:
-    """(N, 3) float32 [m]: the points of the guides that have `Places`, curve after curve.
+    """Return the transferred points (N, 3) float32 [m] of the guides with `Places`, concatenated.
 
-    roots: `SurfacePoints` of all G guides; points: all of theirs [m], counts (G,) for each. A guide that begins off its
-    surface begins as far off the other.
+    roots: `SurfacePoints` of all G guides; points: of all guides [m], with counts (G,). The offset between a guide's
+    first point and its surface is transferred as well.
     """
     starts = geometry.strands.curve_offsets(counts)
     if len(counts) != len(roots) or starts[-1] != len(points):
@@ -114,7 +115,7 @@ def _check(source, target, roots):
 
 
 def _layout(corner_uvs):
-    """A UV layout as a flat `TriMesh`, of the same triangles. Raises `HairError`."""
+    """Return a UV layout as a flat `TriMesh` with the same triangles. Raises `HairError`."""
     flat = np.zeros((3 * len(corner_uvs), 3), np.float32)
     flat[:, :2] = corner_uvs.reshape(-1, 2)
     layout = TriMesh(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
@@ -124,9 +125,9 @@ def _layout(corner_uvs):
 
 
 def _uv_tangents(ground, triangles):
-    """(N, 3, 3): dP/du, dP/dv and the normal [m], as columns, in triangles (N,); (N,) bool, where these span space.
+    """Return ((N, 3, 3) columns dP/du, dP/dv and normal [m] of triangles (N,), (N,) bool: whether these span space).
 
-    The normal is as long as the other two are on average, so that areas scale it as lengths.
+    The normal has the geometric mean length of the tangents, so that it scales with lengths.
     """
     corners, uvs = ground.mesh.corners[triangles], ground.corner_uvs[triangles].astype(np.float64)
     edges, uv_edges = (np.swapaxes(array[:, 1:] - array[:, :1], 1, 2) for array in (corners, uvs))
@@ -144,7 +145,7 @@ def _uv_tangents(ground, triangles):
 
 
 def _kept(source, target, roots, derivatives, is_near, scales):
-    """`Places` of roots, (own, found), that are near, and where the surface faces as the mapped one does."""
+    """Return `Places` of the roots (own, found) that are near and face the same side as the mapped surface."""
     own, found = roots
     own_normals, found_normals = (normals(mesh, at).astype(np.float64) for mesh, at in ((source, own), (target, found)))
     left, _values, right = np.linalg.svd(derivatives)
@@ -164,7 +165,7 @@ def _kept(source, target, roots, derivatives, is_near, scales):
 
 
 def _stretches(derivatives, normals_there):
-    """(N,): the square root of how much a map enlarges areas at right angles to unit normals (N, 3)."""
+    """Return the square roots (N,) of a map's area factors perpendicular to unit normals (N, 3)."""
     # |cof(J) n|: the columns of the cofactor matrix are cross products of the columns of J.
     first, second, third = np.moveaxis(derivatives, 2, 0)
     cofactors = np.stack([np.cross(second, third), np.cross(third, first), np.cross(first, second)], axis=2)

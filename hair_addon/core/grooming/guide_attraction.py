@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Attraction of guides to the surface: they lie down along it, at a clearance above it, and keep their lengths."""
+"""Attraction of guides to the surface: they lie down along it at a clearance, with constant lengths."""
 
 import numpy as np
 import warp as wp
@@ -12,11 +12,11 @@ from ..kernels.parallel import Rows
 from .guide_segments import joined, only, split, turned
 from .guide_tool_settings import AttractSettings
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-STEPS = 6  # of the search for a segment's rise, each of which looks at the surface below its end
-CLOSE = 1e-4  # of a segment's length: its end is as high as it should be
+STEPS = 6  # of the search for a segment's rise; each queries the surface below its end
+CLOSE = 1e-4  # tolerance of the height, relative to a segment's length
 RAMP = 0.5  # rise per length at the root, until a guide reaches the clearance
 DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
 
@@ -24,11 +24,11 @@ DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
 def attracted(
     mesh: TriMesh, points: np.ndarray, normals: np.ndarray, settings: AttractSettings, weights: np.ndarray
 ) -> np.ndarray:
-    """(S, P, 3) float32 [m]: guides that lie closer to a checked `TriMesh`, and not under it; segments keep lengths.
+    """Return guides (S, P, 3) float32 [m] that are closer to a checked `TriMesh`, but not below it.
 
-    points (S, P, 3) [m]; normals (S, 3): unit, at the roots; weights (S,) in [0, 1]. First each guide is laid down, as
-    a path on the surface that turns to the sides as the guide does; then its segments turn toward those by their
-    shares; then what came too low is raised.
+    points (S, P, 3) [m]; normals (S, 3): unit, at the roots; weights (S,) in [0, 1]. Segments keep their lengths. Each
+    guide is laid down as a path on the surface with the same sideways bends; its segments turn toward this path by
+    their weights; segments below the surface are raised.
     """
     shares = settings.amount * np.asarray(weights, np.float64)
     directions, lengths = split(points)
@@ -38,15 +38,15 @@ def attracted(
     laid, _lengths = split(_march(query.mesh, mesh, points, normals, settings.clearance, lays_down=True))
     turned_down = joined(points, turned(directions, laid, shares[:, None]), lengths)
     kept = _march(query.mesh, mesh, turned_down, normals, settings.clearance, lays_down=False)
-    # The marches are of single precision: the lengths are the guides' own.
+    # The kernels use single precision: the exact lengths are restored.
     return only(points, joined(points, split(kept)[0], lengths), shares)
 
 
 def _march(surface, mesh, points, normals, clearance, lays_down):
-    """(S, P, 3) float32: strands laid down at the clearance, or those of their points raised that are below it."""
+    """Return strands (S, P, 3) float32 laid down at the clearance, or only raised to it where they are below."""
     require_count("normals", len(normals), len(points))
 
-    def there(array):
+    def shared(array):
         return wp.array(np.ascontiguousarray(array, np.float32), dtype=wp.vec3, device="cpu", copy=False)
 
     path = parallel.empty_vectors(points.shape[:2], "cpu")
@@ -55,9 +55,9 @@ def _march(surface, mesh, points, normals, clearance, lays_down):
         len(points),
         inputs=[
             surface.id,
-            there(mesh.vertex_normals),
-            Rows(there(points)),
-            Rows(there(normals)),
+            shared(mesh.vertex_normals),
+            Rows(shared(points)),
+            Rows(shared(normals)),
             clearance,
             lays_down,
         ],
@@ -70,13 +70,13 @@ def _march(surface, mesh, points, normals, clearance, lays_down):
 
 @wp.func
 def _side(vector: wp.vec3, normal: wp.vec3):
-    """The part of a vector at right angles to a unit normal."""
+    """Return the component of a vector perpendicular to a unit normal."""
     return vector - wp.dot(vector, normal) * normal
 
 
 @wp.func
 def _least_turn(start: wp.vec3, end: wp.vec3):
-    """The least rotation between unit vectors; none between opposite ones."""
+    """Return the least rotation between unit vectors; the identity for opposite ones."""
     axis = wp.cross(start, end)
     cosine = wp.dot(start, end)
     if cosine < -0.9999:
@@ -100,7 +100,7 @@ def _follow(
     root_normal = normals[guide]
     position = points[guide, 0]
     out_path[guide, 0] = position
-    # Where a guide that stands upright falls to: as it leans on the whole, or down.
+    # The direction in which an upright guide falls: its overall lean, or down.
     lean = _side(points[guide, last] - points[guide, 0], root_normal)
     if wp.length(lean) < 0.05 * wp.length(points[guide, last] - points[guide, 0]):
         lean = _side(DOWN, root_normal)
@@ -109,7 +109,7 @@ def _follow(
     lean = wp.normalize(lean)
     turn = wp.quat_identity()
     along = float(0.0)
-    # Guides may be rooted off the surface; from there on they stay as near to it, or it is of no concern.
+    # Guides may be rooted off the surface: the gap extends the search radius.
     first = wp.mesh_query_point_no_sign(surface, position, 1.0e15)
     gap = wp.length(position - wp.mesh_eval_position(surface, first.face, first.u, first.v))
     for i in range(last):
@@ -128,7 +128,7 @@ def _follow(
                 if query.result:
                     normal, away = normal_and_offset(surface, vertex_normals, query.face, query.u, query.v, place)
                     height = wp.dot(away, normal)
-                    # Past the border of an open surface the nearest point lies sideways: there guides are left alone.
+                    # Beyond the border of an open surface the nearest point lies sideways: no change there.
                     sideways = wp.length(away - height * normal)
                     is_over = sideways <= 0.5 * wp.max(wp.abs(height), wanted) + 1.0e-3 * length
                     is_off = wp.abs(wanted - height) > wp.static(CLOSE) * length

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes of guides copied to others, turned as the surface is turned there."""
+"""Copying of guide shapes to other guides, rotated with the surface."""
 
 from dataclasses import dataclass
 
@@ -11,12 +11,12 @@ from .guide_mirror import nearest
 from .guide_segments import blended, only, rotations, unit
 from .guide_tool_settings import CopySettings
 
-_UPRIGHT = 0.2  # least sine between a normal and the vertical by which a guide's up is known
+_UPRIGHT = 0.2  # least sine of the angle between normal and vertical that defines an upward direction on the surface
 
 
 @dataclass(frozen=True)
 class Places:
-    """Where guides are: roots (N, 3) [m] and unit normals (N, 3) of the surface there."""
+    """Roots (N, 3) [m] of guides and unit normals (N, 3) of the surface."""
 
     roots: np.ndarray
     normals: np.ndarray
@@ -24,17 +24,17 @@ class Places:
 
 @dataclass(frozen=True)
 class Matches:
-    """Of T guides: sources (T,), the indices of the guides to copy, and matrices (T, 3, 3) that turn or mirror them."""
+    """The guides to copy for T targets: sources (T,) indices, and matrices (T, 3, 3) that rotate or mirror them."""
 
     sources: np.ndarray
     matrices: np.ndarray
 
 
 def matched(sources: Places, targets: Places, mapping: str, mirror: Mirror) -> Matches:
-    """The `Matches` of targets: `CopySettings.mapping` says how; mirror: for MIRRORED.
+    """Return the `Matches` of targets by a `CopySettings.mapping`; mirror: for MIRRORED.
 
-    FITTED lays the targets over the sources: their middle, their mean normal and their size. Shapes are turned by the
-    least rotation from normal to normal that keeps up what is up, where the surface is steep enough to say.
+    FITTED aligns center, mean normal and size of the targets with the sources. Shapes are rotated by the least rotation
+    between the normals that preserves the upward direction, where the surface is steep enough to define one.
     """
     roots, normals = (np.asarray(array, np.float64) for array in (targets.roots, targets.normals))
     reflection = np.eye(3)
@@ -47,7 +47,7 @@ def matched(sources: Places, targets: Places, mapping: str, mirror: Mirror) -> M
         scale = its_size / size if size > 0.0 else 1.0
         roots = its_middle + scale * (roots - middle) @ turn
     found = nearest(sources.roots, roots)[0][:, 0]
-    # Normals by the inverse transpose, and a mirror is its own inverse.
+    # Normals transform by the inverse transpose; a reflection is its own inverse.
     reflected = unit(np.asarray(sources.normals, np.float64)[found] @ reflection)
     return Matches(found, upright_rotations(reflected, normals) @ reflection)
 
@@ -55,7 +55,7 @@ def matched(sources: Places, targets: Places, mapping: str, mirror: Mirror) -> M
 def copied(
     points: np.ndarray, sources: np.ndarray, matrices: np.ndarray, settings: CopySettings, weights: np.ndarray
 ) -> np.ndarray:
-    """(T, P, 3) float32 [m]: guides in the shape of others, from their own roots.
+    """Return guides (T, P, 3) float32 [m] with the shapes of other guides and their own roots.
 
     points (T, P, 3) [m]; sources (T, P, 3) [m]: the guide to copy for each; matrices (T, 3, 3); weights (T,) in [0, 1].
     """
@@ -69,9 +69,9 @@ def copied(
 
 
 def upright_rotations(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """(N, 3, 3): rotations that take unit normals (N, 3) to others, and what is up along the surface to what is.
+    """Return rotations (N, 3, 3) that map unit normals (N, 3) to others, and upward tangents to upward tangents.
 
-    Where either surface is nearly level, the least rotations.
+    The least rotations where either surface is nearly level.
     """
     least = rotations(start, end)
     up = np.array([0.0, 0.0, 1.0])
@@ -79,7 +79,7 @@ def upright_rotations(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     is_steep = (np.linalg.norm(before, axis=1) > _UPRIGHT) & (np.linalg.norm(after, axis=1) > _UPRIGHT)
     carried = unit(np.einsum("nij,nj->ni", least, before))
     after = unit(after)
-    # About the end's normal, as both are at right angles to it.
+    # A rotation about the end's normal, to which both are perpendicular.
     cosine = np.sum(carried * after, axis=1)
     sine = np.sum(np.cross(carried, after) * end, axis=1)
     angle = np.where(is_steep, np.arctan2(sine, cosine), 0.0)
@@ -87,7 +87,7 @@ def upright_rotations(start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def _about(axes, angles):
-    """(N, 3, 3) rotations about unit axes (N, 3) by angles (N,) [rad]  (Rodrigues)."""
+    """Return rotations (N, 3, 3) about unit axes (N, 3) by angles (N,) [rad]  (Rodrigues)."""
     cross = np.zeros((len(axes), 3, 3))
     cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -axes[:, 2], axes[:, 1], -axes[:, 0]
     cross -= np.swapaxes(cross, 1, 2)
@@ -96,12 +96,12 @@ def _about(axes, angles):
 
 
 def _mean_normal(normals):
-    """(1, 3) unit; up where normals cancel."""
+    """Return the unit mean normal (1, 3); +Z if normals cancel."""
     mean = unit(np.asarray(normals, np.float64).sum(axis=0, keepdims=True))
     return mean if mean.any() else np.array([[0.0, 0.0, 1.0]])
 
 
 def _extent(roots):
-    """The middle (3,) of roots and their mean square distance from it, as a length."""
+    """Return the center (3,) of roots and their root mean square distance from it."""
     middle = roots.mean(axis=0)
     return middle, float(np.sqrt(np.mean(np.sum((roots - middle) ** 2, axis=1))))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""More or fewer guides: new ones between those that are there, or the most crowded removed. The others stay."""
+"""Changes of the number of guides: insertion between existing guides, or removal of the most crowded ones."""
 
 import heapq
 from collections.abc import Sequence
@@ -16,13 +16,13 @@ from .groom import HairSettings
 from .guide_tool_settings import CountSettings
 
 _POWER = 8  # of the weight between two guides  [Yuksel15]
-_NEIGHBOURS = 6  # of a guide, for the area that it stands for
-_AROUND = 0.75  # of the distance to the fourth nearest guide: new ones stand no farther from guides of a part
+_NEIGHBOURS = 6  # of a guide, for its share of the area
+_AROUND = 0.75  # largest distance of new guides on a partly covered surface, relative to the fourth nearest guide's
 _SAME_SIDE = -1.0 / 3.0  # cosine between normals: guides on two sides of an ear do not crowd each other
 
 
 def difference(settings: CountSettings, weights: np.ndarray) -> int:
-    """How many guides `CountSettings` add, or remove if negative; weights (G,): how much each counts for a factor."""
+    """Return the number of guides that `CountSettings` add, negative to remove; weights (G,): for a factor."""
     if settings.method == "COUNT":
         return settings.guide_count - len(weights)
     return round((settings.factor - 1.0) * float(weights.sum()))
@@ -38,10 +38,10 @@ def new_roots(
     texture: Texture | None = None,
     device: str = "cpu",
 ) -> SurfacePoints:
-    """`count` roots, as far as there is room, evenly between others; around: (G,) bool, next to which of these.
+    """Return at most `count` new roots, evenly between others.
 
-    density (V,) and texture: where guides may be; with neither, they are among the others if these are on a part of the
-    surface only.
+    around: (G,) bool, roots to which new ones may be nearest; density (V,) and texture: of guides; without them, new
+    roots are confined to the part of the surface that the existing guides cover.
     """
     within = None
     if density is None and texture is None:
@@ -66,9 +66,9 @@ def grown_between(
     is_mirrored: bool = False,
     device: str = "cpu",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(M, P, 3) float32 [m]: guides at roots (M,) as the hair of `HairSettings` would grow there, and their nearest.
+    """Return guides (M, P, 3) float32 [m] at roots (M,), interpolated like hair, and their nearest guides (M,).
 
-    The nearest: (M,) indices of `guides` whose region they share. Other arguments as of `groom.bind_hair`.
+    The nearest guides are in the same region. Other arguments as in `groom.bind_hair`.
     """
     binding = groom.bind_hair(
         mesh,
@@ -88,10 +88,10 @@ def grown_between(
 def most_crowded(
     roots: np.ndarray, normals: np.ndarray, count: int, may_go: np.ndarray, spread: np.ndarray | None = None
 ) -> np.ndarray:
-    """Indices (count,) of guides to remove so that the rest is even, by sample elimination [Yuksel15], in this order.
+    """Return the indices (count,) of guides to remove, in order, for an even rest: sample elimination [Yuksel15].
 
-    roots (G, 3) [m]; normals (G, 3): unit; may_go: (G,) bool, of which only these are removed; spread: (G,) positive,
-    how dense guides are to be at each root, None for the same everywhere. At most all that may go.
+    roots (G, 3) [m]; normals (G, 3): unit; may_go: (G,) bool, guides that may be removed; spread: (G,) positive,
+    wanted density of guides at each root, None for uniform. Fewer are returned if not enough may be removed.
     """
     roots = np.asarray(roots, np.float64)
     count = min(count, int(np.count_nonzero(may_go)))
@@ -114,7 +114,7 @@ def most_crowded(
     while len(removed) < count:
         value, guide = heapq.heappop(heap)
         if is_gone[guide] or -value != crowding[guide]:
-            continue  # it stands in the heap again, with less
+            continue  # an outdated entry
         is_gone[guide] = True
         removed.append(guide)
         for pair in range(starts[guide], starts[guide + 1]):
@@ -126,7 +126,7 @@ def most_crowded(
 
 
 def _largest_spacing(roots, thinning):
-    """[m] The spacing of the evenest guides when so many times fewer are left, by the area that each has now."""
+    """Return the largest possible spacing [m] after thinning by a factor, from the present area of each guide."""
     count = min(_NEIGHBOURS, len(roots) - 1)
     if count < 1:
         return 1.0
@@ -136,12 +136,12 @@ def _largest_spacing(roots, thinning):
 
 
 def _some(roots):
-    """At most a thousand of roots, evenly taken: enough for a median."""
+    """Return evenly chosen roots, about a thousand: enough for a median."""
     return roots[:: max(len(roots) // 1000, 1)]
 
 
 def _pairs(places, radius):
-    """Ordered pairs of places (N, 3) nearer than a radius: (Q,) first, rising, (Q,) second, and (Q,) distances."""
+    """Return ordered pairs of places (N, 3) within a radius: (Q,) first, ascending, (Q,) second, (Q,) distances."""
     cells = np.floor((places - places.min(axis=0)) / radius).astype(np.int64) + 1
     row, plane = cells[:, 0].max() + 2, (cells[:, 0].max() + 2) * (cells[:, 1].max() + 2)
     keys = cells @ np.array([1, row, plane])
@@ -150,7 +150,7 @@ def _pairs(places, radius):
     firsts, seconds = [], []
     for z in (-plane, 0, plane):
         for y in (-row, 0, row):
-            # Three cells in a row follow each other.
+            # Three cells in a row have consecutive keys.
             low = np.searchsorted(ranked, keys + z + y - 1, "left")
             sizes = np.searchsorted(ranked, keys + z + y + 1, "right") - low
             within = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Growth of guides from roots: control points of a smooth arc that bends with gravity.
 
-It starts along the normal, along flow lines, or, where guides are draped, downhill.
+The arc starts along the normal, along flow lines, or, for draped guides, downhill.
 """
 
 import numpy as np
@@ -14,15 +14,15 @@ from ..geometry.mirror import Mirror
 from ..kernels import kernel_cache
 from . import flow_lines
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-STEP_COUNT = 48  # straight steps that a guide's arc is made of
-TURNING = 10.0  # how far full gravity bends a guide: the angle to the ground, as tan(angle / 2), shrinks by exp(-10)
-CLEARANCE = 0.03  # how far above the surface a guide slides, by its length
-RISE = 0.5  # how fast a guide may leave the surface at its root, by its length
-LEAST_RISE = 0.05  # of guides that begin flat on it
-LEVEL = 0.01  # sine of the slope at which draped guides begin half upright: level ground has no downhill
+STEP_COUNT = 48  # straight steps of a guide's arc
+TURNING = 10.0  # effect of full gravity: tan(angle / 2), with the angle to straight down, shrinks by exp(-10)
+CLEARANCE = 0.03  # height above the surface relative to a guide's length
+RISE = 0.5  # largest rise per length at the root
+LEAST_RISE = 0.05  # of guides that start flat on the surface
+LEVEL = 0.01  # sine of the slope at which draped guides start half upright: level ground has no downhill direction
 DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
 
 
@@ -41,14 +41,13 @@ def grow(
     lift: float = 0.5 * np.pi,
     device: wp.DeviceLike = "cpu",
 ) -> np.ndarray:
-    """Control points (G, control_point_count, 3) float32 [m] of guides on a checked mesh.
+    """Return control points (G, control_point_count, 3) float32 [m] of guides on a checked mesh.
 
     length [m]; length_variation: each guide's length is multiplied by a random number within 1 ± this; tilt [rad]:
-    largest random angle to the direction that a guide would begin in, the smooth normal if neither flow nor is_draped
-    says otherwise; gravity in [0, 1]: none, to nearly all the way down by the tip (-Z); flow: lines along which guides
-    begin, at the angle lift [rad] to the surface, or None; is_draped: whether guides fall once they are grown, and so
-    begin downhill where there are no lines, at the same angle (`downhill`).
-    A guide keeps its length while it bends, and slides over the surface where it would sink into it.
+    largest random angle to the initial direction, which is the smooth normal without flow and is_draped; gravity in
+    [0, 1]: 0 for none, at 1 tips point nearly straight down (-Z); flow: lines along which guides start, at the angle
+    lift [rad] to the surface, or None; is_draped: whether guides fall after growth; without flow they start downhill at
+    the same angle (`downhill`). Guides bend with constant length, and slide over the surface instead of entering it.
     """
     random = np.random.Generator(np.random.PCG64(seed)).random((len(roots), 3))
     root_normals = normals(mesh, roots)
@@ -78,21 +77,21 @@ def grow(
         outputs=[path],
         device=device,
     )
-    # Controls whose curve runs through the arc itself, so that it is neither shorter nor nearer to the surface.
+    # The curve interpolates the arc, so that it is neither shorter nor closer to the surface.
     abscissae = greville_abscissae(control_point_count)
     return controls_through(_along(path.numpy(), abscissae))
 
 
 def downhill(root_normals: np.ndarray, lift: float, gravity: float) -> np.ndarray:
-    """Unit (G, 3) directions that draped guides begin in. Neighbors agree, so hair parts only at the summit, as at the
-    whorl of a scalp.
+    """Return the initial unit directions (G, 3) of draped guides.
 
-    root_normals: unit (G, 3); lift: angle [rad] to the surface; gravity: as in `grow`, without it guides stand upright.
-    Guides also stand upright on level ground, and below an overhang they turn no further than straight down.
+    Neighbors agree, so hair parts only at a summit, like the whorl of a scalp. root_normals: unit (G, 3); lift: angle
+    [rad] to the surface; gravity: as in `grow`. Guides are upright without gravity and on level ground, and at most
+    point straight down below an overhang.
     """
     steepest = np.array([0.0, 0.0, -1.0]) + root_normals[:, 2:] * root_normals
     slope = np.linalg.norm(steepest, axis=1)
-    # Gravity turns guides by the same law while they grow.
+    # The same law as in `_march`.
     share = slope**2 / (slope**2 + LEVEL**2) * (1.0 - np.exp(-TURNING * gravity))
     turned = np.minimum(share * (0.5 * np.pi - lift), np.arccos(np.clip(-root_normals[:, 2], -1.0, 1.0)))
     along = steepest / np.maximum(slope, 1e-12)[:, None]
@@ -100,7 +99,7 @@ def downhill(root_normals: np.ndarray, lift: float, gravity: float) -> np.ndarra
 
 
 def mirrored(controls: np.ndarray, places: np.ndarray, mirror: Mirror) -> np.ndarray:
-    """Controls (G, n, 3) of which the second half are grown as images of the first, where their roots (G, 3) are."""
+    """Return controls (G, n, 3) whose second half are images of the first, for mirrored roots among places (G, 3)."""
     count = len(places) // 2
     images = mirror.image(places[:count])
     reach = 5e-3 * np.ptp(places, axis=0).max()
@@ -112,10 +111,10 @@ def mirrored(controls: np.ndarray, places: np.ndarray, mirror: Mirror) -> np.nda
 
 
 def _tilted(directions, largest, random_angle, random_turn):
-    """Unit (G, 3) turned away by up to an angle [rad], evenly over the spherical cap."""
+    """Tilt unit vectors (G, 3) by up to an angle [rad], uniformly over the spherical cap."""
     cosine = 1.0 - random_angle * (1.0 - np.cos(largest))
     sine, turn = np.sqrt(1.0 - cosine**2), 2.0 * np.pi * random_turn
-    # Any two directions across will do, so take the axis farthest from each one to start from.
+    # Any two perpendicular directions suffice: start with the axis farthest from each direction.
     across = np.cross(directions, np.eye(3)[np.abs(directions).argmin(axis=1)])
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     along = np.cross(directions, across)
@@ -124,7 +123,7 @@ def _tilted(directions, largest, random_angle, random_turn):
 
 
 def _along(path, fractions):
-    """Points of paths (G, steps + 1, 3), made of equal steps, at fractions (n,) of their lengths → (G, n, 3)."""
+    """Interpolate paths (G, steps + 1, 3) of equal steps at fractions (n,) of their lengths → (G, n, 3)."""
     places = fractions * (path.shape[1] - 1)
     before = np.minimum(places.astype(int), path.shape[1] - 2)
     share = (places - before)[:, None].astype(np.float32)
@@ -151,17 +150,17 @@ def _march(
     direction = directions[guide]
     out_path[guide, 0] = position
     for i in range(steps):
-        # The quickest turn downwards, as strong as gravity's lever: d(angle)/ds = -k sin(angle).
+        # Turn toward straight down: d(angle)/ds = -k sin(angle), like the moment of gravity.
         bend = TURNING * gravity / float(steps)
         direction = wp.normalize(direction + bend * (DOWN - wp.dot(direction, DOWN) * direction))
         ahead = position + step * direction
-        # A guide may first leave the surface, and later keeps a distance that grows with it.
+        # The wanted height rises from the root up to the clearance.
         wanted = wp.min(clearance, float(i + 1) * step * rises[guide])
         query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * clearance + step)
         if query.result:
             normal, away = normal_and_offset(surface, vertex_normals, query.face, query.u, query.v, ahead)
             height = wp.dot(away, normal)
-            # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
+            # Beyond the border of an open surface the nearest point lies sideways: the guide hangs freely.
             if height < wanted and wp.length(away - height * normal) < 0.5 * wanted:
                 direction = wp.normalize(ahead + (wanted - height) * normal - position)
         position += step * direction

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lengths of guides: scaled, set, or kept within limits. Shorter guides are cut along their own curve, or scaled."""
+"""Lengths of guides: scaled, set, or limited. Guides are shortened by cutting along their curve, or by scaling."""
 
 import numpy as np
 
 from ..geometry.strands import lengths as lengths_of
 from .guide_tool_settings import LengthSettings
 
-_ROUNDS = 24  # of the search for where to cut: each of them at least halves the interval every other time
-_CLOSE = 1e-7  # of a guide's length
+_ROUNDS = 24  # of the search for the cut; the interval at least halves every second round
+_CLOSE = 1e-7  # tolerance relative to a guide's length
 
 
 def resized(points: np.ndarray, settings: LengthSettings, weights: np.ndarray) -> np.ndarray:
-    """(S, P, 3) float32 [m]: guides of the lengths that `LengthSettings` ask for, their roots where they were.
+    """Return guides (S, P, 3) float32 [m] with the lengths of `LengthSettings` and unchanged roots.
 
-    points (S, P, 3) [m]; weights (S,) in [0, 1]: how much of the change each guide gets. Guides without a length, and
-    those that are as long already, stay the same to the last bit.
+    points (S, P, 3) [m]; weights (S,) in [0, 1]: fraction of the change. Guides of zero length, and those with the
+    wanted length, are bit-identical.
     """
     present = lengths_of(np.asarray(points, np.float64))
     wanted = {
@@ -33,7 +33,7 @@ def resized(points: np.ndarray, settings: LengthSettings, weights: np.ndarray) -
 
 
 def _scaled(points, factors):
-    """(S, P, 3) float32: strands scaled from their roots by factors (S,)."""
+    """Return strands (S, P, 3) float32 scaled about their roots by factors (S,)."""
     roots = points[:, :1].astype(np.float64)
     scaled = (roots + factors[:, None, None] * (points - roots)).astype(np.float32)
     scaled[:, 0] = points[:, 0]
@@ -41,10 +41,10 @@ def _scaled(points, factors):
 
 
 def cut(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """(S, P, 3) float32 [m]: the first part of each guide, with as many points, all of them on the guide.
+    """Cut guides at given lengths: (S, P, 3) float32 [m], with the same number of points, all on the original guide.
 
-    points (S, P, 3) [m]; ends (S,) [m]: how far along each guide it is cut, at most its length. Points keep their
-    shares of the length, so that a guide that is cut at its tip stays the same.
+    points (S, P, 3) [m]; ends (S,) [m]: arc length of each cut, at most the guide's length. Points keep their fractions
+    of the length: a guide that is cut at its tip is unchanged.
     """
     points = np.asarray(points, np.float64)
     steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
@@ -52,7 +52,7 @@ def cut(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
     lengths = along[:, -1:]
     wanted = along * np.minimum(ends[:, None] / np.where(lengths > 0.0, lengths, 1.0), 1.0)
     last = points.shape[1] - 2
-    # Running lengths are compared strand by strand: P comparisons for each point are few.
+    # Brute force: P comparisons for each point are few.
     segment = np.clip((along[:, None, :] <= wanted[:, :, None]).sum(axis=2) - 1, 0, last)
     start, span = (np.take_along_axis(array, segment, axis=1) for array in (along, steps))
     share = np.clip((wanted - start) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)[..., None]
@@ -63,10 +63,10 @@ def cut(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 
 def cut_to_length(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """(S, P, 3) float32 [m]: guides cut where what is left, with as many points, has the wanted lengths (S,) [m].
+    """Cut guides so that the results have the wanted lengths (S,) [m]: (S, P, 3) float32 [m].
 
-    A polyline through points of another one is shorter than that, so the cut lies a little beyond `wanted`: it is found
-    by false position, by the Illinois rule, between there and the tip.
+    The resampled polyline is shorter than the original up to the cut, so the cut lies slightly beyond `wanted`. It is
+    found by false position with the Illinois rule, between `wanted` and the tip.
     """
     if not len(points):
         return np.asarray(points, np.float32)
@@ -84,7 +84,7 @@ def cut_to_length(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         ends[left] = np.where(slope > 0.0, high[left] - step, low[left])
         error = _cut_length(points[left], ends[left]) - wanted[left]
         is_low = error < 0.0
-        # The end that stays twice in a row counts half.
+        # Illinois rule: halve the error of an end that is retained twice in a row.
         high_error[left] *= np.where(is_low & (side[left] < 0), 0.5, 1.0)
         low_error[left] *= np.where(~is_low & (side[left] > 0), 0.5, 1.0)
         low[left], low_error[left] = np.where(is_low, (ends[left], error), (low[left], low_error[left]))

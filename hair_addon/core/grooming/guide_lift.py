@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lifting of guides: segments turn toward the normal at the root, most at the root, and keep their lengths."""
+"""Lifting of guides: segments turn toward the root's normal, most near the root, with constant lengths."""
 
 import numpy as np
 
@@ -8,14 +8,14 @@ from .guide_tool_settings import LiftSettings
 
 
 def lifted(points: np.ndarray, normals: np.ndarray, settings: LiftSettings, weights: np.ndarray) -> np.ndarray:
-    """(S, P, 3) float32 [m]: guides whose segments stand up from the surface; each keeps its length.
+    """Return lifted guides (S, P, 3) float32 [m]; segments keep their lengths.
 
     points (S, P, 3) [m]; normals (S, 3): unit, at the roots; weights (S,) in [0, 1].
     """
     directions, lengths = split(points)
-    with np.errstate(over="ignore"):  # of the least reach
+    with np.errstate(over="ignore"):  # for the smallest reach
         fade = np.clip(1.0 - arc_shares(lengths) / settings.reach, 0.0, 1.0)
-    # Smooth at both ends, so that guides bend without a kink.
+    # Smoothstep: guides bend without a kink.
     shares = settings.amount * np.asarray(weights, np.float64)[:, None] * fade * fade * (3.0 - 2.0 * fade)
     upward = np.broadcast_to(np.asarray(normals, np.float64)[:, None], directions.shape)
     return only(points, joined(points, turned(directions, upward, shares), lengths), weights)

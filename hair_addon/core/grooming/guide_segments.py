@@ -1,55 +1,56 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides as directions and lengths of their segments: what tools turn and scale, so that roots do not move.
+"""Guides as directions and lengths of their segments, for tools that rotate and scale segments without moving roots.
 
-All arrays are float64 here, so that segments keep their lengths to the rounding of single precision.
+Arrays are float64, so that segments keep their lengths within single precision.
 """
 
 import numpy as np
 
 
 def split(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(S, P, 3) [m] → unit directions (S, P-1, 3) and lengths (S, P-1) [m]; a segment without length points nowhere."""
+    """Return unit directions (S, P-1, 3), zero for zero length, and lengths (S, P-1) [m] of points (S, P, 3) [m]."""
     steps = np.diff(np.asarray(points, np.float64), axis=1)
     lengths = np.linalg.norm(steps, axis=2)
     return steps / np.where(lengths > 0.0, lengths, 1.0)[..., None], lengths
 
 
 def joined(points: np.ndarray, directions: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """(S, P, 3) float32 [m]: strands from the roots of `points`, of segments as `split` gives them."""
+    """Return strands (S, P, 3) float32 [m] with the roots of `points` and segments as from `split`."""
     roots = np.asarray(points[:, :1], np.float64)
     tail = roots + np.cumsum(directions * lengths[..., None], axis=1)
     return np.concatenate([points[:, :1], tail.astype(np.float32)], axis=1)
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    """(..., 3) made unit; zero stays zero."""
+    """Normalize vectors (..., 3); zero stays zero."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(lengths > 0.0, lengths, 1.0)
 
 
 def across(vectors: np.ndarray) -> np.ndarray:
-    """(..., 3): a unit vector at right angles to each unit vector."""
+    """Return a unit vector perpendicular to each unit vector (..., 3)."""
     return unit(np.cross(vectors, np.eye(3)[np.abs(vectors).argmin(axis=-1)]))
 
 
 def turned(directions: np.ndarray, targets: np.ndarray, shares: np.ndarray) -> np.ndarray:
-    """Unit (..., 3) turned toward other unit vectors by shares (...) of the angle between them, in [0, 1].
+    """Rotate unit vectors (..., 3) toward others by fractions (...) in [0, 1] of the angle between them.
 
-    A direction that is opposite to its target turns about an axis across it. Zero stays zero, and turns no other.
+    A direction opposite to its target turns about an arbitrary perpendicular axis. Zero vectors, and directions with a
+    zero target, are unchanged.
     """
     cosine = np.clip(np.sum(directions * targets, axis=-1), -1.0, 1.0)
     aside = targets - cosine[..., None] * directions
     sine = np.linalg.norm(aside, axis=-1)
     is_opposite = (sine < 1e-9) & (cosine < 0.0)
     aside = np.where(is_opposite[..., None], across(directions), aside / np.maximum(sine, 1e-300)[..., None])
-    # Below the rounding of single precision there is nothing to turn.
+    # Angles below the rounding of single precision are ignored.
     has_angle = ((sine >= 1e-9) | is_opposite) & directions.any(axis=-1) & targets.any(axis=-1)
     angle = np.where(has_angle, shares * np.arctan2(sine, cosine), 0.0)[..., None]
     return np.where(angle == 0.0, directions, np.cos(angle) * directions + np.sin(angle) * aside)
 
 
 def rotations(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """(N, 3, 3): the least rotations that take unit vectors (N, 3) to others."""
+    """Return the least rotations (N, 3, 3) that map unit vectors (N, 3) to others."""
     axis, cosine = np.cross(start, end), np.sum(start * end, axis=1)
     cross = np.zeros((len(start), 3, 3))
     for row, column, part, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
@@ -61,12 +62,12 @@ def rotations(start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def blended(points: np.ndarray, others: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(S, P, 3) float32 [m]: strands part of the way to others (S, P, 3) [m]; weights (S,) in [0, 1].
+    """Blend strands with others (S, P, 3) [m] by weights (S,) in [0, 1]: (S, P, 3) float32 [m].
 
-    Each segment turns toward the other's by this share of the angle, and takes this share of its length. Roots stay.
+    Directions of segments are interpolated by angle, lengths linearly. Roots do not move.
     """
     (mine, my_lengths), (theirs, their_lengths) = split(points), split(others)
-    # A segment without length takes the other's direction, so that it can grow.
+    # A segment of zero length takes the other's direction.
     mine, theirs = (
         np.where(one.any(axis=2, keepdims=True), one, other) for one, other in ((mine, theirs), (theirs, mine))
     )
@@ -75,11 +76,11 @@ def blended(points: np.ndarray, others: np.ndarray, weights: np.ndarray) -> np.n
 
 
 def only(points: np.ndarray, changed: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(S, P, 3) float32: changed strands where weights (S,) are above zero, the others to the last bit as they were."""
+    """Return (S, P, 3) float32: changed strands where weights (S,) are positive, else bit-identical points."""
     return np.where((np.asarray(weights) > 0.0)[:, None, None], changed, points).astype(np.float32)
 
 
 def arc_shares(lengths: np.ndarray) -> np.ndarray:
-    """(S, P-1) in [0, 1]: where the middle of each segment is along its strand; lengths (S, P-1) [m]."""
+    """Return the normalized arc length (S, P-1) of each segment's midpoint, in [0, 1]; lengths (S, P-1) [m]."""
     ends = np.cumsum(lengths, axis=1)
     return (ends - 0.5 * lengths) / np.where(ends[:, -1:] > 0.0, ends[:, -1:], 1.0)

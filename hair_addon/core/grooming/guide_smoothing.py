@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smoothing of guides along their length: directions of segments diffuse, so roots and lengths are kept."""
+"""Smoothing of guides along their length: directions of segments diffuse; roots and lengths are preserved."""
 
 import numpy as np
 
@@ -8,10 +8,10 @@ from .guide_tool_settings import SmoothSettings
 
 
 def smoothed(points: np.ndarray, settings: SmoothSettings, weights: np.ndarray) -> np.ndarray:
-    """(S, P, 3) float32 [m]: guides with smaller bends; each segment keeps its length, and straight guides stay.
+    """Return smoothed guides (S, P, 3) float32 [m]; segments keep their lengths, straight guides are unchanged.
 
-    points (S, P, 3) [m]; weights (S,) in [0, 1]. Each step moves a direction toward the mean of those beside it, the
-    first and the last counting twice where they have one neighbor.
+    points (S, P, 3) [m]; weights (S,) in [0, 1]. Each step moves a direction toward the mean of its neighbors; the
+    first and the last direction are their own second neighbors.
     """
     directions, lengths = split(points)
     if directions.shape[1] < 2:

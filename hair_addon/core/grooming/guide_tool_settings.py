@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the tools that change combed guides, whose mathematics is in the files beside this one.
+"""Settings of the tools that change combed guides.
 
-Some of those import Warp, which takes longer than an add-on may take to register: so settings are apart.
+Their mathematics is in other files, some of which import Warp: too slow for the registration of an add-on.
 """
 
 from dataclasses import dataclass
@@ -11,24 +11,24 @@ from ..params import Settings, param
 
 @dataclass(frozen=True)
 class ToolSettings(Settings):
-    """Which guides a tool changes, and how much."""
+    """Selection of the guides that a tool changes, and the strength of the effect."""
 
     selected_only: bool = param(
         True, "Change only the guides selected in Sculpt Mode or Edit Mode; all guides if none is selected"
     )
     mask: str = param(
         "",
-        "Vertex group of the surface that scales the effect; guides rooted where its weight is zero stay as they are",
+        "Vertex group of the surface that scales the effect; guides rooted where its weight is zero do not change",
     )
 
 
 @dataclass(frozen=True)
 class LengthSettings(ToolSettings):
-    """New lengths of guides."""
+    """Settings for lengths of guides."""
 
     method: str = param(
         "SCALE",
-        "How the new length of each guide is found",
+        "How the new length of each guide is computed",
         choices=(
             ("SCALE", "Scale", "Multiply the lengths"),
             ("SET", "Set", "Make all guides equally long"),
@@ -46,7 +46,7 @@ class LengthSettings(ToolSettings):
         "CUT",
         "How guides become shorter; longer ones are always scaled",
         choices=(
-            ("CUT", "Cut", "Cut off the tips; what is left keeps its shape"),
+            ("CUT", "Cut", "Cut off the tips; the remaining part keeps its shape"),
             ("SCALE", "Scale", "Scale the whole guide"),
         ),
     )
@@ -54,40 +54,41 @@ class LengthSettings(ToolSettings):
 
 @dataclass(frozen=True)
 class TrimSettings(ToolSettings):
-    """Trimming of guides."""
+    """Settings for trimming guides."""
 
     cutter: str = param(
         "",
-        "Object that cuts: a mesh with its faces; any other object, such as an empty, cuts off what is on its +Z side",
+        "Object that cuts: a mesh cuts with its faces; any other object, such as an empty, cuts at its XY plane and "
+        "removes the +Z side",
     )
 
 
 @dataclass(frozen=True)
 class SmoothSettings(ToolSettings):
-    """Smoothing of guides."""
+    """Settings for smoothing guides."""
 
     strength: float = param(
         0.5, "Strength of each step; higher values smooth more", low=0.0, high=1.0, subtype="FACTOR"
     )
     iterations: int = param(
-        10, "Number of smoothing steps; more of them smooth longer waves", low=1, high=1000, soft_high=100
+        10, "Number of smoothing steps; higher values smooth longer waves", low=1, high=1000, soft_high=100
     )
 
 
 @dataclass(frozen=True)
 class LiftSettings(ToolSettings):
-    """Lifting of guides."""
+    """Settings for lifting guides."""
 
     amount: float = param(
         0.5,
-        "Part of the angle to the surface normal that guides turn by at their roots; at 1 they start along the normal",
+        "Fraction of the angle to the surface normal by which guides turn at their roots; at 1 they start along it",
         low=0.0,
         high=1.0,
         subtype="FACTOR",
     )
     reach: float = param(
         1.0,
-        "Part of the length along which the lift fades; lower values bend only the part near the root",
+        "Fraction of the length along which the lift fades; lower values bend only the part near the root",
         above=0.0,
         high=1.0,
         subtype="FACTOR",
@@ -96,18 +97,18 @@ class LiftSettings(ToolSettings):
 
 @dataclass(frozen=True)
 class DrapeSettings(ToolSettings):
-    """Draping of guides."""
+    """Settings for draping guides."""
 
     stiffness: float = param(
         1.0,
-        "Factor of the stiffness that the guides have in the Dynamics panel; lower values let them hang more",
+        "Factor of the guides' stiffness in the Dynamics panel; lower values let them hang more",
         low=0.0,
         high=1e4,
         soft_high=10.0,
     )
     seconds: float = param(
         3.0,
-        "Longest time in seconds that guides fall; what is at rest sooner stops the tool",
+        "Maximum time in seconds that guides fall; the tool stops earlier when they are at rest",
         above=0.0,
         high=60.0,
         soft_high=10.0,
@@ -116,7 +117,7 @@ class DrapeSettings(ToolSettings):
 
 @dataclass(frozen=True)
 class AttractSettings(ToolSettings):
-    """Attraction to the surface."""
+    """Settings for attracting guides to the surface."""
 
     amount: float = param(
         0.5,
@@ -127,7 +128,7 @@ class AttractSettings(ToolSettings):
     )
     clearance: float = param(
         0.002,
-        "Height above the surface that guides keep, from a short way above their roots",
+        "Height of guides above the surface, which they reach shortly after their roots",
         low=0.0,
         high=1e3,
         soft_high=0.1,
@@ -138,16 +139,16 @@ class AttractSettings(ToolSettings):
 
 @dataclass(frozen=True)
 class CountSettings(ToolSettings):
-    """Another number of guides."""
+    """Settings for changing the number of guides."""
 
     method: str = param(
         "FACTOR",
-        "How the new number of guides is found",
+        "How the new number of guides is computed",
         choices=(
             (
                 "FACTOR",
                 "Factor",
-                "Multiply the number of guides, where they are selected and inside the mask",
+                "Multiply the number of guides that are selected and inside the mask",
             ),
             ("COUNT", "Count", "Set the number of all guides"),
         ),
@@ -155,18 +156,16 @@ class CountSettings(ToolSettings):
     factor: float = param(
         2.0, "Factor of the number of guides; below 1 guides are removed", above=0.0, high=100.0, soft_high=4.0
     )
-    guide_count: int = param(
-        400, "Number of guides to have", label="Guide count", low=1, high=1_000_000, soft_high=4000
-    )
+    guide_count: int = param(400, "New number of guides", label="Guide count", low=1, high=1_000_000, soft_high=4000)
 
 
 @dataclass(frozen=True)
 class MirrorSettings(ToolSettings):
-    """Mirroring of guides across the object's X axis."""
+    """Settings for mirroring guides across the object's X axis."""
 
     direction: str = param(
         "FROM_POSITIVE",
-        "Side whose guides are kept; those of the other side are replaced with their images",
+        "Side whose guides are kept; guides of the other side are replaced with their images",
         choices=(
             ("FROM_POSITIVE", "+X to -X", "Replace the guides on the -X side"),
             ("FROM_NEGATIVE", "-X to +X", "Replace the guides on the +X side"),
@@ -176,7 +175,7 @@ class MirrorSettings(ToolSettings):
 
 @dataclass(frozen=True)
 class CopySettings(Settings):
-    """Copying of guide shapes between regions."""
+    """Settings for copying guide shapes between regions."""
 
     source: str = param(
         "",
@@ -190,11 +189,11 @@ class CopySettings(Settings):
     )
     mapping: str = param(
         "FITTED",
-        "Which guide each one takes its shape from",
+        "Guide from which each guide takes its shape",
         choices=(
-            ("FITTED", "Fitted", "The one in the same place when the regions are laid over each other"),
-            ("NEAREST", "Nearest", "The nearest one"),
-            ("MIRRORED", "Mirrored", "The one nearest to its place mirrored across the object's X axis"),
+            ("FITTED", "Fitted", "The guide in the same place after the regions are aligned"),
+            ("NEAREST", "Nearest", "The nearest guide"),
+            ("MIRRORED", "Mirrored", "The guide nearest to the place mirrored across the object's X axis"),
         ),
     )
     copy_length: bool = param(True, "Copy the length too; when off, guides keep their lengths")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trimming of guides: each is cut where it first crosses a plane or a mesh."""
+"""Trimming of guides: each guide is cut where it first crosses a plane or a mesh."""
 
 import numpy as np
 import warp as wp
@@ -11,16 +11,16 @@ from ..kernels.parallel import Rows
 from .guide_lengths import cut
 from .guide_segments import only
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-SHORTEST = 1e-3  # of a guide's length: what is left of it at least, so that it keeps a direction
+SHORTEST = 1e-3  # least remaining fraction of a guide's length, which preserves its direction
 
 
 def plane_crossings(points: np.ndarray, origin: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """(S,) [m]: how far along guides (S, P, 3) [m] they first cross a plane, to the side its normal (3,) points to.
+    """Return the arc length (S,) [m] at which guides (S, P, 3) [m] first cross a plane to the side of its normal (3,).
 
-    origin (3,) [m]: a point of the plane. Infinite for guides that do not, and for those rooted on that side.
+    origin (3,) [m]: a point of the plane. Infinite for guides without a crossing, and for those rooted on that side.
     """
     heights = (np.asarray(points, np.float64) - origin) @ np.asarray(normal, np.float64)
     is_crossing = (heights[:, :-1] <= 0.0) & (heights[:, 1:] > 0.0)
@@ -34,10 +34,10 @@ def plane_crossings(points: np.ndarray, origin: np.ndarray, normal: np.ndarray) 
 
 
 def mesh_crossings(points: np.ndarray, cutter: TriMesh) -> np.ndarray:
-    """(S,) [m]: how far along guides (S, P, 3) [m] they first cross the faces of a mesh; infinite if they do not.
+    """Return the arc length (S,) [m] at which guides (S, P, 3) [m] first cross the faces of a mesh; infinite if never.
 
-    What is nearer to a root than `SHORTEST` does not count: guides may be rooted on the cutter. Raises `HairError` for
-    a mesh without faces.
+    Crossings within `SHORTEST` of the root are ignored, because guides may be rooted on the cutter. Raises `HairError`
+    for a mesh without faces.
     """
     check_mesh(cutter)
     triangles = cutter.triangles[cutter.areas > 0.0]
@@ -64,10 +64,10 @@ def mesh_crossings(points: np.ndarray, cutter: TriMesh) -> np.ndarray:
 
 
 def trimmed(points: np.ndarray, crossings: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(S, P, 3) float32 [m]: guides cut where they cross, with as many points as they had.
+    """Return guides (S, P, 3) float32 [m] cut at their crossings, with the same number of points.
 
-    points (S, P, 3) [m]; crossings (S,) [m]: how far along each guide, infinite for none; weights (S,) in [0, 1]: at
-    one half, half of what is beyond stays.
+    points (S, P, 3) [m]; crossings (S,) [m]: arc lengths, infinite for none; weights (S,) in [0, 1]: fraction of the
+    part beyond the crossing that is removed.
     """
     full = lengths_of(np.asarray(points, np.float64))
     ends = np.maximum(full + weights * (np.minimum(crossings, full) - full), SHORTEST * full)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles bound to the strands of a hair: where clump sites stand, and what is kept while sliders move."""
+"""Binding of styles to the strands of a hair, with the placement of clump sites."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ from .groom import HairSettings
 if TYPE_CHECKING:
     from ..styling.stack import Styling
 
-_ROUNDS = 2  # of relaxation: cells vary by 0.09, more evenly than locks do
+_ROUNDS = 2  # of relaxation: sizes of cells vary by 0.09, less than those of real locks
 
 
 def clump_trees(
@@ -40,12 +40,12 @@ def clump_trees(
     is_mirrored: bool = False,
     device: str = "cpu",
 ) -> ClumpTrees:
-    """The `ClumpTrees` of hair, empty at first; arguments as in `groom.bind_hair`."""
+    """Return the `ClumpTrees` of hair, initially empty; arguments as in `groom.bind_hair`."""
     laid = groom.laid_lines(mesh, lines, drawn_on, device)
     binder = RootBinder(mesh, guide_roots, settings, regions, laid, is_mirrored, device)
 
     placed_on, its_texture = mesh if shape is None else shape, texture
-    if is_mirrored:  # as roots are stored, so that sites are the same where the surface is mirrored
+    if is_mirrored:  # as stored roots, so that sites are the same on a mirrored surface
         placed_on = TriMesh(-placed_on.vertices, placed_on.triangles[:, [0, 2, 1]])
         its_texture = None if texture is None else texture.wound_otherwise()
 
@@ -75,10 +75,10 @@ def bind_styles(
     axes: np.ndarray | None = None,
     progress: Progress = no_progress,
 ) -> "Styling | None":
-    """The `Styling` of strands; None where strands follow the guides as they are.
+    """Return the `Styling` of strands; None if no style has an effect and guides have the strands' point count.
 
-    axes: (4, 4) to the surface's own coordinates, as `own_axes` gives them, None where they are the same;
-    progress(step, part): told while clump sites are placed, and may raise to stop.
+    axes: (4, 4) to the surface's own coordinates, from `own_axes`, None for the identity; progress(step, part): callback
+    for the placement of clump sites, may raise to cancel.
     """
     if not any(map(styling.base.has_effect, styles)) and settings.point_count == guides.point_count:
         return None
@@ -89,10 +89,10 @@ def bind_styles(
 
 
 def own_axes(from_own: np.ndarray) -> np.ndarray:
-    """(4, 4): from the coordinates of strands back to a surface's own axes and origin, without scale and shear.
+    """Return the matrix (4, 4) from strand coordinates to a surface's own axes and origin, without scale and shear.
 
-    from_own: (4, 4), from the surface's own coordinates to those of strands; the inverse of the nearest rotation, or
-    rotation and mirror.
+    from_own: (4, 4), from the surface's own to strand coordinates; its nearest rotation, or rotation and reflection, is
+    inverted.
     """
     matrix = np.asarray(from_own, np.float64)
     left, _scale, right = np.linalg.svd(matrix[:3, :3])

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names by which artists call the vertex group that hair grows in, in several languages."""
+"""Common names, in several languages, of the vertex group that hair grows in."""
 
 import re
 import unicodedata
 from collections.abc import Iterable
 
-# The first that is there is taken: what is on a head comes before what is on a face.
+# In order of preference: hair of the head comes before facial hair.
 _WORDS = (
     *(
         "scalp",
@@ -32,7 +32,7 @@ _NOT = {"no", "not", "non", "without", "ohne", "kein", "keine", "sans", "sin", "
 
 
 def suggested(names: Iterable[str]) -> str:
-    """The name that says most clearly that hair grows there: `scalp`, `Head_Hair`, `Kopfhaar.001`; empty for none."""
+    """Return the name that most likely denotes hair, such as `scalp`, `Head_Hair`, `Kopfhaar.001`; "" for none."""
     ranked = [(rank, place, name) for place, name in enumerate(names) if (rank := _rank(name)) is not None]
     return min(ranked)[2] if ranked else ""
 
@@ -45,7 +45,7 @@ def _rank(name):
 
 
 def _words_of(name):
-    """The words of a name without marks above letters: `HeadHair_L` gives head, hair and l."""
+    """Return the lowercase words of a name without diacritics: `HeadHair_L` gives head, hair and l."""
     return re.findall(r"[^\W\d_]+", _plain(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)))
 
 

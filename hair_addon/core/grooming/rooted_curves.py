@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Conversion of arbitrary curves to guides: validity, roots and direction."""
+"""Conversion of arbitrary curves to guides: validation, roots and direction."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, positions
 from ..geometry.strands import curve_offsets
 from ..params import Param, array_of, plain_value
 
-# If the ends' distances to the surface differ by less than this part of the curve's size, its direction is ambiguous.
+# Least difference of the ends' distances to the surface, relative to the curve's size, that determines the direction.
 _CLEAR = 0.1
-# Of the surface's size: a root further away than this is probably on the wrong surface, or in the wrong units.
+# Distance of roots, relative to the surface's size, beyond which the surface or the unit is probably wrong.
 _FAR = 0.02
 _EVERY = Param("", low=1)
 
 
 @dataclass(frozen=True)
 class RootedCurves:
-    """The curves that are guides, G of C.
+    """G of C curves that become guides.
 
-    kept: (G,) indices in rising order; is_reversed: (G,) bool, which ran from tip to root; roots: G `SurfacePoints`
-    nearest to the root ends; distances: (G,) [m] to those; is_far: (G,) bool, which of them are suspiciously far.
+    kept: (G,) ascending indices; is_reversed: (G,) bool, curves from tip to root; roots: G `SurfacePoints` closest to
+    the root ends; distances: (G,) [m] to these; is_far: (G,) bool, suspiciously large distances.
     """
 
     kept: np.ndarray
@@ -33,11 +33,11 @@ class RootedCurves:
     roots: SurfacePoints
     distances: np.ndarray
     is_far: np.ndarray
-    left_out_count: int  # of zero length or with non-finite points
+    left_out_count: int  # curves of zero length or with non-finite points
 
     @property
     def reversed_count(self) -> int:
-        """Number of curves that ran from tip to root."""
+        """Number of curves that run from tip to root."""
         return int(np.count_nonzero(self.is_reversed))
 
     @property
@@ -46,7 +46,7 @@ class RootedCurves:
         return int(np.count_nonzero(self.is_far))
 
     def point_order(self, starts: np.ndarray) -> np.ndarray:
-        """(M,) indices: the points of the kept curves, each from root to tip; starts (C+1,) as given to `root`."""
+        """Return indices (M,) of the kept curves' points, each from root to tip; starts (C+1,) as in `root`."""
         counts = np.diff(starts)
         is_kept = np.zeros(len(counts), bool)
         is_kept[self.kept] = True
@@ -54,7 +54,7 @@ class RootedCurves:
 
 
 def reversal(counts: np.ndarray, is_reversed: np.ndarray) -> np.ndarray:
-    """(N,) indices of the points of curves of (C,) counts, those of some curves, (C,) bool, in the opposite order."""
+    """Return indices (N,) of the points of curves with counts (C,), in reverse order where is_reversed (C,)."""
     starts = curve_offsets(counts)[:-1]
     place = np.arange(counts.sum()) - np.repeat(starts, counts)
     backwards = np.repeat(counts, counts) - 1 - place
@@ -62,10 +62,10 @@ def reversal(counts: np.ndarray, is_reversed: np.ndarray) -> np.ndarray:
 
 
 def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) -> RootedCurves:
-    """`RootedCurves` of points (N, 3) [m], curve after curve, on a `TriMesh` as it is now.
+    """Return the `RootedCurves` of points (N, 3) [m], concatenated over curves, on a `TriMesh`.
 
-    starts (C+1,): where each curve begins, the last entry being N; every: keep every n-th of the usable curves. Raises
-    `HairError` where the mesh cannot carry hair, no curve can be a guide, or most lie further away than it is large.
+    starts (C+1,): of each curve, the last entry is N; every: keep every n-th of the usable curves. Raises `HairError`
+    if the mesh cannot carry hair, no curve is usable, or the median distance of roots exceeds the mesh's size.
     """
     check_mesh(mesh)
     every = checked_every(every)
@@ -98,12 +98,12 @@ def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) 
 
 
 def checked_every(every: int) -> int:
-    """A whole number of at least 1, of whatever type. Raises `HairError`."""
+    """Return `every` as an int of at least 1. Raises `HairError`."""
     return plain_value("Keep Every", every, 1, _EVERY)
 
 
 def _usable(points, starts):
-    """Indices of the curves that have a length and finite points."""
+    """Return indices of the curves with positive length and finite points."""
     counts = np.diff(starts)
     is_usable = counts >= 2
     if not is_usable.any():
@@ -117,7 +117,7 @@ def _usable(points, starts):
 
 
 def _sizes(points, starts):
-    """(C,) [m]: the longest side of the box around each curve; NaN where points are, 0 for a curve without points."""
+    """Return the longest side (C,) [m] of each curve's bounding box; NaN for NaN points, 0 without points."""
     sizes = np.zeros(len(starts) - 1, np.float32)
     has_points = np.diff(starts) > 0
     first = starts[:-1][has_points]
@@ -128,7 +128,7 @@ def _sizes(points, starts):
 
 
 def _run_backwards(at_first, at_last, sizes):
-    """(G,) bool: whether the last point is the root: it is clearly nearer, or both are near and most others run so."""
+    """Return (G,) bool: whether the last point is the root. Ambiguous curves follow the majority of the others."""
     margin = _CLEAR * sizes
     is_backwards, is_forwards = at_last < at_first - margin, at_first < at_last - margin
     backwards_count, forwards_count = np.count_nonzero(is_backwards), np.count_nonzero(is_forwards)
@@ -138,10 +138,10 @@ def _run_backwards(at_first, at_last, sizes):
 
 
 def polylines(curves: Iterable[ArrayLike]) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 3) float32 points and (C+1,) starts of a sequence of (P, 3) arrays. Raises `HairError`."""
+    """Concatenate arrays (P, 3): points (N, 3) float32 and starts (C+1,). Raises `HairError`."""
     try:
         lines = [array_of(line, np.float32) for line in curves]
-    except (TypeError, ValueError, OverflowError):  # what cannot be iterated over
+    except (TypeError, ValueError, OverflowError):  # not iterable
         lines = []
     usable = [line for line in lines if line is not None and line.ndim == 2 and line.shape[1] == 3]
     if not usable or len(usable) < len(lines):

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that stand for many others: the middles of clusters by root and shape.
+"""Representative strands: medoids of clusters by root and shape.
 
-Of each cluster the strand nearest to its mean is taken, so that representatives are strands that are there.
+The representative of a cluster is the strand closest to its mean, and thus an existing strand.
 """
 
 import numpy as np
 
 from ..geometry import clusters
 
-_SHAPE = 0.5  # how much a distance between shapes counts beside one between roots
-_SAMPLES = 4  # points of a strand that stand for its shape
+_SHAPE = 0.5  # weight of distances between shapes relative to distances between roots
+_SAMPLES = 4  # points of a strand that describe its shape
 
 
 def representatives(points: np.ndarray, count: int) -> np.ndarray:
-    """Indices, at most `count` of them and rising, of strands (S, P, 3) [m] that stand for all; S > 0."""
+    """Return ascending indices, at most `count`, of representatives of strands (S, P, 3) [m]; S > 0."""
     features = _features(points)
     if count >= len(features):
         return np.arange(len(features))
@@ -21,7 +21,7 @@ def representatives(points: np.ndarray, count: int) -> np.ndarray:
 
 
 def _features(points):
-    """(S, 3 + 3 k) float32: the root of each strand, and points along it relative to that."""
+    """Return features (S, 3 + 3 k) float32: the root of each strand, and points along it relative to the root."""
     along = np.rint(np.linspace(0.0, points.shape[1] - 1, _SAMPLES + 1)[1:]).astype(np.int64)
     roots = points[:, 0].astype(np.float32)
     shapes = (points[:, along] - points[:, :1]) * (_SHAPE / np.sqrt(_SAMPLES))

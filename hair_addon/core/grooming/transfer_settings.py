@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of a groom's transfer to another mesh; apart from its mathematics, which imports Warp."""
+"""Settings of a groom's transfer to another mesh; separate from its mathematics, which imports Warp."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from ..params import Settings, param
 
 @dataclass(frozen=True)
 class TransferSettings(Settings):
-    """Where guides go on another mesh."""
+    """Settings of the transfer of guides to another mesh."""
 
     method: str = param(
         "NEAREST",
@@ -17,24 +17,24 @@ class TransferSettings(Settings):
             (
                 "NEAREST",
                 "Nearest Surface",
-                "The nearest point of the surface, once both meshes are laid over each other",
+                "The nearest point of the surface after both meshes are aligned",
             ),
             ("UV", "UV Map", "The point with the same UV coordinates, in the active UV maps of both meshes"),
             (
                 "LANDMARKS",
                 "Landmarks",
-                "The nearest point, once the landmarks of both meshes are laid over each other: vertex groups or empty "
-                'children of either mesh that are alike in name and start with "Landmark"',
+                "The nearest point after the landmarks of both meshes are aligned: vertex groups or empty children of "
+                'either mesh with matching names that start with "Landmark"',
             ),
         ),
     )
     alignment: str = param(
         "BOXES",
-        "How the meshes are laid over each other to find the nearest surface",
+        "How the meshes are aligned to find the nearest surface",
         choices=(
             ("BOXES", "Bounding Boxes", "Move and scale the box around one mesh to the box around the other"),
-            ("LOCAL", "Object Coordinates", "By the origin, the rotation and the scale of both objects"),
-            ("WORLD", "As They Are", "Leave both where they are in the scene"),
+            ("LOCAL", "Object Coordinates", "Align origin, rotation and scale of both objects"),
+            ("WORLD", "As They Are", "Use the positions of both meshes in the scene"),
         ),
     )
     reach: float = param(
