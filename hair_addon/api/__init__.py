@@ -12,14 +12,15 @@ Plain arrays need no Blender:
 >>> api.points(hair).shape
 (500, 41, 3)
 
-A path that begins with // is relative to the open .blend file, as everywhere in Blender.
+A path that begins with // is relative to the open .blend file, as in Blender.
 
 In Blender a surface is a mesh object, and guides and hair are Curves datablocks; functions also accept their objects.
 Settings are keyword arguments, which override those of a `Settings` object, or the defaults. Errors that the user can
-fix raise `HairError`, a message of one sentence, before anything in the scene is changed.
+fix raise `HairError`, with a message of one sentence, before the scene is changed.
 
-In the installed extension this is bl_ext.user_default.vellus.hair_addon.api. In a checkout the add-on is registered
-when a function first needs Blender; a script that reads `vellus` properties before calls `hair_addon.register()`.
+In the installed extension the module is bl_ext.user_default.vellus.hair_addon.api. In a checkout the add-on is
+registered when a function first needs Blender; scripts that read `vellus` properties before must call
+`hair_addon.register()`.
 """
 
 from ..core.errors import HairError

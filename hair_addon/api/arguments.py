@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Validation of the Python interface's arguments, before anything is changed. Invalid ones raise `HairError`."""
+"""Validation of the Python interface's arguments. Invalid arguments raise `HairError` before any change."""
 
 import os
 from collections.abc import Collection
@@ -21,9 +21,9 @@ _OF_BLENDER = ("density_group", "density_image", "region_group", "region_attribu
 
 
 def changed(settings_class: type[S], settings: S | None, changes: dict[str, Any], skip: Collection[str] = ()) -> S:
-    """Return `Settings` with some fields changed, based on the defaults if None. Raises `HairError`.
+    """Return `Settings` with some fields changed; settings: None for the defaults. Raises `HairError`.
 
-    skip: names of fields that do not apply.
+    skip: names of fields that may not be changed.
     """
     known = [name for name, _default, _details in declared(settings_class) if name not in skip]
     unknown = next((name for name in changes if name not in known), None)
@@ -36,10 +36,12 @@ def changed(settings_class: type[S], settings: S | None, changes: dict[str, Any]
 
 
 def are_arrays(surface: object) -> bool:
+    """Return whether a surface is given as arrays instead of a mesh object."""
     return isinstance(surface, TriMesh | tuple | list)
 
 
 def mesh_of(arrays: object) -> TriMesh:
+    """Return the `TriMesh` of (vertices, triangles), or of a `TriMesh`, which is validated. Raises `HairError`."""
     if isinstance(arrays, TriMesh):
         arrays = arrays.vertices, arrays.triangles
     if not isinstance(arrays, tuple | list) or len(arrays) != 2:
@@ -48,6 +50,7 @@ def mesh_of(arrays: object) -> TriMesh:
 
 
 def require_no_names(settings: Settings) -> None:
+    """Raise `HairError` if settings refer to data in a .blend file."""
     named = next((name for name in _OF_BLENDER if getattr(settings, name, "")), None)
     if named is not None:
         raise HairError(f'"{named}" refers to data in a .blend file: with plain arrays, use core.grooming.groom.')
@@ -69,13 +72,13 @@ def path_of(given: str | os.PathLike[str]) -> Path:
 
 
 def choice(given: object, kind: str, known: Collection[str]) -> str:
-    """Return a name if it is one of the known ones. Raises `HairError`."""
+    """Return a name that must be one of the known ones. Raises `HairError`."""
     if not isinstance(given, str) or given not in known:
         raise HairError(f"Unknown {kind} {described(given)}: choose from {', '.join(known)}.")
     return given
 
 
-def heard(progress: object) -> Progress:
+def checked_progress(progress: object) -> Progress:
     """Return a progress callback. Raises `HairError` if it is not callable."""
     if not callable(progress):
         raise HairError(f"progress must be a function of (step, part), not {described(progress)}.")
@@ -83,7 +86,7 @@ def heard(progress: object) -> Progress:
 
 
 def curves_object_of(given: Any) -> Any:
-    """Return a curves object that is neither guides nor hair, given as such or as its Curves. Raises `HairError`."""
+    """Return a curves object that is neither guides nor hair; given: the object or its Curves. Raises `HairError`."""
     view_layer = blender.data.scene.present_depsgraph().view_layer
     curves_object = blender.data.arguments.object_with_curves(given, view_layer)
     if not blender.groom.foreign.foreign_curves.is_foreign(curves_object):

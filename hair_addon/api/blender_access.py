@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Blender integration as functions of the Python interface use it: registered, or one sentence about why not."""
+"""Access of the Python interface to the Blender integration, which is registered on first use."""
 
 import importlib.util
 from pathlib import Path
@@ -13,7 +13,7 @@ ARRAYS_ONLY = "This installation of Vellus works on arrays alone: use the extens
 
 
 class RegisteredBlender(lazy.Package):
-    """The package `blender`; scripts in a checkout need not register the add-on themselves."""
+    """The package `blender`, registered on first access: scripts in a checkout need not register the add-on."""
 
     def __getattr__(self, name: str) -> Any:
         require_blender()
@@ -23,12 +23,12 @@ class RegisteredBlender(lazy.Package):
 
 
 def require_blender() -> None:
-    """Raise `HairError` where Python has no Blender, or the package no integration."""
+    """Raise `HairError` if Blender's module or the package's integration is missing."""
     if not (Path(__file__).parents[1] / "blender").is_dir():
         raise HairError(ARRAYS_ONLY)
     try:
         is_there = importlib.util.find_spec("bpy") is not None
-    except ValueError:  # a module that was made without one
+    except ValueError:  # a `bpy` module without a spec
         is_there = True
     if not is_there:
         raise HairError(NO_BLENDER)

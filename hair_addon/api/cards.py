@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions of hair for games."""
+"""Python interface: hair for games."""
 
 import os
 from typing import Any
 
 from ..core.cards.card_settings import CardSettings, TubeSettings
 from ..core.long_work import Progress, no_progress, run_now
-from .arguments import changed, heard, path_of
+from .arguments import changed, checked_progress, path_of
 from .blender_access import blender
 
 Curves = Any
@@ -23,10 +23,10 @@ def make_hair_cards(
     progress: Progress = no_progress,
     **changes: Any,
 ) -> list[MeshObject]:
-    """Make cards of hair, with textures drawn of its strands; returns a mesh object for each level, the finest first.
+    """Create cards of hair, with textures of its strands; returns a mesh object for each level, finest first.
 
-    hair: hair Curves; settings: `CardSettings`; folder: of the textures' .png files, None packs them into the .blend;
-    changes: fields of `CardSettings` by name.
+    hair: hair Curves; settings: `CardSettings`; folder: for the textures' .png files, None packs them into the .blend
+    file; changes: fields of `CardSettings` by name.
 
     >>> settings = {"card_count": 60, "segment_count": 4, "level_count": 2, "texture_size": 256}
     >>> cards, fewer = api.make_hair_cards(bpy.data.objects["Hair"], **settings)
@@ -35,15 +35,15 @@ def make_hair_cards(
     """
     wanted, place = changed(CardSettings, settings, changes), None if folder is None else path_of(folder)
     target = blender.data.arguments.curves_of(hair, "HAIR")
-    levels = run_now(blender.io.hair_cards.making_cards(target, wanted, place), heard(progress))
-    _say(levels[0].notes)
+    levels = run_now(blender.io.hair_cards.making_cards(target, wanted, place), checked_progress(progress))
+    _print(levels[0].notes)
     return [level.mesh_object for level in levels]
 
 
 def make_hair_tubes(
     hair: Curves, settings: TubeSettings | None = None, *, progress: Progress = no_progress, **changes: Any
 ) -> MeshObject:
-    """Make a mesh object of the strands of hair, each a closed tube with UV coordinates.
+    """Create a mesh object of hair strands as closed tubes with UV coordinates.
 
     hair: hair Curves; settings: `TubeSettings`; changes: its fields by name.
 
@@ -53,11 +53,11 @@ def make_hair_tubes(
     """
     wanted = changed(TubeSettings, settings, changes)
     target = blender.data.arguments.curves_of(hair, "HAIR")
-    made = run_now(blender.io.hair_meshes.making_tubes(target, wanted), heard(progress))
-    _say(made.notes)
-    return made.mesh_object
+    result = run_now(blender.io.hair_meshes.making_tubes(target, wanted), checked_progress(progress))
+    _print(result.notes)
+    return result.mesh_object
 
 
-def _say(notes):
+def _print(notes):
     for note in notes:
         blender.host.notices.say(str(note))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions of dynamics."""
+"""Python interface: dynamics."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -15,7 +15,7 @@ from ..core.errors import HairError
 from ..core.geometry.strands import Strands, check_strands
 from ..core.long_work import Progress, no_progress, run_now
 from ..core.params import Param, array_of, plain_value
-from .arguments import changed, choice, heard, mesh_of
+from .arguments import changed, checked_progress, choice, mesh_of
 from .blender_access import blender
 
 Curves = Any
@@ -37,7 +37,7 @@ _COMPONENT = Param("")
 
 
 def dynamics_of(guides: Curves) -> DynamicsSettings:
-    """Return the settings of the simulation of guide Curves.
+    """Return the simulation settings of guide Curves.
 
     >>> api.dynamics_of(bpy.data.objects["Guides"]).bend_stiffness
     8.0
@@ -52,11 +52,10 @@ def set_dynamics(
     simulates: bool | None = None,
     **changes: Any,
 ) -> DynamicsSettings:
-    """Change the simulation of guide Curves; returns its settings.
+    """Change the simulation settings of guide Curves, and return them.
 
     settings: `DynamicsSettings`, the name of a preset such as "STYLED", or None for the current ones; changes: fields
-    of `DynamicsSettings`; simulates: whether the guides are simulated while the animation plays, None to leave that as
-    it is.
+    of `DynamicsSettings`; simulates: whether the guides are simulated during playback, None for no change.
 
     >>> guides = bpy.data.objects["Guides"]
     >>> api.set_dynamics(guides, "STYLED", simulates=True, friction=0.4).hold
@@ -82,11 +81,12 @@ def bake_dynamics(
     starts_over: bool = False,
     progress: Progress = no_progress,
 ) -> range:
-    """Simulate guide Curves from their start frame on, write the frames to their cache folder, and return these.
+    """Simulate guide Curves from their start frame on, write the frames to their cache folder, and return the range.
 
-    last_frame: the scene's last for None; starts_over: simulate frames again that are there, instead of going on after
-    them; progress(step, part): callback, which may raise to stop: frames so far are kept. The guides simulate from then
-    on. Raises `HairError` where the folder cannot be written, the .blend was not saved, or memory is short.
+    last_frame: None for the scene's last; starts_over: simulate existing frames again instead of continuing after them;
+    progress(step, part): callback, may raise to cancel, which keeps the frames so far. Simulation of the guides is
+    switched on. Raises `HairError` if the folder cannot be written, the .blend file is not saved, or memory is
+    insufficient.
 
     >>> guides = bpy.data.objects["Guides"]
     >>> guides.data.vellus.cache_folder = "haircache"
@@ -100,16 +100,17 @@ def bake_dynamics(
     last = plain_value("last_frame", last, 1, _FRAME)
     starts_over = plain_value("starts_over", starts_over, False, _SWITCH)
     work = blender.groom.dynamics.guide_baking.baking([target], last, scene_time.present_scene(), starts_over)
-    (baked,) = run_now(work, heard(progress))
+    (baked,) = run_now(work, checked_progress(progress))
     target.vellus.simulates = True
     return range(baked.first, baked.last + 1)
 
 
 def deliver_dynamics(guides: Curves, *, progress: Progress = no_progress) -> Path:
-    """Write the hair of baked guides to a USD file beside the .blend, let Blender play it, and return its path.
+    """Write the hair of baked guides to a USD file beside the .blend file, play it in Blender, and return its path.
 
-    Files that link the hair, render farms and Blender without Vellus show it then. The frames are those of the scene.
-    Raises `HairError` where a frame is not baked, the .blend was not saved, or the file cannot be written.
+    The delivered hair is visible in files that link it, on render farms and in Blender without Vellus. All frames of
+    the scene are written. Raises `HairError` if a frame is not baked, the .blend file is not saved, or the USD file
+    cannot be written.
 
     >>> api.deliver_dynamics(bpy.data.objects["Guides"]).name
     'shot_Guides.usdc'
@@ -117,13 +118,13 @@ def deliver_dynamics(guides: Curves, *, progress: Progress = no_progress) -> Pat
     target = blender.data.arguments.guides_of(guides)
     delivery = blender.io.delivery
     work = delivery.delivering(target, delivery.path_of(target), blender.host.scene_time.present_scene())
-    return run_now(work, heard(progress)).path
+    return run_now(work, checked_progress(progress)).path
 
 
 def remove_delivery(guides: Curves) -> None:
-    """Let the hair of guide Curves follow them again, instead of the delivered frames. The file stays.
+    """Let the hair of guide Curves follow the guides again instead of the delivered frames. The file is kept.
 
-    Raises `HairError` where no hair plays delivered frames.
+    Raises `HairError` if no hair plays delivered frames.
 
     >>> api.remove_delivery(bpy.data.objects["Guides"])
     """
@@ -141,14 +142,14 @@ def simulate(
     regions: ArrayLike | None = None,
     **changes: Any,
 ) -> Iterator[np.ndarray]:
-    """Simulate guides on a mesh of plain arrays that moves: a generator of (G, P, 3) float32 [m], one for each pose.
+    """Simulate guides on a moving mesh of plain arrays: yields points (G, P, 3) float32 [m] for each pose.
 
-    poses: for each frame the vertices (V, 3) [m], read when the frame is asked for; guides: `Strands` on the first of
-    them, as `distribute_guides` returns them, which come out first as they are; triangles: (F, 3) indices of vertices,
-    wound so that normals point out. settings: `DynamicsSettings`; changes: its fields by name; frame_rate: poses a
-    second; gravity: [m/s²]; regions: (G,) whole numbers; guides of two of them do not rub or press on each
-    other, as beyond a parting; None for one. Raises `HairError` for what cannot be simulated, and later for a pose that
-    has other vertices, or non-finite ones.
+    poses: vertices (V, 3) [m] for each frame, read on demand; triangles: (F, 3) indices of vertices, wound so that
+    normals point outward; guides: `Strands` on the first pose, as from `distribute_guides`, yielded unchanged for it;
+    settings: `DynamicsSettings`; changes: its fields by name; frame_rate: of the poses [1/s]; gravity: [m/s²]; regions:
+    (G,) integers; guides of different regions do not rub or press on each other, as across a parting; None for one
+    region. Raises `HairError` for invalid arguments, and during iteration for a pose with another number of vertices or
+    non-finite ones.
 
     >>> import numpy as np
     >>> vertices = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]], np.float32)
@@ -167,8 +168,8 @@ def simulate(
         raise HairError("guides must be Strands, as distribute_guides() returns for arrays.")
     check_strands(guides)
     try:
-        coming = iter(poses)
-        first = next(coming, None)
+        remaining = iter(poses)
+        first = next(remaining, None)
     except TypeError as error:
         raise HairError("poses must be an iterable of vertices (V, 3), one array for each frame.") from error
     if first is None:
@@ -176,11 +177,11 @@ def simulate(
     mesh = mesh_of((first, triangles))
     dynamics.moving_mesh.require(mesh, guides)
     parted = None if regions is None else _regions_of(regions, len(guides))
-    return dynamics.moving_mesh.simulated(mesh, guides, coming, wanted, 1.0 / rate, (x, y, z), regions=parted)
+    return dynamics.moving_mesh.simulated(mesh, guides, remaining, wanted, 1.0 / rate, (x, y, z), regions=parted)
 
 
 def _regions_of(given, guide_count):
-    """(G,) int32 from 0. Raises `HairError`."""
+    """Return consecutive regions (G,) int32 from 0. Raises `HairError`."""
     regions = array_of(given)
     if regions is None or regions.dtype.kind not in "iu" or regions.shape != (guide_count,):
         raise HairError(f"regions must be whole numbers of shape ({guide_count},), one of each guide.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions of exports."""
+"""Python interface: export."""
 
 import os
 from collections.abc import Iterable
@@ -8,7 +8,7 @@ from typing import Any
 from ..core.errors import HairError
 from ..core.files.export_settings import ExportSettings
 from ..core.long_work import Progress, no_progress, run_now
-from .arguments import changed, heard, path_of
+from .arguments import changed, checked_progress, path_of
 from .blender_access import blender
 
 Curves = Any
@@ -24,11 +24,11 @@ def export_groom(
     progress: Progress = no_progress,
     **changes: Any,
 ) -> list[str]:
-    """Write hair and its guides for engines and other programs; returns what their importers will do with it.
+    """Write hair and its guides for engines and other programs; returns warnings about their import.
 
-    path: .abc is written as Unreal imports grooms, .usd, .usdc and .usda for Unreal, Houdini and Omniverse; hair: hair
-    Curves, a group each in the file, None for all; settings: `ExportSettings`; changes: its fields by name. The
-    sentences that come back tell of strands without length, of missing UV coordinates, and of other things to know.
+    path: .abc for Unreal's groom importer, .usd, .usdc and .usda for Unreal, Houdini and Omniverse; hair: hair Curves,
+    which become groups of the file, None for all; settings: `ExportSettings`; changes: its fields by name. Warnings
+    concern, for example, strands of zero length and missing UV coordinates.
 
     >>> api.export_groom("hair.abc", [bpy.data.objects["Hair"]], has_color=False)
     []
@@ -39,13 +39,13 @@ def export_groom(
     else:
         chosen = list(dict.fromkeys(blender.data.arguments.curves_of(one, "HAIR") for one in _listed(hair)))
     work = blender.io.groom_export.exporting(target, chosen, wanted, blender.host.scene_time.present_scene())
-    return [str(note) for note in run_now(work, heard(progress)).notes]
+    return [str(note) for note in run_now(work, checked_progress(progress)).notes]
 
 
 def _listed(hair):
     try:
         if not isinstance(hair, str):
             return [*hair]
-    except TypeError:  # also an array without dimensions, which has the method of iterables
+    except TypeError:  # also for 0-D arrays, which have `__iter__`
         pass
     raise HairError("hair must be a list of hair Curves, or None for all.")

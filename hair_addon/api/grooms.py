@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides and hair: distributed, interpolated, shaded; settings of a groom."""
+"""Python interface: distribution of guides, interpolation of hair, shading, and settings of a groom."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -21,13 +21,11 @@ from ..core.params import require_class
 from ..core.shading import presets
 from ..core.shading.appearance import Appearance, shown_changes
 from ..core.styling.base import StyleSettings
-from .arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
+from .arguments import are_arrays, changed, checked_progress, choice, mesh_of, path_of, require_no_names
 from .blender_access import blender
-from .styles import (
-    styled_strands,
-)
+from .styles import styled_strands
 
-# Blender has no types outside of Blender. Wherever Curves are taken their object is too.
+# Blender's types exist only in Blender. Functions that accept Curves also accept their object.
 Curves = Any
 MeshObject = Any
 Arrays = TriMesh | tuple[ArrayLike, ArrayLike]  # vertices (V, 3) [m] and triangles (F, 3)
@@ -45,16 +43,16 @@ def distribute_guides(
 ) -> Curves | Strands:
     """Distribute guides evenly on a surface.
 
-    surface: a mesh object, whose new guide Curves are returned; or (vertices (V, 3) [m], triangles (F, 3)), whose
-    `Strands` are. settings: `GuideSettings`; changes: its fields by name; progress(step, part): callback.
-    The length is computed from the surface unless it is given.
+    surface: a mesh object, for which new guide Curves are returned, or (vertices (V, 3) [m], triangles (F, 3)), for
+    which `Strands` are returned; settings: `GuideSettings`; changes: its fields by name; progress(step, part):
+    callback. The length is computed from the surface unless given.
 
     >>> surface = bpy.data.objects["Scalp"]
     >>> guides = api.distribute_guides(surface, guide_count=50, length=0.3)
     >>> guides.name, len(guides.curves)
     ('Guides', 50)
     """
-    settings, progress = changed(GuideSettings, settings, changes), heard(progress)
+    settings, progress = changed(GuideSettings, settings, changes), checked_progress(progress)
     if are_arrays(surface):
         require_no_names(settings)
         return dynamics.draped_growth.grow(mesh_of(surface), settings, progress=progress)
@@ -74,17 +72,17 @@ def interpolate_hair(
 ) -> Curves | Strands:
     """Interpolate strands between guides, and style them.
 
-    guides: guide Curves, whose new hair Curves are returned; or the `Strands` of guides on a `mesh` of arrays, whose
-    `Strands` are. settings: `HairSettings`; changes and progress as above. Radius and influence distance are computed
-    from the surface unless they are given. Strands use the mask of their guides, unless `density_group` names another
-    group; with plain arrays, they cover the whole mesh. styles: in the order in which they are applied; masks: of plain
-    arrays, weights (V,) of the vertices by the names that styles use.
+    guides: guide Curves, for which new hair Curves are returned, or `Strands` of guides on a `mesh` of arrays, for
+    which `Strands` are returned; settings: `HairSettings`; styles: in the order of application; masks: for plain
+    arrays, weights (V,) of vertices by the names that styles use; changes and progress: as in `distribute_guides`.
+    Radius and influence distance are computed from the surface unless given. Strands use the mask of their guides
+    unless `density_group` is set; with plain arrays, they cover the whole mesh.
 
     >>> hair = api.interpolate_hair(bpy.data.objects["Guides"], strand_count=2000, radius=0.001)
     >>> hair.vellus.hair.strand_count
     2000
     """
-    settings, progress = changed(HairSettings, settings, changes), heard(progress)
+    settings, progress = changed(HairSettings, settings, changes), checked_progress(progress)
     if isinstance(guides, Strands):
         check_strands(guides)
         if mesh is None:
@@ -106,7 +104,7 @@ def interpolate_hair(
 def add_hair(
     surface: MeshObject, settings: GroomSettings | None = None, *, progress: Progress = no_progress
 ) -> tuple[Curves, Curves]:
-    """Add guides and hair to a mesh object and set its look; returns the Curves of both. settings: `GroomSettings`.
+    """Add guides and hair to a mesh object, with their look; returns the Curves of both. settings: `GroomSettings`.
 
     >>> settings = api.GroomSettings(api.GuideSettings(guide_count=30), api.HairSettings(strand_count=900))
     >>> guides, hair = api.add_hair(bpy.data.objects["Scalp"], settings)
@@ -116,13 +114,13 @@ def add_hair(
     settings = GroomSettings() if settings is None else settings
     require_class(settings, GroomSettings, "settings")
     work = blender.groom.transfer.groom_settings.adding_hair(_grown_on(surface), settings, _depsgraph())
-    return run_now(work, heard(progress))
+    return run_now(work, checked_progress(progress))
 
 
 def points(strands: Curves | Strands) -> np.ndarray:
-    """(S, P, 3) float32 [m] of guides or hair.
+    """Return the points (S, P, 3) float32 [m] of guides or hair.
 
-    Those of Curves are in world space, with Z up, deformed with their surface; those of `Strands` are unchanged.
+    Points of Curves are in world space, with Z up, deformed with their surface; points of `Strands` are unchanged.
 
     >>> api.points(bpy.data.objects["Hair"]).shape
     (2000, 41, 3)
@@ -137,11 +135,11 @@ def points(strands: Curves | Strands) -> np.ndarray:
 
 
 def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | None = None, **changes: Any) -> None:
-    """Give hair a look, for the viewport and for Cycles.
+    """Set the look of hair, for the viewport and for Cycles.
 
     look: an `Appearance`, the name of a preset such as "BLOND", or None for the current one; changes: fields of
-    `Appearance`; model: "MARSCHNER" or "KAJIYA_KAY", None for the current one. A change of melanin, redness or tint,
-    of color, or of absorption also sets the parametrization to it.
+    `Appearance`; model: "MARSCHNER" or "KAJIYA_KAY", None for the current one. Changing melanin, redness or tint,
+    color, or absorption also selects that parametrization.
 
     >>> api.shade(bpy.data.objects["Hair"], "AUBURN", roughness=0.25)
     >>> api.settings_of(bpy.data.objects["Hair"]).appearance.roughness
@@ -197,7 +195,7 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
     blender.groom.transfer.groom_settings.apply_settings(_curves(hair, "HAIR"), settings)
 
 
-# What is given.
+# Arguments.
 
 
 def _curves(given, kind=None):
@@ -205,11 +203,11 @@ def _curves(given, kind=None):
 
 
 def _grown_on(given):
-    """The mesh object that hair is to grow on; what is wrong with it is printed."""
+    """Return the mesh object for hair; prints a warning about inverted normals."""
     surface = blender.data.arguments.surface_object(given)
-    said = blender.data.orientation.warning(surface)
-    if said is not None:
-        blender.host.notices.say(said[0].format(**said[1]))
+    warning = blender.data.orientation.warning(surface)
+    if warning is not None:
+        blender.host.notices.say(warning[0].format(**warning[1]))
     return surface
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions of guide tools."""
+"""Python interface: guide tools."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ Curves = Any
 
 __all__ = ["change_guides"]
 
-# The settings of each tool.
+# Tool → its settings.
 TOOLS = {
     "LENGTH": guide_tool_settings.LengthSettings,
     "TRIM": guide_tool_settings.TrimSettings,
@@ -30,11 +30,13 @@ TOOLS = {
 def change_guides(
     guides: Curves, tool: str, settings: ToolSettings | CopySettings | None = None, **changes: Any
 ) -> int:
-    """Change guide Curves and keep their combing; returns how many have changed, were mirrored, or are there now.
+    """Apply a guide tool to guide Curves, which stay combed; returns the number of changed guides.
 
-    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT", "ATTRACT" or "DRAPE"; settings: of the
-    tool, from core/grooming/guide_tool_settings.py; changes: its fields by name. Hair follows at the next update of
-    the view layer.
+    For "MIRROR" the number of mirrored guides is returned, for "COUNT" the new number of guides.
+
+    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT", "ATTRACT" or "DRAPE"; settings: of the tool,
+    from core/grooming/guide_tool_settings.py; changes: its fields by name. Hair follows at the next update of the view
+    layer.
 
     >>> guides = bpy.data.objects["Guides"]
     >>> api.change_guides(guides, "LENGTH", method="MAXIMUM", length=0.2)

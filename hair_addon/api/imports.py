@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions of hair that comes from elsewhere, or goes to another mesh."""
+"""Python interface: import of curves, and transfer of grooms to other meshes."""
 
 import os
 from collections.abc import Iterable
@@ -16,7 +16,7 @@ from ..core.grooming import groom
 from ..core.grooming.derived_guides import DerivationSettings
 from ..core.grooming.transfer_settings import TransferSettings
 from ..core.long_work import Progress, no_progress, run_now
-from .arguments import are_arrays, changed, choice, curves_object_of, heard, mesh_of, path_of
+from .arguments import are_arrays, changed, checked_progress, choice, curves_object_of, mesh_of, path_of
 from .blender_access import blender
 
 if TYPE_CHECKING:
@@ -40,12 +40,13 @@ def use_as_guides(
     applies_modifiers: bool = True,
     progress: Progress = no_progress,
 ) -> Curves | Strands:
-    """Use curves not created by Vellus as guides; every n-th of them is kept.
+    """Use curves that Vellus did not create as guides; every n-th curve is kept.
 
-    curves: a curves object, which becomes guide Curves in place and is returned: with its modifiers applied, or the
-    original curves; surface: the mesh object that they grow on, None for their own. Or arrays (P, 3) [m], one per
-    curve, with surface (vertices, triangles): their `Strands`. The root is the end nearer to the surface; curves with
-    zero length or non-finite points are removed. Points do not move.
+    curves: a curves object, which becomes guide Curves in place and is returned, or arrays (P, 3) [m], one for each
+    curve, for which `Strands` are returned; surface: the mesh object that they grow on, None for the curves' own
+    surface, or (vertices, triangles) for arrays; applies_modifiers: use the evaluated instead of the original curves.
+    The root is the end nearer to the surface; curves of zero length or with non-finite points are removed. Points do
+    not move.
 
     >>> bpy.ops.object.curves_random_add()
     {'FINISHED'}
@@ -72,7 +73,7 @@ def use_as_guides(
         every=every,
         applies_modifiers=applies_modifiers,
     )
-    return run_now(work, heard(progress)).guides
+    return run_now(work, checked_progress(progress)).guides
 
 
 def _guides_of_arrays(curves, mesh, every):
@@ -94,13 +95,13 @@ def use_as_hair(
     progress: Progress = no_progress,
     **changes: Any,
 ) -> "KeptHair":
-    """Use curves not created by Vellus as hair, as they are, and derive guides that reproduce them.
+    """Use curves that Vellus did not create as hair, unchanged, and derive guides that reproduce them.
 
-    curves, surface and applies_modifiers: as of `use_as_guides`; settings: `DerivationSettings`; changes: its fields by
-    name; follows_guides: replace the strands with strands on the same roots that follow the guides; guides: a curves
-    object that becomes the hair's guides, as they are, in place of derived ones. Returns what has
-    `hair` and `guides`, the Curves, and `mean_error` and `high_error`: how far strands are from their reproduction as a
-    part of their length, the root mean square and what 95 % stay below. No point moves.
+    curves, surface and applies_modifiers: as in `use_as_guides`; settings: `DerivationSettings`; changes: its fields by
+    name; follows_guides: replace the strands with interpolated strands on the same roots; guides: a curves object that
+    becomes the hair's guides instead of derived ones. The result has `hair` and `guides`, the Curves, and `mean_error`
+    and `high_error`: the root mean square and the 95th percentile of the strands' reproduction errors, relative to
+    their lengths. Points do not move.
 
     >>> bpy.ops.object.curves_random_add()
     {'FINISHED'}
@@ -108,7 +109,7 @@ def use_as_hair(
     >>> len(used.hair.curves), len(used.guides.curves), used.mean_error < used.high_error
     (500, 50, True)
     """
-    wanted, progress = changed(DerivationSettings, settings, changes), heard(progress)
+    wanted, progress = changed(DerivationSettings, settings, changes), checked_progress(progress)
     curves_object = curves_object_of(curves)
     depsgraph = blender.data.scene.present_depsgraph()
     if surface is None:
@@ -134,12 +135,13 @@ def import_curves(
     unit: str | float | None = None,
     up: str | None = None,
 ) -> "Found":
-    """Read curves of a file, for `use_as_guides` and `use_as_hair`; the surface is where they are expected.
+    """Read curves from a file, for `use_as_guides` and `use_as_hair`.
 
-    path: .abc, .usd, .usdc, .usda, .usdz, .npz or .blend; kind: "GUIDES" or "HAIR", of which a groom has both; name: of
-    an object or a group, "" for all; unit: m, cm, mm, in, ft, km or meters in a unit; up: the axis that points up, X, Y
-    or Z; None for what the file says. Returns what has `curves`, a curves object, `guides`, one of the guides that the
-    file has for this hair or None, and `notes`, sentences about what was assumed or left out.
+    path: .abc, .usd, .usdc, .usda, .usdz, .npz or .blend; surface: the mesh object that the curves grow on, by which
+    missing unit and axis are inferred; kind: "GUIDES" or "HAIR", if a groom has both; name: of an object or a group, ""
+    for all; unit: m, cm, mm, in, ft, km or the number of meters in a unit; up: X, Y or Z; None for the file's own. The
+    result has `curves`, a curves object, `guides`, the file's guides of this hair or None, and `notes`, sentences about
+    assumptions and skipped curves.
 
     >>> api.export_groom("groom.abc", [bpy.data.objects["Hair"]])
     []
@@ -170,7 +172,7 @@ def transfer_groom(
     """Copy hair and its guides, or guides alone, to another mesh object of any topology.
 
     settings: `TransferSettings`; changes: its fields by name: method "UV", "NEAREST" or "LANDMARKS", alignment, reach,
-    scale_lengths. Returns what has `guides` and `hair`, the new Curves, `places` with `kept` and `lost_count`, and
+    scale_lengths. The result has `guides` and `hair`, the new Curves, `places` with `kept` and `lost_count`, and
     `cleared`, the names of masks that the mesh does not have.
 
     >>> bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=2.0)
@@ -179,7 +181,7 @@ def transfer_groom(
     >>> len(made.guides.curves), made.places.lost_count, round(made.places.scale, 1)
     (75, 0, 2.0)
     """
-    wanted, progress = changed(TransferSettings, settings, changes), heard(progress)
+    wanted, progress = changed(TransferSettings, settings, changes), checked_progress(progress)
     given = blender.data.arguments.curves_of(hair)
     is_hair = given.vellus.kind == "HAIR"
     guides = blender.groom.pipeline.inputs_of(given)[0] if is_hair else blender.data.arguments.guides_of(given)

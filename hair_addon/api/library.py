@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions of grooms in asset libraries."""
+"""Python interface: grooms in asset libraries."""
 
 import os
 from pathlib import Path
@@ -12,7 +12,7 @@ from ..core import grooming
 from ..core.errors import HairError
 from ..core.long_work import Progress, no_progress, run_now
 from ..core.params import array_of, described, is_text
-from .arguments import choice, heard, path_of
+from .arguments import checked_progress, choice, path_of
 from .blender_access import blender
 
 Curves = Any
@@ -26,10 +26,10 @@ def save_groom(
 ) -> Path:
     """Save hair Curves and their guides as an asset; returns the file.
 
-    path: the folder of an asset library, or a .blend file, which is replaced if it has nothing but grooms; name: of the
-    groom, the hair's for none; catalog: of the library, such as "Hair/Short", empty for none; picture: (height, width,
-    4), sRGB, the first row at the bottom, drawn by Vellus for None. The file holds the guides at rest, their surface,
-    masks and settings; not the strands, which grow again.
+    path: the folder of an asset library, or a .blend file, which is replaced if it contains only grooms; name: of the
+    groom, "" for the hair's; catalog: of the library, such as "Hair/Short", "" for none; picture: (height, width, 4),
+    sRGB, bottom row first, None to draw one. The file contains the guides at rest, their surface, masks and settings,
+    but not the strands, which are generated again.
 
     >>> file = api.save_groom(bpy.data.objects["Hair"], "library", name="Bob")
     >>> file.name
@@ -43,7 +43,7 @@ def save_groom(
 
 
 def _pixels(picture):
-    """A picture as (height, width, 4) float32, None for None. Raises `HairError`."""
+    """Return a picture as (height, width, 4) float32, None for None. Raises `HairError`."""
     if picture is None:
         return None
     pixels = array_of(picture, np.float32)
@@ -53,7 +53,7 @@ def _pixels(picture):
 
 
 def groom_names(path: str | os.PathLike) -> list[str]:
-    """Names of the assets in a .blend file, in alphabetical order.
+    """Return the names of the assets in a .blend file, in alphabetical order.
 
     >>> api.groom_names("library/Bob.asset.blend")
     ['Bob']
@@ -69,11 +69,11 @@ def apply_groom(
     method: str = "AUTO",
     progress: Progress = no_progress,
 ) -> tuple[Curves, Curves]:
-    """Put a saved groom on a mesh object as new guides and hair; returns the Curves of both.
+    """Apply a saved groom to a mesh object as new guides and hair; returns the Curves of both.
 
-    path: a .blend file with grooms; name: which one, if there are several; method: "UV" carries guides by UV
-    coordinates, "NEAREST" to the nearest surface, "AUTO" takes a copy of the saved surface as it is, then UV maps that
-    agree, then the nearest surface. Lengths follow the surface's size.
+    path: a .blend file with grooms; name: of the groom, if there are several; method: "UV" transfers guides by UV
+    coordinates, "NEAREST" to the nearest surface; "AUTO" chooses an exact copy if the mesh equals the saved surface,
+    else UV maps that agree, else the nearest surface. Lengths scale with the surface.
 
     >>> guides, hair = api.apply_groom(bpy.data.objects["Scalp"], "library/Bob.asset.blend")
     >>> len(guides.curves)
@@ -87,5 +87,5 @@ def apply_groom(
     work = blender.groom.transfer.library_groom.adding_groom(
         target, groom, blender.data.scene.present_depsgraph(), method
     )
-    applied = run_now(work, heard(progress))
+    applied = run_now(work, checked_progress(progress))
     return applied.made.guides, applied.made.hair

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions of styles."""
+"""Python interface: styles."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -30,7 +30,7 @@ from ..core.styling.smooth import Settings as Smooth
 from ..core.styling.style_inputs import Inputs
 from ..core.styling.trim import Settings as Trim
 from ..core.styling.wet import Settings as Wet
-from .arguments import changed, choice, heard
+from .arguments import changed, checked_progress, choice
 from .blender_access import blender
 
 Curves = Any
@@ -65,11 +65,11 @@ def add_style(
 ) -> StyleSettings:
     """Add a style after the other styles of hair Curves; returns its settings.
 
-    style: a name of the menu such as "CURL" or "WAVE", or settings such as `Curl(…)`; name: in the list, by default the
+    style: a name in the menu such as "CURL" or "WAVE", or settings such as `Curl(…)`; name: in the list, by default the
     menu's; changes: fields of the style's settings; fit: whether the menu's lengths, which are for a human head, are
-    fitted to the surface: what `Curl(…)` and changes give is taken as it is; progress(step, part): callback while locks
-    are placed, which may raise to stop: then nothing is added. Without a `seed` a style of the menu gets one that no
-    other style of the hair has.
+    scaled to the surface; values of `Curl(…)` and changes are never scaled; progress(step, part): callback for the
+    placement of locks, may raise to cancel without a change. Without a `seed`, a style of the menu gets one that is
+    unique among the hair's styles.
 
     >>> hair = bpy.data.objects["Hair"]
     >>> api.add_style(hair, "CURL", radius=0.004).radius
@@ -87,11 +87,11 @@ def add_style(
     fit, name = plain_value("fit", fit, False, _SWITCH), plain_value("name", name, "", _SWITCH)
     target = blender.data.arguments.curves_of(hair, "HAIR")
     work = blender.groom.styles.hair_styles.adding(target, settings, name, is_fitted=fit, kept=kept)
-    return run_now(work, heard(progress))
+    return run_now(work, checked_progress(progress))
 
 
 def styles_of(hair: Curves) -> tuple[StyleSettings, ...]:
-    """Return the styles of hair Curves in order, disabled ones too.
+    """Return the styles of hair Curves in order, including disabled ones.
 
     >>> [type(style) is api.Curl for style in api.styles_of(bpy.data.objects["Hair"])]
     [True]
@@ -100,7 +100,7 @@ def styles_of(hair: Curves) -> tuple[StyleSettings, ...]:
 
 
 def set_styles(hair: Curves, styles: Sequence[StyleSettings], *, progress: Progress = no_progress) -> None:
-    """Replace the styles of hair Curves; a style keeps the name and the keys of one of its kind.
+    """Replace the styles of hair Curves; a style inherits name and keyframes of a previous one of its kind.
 
     progress: as in `add_style`.
 
@@ -110,17 +110,16 @@ def set_styles(hair: Curves, styles: Sequence[StyleSettings], *, progress: Progr
     """
     styles, _names = require_styles(styles)
     target = blender.data.arguments.curves_of(hair, "HAIR")
-    run_now(blender.groom.styles.hair_styles.assigning(target, styles), heard(progress))
+    run_now(blender.groom.styles.hair_styles.assigning(target, styles), checked_progress(progress))
 
 
 def apply_style_preset(
     hair: Curves, preset: str, *, fit: bool = True, keep_styles: bool = False, progress: Progress = no_progress
 ) -> None:
-    """Replace the styles of hair Curves by those of a preset such as "CURLY".
+    """Replace the styles of hair Curves with those of a preset such as "CURLY".
 
-    fit: whether lengths, which are for a human head, are multiplied by the size of the surface; keep_styles: whether
-    the preset's styles come after the present ones, in place of replacing them; progress: as in
-    `add_style`.
+    fit: whether lengths, which are for a human head, are scaled to the surface; keep_styles: append the preset's styles
+    to the present ones instead of replacing them; progress: as in `add_style`.
 
     >>> api.apply_style_preset(bpy.data.objects["Hair"], "FRIZZY")
     >>> [style.octaves for style in api.styles_of(bpy.data.objects["Hair"])]
@@ -130,7 +129,7 @@ def apply_style_preset(
     fit, keep = plain_value("fit", fit, False, _SWITCH), plain_value("keep_styles", keep_styles, False, _SWITCH)
     target = blender.data.arguments.curves_of(hair, "HAIR")
     work = blender.groom.styles.hair_styles.applying_preset(target, found, is_fitted=fit, keeps_styles=keep)
-    run_now(work, heard(progress))
+    run_now(work, checked_progress(progress))
 
 
 def styled_strands(
@@ -141,7 +140,7 @@ def styled_strands(
     masks: Mapping[str, ArrayLike] | None,
     progress: Progress,
 ) -> Strands:
-    """Strands between guides on a mesh of arrays, with styles; arguments as in `api.interpolate_hair`."""
+    """Return styled strands between guides on a mesh of arrays; arguments as in `api.interpolate_hair`."""
     styles, _names = require_styles(styles)
     if not isinstance(masks, Mapping | None):
         raise HairError(f"masks must be a dictionary of weights by their names, not {described(masks)}.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions of lookup tables."""
+"""Python interface: lookup tables."""
 
 import os
 from pathlib import Path
@@ -10,14 +10,14 @@ from ..core.long_work import Progress, no_progress, run_now
 from ..core.params import Param, plain_value, require_class
 from ..core.shading import appearance
 from ..core.shading.tables import lookup_tables
-from .arguments import changed, heard, path_of
+from .arguments import changed, checked_progress, path_of
 from .blender_access import blender
 
 _ANY = Param("")
 
 
 def table_settings(settings: GroomSettings, **changes: Any) -> lookup_tables.Settings:
-    """Return the `lookup_tables.Settings` of the tables for hair with these `GroomSettings`.
+    """Return the `lookup_tables.Settings` for hair with given `GroomSettings`.
 
     >>> settings = api.GroomSettings(appearance=api.Appearance(roughness=0.2))
     >>> api.table_settings(settings, size=64).roughness
@@ -36,9 +36,9 @@ def bake_tables(
     progress: Progress = no_progress,
     **changes: Any,
 ) -> list[Path]:
-    """Bake the tables of the Marschner model and of dual scattering to OpenEXR in a folder; returns the file paths.
+    """Bake the tables of the Marschner model and of dual scattering to OpenEXR files in a folder; returns their paths.
 
-    settings: `lookup_tables.Settings`; has_plots: whether to write a plot of each table.
+    settings: `lookup_tables.Settings`; has_plots: also write a plot of each table.
 
     >>> [path.name for path in api.bake_tables("tables", size=32)][:3]
     ['m.exr', 'n.exr', 'n_trt.exr']
@@ -46,4 +46,6 @@ def bake_tables(
 
     settings = changed(lookup_tables.Settings, settings, changes)
     has_plots = plain_value("has_plots", has_plots, False, _ANY)
-    return run_now(blender.io.table_files.baking_tables(settings, path_of(folder), has_plots), heard(progress))
+    return run_now(
+        blender.io.table_files.baking_tables(settings, path_of(folder), has_plots), checked_progress(progress)
+    )
