@@ -77,8 +77,8 @@ def bind_styles(
 ) -> "Styling | None":
     """Return the `Styling` of strands; None if no style has an effect and guides have the strands' point count.
 
-    axes: (4, 4) to the surface's own coordinates, from `own_axes`, None for the identity; progress(step, part): callback
-    for the placement of clump sites, may raise to cancel.
+    axes: (4, 4) to the surface's own coordinates, from `own_axes`, None for the identity; progress(step, part):
+    callback for the placement of clump sites, may raise to cancel.
     """
     if not any(map(styling.base.has_effect, styles)) and settings.point_count == guides.point_count:
         return None
