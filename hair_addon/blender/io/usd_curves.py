@@ -71,7 +71,7 @@ def _sets_of(path, prim, name, timing, notes) -> Iterator[CurveSet]:
     if drawn.was_smooth:
         notes.append(HairError(curve_file.SPLINES_MOVE, path=f'"{name}" in {path}'))
     if drawn.has_odd_widths:
-        sentence = "has widths neither for each point nor for each curve: they are ignored."
+        sentence = "has widths neither for each point nor for each curve: they are left out."
         notes.append(HairError(f'"{name}" in {path} {sentence}'))
     if usd_stage.is_skinned(prim):
         sentence = "is bound to a skeleton: it is read as it was bound, without a pose."

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dynamics: guides as elastic rods that move with their surface, in units of the SI."""
+"""Dynamics: guides as elastic rods that move with their surface, in SI units."""
 
 from typing import TYPE_CHECKING
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Force fields: what the air does at each point, and what else pulls.
+"""Force fields: velocity of the air, accelerations and drag at each point.
 
-Falloff, distances and shapes are those of Blender's force fields, as in its source, effect.cc. Fields act otherwise
-than there in what they stand for: *Wind* is the velocity of the air, to which *Turbulence* adds noise of place and
-time; *Force* and *Vortex* are accelerations; *Drag* multiplies the drag of air.
+Falloff, distances and shapes are those of Blender's force fields, as in its source, effect.cc. The quantities differ:
+*Wind* is the velocity of the air, to which *Turbulence* adds noise in space and time; *Force* and *Vortex* are
+accelerations; *Drag* multiplies the drag of air.
 """
 
 import math
@@ -32,18 +32,18 @@ _WIND, _TURBULENCE, _FORCE, _VORTEX, _DRAG = (wp.constant(index) for index in ra
 _POINT, _LINE, _PLANE = (wp.constant(index) for index in range(len(SHAPES)))
 _SPHERE, _TUBE, _CONE = (wp.constant(index) for index in range(len(FALLOFFS)))
 _POSITIVE, _NEGATIVE = wp.constant(1), wp.constant(2)
-_LEAST_ROWS = 512  # points that are worth a thread
+_LEAST_ROWS = 512  # least number of points for a thread
 _OCTAVES = wp.constant(3)
 _DEGREES = wp.constant(180.0 / math.pi)
 
 
 @dataclass(frozen=True)
 class ForceField:
-    """A force field; names and meanings of values as those of `bpy.types.FieldSettings`.
+    """A force field; names and meanings of values as in `bpy.types.FieldSettings`.
 
-    origin (3,) [m] and axis (3,), the direction of its Z axis. strength: of Wind and Turbulence [m/s], of Force [m/s²],
-    of Vortex [1/s], POINT: [1/s²]; of Drag, what is added to the factor 1. flow [1/s]: damping of hair in Force and
-    Vortex; the drag of air is what it stands for in Wind and Turbulence. Distances [m]: None where not used.
+    origin (3,) [m]; axis (3,): direction of its Z axis; strength: of Wind and Turbulence [m/s], of Force [m/s²], of
+    Vortex [1/s], POINT: [1/s²], of Drag: added to the factor 1; flow [1/s]: damping of hair in Force and Vortex, unused
+    in Wind and Turbulence, where the drag of air replaces it; distances [m]: None if unused.
     """
 
     kind: str
@@ -53,20 +53,20 @@ class ForceField:
     flow: float = 0.0
     shape: str = "POINT"
     falloff: str = "SPHERE"
-    direction: str = "BOTH"  # of the axis, towards which the field acts
+    direction: str = "BOTH"  # side of the origin along the axis on which the field acts
     power: float = 0.0
     minimum: float | None = None
     maximum: float | None = None
     radial_power: float = 0.0  # of TUBE and CONE
     radial_minimum: float | None = None  # CONE: an angle [rad]
     radial_maximum: float | None = None
-    is_gravitation: bool = False  # Force: also by the distance's inverse square
+    is_gravitation: bool = False  # Force: multiplied by the inverse squared distance
     size: float = 0.0  # of Turbulence [m], 0: 1 m
-    is_global: bool = False  # Turbulence: noise of places in the scene, not about the object
+    is_global: bool = False  # Turbulence: noise in world space, not relative to the object
     seed: int = 1
 
     def problem(self) -> str | None:
-        """Why this field cannot act; None if it can."""
+        """Return why this field cannot act; None if it can."""
         names = ((self.kind, KINDS), (self.shape, SHAPES), (self.falloff, FALLOFFS), (self.direction, DIRECTIONS))
         for name, known in names:
             if name not in known:
@@ -102,9 +102,9 @@ class _Field:
 
 
 class Air:
-    """What force fields do to points: arrays (groups, rows, lanes) float32 on one device, of the solver's layout.
+    """Effect of force fields on points: arrays (groups, rows, lanes) float32 on one device, in the solver's layout.
 
-    airs: 3 rows a point, the velocity of the air [m/s]; accelerations: 3 [m/s²]; drags: 1, the factor of air drag.
+    airs: 3 rows per point, velocity of the air [m/s]; accelerations: 3 rows [m/s²]; drags: 1 row, factor of air drag.
     """
 
     def __init__(self, point_shape: tuple[int, int, int], device: wp.DeviceLike = "cpu") -> None:
@@ -118,9 +118,9 @@ class Air:
         self.drags = wp.full(point_shape, 1.0, dtype=float, device=self.device)
 
     def blow(self, fields: Sequence[ForceField], positions: Any, velocities: Any, time: float) -> list[HairError]:
-        """Evaluate fields at positions [m] of points with velocities [m/s], 3 rows a point, at a time [s].
+        """Evaluate fields at positions [m] of points with velocities [m/s], 3 rows per point, at a time [s].
 
-        Returns why some of them do not act, which is as if they were not there. Raises `HairError` for arrays of other
+        Returns the reasons why fields do not act; such fields are ignored. Raises `HairError` for arrays of other
         shapes.
         """
         groups, points, lanes = self._shape
@@ -152,7 +152,7 @@ def _row_of(field):
     row.origin = wp.vec3(*field.origin)
     row.axis = wp.normalize(wp.vec3(*(np.asarray(field.axis) / np.abs(field.axis).max())))
     row.strength, row.flow, row.power, row.radial_power = field.strength, field.flow, field.power, field.radial_power
-    # Blender's formula takes a cone's angles in degrees.
+    # Blender's formula uses a cone's angles in degrees.
     unit = 180.0 / math.pi if field.falloff == "CONE" else 1.0
     row.minimum, row.maximum = _limit(field.minimum, -1.0), _limit(field.maximum, math.inf)
     row.radial_minimum, row.radial_maximum = (
@@ -170,7 +170,7 @@ def _limit(value, unused, unit=1.0):
 
 @wp.func
 def _falloff_of(distance: float, minimum: float, maximum: float, power: float):
-    """Part of a field's strength at a distance; minimum -1: none."""
+    """Return the fraction of a field's strength at a distance; minimum -1: none."""
     if distance > maximum:
         return 0.0
     if distance < minimum:
@@ -180,7 +180,7 @@ def _falloff_of(distance: float, minimum: float, maximum: float, power: float):
 
 @wp.func
 def _strength_at(field: _Field, offset: wp.vec3, distance: float):
-    """Part of a field's strength; offset: from its origin; distance: from its point, line or plane."""
+    """Return the fraction of a field's strength; offset: from its origin; distance: from its point, line or plane."""
     along = wp.dot(offset, field.axis)
     if (field.direction == _POSITIVE and along < 0.0) or (field.direction == _NEGATIVE and along > 0.0):
         return 0.0
@@ -195,7 +195,7 @@ def _strength_at(field: _Field, offset: wp.vec3, distance: float):
 
 @wp.func
 def _hash(x: wp.uint32):
-    # As random_numbers.py.
+    # As in random_numbers.py.
     x = (x ^ (x >> wp.uint32(16))) * wp.uint32(0x7FEB352D)
     x = (x ^ (x >> wp.uint32(15))) * wp.uint32(0x846CA68B)
     return x ^ (x >> wp.uint32(16))
@@ -203,13 +203,13 @@ def _hash(x: wp.uint32):
 
 @wp.func
 def _signed(bits: wp.uint32):
-    """A number in [-1, 1)."""
+    """Convert bits to a number in [-1, 1)."""
     return float(bits >> wp.uint32(8)) * wp.static(2.0**-23) - 1.0
 
 
 @wp.func
 def _corner(x: int, y: int, z: int, t: int, seed: wp.uint32):
-    """A random vector of a point of the lattice, each component in [-1, 1)."""
+    """Return the random vector of a lattice point, each component in [-1, 1)."""
     bits = seed * wp.uint32(0x9E3779B9)
     bits = _hash(bits ^ wp.uint32(x))
     bits = _hash(bits ^ wp.uint32(y))
@@ -226,7 +226,7 @@ def _faded(x: float):
 
 @wp.func
 def _noise(place: wp.vec3, time: float, seed: wp.uint32):
-    """Smooth noise of place and time, each component in [-1, 1): random vectors on a lattice, interpolated."""
+    """Return smooth noise in space and time, each component in [-1, 1): interpolated random vectors on a lattice."""
     x = wp.floor(place[0])
     y = wp.floor(place[1])
     z = wp.floor(place[2])
@@ -249,11 +249,11 @@ def _noise(place: wp.vec3, time: float, seed: wp.uint32):
 
 @wp.func
 def _turbulence(place: wp.vec3, time: float, seed: wp.uint32):
-    """Noise in octaves, each of half the size, half the time and half the strength."""
+    """Return noise in octaves, each with half the size, half the duration and half the strength."""
     total = wp.vec3()
     scale = float(1.0)
     for octave in range(_OCTAVES):
-        # Beyond this, cells are smaller than what a float can tell apart.
+        # Beyond this limit, cells are smaller than the resolution of a float.
         if wp.max(wp.abs(place * scale)) < 4.0e6:
             total += _noise(place * scale, time * scale, seed + wp.uint32(octave)) / scale
         scale *= 2.0
@@ -319,7 +319,7 @@ def _blow(
             if field.shape == _POINT:
                 pull = strength * distance * wp.normalize(swirl)
             else:
-                # Towards the velocity of the vortex, with what keeps it on its circle.
+                # Toward the velocity of the vortex, plus the centripetal acceleration.
                 pull = strength * (swirl + strength * wp.cross(field.axis, swirl)) - velocity
         if field.kind == _FORCE or field.kind == _VORTEX:
             acceleration += pull - field.flow * part * velocity

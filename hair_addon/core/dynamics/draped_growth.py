@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that are draped once they are grown: new hair hangs, and lies on its surface in place of passing through it.
+"""Draping of guides after growth: new hair hangs, and lies on its surface instead of passing through it.
 
-What grows on a surface is simulated as if it grew on a human scalp, whatever the size of the surface, as all lengths of
-new hair follow from it (grooming/groom_defaults.py). So hair of a giant and of a mouse look alike, and a setting of
-gravity in place of the scene's says how far it falls.
+Growth is simulated as on a human scalp for any size of surface, because all lengths of new hair are proportional to the
+surface (grooming/groom_defaults.py). Hair of a giant and of a mouse thus looks alike. The gravity is a setting of the
+guides, not the scene's.
 """
 
 import math
@@ -27,16 +27,16 @@ from .collision import contact_queries, contact_substep
 from .rod import detail, rod_solver, rods
 from .rod.settings import DynamicsSettings
 
-SCALP = 0.055  # [m²], of a human head
-# Loose hair, two millimetres from the skin: guides stand for wisps, whose strands lie beside them.
+SCALP = 0.055  # area of a human scalp [m²]
+# Loose hair, two millimetres from the skin: guides represent wisps, whose strands lie beside them.
 _HAIR = DynamicsSettings(bend_stiffness=0.5, collision_distance=2e-3, substeps=2)
 _SECONDS = 1.0
 _EARTH = 9.81  # [m/s²]
-_GROWN = 0.6  # part of the progress
+_GROWN = 0.6  # progress after growth
 
 
 def grow(mesh: TriMesh, settings: GuideSettings, *, progress: Progress = no_progress, **ground: Any) -> Strands:
-    """`groom.distribute_guides` with the same arguments, draped where the settings say so. Raises `HairError`."""
+    """`groom.distribute_guides` with the same arguments, then draping if the settings enable it. Raises `HairError`."""
     if not settings.drape:
         return distribute_guides(mesh, settings, progress=progress, **ground)
     guides = distribute_guides(mesh, settings, progress=part_of(progress, 0.0, _GROWN), **ground)
@@ -56,13 +56,13 @@ def settled(
     mirror: Mirror = ACROSS_X,
     progress: Progress = no_progress,
 ) -> Strands:
-    """Guides that have grown on a mesh, where they come to rest. settings: completed for the mesh.
+    """Return guides that have grown on a mesh in their rest position. settings: completed for the mesh.
 
-    The other arguments are those of `groom.distribute_guides`. Raises `HairError` where guides cannot be draped.
+    Other arguments as in `groom.distribute_guides`. Raises `HairError` if guides cannot be draped.
     """
     device = guides.points.device
     load_kernels(device, progress)
-    metres = math.sqrt(SCALP / groom_defaults.grown_area(mesh, density, texture))  # in a unit of the mesh
+    metres = math.sqrt(SCALP / groom_defaults.grown_area(mesh, density, texture))  # per unit of the mesh
     gravity = (0.0, 0.0, -_EARTH * groom_defaults.known(settings.gravity))
     used, triangles = np.unique(mesh.triangles[within_reach(mesh, settings, density)], return_inverse=True)
     center = mesh.vertices[used].mean(axis=0, dtype=np.float64)
@@ -71,19 +71,19 @@ def settled(
     )
     grown = guides.numpy()
 
-    def tell(part):
+    def report(part):
         progress("Draping guides", part)
 
-    points = draping.draped(metres * (grown - center), surface, _HAIR, gravity, _SECONDS, device, tell)
+    points = draping.draped(metres * (grown - center), surface, _HAIR, gravity, _SECONDS, device, report)
     points = (points / metres + center).astype(np.float32)
-    points[:, 0] = grown[:, 0]  # to the last bit: where the surface has them
+    points[:, 0] = grown[:, 0]  # roots stay bit-identical
     if settings.symmetric:
         points = grooming.guide_growth.mirrored(points, positions(mesh, guides.roots), mirror)
     return from_numpy(points, guides.roots, device)
 
 
 def within_reach(mesh: TriMesh, settings: GuideSettings, density: np.ndarray | None = None) -> np.ndarray:
-    """(F,) bool: the triangles that guides may come near to: those near the box of where they grow.
+    """Return (F,) bool: triangles within a guide's length of the bounding box of the grown area.
 
     settings: completed for the mesh; density: as in `groom.distribute_guides`.
     """
@@ -94,14 +94,14 @@ def within_reach(mesh: TriMesh, settings: GuideSettings, density: np.ndarray | N
 
 
 def _corners_with(mesh, is_chosen):
-    """(N, 3): the corners of the triangles that have a chosen vertex."""
+    """Return the corners (N, 3) of the triangles with a chosen vertex."""
     return mesh.corners[is_chosen[mesh.triangles].any(axis=1)].reshape(-1, 3)
 
 
 def load_kernels(
     device: wp.DeviceLike, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS
 ) -> None:
-    """Load what `settled` launches, as `groom.load_kernels` does; same arguments."""
+    """Load the kernels of `settled`; arguments as in `groom.load_kernels`."""
     on_device = [contact_queries, detail, rods, resampling]
     on_device += [contact_substep] if wp.get_device(device).is_cpu else [rod_solver]
     modules = [wp.get_module(module.__name__) for module in on_device]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that settle under gravity on a surface that stands still: a groom that hangs and lies where it was grown."""
+"""Draping: guides settle under gravity on a static surface."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,12 +16,12 @@ from .rod.settings import DynamicsSettings
 from .root_motion import RootPose
 from .simulation import MOST_SUBSTEPS, Obstacle, Simulation, World
 
-# Of an animation's frames, as reading the surface takes a while for each.
+# Animation frames in a simulated frame: reading the surface for each frame is slow.
 _FRAMES = 4
 FRAME = _FRAMES / 24.0  # [s]
 REST = 5e-3  # [m/s] below which guides are at rest
 _DAMPING = 0.05  # [s]
-_DRAG = 4.0  # times that of air: equilibria stay, and are come to sooner
+_DRAG = 4.0  # multiple of air drag: same equilibria, reached sooner
 
 
 def draped(
@@ -35,10 +35,10 @@ def draped(
     *,
     wetness: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Guides (G, P, 3) [m] → (G, P, 3) float64 where they come to rest, or after some seconds if they do not before.
+    """Simulate guides (G, P, 3) [m] until they rest, for at most `seconds`; returns (G, P, 3) float64.
 
-    mesh: the surface that they grow on and lie upon; gravity: [m/s²]; tell: called with the part that is done, and may
-    raise to stop; wetness: as `Simulation` takes it. Raises `HairError`, also for a surface that nothing collides with.
+    mesh: the surface that they grow and lie on; gravity: [m/s²]; tell: called with the completed fraction, may raise to
+    cancel; wetness: as in `Simulation`. Raises `HairError`, also if the surface is unusable as a collider.
     """
     pose = RootPose(np.asarray(points[:, 0], np.float64), np.tile(rotations.IDENTITY, (len(points), 1)))
     vertices, triangles = mesh.vertices.astype(np.float64), _facing(mesh, points)
@@ -63,15 +63,15 @@ def draped(
     for frame in range(count):
         tell(frame / count)
         simulation.advance(pose, world, FRAME)
-        there = simulation.vertices()
-        if np.linalg.norm(there - before, axis=2).max() < REST * FRAME:
+        after = simulation.vertices()
+        if np.linalg.norm(after - before, axis=2).max() < REST * FRAME:
             break
-        before = there
+        before = after
     return simulation.points()
 
 
 def _facing(mesh, points):
-    """(F, 3) triangles of a mesh, where it is open with the hair (G, P, 3) in front of it."""
+    """Return the triangles (F, 3) of a mesh; open parts are wound so that the hair (G, P, 3) is in front of them."""
     parts = closed_parts.open_parts(mesh)
     if (parts < 0).all():
         return mesh.triangles

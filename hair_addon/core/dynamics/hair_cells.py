@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cells of a volume of hair, and what they do to a point in them: the functions of hair_volume.py's kernels."""
+"""Cells of a hair volume, and their effect on a point: functions for the kernels of hair_volume.py."""
 
 import warp as wp
 
 from ..kernels import native_code
 
-# Every device rounds as the processor does.
+# Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.struct
 class Grid:
-    """Cells of each region, whose corners are whole multiples of the cell size."""
+    """Cells of each region; corners are integral multiples of the cell size."""
 
     low: wp.vec3i
     counts: wp.vec3i
@@ -20,7 +20,7 @@ class Grid:
 
 @wp.func
 def cell_of(grid: Grid, place: wp.vec3, region: int):
-    """The number of the cell before a place [cells], -1 outside of the grid."""
+    """Return the index of the cell that contains a place [cells], -1 outside the grid."""
     x = int(wp.floor(place[0])) - grid.low[0]
     y = int(wp.floor(place[1])) - grid.low[1]
     z = int(wp.floor(place[2])) - grid.low[2]
@@ -33,7 +33,7 @@ def cell_of(grid: Grid, place: wp.vec3, region: int):
 
 @wp.func
 def part_of(place: wp.vec3):
-    """Where a place is between the cell before it and the next one, along each axis."""
+    """Return the fractional part of a place along each axis."""
     return wp.vec3(place[0] - wp.floor(place[0]), place[1] - wp.floor(place[1]), place[2] - wp.floor(place[2]))
 
 
@@ -59,9 +59,10 @@ def _bounded(change: wp.vec3, fastest: float):
 
 @wp.func
 def _settled(place: wp.vec3, then: wp.vec3, velocity: wp.vec3, per_step: float, change: wp.vec3, back: wp.vec3):
-    """The change of velocity of a point between a place and the one it would come to, where it would get another one.
+    """Limit the change of velocity of a point that would be pushed back in the next cell; places in cells.
 
-    Places in cells. Where it is pushed back there, it comes to where the cells meet: it would shake there forever.
+    back: change of velocity at the next place, `then`. Between opposite pushes the point moves to the border of the
+    cells, where it would otherwise oscillate forever.
     """
     for axis in range(3):
         here = wp.floor(place[axis])
@@ -86,10 +87,10 @@ def rubbed(
     pressure: float,
     fastest: float,
 ):
-    """The velocity of a point at a place [cells], after friction, pressure and cohesion for a duration.
+    """Return the velocity of a point at a place [cells] after friction, pressure and cohesion for a duration.
 
-    fields, missing: as `_around` reads them; mixed: part of the velocity that becomes the mean one; pressure: by the
-    size of a cell, times the duration; fastest: largest change [m/s].
+    fields, missing: as in `_around`; mixed: fraction of the velocity that is replaced by the mean; pressure: divided by
+    the cell size, times the duration; fastest: largest change [m/s].
     """
     cell = cell_of(grid, place, region)
     if cell < 0:

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The mean motion of hair around a point, and the push of pressure and cohesion: six numbers from eight cells.
+// Mean velocity of hair around a point, and the push of pressure and cohesion: six numbers from eight cells.
 //
 // The body of `_around` in hair_volume.py. Parameters:
 //
-//   int row                       the cell before the point
-//   int across, int along         from a cell to the next one along x, along y; along z it is 1
-//   vec3 part                     where the point is between the cells, 0..1 along each axis
+//   int row                       the cell of the point
+//   int across, int along         index offset of the next cell along x, along y; 1 along z
+//   vec3 part                     position of the point between the cells, 0..1 along each axis
 //   float wetness                 of the point's strand
-//   array_t<vec4> fields          of each cell the mean velocity [m/s], and e, how much too dense it is
-//   array_t<float> missing        of each cell s, how much too thin it is; empty where wetness is 0
+//   array_t<vec4> fields          for each cell the mean velocity [m/s], and e, the excess of density
+//   array_t<float> missing        for each cell s, the lack of density; may be empty if wetness is 0
 //
-// Returns Σ w v, and -Σ (e - wetness s) ∇w by the size of a cell.
+// Returns Σ w v, and -Σ (e - wetness s) ∇w in units of 1 / cell size.
 
 {
 float around[4] = {0.0f, 0.0f, 0.0f, 0.0f}, push[3] = {0.0f, 0.0f, 0.0f};

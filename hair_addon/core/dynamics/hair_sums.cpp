@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Adds the mass and momentum of one point to the eight cells around it: whole numbers, in any order the same.
+// Adds the mass and momentum of a point to the eight cells around it: integers, whose sums do not depend on the order.
 //
 // The body of `_add` in hair_volume.py. Parameters:
 //
-//   int row                       the cell before the point
-//   int across, int along         from a cell to the next one along x, along y; along z it is 1
-//   vec3 part                     where the point is between the cells, 0..1 along each axis
+//   int row                       the cell of the point
+//   int across, int along         index offset of the next cell along x, along y; 1 along z
+//   vec3 part                     position of the point between the cells, 0..1 along each axis
 //   float mass                    in 1 / UNIT of the mean
 //   vec3 velocity                 [m/s]
 //   array_t<int64> sums           (cells, 4), or (cells, 1) for the mass alone
 //
-// On a processor no other thread adds to the same array.
+// On a CPU no other thread adds to the same array.
 
 {
 const int columns = sums.shape[1];

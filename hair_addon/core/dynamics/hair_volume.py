@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair among hair: friction, pressure and cohesion of all strands as a volume, on a grid [Petrovic06] [McAdams09].
+"""Interaction of hair: friction, pressure and cohesion of all strands as a volume on a grid [Petrovic06] [McAdams09].
 
-Each region of the surface has a grid of its own, so that hair on both sides of a parting does not mix. Sums over
-points are of whole numbers: in any order, on any number of cores, they are the same to the last bit.
+Each region of the surface has its own grid, so that hair on both sides of a parting does not mix. Sums over points are
+integers, and thus bit-identical for any order and number of cores.
 
     ρ_c = Σ w m,  P_c = Σ w m v                                   trilinear weights w; ρ⁰ of the groom
-    v_i ← (1 - f) v_i + f Σ w P_c / ρ_c,  f = 1 - exp(-k_f Δt)    friction: keeps momentum
-    e_c = (ρ_c - 1.2 max(ρ⁰_c, ρ̄, ρ¹))₊                          pressure: how much too dense
-    s_c = min(0.8 ρ⁰_c - ρ_c, 3 ρ_c)₊                             cohesion: how much too thin, but not torn apart
+    v_i ← (1 - f) v_i + f Σ w P_c / ρ_c,  f = 1 - exp(-k_f Δt)    friction: preserves momentum
+    e_c = (ρ_c - 1.2 max(ρ⁰_c, ρ̄, ρ¹))₊                          pressure: excess of density
+    s_c = min(0.8 ρ⁰_c - ρ_c, 3 ρ_c)₊                             cohesion: lack of density, zero if torn apart
     v_i ← v_i - Δt (k_p / ρ̄) Σ_c (e_c - wetness_i s_c) ∇w_ic      |Δv| ≤ ½ cell / Δt
 
-ρ̄ is the mean of ρ⁰ over its cells. Without it in the pressure, hair could not fall where the groom has none. ρ¹ is the
-most that a straight strand has in a cell by itself: without it strands that stand alone would push themselves.
+ρ̄ is the mean of ρ⁰ over its non-empty cells. Without it in the pressure, hair could not fall into places without hair
+in the groom. ρ¹ is the largest density of a single straight strand in a cell: without it isolated strands would repel
+themselves.
 
-Hair that is at rest stays so. Where it is so dense that an explicit step would overshoot, e and s count for less:
-(ω Δt)² = 2 k_p ρ_c / ρ̄ (Δt / cell)² stays below 1. And ∇w jumps between cells, so a point that is pushed back and forth
-comes to where they meet (hair_cells.py).
+Hair at rest stays at rest. Where an explicit step would overshoot because hair is too dense, e and s are reduced:
+(ω Δt)² = 2 k_p ρ_c / ρ̄ (Δt / cell)² stays below 1. ∇w is discontinuous between cells, so a point between opposite
+pushes moves to the border of the cells (hair_cells.py).
 """
 
 import math
@@ -36,24 +37,24 @@ LEAST_CELL = 0.004  # [m]
 MOST_CELLS_ALONG = 96
 MOST_CELLS = 4 * MOST_CELLS_ALONG**3  # of all regions
 
-_FEWEST_CELLS = 4096  # of a region, that are always allowed
-_MOST_SHARES = 4  # each has a grid of its own while it adds
-_LEAST_ROWS = 20_000  # points that are worth a thread
-_UNIT = wp.constant(2.0**20)  # of sums, in a mean mass
-_FASTEST = wp.constant(1.0e4)  # [m/s] of points that count
+_FEWEST_CELLS = 4096  # number of cells of a region that is always allowed
+_MOST_SHARES = 4  # each with its own grid for sums
+_LEAST_ROWS = 20_000  # least number of points for a thread
+_UNIT = wp.constant(2.0**20)  # units of sums per mean mass
+_FASTEST = wp.constant(1.0e4)  # [m/s]: faster points are ignored
 _FARTHEST = wp.constant(1.0e5)  # [m]
 _DENSE, _THIN, _LOOSE = wp.constant(1.2), wp.constant(0.8), wp.constant(3.0)
 
 
 class HairVolume:
-    """The volume of strands whose points have masses (groups, points, lanes) > 0, in units of their mean.
+    """The volume of strands with masses of points (groups, points, lanes), in units of their mean.
 
-    Points without a mass, as those of lanes without a strand, take no part. Positions and velocities are (groups,
-    points × 3, lanes), as the solver's.
+    Points of zero mass, such as those of unused lanes, are ignored. Positions and velocities are (groups, points × 3,
+    lanes), as in the solver.
     """
 
     def __init__(self, masses: Any, regions: np.ndarray | None = None, cell_size: float = LEAST_CELL) -> None:
-        """regions: (groups, lanes) whole numbers from 0, of each strand's region; cell_size [m], at least."""
+        """regions: (groups, lanes) integers from 0, the region of each strand; cell_size: least size [m]."""
         self.device = masses.device
         self._shape = groups, _, lanes = masses.shape
         self._masses = masses
@@ -67,7 +68,7 @@ class HairVolume:
         if not (math.isfinite(cell_size) and cell_size > 0.0):
             raise HairError("The cell size must be positive, not {size} m.", size=cell_size)
         self._regions = wp.array(regions, dtype=int, device=self.device)
-        # A grid of more cells than points would be mostly empty, and take longer to clear than to fill.
+        # A grid with many more cells than points would be mostly empty, and slower to clear than to fill.
         self._most_cells = min(max(2 * math.prod(masses.shape), _FEWEST_CELLS * self._region_count), MOST_CELLS)
         self._least_cell = cell_size
         self.cell_size = cell_size
@@ -78,15 +79,16 @@ class HairVolume:
         self._weights: Any = None
         self._kept_sums: list[Any] = []
         self._fields: Any = None
-        self._missing: Any = None  # s by ρ̄, of each cell; empty where all strands are dry
+        self._missing: Any = None  # s / ρ̄ of each cell; empty if all strands are dry
 
     def fit(self, positions: Any, groom: Any) -> None:
-        """Lay the grid over strands, and over the groom as it is carried by the surface; once a frame. [m]"""
+        """Fit the grid to strands and to the groom as carried by the surface [m]; to be called once per frame."""
         self._require_shape(positions)
         self._require_shape(groom)
         bounds = wp.array(np.repeat([[np.inf], [-np.inf]], 3, axis=1), dtype=float, device=self.device)
-        for there in (positions, groom):
-            kernel_cache.launch(_bound, self._shape, inputs=[self._masses, there], outputs=[bounds], device=self.device)
+        for points in (positions, groom):
+            inputs = [self._masses, points]
+            kernel_cache.launch(_bound, self._shape, inputs=inputs, outputs=[bounds], device=self.device)
         low, high = bounds.numpy().astype(np.float64)
         if not np.isfinite([low, high]).all():
             self.grid = None
@@ -103,10 +105,10 @@ class HairVolume:
     def rub(
         self, positions: Any, velocities: Any, duration: float, friction: float, pressure: float, wetness: Any = None
     ) -> None:
-        """Change velocities [m/s] by what hair does to hair in a time [s]; roots keep theirs.
+        """Apply the interaction of hair to velocities [m/s] for a duration [s]; roots are not changed.
 
-        friction k_f [1/s], pressure k_p [m²/s²], wetness (groups, 1, lanes) of each strand, 0..1, None where all are
-        dry. After `fit` in this frame; points that have left the grid since are left alone.
+        friction k_f [1/s]; pressure k_p [m²/s²]; wetness (groups, 1, lanes) of each strand in [0, 1], None if all are
+        dry. Requires `fit` in this frame; points that have left the grid since are not changed.
         """
         self._require_shape(positions)
         self._require_shape(velocities)
@@ -132,13 +134,13 @@ class HairVolume:
         parallel.launch_shares(_rub, groups * points * lanes, inputs, [[velocities]] * shares, self.device)
 
     def _missing_of(self, cell_count):
-        """The array of s for as many cells."""
+        """Return the array of s for a number of cells."""
         if self._missing is None or len(self._missing) != cell_count:
             self._missing = wp.empty(cell_count, dtype=float, device=self.device)
         return self._missing
 
     def _most_of_one(self, groom):
-        """What a straight strand of mean mass has at most in a cell: a point, or all points of a cell's length."""
+        """Return ρ¹, the most mass of a straight mean strand in a cell: a point, or all points in a cell's length."""
         if self._weights is None:
             masses = self._masses.numpy().astype(np.float64)
             points = groom.numpy().astype(np.float64).reshape(len(masses), -1, 3, masses.shape[2])
@@ -151,7 +153,7 @@ class HairVolume:
         return float(_UNIT * (masses * np.maximum(1.0, self.cell_size / lengths)).mean())
 
     def _cells(self, low, high):
-        """(cell size, first cell, number of cells along each axis) of a grid over a box, with a cell around it."""
+        """Return (cell size, first cell, number of cells along each axis) of a grid over a box, with a margin."""
         size = self._least_cell
         while True:
             first = np.floor(low / size) - 1.0
@@ -161,7 +163,7 @@ class HairVolume:
             size *= 1.25
 
     def _sums(self, positions, velocities):
-        """(cells, 4) int64: mass and momentum of each cell; velocities None: mass alone."""
+        """Return sums (cells, 4) int64: mass and momentum of each cell, or mass alone (cells, 1) without velocities."""
         groups, points, lanes = self._shape
         cell_count = self._region_count * math.prod(self.grid.counts)
         count = groups * points * lanes
@@ -171,13 +173,13 @@ class HairVolume:
         inputs = [self.grid, self._masses, self._regions, positions, positions if velocities is None else velocities]
         kernel_cache.load(self.device, _scatter.module)
         parallel.launch_shares(_scatter, count, inputs, [[each] for each in sums], self.device)
-        for other in sums[1:]:  # on the processor, where each thread has its own
+        for other in sums[1:]:  # on the CPU, where each thread has its own sums
             total = sums[0].numpy()
             total += other.numpy()
         return sums[0]
 
     def _cleared(self, cell_count, width, shares):
-        """Arrays of zeros: for motion the same ones as before, as fresh memory takes as long as a sum."""
+        """Return arrays of zeros; those for motion are reused, because allocation takes as long as a sum."""
         if width == 1:
             return [wp.zeros((cell_count, width), dtype=wp.int64, device=self.device) for _ in range(shares)]
         if len(self._kept_sums) != shares or len(self._kept_sums[0]) != cell_count:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides on a mesh whose vertices move from frame to frame, simulated: plain arrays in, plain arrays out."""
+"""Simulation of guides on a mesh whose vertices move from frame to frame: plain arrays in, plain arrays out."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -33,11 +33,11 @@ def simulated(
     *,
     regions: np.ndarray | None = None,
 ) -> Iterator[np.ndarray]:
-    """Guides (G, P, 3) float32 [m] in each frame: first as they were combed, then one frame for each pose.
+    """Yield guides (G, P, 3) float32 [m] for each frame: first as combed, then one frame for each pose.
 
-    mesh: the surface in the first frame; guides: `Strands` on it, that `require` lets pass; poses: (V, 3) [m] of its
-    vertices in the frames after; seconds: that a frame takes; gravity: [m/s²]; regions: as `Simulation` takes them.
-    Raises `HairError`.
+    mesh: the surface in the first frame; guides: `Strands` on it, checked by `require`; poses: (V, 3) [m] of its
+    vertices in the following frames; seconds: duration of a frame; gravity: [m/s²]; regions: as in `Simulation`. Raises
+    `HairError`.
     """
     surface = _Surface(mesh, guides, settings.size)
     groom = guides.numpy().astype(np.float64)
@@ -70,7 +70,7 @@ def require(mesh: TriMesh, guides: Strands) -> None:
 
 
 def _checked(given, number, vertex_count):
-    """(V, 3) float32 of a pose. Raises `HairError`, which names it."""
+    """Return the vertices (V, 3) float32 of a pose. Raises `HairError` with its number."""
     vertices = array_of(given, np.float32)
     if vertices is None or vertices.shape != (vertex_count, 3) or not np.isfinite(vertices).all():
         raise HairError(f"Pose {number} must be finite numbers of shape ({vertex_count}, 3), as the first one.")
@@ -78,7 +78,7 @@ def _checked(given, number, vertex_count):
 
 
 class _Surface:
-    """A mesh that moves, in units of which `size` are a metre."""
+    """A moving mesh; size: metres per unit of the mesh."""
 
     def __init__(self, mesh, guides, size):
         self._mesh, self._size = mesh, size
@@ -89,7 +89,7 @@ class _Surface:
         corners, weights = self._places
         roots = np.einsum("nc,ncx->nx", weights, mesh.vertices[corners])
         self._reach = max(float(np.ptp(mesh.vertices, axis=0).max()), 1e-20)
-        # Each root, and a point along each axis from it.
+        # Each root, and a point at a distance along each axis.
         self._crosses = roots[:, None] + self._reach * np.concatenate([np.zeros((1, 3)), np.eye(3)])
 
     @cached_property
@@ -99,7 +99,7 @@ class _Surface:
         return vertex_turns.turning(self._mesh.vertices, self._faces, self._places[0])
 
     def pose(self, vertices):
-        """The `RootPose` of guides where the mesh has these vertices."""
+        """Return the `RootPose` of guides for vertices of the mesh."""
         corners, weights = self._places
         positions = np.einsum("nc,ncx->nx", weights.astype(np.float64), vertices.astype(np.float64)[corners])
         motion = surface_deform.turned(self._mesh.vertices, vertices, self._turning)
@@ -109,12 +109,12 @@ class _Surface:
 
     @cached_property
     def _triangles(self):
-        """(F, 3), where the mesh is open with the hair in front of it."""
+        """Triangles (F, 3); open parts are wound so that the hair is in front of them."""
         parts = closed_parts.open_parts(self._mesh)
         return closed_parts.facing_hair(self._mesh, parts, self._places[0], self._ways)
 
     def obstacle(self, vertices, settings):
-        """The mesh itself, which guides collide with."""
+        """Return the mesh as an `Obstacle`."""
         vertices = self._size * vertices.astype(np.float64)
         distance = settings.collision_distance
         return Obstacle("surface", vertices, self._triangles, settings.friction, distance)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands between simulated guides, kept out of what the guides collide with.
+"""Strands between simulated guides, kept outside the guides' colliders.
 
-Guides are outside, yet a mean of them may pass through a collider between them. From root to tip, each point that is
-inside is moved to the nearest place outside, and what follows it is taken along and returns gradually, so that strands
-keep their shape and nearly their length. Strands that are outside stay bit by bit.
+Guides are outside, but their weighted sums may pass through a collider between them. From root to tip, each point that
+is inside is moved to the closest place outside; the following points move along and return gradually, so that strands
+keep their shape and almost their length. Strands that are outside stay bit-identical.
 """
 
 from collections.abc import Sequence
@@ -22,21 +22,21 @@ from .simulation import Obstacle
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_RETURN = wp.constant(0.15)  # of the way back, that a strand takes on the length of a segment
-_ROUNDS = wp.constant(3)  # of moving a point out, and back to its distance from the one before
-_PUSHES = wp.constant(4)  # afterwards, where one is not enough: in the notches of a mesh
-_AHEAD = wp.constant(1.0)  # segments that a surface is looked for beyond the next point, to spare later queries
+_RETURN = wp.constant(0.15)  # fraction of the way back to the original path, per segment
+_ROUNDS = wp.constant(3)  # of moving a point out, and back to its distance from the previous point
+_PUSHES = wp.constant(4)  # further moves out, for notches of a mesh
+_AHEAD = wp.constant(1.0)  # additional search radius in segments, which saves later queries
 _PER_CELL = 16  # points for each cell of the grid of distances
-_NEAR = wp.constant(1e-6)  # [m] less than the distance that counts as that distance
+_NEAR = wp.constant(1e-6)  # tolerance of distances [m]
 
 
 def kept_outside(
     points: np.ndarray, obstacles: Sequence[Obstacle], device: wp.DeviceLike = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Strands (S, P, 3) [m] → (the same kept outside, float64; (S,) bool, which of them had to be moved).
+    """Move strands (S, P, 3) [m] out of obstacles → (points (S, P, 3) float64, (S,) bool: which were moved).
 
-    obstacles: each with the distance that points keep. Roots stay. A collider that cannot be used is ignored, as
-    `Colliders` does. Raises `HairError` for points that are not finite.
+    obstacles: with the distance that points keep. Roots do not move. Invalid colliders are ignored, as in `Colliders`.
+    Raises `HairError` for non-finite points.
     """
     points = np.asarray(points, np.float64)
     if not np.isfinite(points).all():
@@ -47,17 +47,17 @@ def kept_outside(
     is_moved = np.zeros(len(points), bool)
     if colliders.mesh is None or not points.size:
         return points, is_moved
-    # In rows as long as strands: three numbers at a time take thrice as long.
+    # Rows of whole strands: broadcasting over three numbers takes three times as long.
     offsets = points.reshape(len(points), -1) - np.tile(origin, points.shape[1])
-    given = wp.array(offsets.astype(np.float32).reshape(points.shape), dtype=wp.vec3, device=colliders.device)
-    out = wp.empty_like(given)
+    original = wp.array(offsets.astype(np.float32).reshape(points.shape), dtype=wp.vec3, device=colliders.device)
+    out = wp.empty_like(original)
     moved = wp.zeros(len(points), dtype=int, device=colliders.device)
-    inputs = [Rows(given), _surface_of(colliders), _grid_of(colliders, points.size // 3)]
+    inputs = [Rows(original), _surface_of(colliders), _grid_of(colliders, points.size // 3)]
     parallel.launch(_keep_outside, len(points), inputs, [out, moved], colliders.device, least_rows=256)
     is_moved = moved.numpy() != 0
     if not is_moved.any():
         return points, is_moved
-    before, after = given.numpy()[is_moved], out.numpy()[is_moved]
+    before, after = original.numpy()[is_moved], out.numpy()[is_moved]
     is_same = (after == before).all(axis=2)[..., None]
     kept = points.copy()
     kept[is_moved] = np.where(is_same, points[is_moved], after + origin)
@@ -65,14 +65,14 @@ def kept_outside(
 
 
 def _grid_of(colliders, point_count):
-    """Distances from the colliders, on a grid that is worth its time for so many points."""
+    """Return the grid of distances from the colliders, with a resolution suited to the number of points."""
     mesh = colliders.mesh
     triangles = mesh.indices.numpy().reshape(-1, 3)
     return distance_grid(mesh.points.numpy(), triangles, point_count // _PER_CELL + 1, colliders.device)
 
 
 def _surface_of(colliders):
-    """The colliders as points ask them."""
+    """Return the colliders as a `Surface` for kernels."""
     surface = Surface()
     surface.mesh, surface.points, surface.indices = colliders.mesh.id, colliders.mesh.points, colliders.mesh.indices
     surface.previous, surface.face_colliders = colliders.previous, colliders.face_colliders
@@ -83,7 +83,7 @@ def _surface_of(colliders):
 
 @wp.func
 def _lack(surface: Surface, place: wp.vec3, radius: float):
-    """(direction out, how far a point lacks its distance, how far the nearest surface is, up to a radius)."""
+    """Return (outward direction, missing distance of a point, distance of the nearest surface within a radius)."""
     hit = nearest(surface, place, place, radius, 0)
     lack = float(0.0)
     if hit.collider >= 0 and wp.dot(hit.normal, hit.normal) > 0.5:
@@ -104,7 +104,7 @@ def _keep_outside(
     last = points[strand, 0]
     out_points[strand, 0] = last
     is_moved = int(0)
-    clear = float(0.0)  # way that may be gone before a surface can be near
+    clear = float(0.0)  # distance that can be travelled before a surface may be near
     for i in range(1, points.shape[1]):
         before = points[strand, i - 1]
         way = points[strand, i] - before
@@ -116,13 +116,13 @@ def _keep_outside(
         clear -= step_size
         if clear <= 0.0:
             clear = least_distance(grid, place) - surface.largest_distance
-            if clear > step_size:  # outside, as the point before: there is no surface between the two
+            if clear > step_size:  # outside like the previous point: no surface between the two
                 out_points[strand, i] = place
                 last = place
                 continue
             lack = float(1.0)
             gap = float(0.0)
-            # The point before is outside, so a surface between the two is not farther than they are apart.
+            # The previous point is outside: a surface between the two is no farther than their distance.
             radius = _AHEAD * size + step_size + surface.largest_distance
             for step in range(_ROUNDS + _PUSHES):
                 if lack > _NEAR:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the surface carries the roots of simulated strands from frame to frame: jumps, and motion that is not to be felt.
+"""Motion of the roots of simulated strands from frame to frame: jumps, and motion without effect on the hair.
 
-A strand whose root jumps, farther than the teleport distance or by a large angle, goes along as it is. With inertia
-below 1, a part of the rigid motion of the whole surface carries everything, so that the hair does not feel that part.
+A strand whose root jumps, farther than the teleport distance or by a large angle, moves along rigidly. With inertia
+below 1, a fraction of the rigid motion of the whole surface moves all strands rigidly, without effect on their shape.
 """
 
 import math
@@ -14,15 +14,15 @@ from ..errors import HairError
 from ..kernels.checks import require_count
 from .rod import rotations
 
-TELEPORT_ANGLE = math.radians(120.0)  # in a frame
+TELEPORT_ANGLE = math.radians(120.0)  # per frame
 
 
 @dataclass(frozen=True)
 class RootPose:
-    """Where the surface has the roots of S strands at one time.
+    """Roots of S strands at one time.
 
-    positions: (S, 3) float64 [m]; turns: (S, 4) float64, rotations of the surface there since the groom; scale: of
-    lengths since the groom. Raises `HairError` for what is not finite.
+    positions: (S, 3) float64 [m]; turns: (S, 4) float64, rotations of the surface relative to the groom; scale: of
+    lengths relative to the groom. Raises `HairError` for non-finite values.
     """
 
     positions: np.ndarray
@@ -34,20 +34,20 @@ class RootPose:
         if not (np.isfinite(self.positions).all() and np.isfinite(self.turns).all()):
             raise HairError("The surface has non-finite coordinates where hair grows on it.")
         if not (math.isfinite(self.scale) and self.scale > 0.0):
-            raise HairError("The surface has no size: its scale is zero, or no number.")
+            raise HairError("The surface has no size: its scale is zero or not a number.")
 
     def carried(self, points: np.ndarray) -> np.ndarray:
-        """Points (S, N, 3) of each strand as in the groom, from its root there → float64 where the surface has them."""
+        """Move points (S, N, 3) of the groom, relative to each root, with the surface; returns float64."""
         return self.positions[:, None] + rotations.rotated(self.turns[:, None], self.scale * points)
 
     def moved(self, motion: "RigidMotion") -> "RootPose":
-        """The same after a motion of all."""
+        """Return the pose after a rigid motion."""
         return replace(
             self, positions=motion.moved(self.positions), turns=rotations.product(motion.rotation, self.turns)
         )
 
     def with_rows(self, chosen: np.ndarray, other: "RootPose") -> "RootPose":
-        """The same with some roots, (M,) indices, where another pose has them."""
+        """Return the pose with some roots, (M,) indices, taken from another pose."""
         positions, turns = self.positions.copy(), self.turns.copy()
         positions[chosen], turns[chosen] = other.positions[chosen], other.turns[chosen]
         return replace(self, positions=positions, turns=turns)
@@ -55,25 +55,25 @@ class RootPose:
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """A rotation (…, 4) about points (…, 3), and then a way (…, 3) [m]."""
+    """A rotation (…, 4) about center (…, 3), followed by a translation way (…, 3) [m]."""
 
     rotation: np.ndarray
     center: np.ndarray
     way: np.ndarray
 
     def part(self, share: float) -> "RigidMotion":
-        """The same motion for a share 0..1 of the time."""
+        """Return a fraction in [0, 1] of the motion."""
         return RigidMotion(_power(self.rotation, share), self.center, share * self.way)
 
     def moved(self, points: np.ndarray) -> np.ndarray:
-        """Points (…, 3) [m] after the motion."""
+        """Return points (…, 3) [m] after the motion."""
         return self.center + rotations.rotated(self.rotation, points - self.center) + self.way
 
 
 def rigid_motion(before: RootPose, after: RootPose) -> RigidMotion:
-    """The rigid motion that takes roots nearest to where they are in `after`: least squares.
+    """Return the rigid motion that best maps the roots from one pose to another.
 
-    Its rotation is the mean of those of the surface at the roots, which a few roots in a line determine as well.
+    Its rotation is the mean of the surface's rotations at the roots, which is defined even for few roots in a line.
     """
     turned = rotations.product(after.turns, rotations.inverse(before.turns))
     center = before.positions.mean(axis=0)
@@ -81,30 +81,30 @@ def rigid_motion(before: RootPose, after: RootPose) -> RigidMotion:
 
 
 def ways(before: RootPose, after: RootPose) -> np.ndarray:
-    """(S,) how far roots move [m]."""
+    """Return the distances (S,) that roots move [m]."""
     moved = after.positions - before.positions
     return np.sqrt(np.einsum("si,si->s", moved, moved))
 
 
 def jumps(before: RootPose, after: RootPose, distance: float) -> np.ndarray:
-    """(S,) bool: whether roots move farther than a distance [m], or turn by more than `TELEPORT_ANGLE`."""
+    """Return (S,) bool: whether roots move farther than a distance [m], or turn by more than `TELEPORT_ANGLE`."""
     cosines = np.abs(np.einsum("si,si->s", before.turns, after.turns))
     return (ways(before, after) > distance) | (cosines < math.cos(TELEPORT_ANGLE / 2.0))
 
 
 def jump_of(before: RootPose, after: RootPose, chosen: np.ndarray) -> RigidMotion:
-    """The motion of each of some roots, (M,) indices or a mask."""
+    """Return the motion of each of some roots, (M,) indices or a mask."""
     turned = rotations.product(after.turns, rotations.inverse(before.turns))[chosen]
     return RigidMotion(turned, before.positions[chosen], (after.positions - before.positions)[chosen])
 
 
 def _mean(turned):
-    """The rotation nearest to rotations (S, 4): the eigenvector of the sum of their outer products [Markley07]."""
+    """Return the mean of rotations (S, 4): the dominant eigenvector of the sum of outer products [Markley07]."""
     return np.linalg.eigh(turned.T @ turned)[1][:, -1]
 
 
 def _power(rotation, share):
-    """A rotation by a share of its angle, the shorter way."""
+    """Return a rotation by a fraction of its angle, along the shorter arc."""
     rotation = np.where(rotation[..., 3:] < 0.0, -rotation, rotation)
     sine = np.linalg.norm(rotation[..., :3], axis=-1, keepdims=True)
     angle = np.arctan2(sine, rotation[..., 3:])

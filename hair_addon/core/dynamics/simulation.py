@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`Simulation`: guides that move with their surface, frame by frame.
 
-Guides become strands of fewer points, `Rods`; what these leave of the guides' shape is added to where they go. All
-coordinates are in metres, in axes that do not turn with the surface. The solver's numbers are single, so it counts from
-an origin near the hair, which follows it in steps that they hold exactly.
+Guides are simulated as strands with fewer points, `Rods`; the remaining detail of their shape is added to the result.
+All coordinates are in metres, in axes that do not turn with the surface. The solver uses single precision, with an
+origin near the hair that follows it in steps that are exact in single precision.
 """
 
 import math
@@ -30,17 +30,17 @@ from .rod.settings import DynamicsSettings
 from .root_motion import RigidMotion, RootPose
 
 MOST_SUBSTEPS = 64
-_LONGEST_WAY = 0.01  # [m] that roots and colliders move in a substep, less where segments are shorter,
-_SHORTEST_WAY = 0.003  # but no less: short fur moves the same from there on
-_GRID = 0.125  # [m] between the places of the origin
-_LEAST_RUBBING = 0.01 - 1e-9  # [s] between effects of hair on hair
-_ASKED = 256  # guides that are asked how far others are
-_MOST_RESETS = 10  # frames running in which a strand breaks, after which it stays in its groom
+_LONGEST_WAY = 0.01  # largest motion of roots and colliders in a substep [m]; smaller for shorter segments,
+_SHORTEST_WAY = 0.003  # down to this limit, below which short fur moves the same
+_GRID = 0.125  # spacing of possible origins [m]
+_LEAST_RUBBING = 0.01 - 1e-9  # interval between evaluations of the hair volume [s]
+_ASKED = 256  # sampled guides for the mean distance
+_MOST_RESETS = 10  # consecutive frames with breakage after which a strand stays in its groom
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A mesh that hair collides with: vertices (V, 3) float64 [m], triangles (F, 3) int32; the rest as `Collider`."""
+    """A mesh that hair collides with: vertices (V, 3) float64 [m], triangles (F, 3) int32; other fields: `Collider`."""
 
     name: str
     vertices: np.ndarray
@@ -50,18 +50,18 @@ class Obstacle:
     is_double_sided: bool = False
 
     def moved(self, motion: RigidMotion) -> "Obstacle":
-        """The same after a motion."""
+        """Return the obstacle after a rigid motion."""
         return replace(self, vertices=motion.moved(self.vertices))
 
     def seen_from(self, origin: np.ndarray) -> Collider:
-        """The `Collider` in coordinates from an origin."""
+        """Return the `Collider` in coordinates relative to an origin."""
         mesh = TriMesh((self.vertices - origin).astype(np.float32), self.triangles)
         return Collider(self.name, mesh, self.friction, self.distance, self.is_double_sided)
 
 
 @dataclass(frozen=True)
 class World:
-    """What acts on hair at the end of a frame: gravity [m/s²], what it collides with, and force fields; time [s]."""
+    """Environment of the hair at the end of a frame: gravity [m/s²], obstacles, force fields, time [s]."""
 
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     obstacles: tuple[Obstacle, ...] = ()
@@ -70,7 +70,7 @@ class World:
 
 
 class Simulation:
-    """Simulated guides, from the frame on in which they are as they were combed."""
+    """Simulated guides, which start as combed."""
 
     def __init__(
         self,
@@ -83,14 +83,14 @@ class Simulation:
         regions: np.ndarray | None = None,
         wetness: np.ndarray | None = None,
     ) -> None:
-        """groom: (G, P, 3) [m], combed guides before the surface turned them; pose: of their roots now.
+        """groom: (G, P, 3) [m], combed guides on the surface at rest; pose: of their roots in the first frame.
 
-        regions: (G,) whole numbers from 0, guides of two of which do not rub or press on each other; None for one.
-        wetness: (G,) of each guide, from 0 to 1; that of the settings for None. Raises `HairError` where these are not
-        finite, or of other guides.
+        regions: (G,) integers from 0; guides of different regions do not interact; None for one region. wetness: (G,)
+        of each guide in [0, 1], None for that of the settings. Raises `HairError` for non-finite values or counts that
+        do not match.
         """
         self.settings, self.pose, self.world = settings, pose, world
-        self.substeps = self.asked_substeps = 0  # of the last frame, and how many its motion asks for
+        self.substeps = self.asked_substeps = 0  # of the last frame, and the number that its motion requires
         self._device = wp.get_device(device)
         self._start, self._origin = pose, np.round(pose.positions.mean(axis=0) / _GRID) * _GRID
         self._scale = pose.scale
@@ -103,7 +103,7 @@ class Simulation:
         self._rods = Rods(vertices, self._material, rest, self._device)
         self._rods.set_start(pose.turns)
         self._detail = detail.detail_of(combed, self._rods)
-        self._resets = np.zeros((2, len(groom)), int)  # in all, and frames running
+        self._resets = np.zeros((2, len(groom)), int)  # total, and consecutive frames
         self._colliders = Colliders(self._device)
         self._read_obstacles(world.obstacles)
         self._contacts = Contacts(self._rods.arrays.positions, self._colliders)
@@ -113,14 +113,14 @@ class Simulation:
         self._since_rubbed = 0.0  # [s]
 
     def _new_volume(self):
-        """Hair among hair, with cells as large as guides are apart."""
+        """Return the `HairVolume`, with cells as large as the spacing of guides."""
         masses = self._material.masses / self._material.masses.mean()
         cell = self.settings.cell_size or max(LEAST_CELL, _mean_distance(self._start.positions))
         regions = to_lanes(self._regions, self._rods.lanes)[:, 0]
         return HairVolume(self._rods.in_lanes(masses, is_padded=False), regions, cell)
 
     def _new_waters(self):
-        """(groups, 1, lanes) wetness of guides; None where all are dry."""
+        """Return the wetness (groups, 1, lanes) of guides; None if all are dry."""
         count = len(self._groom)
         wetness = np.full(count, self.settings.wetness) if self._wetness is None else np.asarray(self._wetness)
         return self._rods.in_lanes(wetness[:, None]) if wetness.any() else None
@@ -146,11 +146,11 @@ class Simulation:
         return regions
 
     def _combed(self):
-        """(G, P, 3): the groom where the surface had it in the first frame, from the origin, at its present scale."""
+        """Return the groom (G, P, 3) in the pose of the first frame at the present scale, relative to the origin."""
         return replace(self._start, scale=self._scale).carried(self._groom) - self._origin
 
     def _shapes(self, vertices):
-        """(`Material`, `RestShape`) of vertices."""
+        """Return (`Material`, `RestShape`) of vertices."""
         material = material_of(self.settings, np.linalg.norm(np.diff(vertices, axis=1), axis=2), self._wetness)
         if not self.settings.sag_free:
             return material, combed_shape(vertices)
@@ -160,13 +160,14 @@ class Simulation:
     def change(
         self, settings: DynamicsSettings, groom: np.ndarray | None = None, wetness: np.ndarray | None = None
     ) -> None:
-        """Go on with other settings and wetness, and with guides combed otherwise; the number of vertices stays.
+        """Continue with other settings, wetness and groom, with the same number of vertices.
 
-        groom: as it is for None; wetness: (G,), that of the settings for None. Raises `HairError` where it does not.
+        groom: None for no change; wetness: (G,), None for that of the settings. Raises `HairError` for another number
+        of vertices.
         """
         wetness = self._checked_wetness(wetness)
         if settings.vertex_count != self.settings.vertex_count:
-            raise HairError("Another number of points needs a new simulation: play from the start.")
+            raise HairError("A change of the number of points requires a new simulation: play from the start.")
         self.settings, self._wetness = settings, wetness
         if groom is not None:
             require_count("guides", len(groom), len(self._groom))
@@ -174,7 +175,7 @@ class Simulation:
         self._renew()
 
     def divide(self, regions: np.ndarray | None) -> bool:
-        """Go on with other regions of guides, as in `__init__`; returns whether they are others."""
+        """Continue with other regions of guides, as in `__init__`; returns whether they differ."""
         regions = self._checked_regions(regions)
         is_other = not np.array_equal(regions, self._regions)
         if is_other:
@@ -183,7 +184,7 @@ class Simulation:
         return is_other
 
     def _renew(self):
-        """Give the strands the material and shape that follow from settings, groom and scale."""
+        """Update the strands' material and shape from settings, groom and scale."""
         combed = self._combed()
         vertices = detail.vertices_of(combed, self.settings.vertex_count)
         self._material, rest = self._shapes(vertices)
@@ -194,13 +195,13 @@ class Simulation:
         self._volume, self._waters = self._new_volume(), self._new_waters()
 
     def advance(self, pose: RootPose, world: World, seconds: float) -> None:
-        """Simulate a frame that takes some seconds, at whose end roots have this pose and the world is this one.
+        """Simulate a frame of a duration [s]; pose and world: at its end.
 
-        Raises `HairError` for what cannot be simulated; then nothing has changed.
+        Raises `HairError` for invalid input, without a change.
         """
         require_count("roots", len(pose.positions), len(self._groom))
         if not math.isfinite(seconds) or seconds < 0.0:
-            raise HairError("Time does not go on: set the frame rate and the time scale.")
+            raise HairError("Time does not advance: set the frame rate and the time scale.")
         if seconds == 0.0:
             return
         before = self._carried_along(self.pose, pose)
@@ -231,7 +232,7 @@ class Simulation:
 
     @property
     def _is_free(self):
-        """Whether nothing acts on strands but their surface's motion, gravity and still air."""
+        """Whether only the surface's motion, gravity and still air act on strands."""
         return self._colliders.mesh is None and not self.world.fields and not self._is_rubbing
 
     @property
@@ -240,7 +241,7 @@ class Simulation:
         return settings.hair_friction > 0.0 or settings.hair_pressure > 0.0
 
     def _end_of_run(self, step, first):
-        """The substep, after one, before which hair acts on hair, or the frame ends."""
+        """Return the substep at which the hair volume is evaluated next, or the end of the frame."""
         if not self._is_rubbing:
             return step.count
         since, end = self._since_rubbed, first
@@ -267,12 +268,12 @@ class Simulation:
             self._since_rubbed = 0.0
 
     def _seen(self, field):
-        """A force field from the origin, as strong as the settings let it be."""
+        """Return a force field relative to the origin, with its strength scaled by the settings."""
         x, y, z = np.asarray(field.origin) - self._origin
         return replace(field, origin=(x, y, z), strength=self.settings.force_fields * field.strength)
 
     def _carried_along(self, before, after):
-        """Move all by what hair is not to feel of the surface's motion; the pose from which it feels the rest."""
+        """Apply the part of the surface's motion that moves strands rigidly; returns the start pose of the rest."""
         origin = np.round(after.positions.mean(axis=0) / _GRID) * _GRID
         shared = None
         if self.settings.inertia < 1.0:
@@ -293,7 +294,7 @@ class Simulation:
         return before
 
     def _carry(self, motion, chosen=None):
-        """Move strands rigidly as they are: all, or (M,) indices of some, each with a motion of its own."""
+        """Move strands rigidly: all, or (M,) indices of some, each with its own motion."""
         count = len(self._groom)
         rows = np.arange(count) if chosen is None else chosen
         is_chosen = np.zeros(count, bool)
@@ -315,13 +316,13 @@ class Simulation:
         self._colliders.read([obstacle.seen_from(self._origin) for obstacle in obstacles])
 
     def _substep_count(self, before, after):
-        """How many substeps the motion in the next frame asks for."""
+        """Return the number of substeps that the motion in the next frame requires."""
         way = max(float(root_motion.ways(before, after).max()), self._colliders.largest_motion)
         longest = min(_LONGEST_WAY, max(float(self._material.lengths.mean()), _SHORTEST_WAY))
         return min(max(math.ceil(way / longest), self.settings.substeps), MOST_SUBSTEPS)
 
     def _put_back_broken(self):
-        """Count the strands that broke in this frame; one that did for long stays in its groom from now on."""
+        """Count the strands that broke in this frame; after `_MOST_RESETS` frames they stay in their groom."""
         counts = self._rods.reset_counts()
         self._resets[1] = np.where(counts > self._resets[0], self._resets[1] + 1, self._resets[1] * self._is_out)
         self._resets[0] = counts
@@ -332,38 +333,38 @@ class Simulation:
 
     @property
     def broken(self) -> np.ndarray:
-        """Indices of strands that broke in the last frame, and were put back to their groom."""
+        """Indices of strands that broke in the last frame and were reset to their groom."""
         return np.flatnonzero(self._resets[1])
 
     @property
     def notes(self) -> list[HairError]:
-        """Colliders that were left out in the last frame, and why."""
+        """Colliders that were ignored in the last frame, with reasons."""
         return self._colliders.notes
 
     def points(self) -> np.ndarray:
-        """(G, P, 3) float64 [m]: where guides are."""
+        """Return the points (G, P, 3) float64 [m] of guides."""
         points = detail.detailed_points(self._detail, self._rods).numpy() + self._origin
         if self._is_out.any():
             points[self._is_out] = self.pose.carried(self._groom)[self._is_out]
         return points
 
     def vertices(self) -> np.ndarray:
-        """(G, vertex_count, 3) float64 [m]: the simulated points of guides."""
+        """Return the simulated points (G, vertex_count, 3) float64 [m] of guides."""
         return self._rods.positions() + self._origin
 
     def stretch(self) -> np.ndarray:
-        """(G, M) of the simulated segments: their lengths in those at rest, less one."""
+        """Return the strain (G, M) of the simulated segments: length / rest length - 1."""
         return self._rods.stretch()
 
     def save(self) -> dict[str, np.ndarray]:
-        """All that later frames follow from, beside what `__init__`, and `load` with it, are given: arrays by name."""
+        """Return the state from which the simulation can continue, without the inputs of `__init__`: arrays by name."""
         rods = {f"rods_{name}": array for name, array in self._rods.save().items()}
         contacts = {f"contacts_{name}": array for name, array in self._contacts.state().items()}
         own = {"origin": self._origin, "resets": self._resets, "since_rubbed": np.array([self._since_rubbed])}
         return rods | contacts | own
 
     def load(self, state: Mapping[str, np.ndarray], pose: RootPose, world: World) -> None:
-        """Go on from a state that `save` gave in a frame with this pose and world. Raises `HairError`."""
+        """Continue from a state of `save`; pose and world: of its frame. Raises `HairError`."""
         origin, resets, rubbed = (np.asarray(state.get(name, ())) for name in ("origin", "resets", "since_rubbed"))
         is_finite = all(np.isfinite(array).all() for array in (origin, rubbed))
         if not is_finite or (origin.shape, resets.shape, rubbed.shape) != ((3,), self._resets.shape, (1,)):
@@ -380,12 +381,12 @@ class Simulation:
 
 
 def _mean_distance(places):
-    """The mean distance of places (G, 3) from the nearest other one, of some of them; 0 for a single one."""
+    """Return the mean distance of places (G, 3) from the nearest other one, by samples; 0 for a single place."""
     if len(places) < 2:
         return 0.0
     some = places[:: max(len(places) // _ASKED, 1)]
     distances = np.linalg.norm(some[:, None] - places, axis=2)
-    distances[distances == 0.0] = np.inf  # of itself, and of another in the same place
+    distances[distances == 0.0] = np.inf  # the same or a coincident place
     nearest = distances.min(axis=1)
     return float(nearest[np.isfinite(nearest)].mean()) if np.isfinite(nearest).any() else 0.0
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Obstacles that get other vertices or faces while hair is simulated: for hair they stay where they were before."""
+"""Obstacles whose topology changes during a simulation: hair collides with their previous state."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -25,7 +25,7 @@ def stopped(
             taken.append(obstacle)
             continue
         taken.append(replace(obstacle, vertices=before.vertices, triangles=before.triangles))
-        sentence = "{name} has other vertices or faces in frame {frame}: for hair it stays where it was before."
+        sentence = "{name} changes its vertices or faces in frame {frame}: hair collides with its previous shape."
         notes.append(HairError(sentence, name=obstacle.name, frame=frame))
     return tuple(taken), notes
 
@@ -44,7 +44,7 @@ def divided(obstacles: Sequence[Obstacle], last: Mapping[str, Obstacle]) -> dict
 
 
 def _is_same(one, other):
-    """Whether two obstacles have the same vertices and faces, wherever they are."""
+    """Return whether two obstacles have the same topology."""
     return len(one.vertices) == len(other.vertices) and np.array_equal(one.triangles, other.triangles)
 
 

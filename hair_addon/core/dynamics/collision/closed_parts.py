@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which side of a triangle mesh is outside, and where it ends in a rim."""
+"""Orientation of the closed and open parts of a triangle mesh, and its rims."""
 
 import numpy as np
 
 from ...geometry.connected_components import connected_components
 from ...geometry.mesh import TriMesh
 
-_MOST_SAMPLES = 16  # vertices of a part that are asked whether they are inside another
+_MOST_SAMPLES = 16  # vertices of a part that are tested for being inside another part
 
 
 def outward(mesh: TriMesh) -> np.ndarray:
-    """(F, 3) int32: the triangles, those of closed parts wound counter-clockwise seen from outside.
+    """Return the triangles (F, 3) int32, in closed parts wound counter-clockwise seen from outside.
 
-    A closed part of negative volume is turned, unless it is inside another one: then it bounds a cavity.
+    A closed part of negative volume is flipped, unless it is inside another one and thus bounds a cavity.
     """
     triangles = mesh.checked_triangles.copy()
     parts = connected_components(mesh)
     is_closed = _is_closed(welded(mesh), parts)
     centred = mesh.corners - mesh.corners.reshape(-1, 3).mean(axis=0)
-    volumes = np.bincount(parts, np.linalg.det(centred) / 6.0)  # of the tetrahedra to the middle
+    volumes = np.bincount(parts, np.linalg.det(centred) / 6.0)  # of tetrahedra with an apex at the center
     for part in np.flatnonzero(is_closed & (volumes < 0.0)):
         others = [other for other in np.flatnonzero(is_closed) if other != part]
         if not any(_is_inside(mesh, parts == part, parts == other) for other in others):
@@ -28,15 +28,16 @@ def outward(mesh: TriMesh) -> np.ndarray:
 
 
 def open_parts(mesh: TriMesh) -> np.ndarray:
-    """(F,) int32: the connected part of each triangle, -1 in closed ones, whose outside is known."""
+    """Return the connected part (F,) int32 of each triangle, -1 for closed parts, whose outside is known."""
     parts = connected_components(mesh)
     return np.where(_is_closed(welded(mesh), parts)[parts], -1, parts).astype(np.int32)
 
 
 def facing_hair(mesh: TriMesh, parts: np.ndarray, corners: np.ndarray, ways: np.ndarray) -> np.ndarray:
-    """(F, 3) int32: the triangles, those of an open part turned whose hair leaves it at its back, on the mean.
+    """Return the triangles (F, 3) int32; open parts are flipped if their hair is behind them on average.
 
-    parts: of `open_parts`; corners: (S, 3) vertices around the root of each strand; ways: (S, 3) from roots on.
+    parts: from `open_parts`; corners: (S, 3) vertices around the root of each strand; ways: (S, 3) directions of
+    strands at their roots.
     """
     triangles = mesh.checked_triangles
     part_of = np.full(len(mesh.vertices), -1, np.int32)
@@ -56,13 +57,13 @@ def facing_hair(mesh: TriMesh, parts: np.ndarray, corners: np.ndarray, ways: np.
 
 
 def _unit(vectors):
-    """Vectors (N, 3) of length one; zero where there is none."""
+    """Normalize vectors (N, 3); zero stays zero."""
     sizes = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.divide(vectors, sizes, out=np.zeros_like(vectors), where=sizes > 0.0)
 
 
 def rims(mesh: TriMesh) -> np.ndarray:
-    """(F,) int32 bits of a triangle's rims.
+    """Return rim bits (F,) int32 of triangles.
 
     Bit k: the edge opposite to corner k has no other triangle. Bit 3 + k: corner k is on such an edge.
     """
@@ -77,7 +78,7 @@ def rims(mesh: TriMesh) -> np.ndarray:
 
 
 def welded(mesh: TriMesh) -> np.ndarray:
-    """(F, 3) triangles of a mesh whose vertices in one place are one: seams are no rims."""
+    """Return the triangles (F, 3) of a mesh with coincident vertices merged, so that seams are not rims."""
     order = np.lexsort(mesh.vertices.T)
     ordered = mesh.vertices[order]
     is_new = np.ones(len(order), bool)
@@ -88,9 +89,9 @@ def welded(mesh: TriMesh) -> np.ndarray:
 
 
 def _edge_kinds(edges):
-    """(which kind each edge is, how many there are of each kind) of edges (N, 2): those of the same vertices are one.
+    """Return (unique edge of each edge (N, 2), number of each unique edge).
 
-    They are sorted as single numbers, in a fifth of the time that rows take.
+    Edges are sorted as single numbers, in a fifth of the time of rows.
     """
     _, kinds, counts = np.unique(
         edges[:, 0].astype(np.int64) << 32 | edges[:, 1], return_inverse=True, return_counts=True
@@ -99,7 +100,7 @@ def _edge_kinds(edges):
 
 
 def _is_closed(triangles, parts):
-    """(parts,) whether each edge of a part has two triangles, which run along it in opposite directions."""
+    """Return (parts,) bool: whether each edge of a part has two triangles with opposite directions."""
     directed = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     ahead = directed[:, 0] < directed[:, 1]
     of_edge, counts = _edge_kinds(np.sort(directed, axis=1))
@@ -109,7 +110,7 @@ def _is_closed(triangles, parts):
 
 
 def _is_inside(mesh, inner, outer):
-    """Whether the triangles `inner` are inside the closed part of the triangles `outer`: by their winding numbers."""
+    """Return whether the triangles `inner` are inside the closed part of triangles `outer`, by winding numbers."""
     points, shell = mesh.corners[inner].reshape(-1, 3), mesh.corners[outer]
     low, high = shell.reshape(-1, 3).min(axis=0), shell.reshape(-1, 3).max(axis=0)
     if (points < low).any() or (points > high).any():
@@ -119,7 +120,7 @@ def _is_inside(mesh, inner, outer):
         la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
         dots = [np.einsum("fi,fi->f", *pair) for pair in ((a, b), (b, c), (c, a))]
         below = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
-        # Solid angles [Oosterom83]; -4π or 4π in all inside, as the outer part is wound.
+        # Solid angles [Oosterom83]; their sum is ±4π inside, with the sign of the outer part's winding.
         solid = 2.0 * np.arctan2(np.linalg.det(np.stack([a, b, c], axis=1)), below).sum()
         if abs(solid) < 2.0 * np.pi:
             return False

@@ -9,25 +9,25 @@ from ..rod.settings import DynamicsSettings
 
 @dataclass(frozen=True)
 class ColliderSettings(Settings):
-    """How hair collides with a mesh object, where that differs from the settings of the hair."""
+    """Collision settings of a mesh object that override those of the hair."""
 
     overrides_friction: bool = param(
-        False, "Use the friction of this object in place of that of the hair", label="Own friction"
+        False, "Use the friction of this object instead of that of the hair", label="Own friction"
     )
     friction: float = param_of(DynamicsSettings, "friction")
     overrides_distance: bool = param(
-        False, "Use the collision distance of this object in place of that of the hair", label="Own distance"
+        False, "Use the collision distance of this object instead of that of the hair", label="Own distance"
     )
     collision_distance: float = param_of(DynamicsSettings, "collision_distance")
     is_double_sided: bool = param(
         False,
-        "Hair collides with both sides, as of cloth: it stays on the side where it is. Otherwise hair is kept outside",
+        "Hair collides with both sides, as for cloth, and stays on its side. Otherwise hair is kept outside",
         label="Double-Sided",
     )
 
 
 def contact_of(collider: ColliderSettings, settings: DynamicsSettings) -> tuple[float, float]:
-    """(coefficient of friction, distance [units of length]) between hair and a collider."""
+    """Return (coefficient of friction, distance [units of length]) between hair and a collider."""
     friction = collider.friction if collider.overrides_friction else settings.friction
     distance = collider.collision_distance if collider.overrides_distance else settings.collision_distance
     return friction, distance

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that hair collides with: several as one `wp.Mesh`, between the poses of two frames.
+"""Meshes that hair collides with, combined into one `wp.Mesh`, interpolated between the poses of two frames.
 
-All is checked before Warp sees it: a mesh without faces, an index out of range or one coordinate that is no number
-would end Blender, or silence every query.
+Input is validated before it is passed to Warp: a mesh without faces, an index out of range or a non-finite coordinate
+would crash Blender, or make all queries fail.
 """
 
 import itertools
@@ -26,15 +26,15 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 FARTHEST = 1.0e6  # [m] from the origin
 
-_LEAST_ROWS = 32_768  # vertices that are worth a thread
+_LEAST_ROWS = 32_768  # least number of vertices for a thread
 
 
 @dataclass(frozen=True)
 class Collider:
-    """One mesh in its pose at the end of a frame; name: unique among colliders.
+    """A mesh in its pose at the end of a frame; name: unique among colliders.
 
-    friction: Coulomb's coefficient; distance [m]: that hair keeps from it; is_double_sided: a sheet, of which each
-    point keeps the side that it was on. Else its back is its inside.
+    friction: Coulomb's coefficient; distance [m]: kept by the hair; is_double_sided: for sheets, on which each point
+    stays on its side; otherwise the back of the mesh is its inside.
     """
 
     name: str
@@ -46,16 +46,16 @@ class Collider:
 
 @dataclass
 class _Known:
-    """A collider that takes part, with the triangles that Warp has."""
+    """An active collider, with its triangles in Warp's mesh."""
 
     mesh: TriMesh  # with the vertices of the last frame
-    triangles: np.ndarray  # with an area, wound outwards
+    triangles: np.ndarray  # of positive area, wound outwards
     rims: np.ndarray
 
 
 @dataclass(frozen=True)
 class _Move:
-    """How colliders move from one part of a frame to another; names as of `Colliders`."""
+    """Motion of the colliders between two times in a frame; names as in `Colliders`."""
 
     rigid_motion: tuple[np.ndarray, np.ndarray]
     motion: float
@@ -65,34 +65,33 @@ class _Move:
 
 
 class Colliders:
-    """Colliders on a device; `read` once a frame, then `pose` once a substep.
+    """Colliders on a device; call `read` once per frame, then `pose` once per substep.
 
-    Triangles without an area when a collider is first read take no part.
+    Triangles of zero area in the first frame of a collider are ignored.
     """
 
     def __init__(self, device: wp.DeviceLike = "cpu") -> None:
         self.device = wp.get_device(device)
-        self.notes: list[HairError] = []  # who is left out, or stopped, in the last frame read
-        self.build_count = 0  # of meshes made so far
-        self.read_count = 0  # of frames
-        self.jump_count = 0  # of frames that did not begin where the one before was left
-        self.mesh: Any = None  # wp.Mesh in its present pose; None where nothing collides
-        self.previous: Any = None  # (V,) vec3: the pose of the substep before
+        self.notes: list[HairError] = []  # ignored or stopped colliders of the last frame
+        self.build_count = 0  # number of meshes built
+        self.read_count = 0  # number of frames
+        self.jump_count = 0  # number of frames that did not start in the pose of the previous one
+        self.mesh: Any = None  # wp.Mesh in its present pose; None without colliders
+        self.previous: Any = None  # (V,) vec3: pose of the previous substep
         self.face_colliders: Any = None  # (F,) int
-        self.rims: Any = None  # (F,) int, of `closed_parts.rims`
-        self.settings: Any = None  # (C,) vec3: friction, distance [m], 1 where double-sided
+        self.rims: Any = None  # (F,) int, from `closed_parts.rims`
+        self.settings: Any = None  # (C,) vec3: friction, distance [m], 1 if double-sided
         self._rows: list[tuple[float, float, float]] = []  # of `settings`
         self.names: tuple[str, ...] = ()
         self.largest_distance = 0.0  # [m]
-        self.largest_motion = 0.0  # [m] of a vertex in this frame
-        # (rotation (3, 3), translation [m]) of all in this substep, and since the beginning; a vertex of this substep
-        # moves by `motion` [m] otherwise, at most.
+        self.largest_motion = 0.0  # of a vertex in this frame [m]
+        # (rotation (3, 3), translation [m]) of all colliders in this substep, and since the beginning; `motion`: bound
+        # of the residual motion of a vertex in this substep [m].
         self.rigid_motion = self.rigid_motion_so_far = STILL
         self.motion = 0.0
-        # (matrix (3, 3), translation [m]) of points that move with the colliders, and what they deform by otherwise.
+        # (matrix (3, 3), translation [m]) of points that move with the colliders, and bound of the residual [m].
         self.carry, self.deformation = STILL, 0.0
-        # How far a vertex is from where it was when this frame began, and may be after all frames before from where it
-        # was in the beginning, but for their motion as a whole [m].
+        # Bound of the residual motion of a vertex in this frame, and in all previous frames [m].
         self.drift = self.drift_before = 0.0
         self._known: dict[str, _Known] = {}
         self._before: Any = None
@@ -101,14 +100,14 @@ class Colliders:
         self._end: Any = None  # (V, 3) vertices at its end
         self._part = 0.0
         self._is_still = True
-        self._posed: Any = None  # the vertices that the mesh has; None between two frames
-        self._moves: dict[tuple[float, float], _Move] = {}  # of this frame, from part to part
+        self._posed: Any = None  # vertices of the mesh; None between two frames
+        self._moves: dict[tuple[float, float], _Move] = {}  # of this frame, by start and end
 
     def read(self, colliders: Sequence[Collider], frame: int = 0) -> None:
-        """Take the poses at the end of a frame: its beginning is the end of the frame before.
+        """Set the poses at the end of a frame, which starts at the end of the previous one.
 
-        A new collider stands still in its first frame. One that cannot be used is left out; one whose topology has
-        changed stays where it was. Either is named in `notes`, with the frame.
+        A new collider is at rest in its first frame. Invalid colliders are ignored; colliders with changed topology
+        keep their previous pose. Both are reported in `notes`, with the frame.
         """
         self.notes = []
         self.read_count += 1
@@ -130,23 +129,23 @@ class Colliders:
 
     @property
     def is_still(self) -> bool:
-        """Whether there are colliders, none of which moves in this frame."""
+        """Whether there are colliders and none of them moves in this frame."""
         return self.mesh is not None and self._is_still
 
     def pose(self, part: float) -> None:
-        """Move to the pose at a part 0..1 of the frame, greater than the last one: vertices on straight lines."""
+        """Move to the pose at a fraction in [0, 1] of the frame, greater than the last one, by linear interpolation."""
         self.go_to(part)
         self.place(part)
 
     def expect(self, count: int) -> None:
-        """Say in how many poses at equal distances the frame will be gone through, whose motions are found at once."""
+        """Announce a number of equidistant poses in the frame, whose motions are computed together."""
         if self.mesh is None or self._is_still or (0.0, 1.0 / count) in self._moves:
             return
         parts = [step / count for step in range(count + 1)]
         self._moves.update(zip(itertools.pairwise(parts), self._moves_of(parts[:-1], parts[1:]), strict=True))
 
     def go_to(self, part: float) -> None:
-        """What is known on the host of a pose, as `pose` does, which also moves the mesh."""
+        """Update the motion data on the host for a pose; part of `pose`."""
         if self.mesh is None or self._is_still:
             return
         key = self._part, part
@@ -159,7 +158,7 @@ class Colliders:
         self._part, self._posed = part, self._end if part == 1.0 else None
 
     def _moves_of(self, first, last):
-        """The `_Move` of each of some substeps, from parts of the frame to later ones."""
+        """Return the `_Move` of each substep, from start and end times."""
         (turns, shifts), motions = self._way.between(first, last)
         (carries, carry_shifts), deformations = self._way.carried(first, last)
         drifts = self._way.between(np.zeros(len(last)), last)[1]
@@ -167,7 +166,7 @@ class Colliders:
         return [_Move(*row) for row in zip(*whole, deformations.tolist(), drifts.tolist(), strict=True)]
 
     def place(self, part: float) -> None:
-        """Move the mesh, as `pose` does, on the device alone."""
+        """Move the mesh on the device to a pose; part of `pose`."""
         if self.mesh is None or self._is_still:
             return
         parallel.launch(
@@ -181,7 +180,7 @@ class Colliders:
         self.mesh.refit()
 
     def _taken(self, collider, frame):
-        """What is known of a collider, and its vertices at the beginning and at the end of the frame."""
+        """Return the `_Known` of a collider, and its vertices at the beginning and at the end of the frame."""
         known, mesh = self._known.get(collider.name), collider.mesh
         if known is None:
             known = _first_known(mesh)
@@ -192,7 +191,7 @@ class Colliders:
             return known, before.vertices, mesh.vertices
         self.notes.append(
             HairError(
-                "{name} has other vertices or faces in frame {frame}: for hair it stays where it was before.",
+                "{name} changes its vertices or faces in frame {frame}: hair collides with its previous shape.",
                 name=collider.name,
                 frame=frame,
             )
@@ -200,7 +199,7 @@ class Colliders:
         return known, before.vertices, before.vertices
 
     def _build(self):
-        """Make the mesh of all colliders, whose vertices `_put` writes."""
+        """Build the mesh of all colliders; `_put` writes its vertices."""
         self.build_count += 1
         self.names = tuple(self._known)
         if not self._known:
@@ -245,16 +244,16 @@ class Colliders:
 
     def _set(self, colliders):
         rows = [(one.friction, one.distance, float(one.is_double_sided)) for one in colliders]
-        if rows != self._rows:  # else it stays where it is
+        if rows != self._rows:  # otherwise the array keeps its address
             self._rows = rows
             self.settings = wp.array(np.array(rows, np.float32).reshape(-1, 3), dtype=wp.vec3, device=self.device)
         self.largest_distance = max((one.distance for one in colliders), default=0.0)
 
 
 def problem_of(collider: Collider, frame: int = 0, is_new: bool = True) -> HairError | None:
-    """Why a collider cannot be used, as a sentence that names it and the frame; None if it can.
+    """Return why a collider cannot be used, with its name and the frame; None if it can.
 
-    is_new: off for one whose faces are known to have had an area, which takes a while to find out.
+    is_new: False skips the slow check for faces of positive area, for colliders that have passed it.
     """
     cause = _cause(collider, is_new)
     if cause is None:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Planes of contact between strands and colliders, for the solver to keep points in front of.
+"""Contact planes between strands and colliders, in front of which the solver keeps points.
 
-Arrays are in lane groups: (groups, rows, lanes), as the solver's. A vector takes three rows, a plane `PLANE` rows:
-n (3), the offset n·c + r, the displacement of the surface at c in this substep (3), and the coefficient of friction.
-A point in front has n·x ≥ offset; n = 0 where there is no contact.
+Arrays are (groups, rows, lanes), as in the solver. A vector has three rows, a plane `PLANE` rows: n (3), the offset
+n·c + r, the displacement of the surface at c in this substep (3), and the coefficient of friction. A point in front has
+n·x ≥ offset; n = 0 without contact.
 """
 
 from typing import Any
@@ -21,22 +21,22 @@ from .distance_grid import distance_grid
 from .nearest_surface import Surface
 from .surface_motions import SurfaceMotions
 
-RISE = 0.02  # [m/s] at most, of a point that the groom has inside
-LEAST_ROWS = 128  # times `WIDTH` strands that are worth a thread
+RISE = 0.02  # largest speed of points that move out because they are inside in the groom [m/s]
+LEAST_ROWS = 128  # least number of `WIDTH` strands for a thread
 
-_MOST_DRIFT = 0.5  # of a cell of the grid of distances, after which the next frame has a new one
-_DEEPEST = 0.1  # [m] inside that the groom is measured
+_MOST_DRIFT = 0.5  # of a cell of the distance grid, beyond which the next frame builds a new grid
+_DEEPEST = 0.1  # search radius for the groom's distances [m]
 
 
 class Contacts:
-    """Planes of contact of strands, (groups, vertices × 3, lanes) positions [m], with `Colliders`.
+    """Contact planes of strands, with positions (groups, vertices × 3, lanes) [m], and `Colliders`.
 
-    Each vertex but the root keeps min(the collider's distance, its own in the groom), so that nothing is pushed in the
-    first frame. Raises `HairError` for arrays that do not fit.
+    Each vertex but the root keeps the smaller of the collider's distance and its distance in the groom, so that no
+    vertex is pushed in the first frame. Raises `HairError` for arrays that do not match.
     """
 
     def __init__(self, groom: Any, colliders: Colliders) -> None:
-        """groom: positions at rest [m], on the colliders' device, to which `colliders` is posed."""
+        """groom: positions at rest [m], on the colliders' device; `colliders` must be in the pose of the groom."""
         if groom.ndim != 3 or groom.shape[1] % 3 or groom.shape[1] < 6 or groom.dtype != wp.float32:
             raise HairError("Positions of strands are (groups, vertices × 3, lanes) numbers of single precision.")
         self.colliders = colliders
@@ -51,14 +51,14 @@ class Contacts:
         self._grid: Any = None
         self._distances = wp.empty(0, dtype=float, device=device)  # of the grid
         self._motions = SurfaceMotions(device)
-        # How far colliders had drifted before the frame in which the grid was made, and in that frame [m].
+        # Drift of the colliders before the frame in which the grid was built, and in this frame [m].
         self._grid_drift = self._first_drift = 0.0
         self._none = wp.empty((0, 0, 0), dtype=float, device=device)
         self._counts, self._read_count = (colliders.build_count, colliders.jump_count), colliders.read_count
         self.measure(groom)
 
     def measure(self, groom: Any) -> None:
-        """Take other positions at rest: distances that points keep follow from them."""
+        """Measure the distances of positions at rest, which points keep."""
         self._require_shape(groom)
         self.forget()
         for is_middle, samples in enumerate((self.vertices, self.middles)):
@@ -78,10 +78,10 @@ class Contacts:
     ) -> Any:
         """Return `planes` for the predicted positions of a substep, which began at `last_positions`.
 
-        Called in every substep, then once more with `is_final`: what is near is followed from one to the next.
-        duration [s] of the substep. is_final: afterwards, for points that are still inside, `found_planes`: segments
-        are not asked, and nothing rises; moved: (groups, 1, lanes) numbers, not zero for strands some of whose points
-        have moved since: only these ask again. is_skipping: off asks the surface for every point, which finds the same.
+        To be called in every substep, then again with `is_final`, because near surfaces are tracked between calls.
+        duration: of the substep [s]; is_final: after the solve, for points that are still inside, `found_planes`,
+        without segments and without rise; moved: (groups, 1, lanes) numbers, non-zero for strands with points that have
+        moved since, which alone are queried again; is_skipping: False queries every point, with the same result.
         """
         self._require_shape(positions)
         self._require_shape(last_positions)
@@ -101,7 +101,7 @@ class Contacts:
         return self.look(self.surface(), asking, positions, last_positions, moved)
 
     def look(self, surface: Surface, asking: Asking, positions: Any, last_positions: Any, moved: Any = None) -> Any:
-        """The launches of `find`, of arrays that it has checked: for a surface and a way of asking."""
+        """Launch the kernels of `find` for validated arrays, a surface and an `Asking`."""
         is_final = asking.is_final != 0
         *either, middle_planes = self.planes
         planes = either[int(is_final)]
@@ -114,13 +114,13 @@ class Contacts:
 
     @property
     def planes(self) -> tuple[Any, Any, Any]:
-        """Planes of all groups, as `planes_of`."""
+        """Planes of all groups, from `planes_of`."""
         if self._planes is None:
             self._planes = self.planes_of(self._shape[0])
         return self._planes
 
     def follow(self) -> None:
-        """Keep what is known of the colliders true; once in a substep, after they were posed."""
+        """Update the data of the colliders; to be called once per substep, after they are posed."""
         colliders = self.colliders
         counts = colliders.build_count, colliders.jump_count
         if self._counts != counts:
@@ -137,7 +137,7 @@ class Contacts:
         self._grid.drift = self._first_drift + drifted + colliders.drift
 
     def _new_grid(self):
-        """The colliders' distances where they are, seen from where they were at rest."""
+        """Return the grid of distances from the colliders' present pose, in rest coordinates."""
         turned, moved = self.colliders.rigid_motion_so_far
         mesh = self.colliders.mesh
         vertices = (mesh.points.numpy() - moved) @ turned
@@ -146,7 +146,7 @@ class Contacts:
         return distance_grid(vertices, mesh.indices.numpy().reshape(-1, 3), sample_count, self.colliders.device)
 
     def _put_distances(self):
-        """Copy the grid's distances to where kernels read them: the same memory for as long as they fit."""
+        """Copy the grid's distances to the array for kernels, which is reallocated only if it is too small."""
         distances = self._grid.distances.flatten()
         if len(self._distances) < len(distances):
             count = len(distances) + len(distances) // 2
@@ -154,48 +154,48 @@ class Contacts:
         wp.copy(self._distances, distances, count=len(distances))
 
     def expect(self, count: int) -> None:
-        """Say how many substeps the frame has, at most."""
+        """Announce the maximum number of substeps of the frame."""
         self.colliders.expect(count)
         self._motions.make_room(count)
 
     def note_motion(self, substep: int = 0) -> None:
-        """Write down how the colliders come to where they are posed now."""
+        """Store the motion of the colliders to their present pose."""
         self._motions.note(substep, self.colliders, self._grid)
 
     def send_motions(self, first: int = 0, end: int = 1) -> None:
-        """Let kernels read what was noted of substeps first … end - 1."""
+        """Send the stored motions of substeps first … end - 1 to the device."""
         self._motions.send(first, end)
 
     def memory(self) -> list[tuple[int, int]]:
-        """Address and length of the arrays of `surface` that may become others."""
+        """Return address and length of the arrays of `surface` that may be reallocated."""
         arrays = self._motions.array, self._distances, self.colliders.settings
         return [(array.ptr, len(array)) for array in arrays]
 
     def planes_of(self, group_count: int) -> tuple[Any, Any, Any]:
-        """Memory for planes of some groups: of vertices before and after the solve, and of segments."""
+        """Allocate planes of a number of groups: of vertices before and after the solve, and of segments."""
         counts = self._vertex_count, self._vertex_count, self._vertex_count - 1
         shapes = [(group_count, PLANE * count, self._shape[2]) for count in counts]
         first, second, third = (wp.zeros(shape, dtype=float, device=self.colliders.device) for shape in shapes)
         return first, second, third
 
     def forget(self) -> None:
-        """Let every point ask the surface again: colliders or positions are others."""
+        """Invalidate all tracked distances, after a change of colliders or positions."""
         self._grid = None
         for samples in (self.vertices, self.middles):
             samples.clear.zero_()
 
     def state(self) -> dict[str, np.ndarray]:
-        """What later planes follow from, beside positions: as arrays on the processor."""
+        """Return the state of contacts without positions, as arrays on the CPU."""
         state = {name: array.numpy().copy() for name, array in self._arrays()}
         return {name: np.minimum(array, 0.0) if "clear" in name else array for name, array in state.items()}
 
     def load(self, state: dict[str, np.ndarray]) -> None:
-        """Take a state of such strands. Raises `HairError` where its arrays do not fit."""
-        for name, there in self._arrays():
+        """Restore a state. Raises `HairError` if its arrays do not match."""
+        for name, target in self._arrays():
             array = state.get(name)
-            if array is None or array.shape != there.shape or not np.isfinite(array).all():
+            if array is None or array.shape != target.shape or not np.isfinite(array).all():
                 raise HairError("The state of contacts is not that of these strands.")
-            there.assign(array)
+            target.assign(array)
         self._grid = None
 
     def _arrays(self):
@@ -211,7 +211,7 @@ class Contacts:
         return samples
 
     def surface(self, substep: int = 0) -> Surface:
-        """The colliders in their present pose, for kernels; substep: whose motion they read."""
+        """Return the colliders in their present pose for kernels; substep: index of its motion."""
         colliders, surface = self.colliders, Surface()
         surface.mesh, surface.points, surface.indices = colliders.mesh.id, colliders.mesh.points, colliders.mesh.indices
         surface.previous, surface.face_colliders = colliders.previous, colliders.face_colliders
@@ -232,7 +232,7 @@ class Contacts:
             raise HairError("Positions of strands must be one block of memory, on the colliders' device.")
 
     def _launch(self, kernel, inputs, outputs):
-        """Launch a kernel for all samples: on a processor a thread for `WIDTH` strands each, on all cores."""
+        """Launch a kernel for all samples: on a CPU a thread for `WIDTH` strands each, on all cores."""
         groups, _, lanes = self._shape
         device, count = self.colliders.device, self._vertex_count - 1
         at_once = (count, WIDTH) if device.is_cpu else (1, 1)
@@ -247,7 +247,7 @@ class Contacts:
 
 
 def asking_of(duration: float, is_final: bool = False, is_again: bool = False, is_skipping: bool = True) -> Asking:
-    """How samples ask in a substep of a duration [s], zero where nothing rises; the rest as in `Contacts.find`."""
+    """Return the `Asking` of a substep of a duration [s], zero for no rise; other arguments as in `Contacts.find`."""
     asking = Asking()
     asking.is_final, asking.is_again, asking.is_skipping = int(is_final), int(is_again), int(is_skipping)
     asking.rise = RISE * duration

@@ -1,26 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Which of LANES samples of strands look for a surface, and how far: on a processor the lanes of its vectors, on a GPU
-// one sample a thread. A sample that was farther away than it has come since, seen from the surface, is spared, and so
-// is one that the grid of distances knows to be far away.
+// Selects which of LANES samples of strands query the surface, and their search radius: in the lanes of vectors on a
+// CPU, one sample per thread on a GPU. A sample is skipped if its last distance exceeds its motion relative to the
+// surface since, or if the grid of distances shows that it is far away.
 //
 // The body of `_put_needs` in contact_queries.py. Parameters, of arrays (groups, rows, lanes):
 //
-//   int group, int sample, int first_lane    which samples
-//   int is_middle                            1: the middle of segment `sample`; 0: the vertex after it
-//   Asking asking                            is_final: after the solve; is_again: a sample that has not moved since it
-//                                            last looked keeps its plane; is_skipping, 0: every sample looks; rise: of
-//                                            samples that the groom has inside [m]
-//   Surface surface                          as nearest_surface.py says
-//   array_t<float> positions, last_positions 3 rows a vertex [m], now and when the substep began
-//   array_t<float> middle_planes             PLANE rows a segment
-//   Samples samples                          rest: distance in the groom [m], changed by `rise`; sides: 0 for those
-//                                            that do not look; asked: 3 rows, place at rest where it last looked [m];
-//                                            clear: how far from there it was [m], less the surface's motion since
-//   array_t<float> out_planes                PLANE rows: zero, but for how far it looks [m] in place of the offset, and
-//                                            1 in place of the friction where a segment beside has a plane
+//   int group, int sample, int first_lane    the samples
+//   int is_middle                            1: midpoint of segment `sample`; 0: the vertex after it
+//   Asking asking                            is_final: after the solve; is_again: samples that have not moved since
+//                                            their last query keep their planes; is_skipping, 0: every sample queries;
+//                                            rise: of samples that are inside in the groom [m]
+//   Surface surface                          see nearest_surface.py
+//   array_t<float> positions, last_positions 3 rows per vertex [m], now and at the start of the substep
+//   array_t<float> middle_planes             PLANE rows per segment
+//   Samples samples                          rest: distance in the groom [m], changed by `rise`; sides: becomes 0 for
+//                                            skipped samples; asked: 3 rows, rest coordinates of the last query [m];
+//                                            clear: distance at the last query minus the surface's motion since [m]
+//   array_t<float> out_planes                PLANE rows: zero, except for the search radius [m] in the row of the
+//                                            offset, and 1 in that of the friction if an adjacent segment has a plane
 //
-// Returns whether any of them looks, or has such a segment beside.
+// Returns whether any sample queries the surface, or has an adjacent segment with a plane.
 //
 // Constants: WIDTH, PLANE, MARGIN, NEAR, MOST_MOTION, SLACK, BACK, STAYED [m].
 
@@ -92,8 +92,8 @@ if (rise > 0.0f) {
 }
 const lanes most = lower_of(lanes(surface.largest_distance), at_rest);
 
-// As the surface sees it. Through a collider that does not deform a ray finds what has passed: the nearest surface is
-// looked for no farther than it may pull.
+// Motion relative to the surface. For colliders without deformation a ray finds crossed surfaces: the search for the
+// nearest one is limited to NEAR.
 const vector carried = turned(now.carry, last);
 const auto& shift = now.carry_shift;
 const vector way = minus(point, vector{carried.x + shift[0], carried.y + shift[1], carried.z + shift[2]});
@@ -107,13 +107,13 @@ const auto& moved = now.moved;
 const vector place = turned(now.to_rest, vector{point.x - moved[0], point.y - moved[1], point.z - moved[2]});
 const lanes away = length_of(minus(place, get_vector(samples.asked, sample)));
 const auto is_spared = (left - away > needed + SLACK) & where(asking.is_skipping);
-needed = before < 0.0f ? higher_of(needed, moving + MARGIN - left) : needed;  // inside, maybe deeper
+needed = before < 0.0f ? higher_of(needed, moving + MARGIN - left) : needed;  // inside, possibly deeper
 const auto is_kept = (away <= STAYED) & where(is_again);
 const auto is_number = length - length == 0.0f;
 const auto is_short = (segment <= 2.0f * most) & where(is_middle);
 auto is_asking = is_number & !is_spared & !is_short & !is_kept;
 if (asking.is_skipping && any_of(is_asking) && surface.distances.shape[0] > 0) {
-  // So far from any surface that neither the nearest one matters, nor any was passed on the way.
+  // Beyond this distance neither the nearest surface matters, nor can any surface have been crossed.
   const lanes limit = higher_of(needed, length + 2.0f * (deformation + BACK)) + SLACK;
   is_asking = is_asking & !(least_distance(now.grid, surface.distances.data, place.x, place.y, place.z) > limit);
 }

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Kernels of contact.py: the nearest surface of each sample of a strand, as a plane.
 
-A sample is a vertex, but for the root's, or the middle of a segment. Which of them look for a surface says
-contact_needs.cpp, for all lanes at once. Which rows of an array a vector or a plane takes stands in `_index`, and there
-in `row_of`.
+A sample is a vertex except the root, or the midpoint of a segment. contact_needs.cpp selects the samples that query the
+surface, for all lanes at once. `_index`, and `row_of` in that file, define the rows of vectors and planes.
 """
 
 import warp as wp
@@ -12,42 +11,42 @@ from ...kernels import native_code
 from .nearest_surface import BACK, Hit, Surface, crossed, nearest
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
-BLOCK = 64  # threads of a GPU: of 256, which look for as long as the slowest, a multiprocessor has few at once
+BLOCK = 64  # threads of a GPU block: 256 would wait for the slowest query, with few blocks per multiprocessor
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "block_dim": BLOCK})
 
-PLANE = wp.constant(8)  # rows of an array that a plane takes
-WIDTH = 16  # samples that a thread of the processor takes at once
-NOWHERE = wp.constant(1e9)  # [m] from any collider
+PLANE = wp.constant(8)  # rows of a plane
+WIDTH = 16  # samples of a CPU thread
+NOWHERE = wp.constant(1e9)  # distance without a collider [m]
 
-MARGIN = wp.constant(1e-3)  # [m] beyond what a point keeps, for what the solver does to it
-MOST_MOTION = wp.constant(0.5)  # [m] of a point in a substep that is looked for: no farther, as it costs
+MARGIN = wp.constant(1e-3)  # search margin for motion by the solver [m]
+MOST_MOTION = wp.constant(0.5)  # largest motion of a point in a substep that extends the search [m]
 
-_AHEAD = wp.constant(0.01)  # [m] at most, looked for beyond what is needed, to spare later queries
+_AHEAD = wp.constant(0.01)  # largest additional search radius, which saves later queries [m]
 
 
 @wp.struct
 class Samples:
-    """Points of strands that ask for a plane, (groups, samples, lanes), and what they keep from substep to substep."""
+    """State of the samples of strands between substeps, (groups, samples, lanes)."""
 
-    rest: wp.array3d[float]  # [m]: the distance in the groom, negative inside, `NOWHERE` where no collider is near
-    sides: wp.array3d[int]  # ± (1 + collider) of the double-sided one nearby, 0: none
-    asked: wp.array3d[float]  # (groups, 3 samples, lanes) [m]: where it last looked for a surface, `Surface.to_rest`
-    clear: wp.array3d[float]  # [m]: how far from there it was at least, less its motion since; negative inside
+    rest: wp.array3d[float]  # distance in the groom [m], negative inside, `NOWHERE` if no collider is near
+    sides: wp.array3d[int]  # ± (1 + collider) of a near double-sided collider, 0: none
+    asked: wp.array3d[float]  # (groups, 3 samples, lanes): place of the last query [m], in rest coordinates
+    clear: wp.array3d[float]  # distance at the last query minus the surface's motion since [m]; negative inside
 
 
 @wp.struct
 class Asking:
-    """How samples ask: as the flags of `Contacts.find` say."""
+    """Query options: see `Contacts.find`."""
 
     is_final: int
     is_again: int
     is_skipping: int
-    rise: float  # [m] in this substep, of samples that the groom has inside
+    rise: float  # motion in this substep of samples that are inside in the groom [m]
 
 
 @wp.func
 def _index(row: int, per_vector: int, component: int):
-    """The row of an array of vectors that holds a component."""
+    """Return the row of a vector's component."""
     return per_vector * row + component
 
 
@@ -84,7 +83,7 @@ def _put_plane(
 
 @wp.func
 def _sample(values: wp.array3d[float], group: int, sample: int, lane: int, is_middle: int):
-    """The position of a sample: the vertex after the root, or the middle of a segment."""
+    """Return the position of a sample: a vertex after the root, or the midpoint of a segment."""
     if is_middle == 0:
         return _vector(values, group, sample + 1, lane)
     return 0.5 * (_vector(values, group, sample, lane) + _vector(values, group, sample + 1, lane))
@@ -99,7 +98,7 @@ def _normal(planes: wp.array3d[float], group: int, row: int, lane: int):
 
 @wp.func
 def _gap(planes: wp.array3d[float], group: int, row: int, lane: int, point: wp.vec3):
-    """How far a point is in front of a plane; `NOWHERE` where there is none."""
+    """Return the distance of a point in front of a plane; `NOWHERE` without a plane."""
     normal = _normal(planes, group, row, lane)
     if wp.dot(normal, normal) < 0.5:
         return NOWHERE
@@ -148,7 +147,7 @@ def _look(
     samples: Samples,
     out_planes: wp.array3d[float],
 ):
-    """Write the plane of one sample, if there is a surface as near as `needed`."""
+    """Write the plane of a sample if there is a surface within `needed`."""
     row = sample + 1 - is_middle
     point = _sample(positions, group, sample, lane, is_middle)
     last = _sample(last_positions, group, sample, lane, is_middle)
@@ -163,7 +162,7 @@ def _look(
     if now.deformation <= BACK and at_rest >= 0.0:
         start = now.carry * last + now.carry_shift
         way = wp.length(point - start)
-        # Nothing was passed if no surface is as near as the way is long.
+        # The point cannot have crossed a surface that is farther away than its motion.
         if hit.gap <= way + 2.0 * BACK:
             entry = crossed(surface, point, start, largest)
             if entry.collider >= 0:
@@ -177,14 +176,14 @@ def _look(
     samples.clear[group, sample, lane] = hit.gap
     is_near = hit.collider >= 0 and hit.gap <= needed
     if entry.collider >= 0 and not (is_near and hit.distance <= 0.0 and wp.dot(hit.normal, entry.normal) > 0.0):
-        hit = entry  # the nearest is not the front of what it came through
+        hit = entry  # the nearest surface is not the front of the crossed one
     elif not is_near:
         return
     samples.clear[group, sample, lane] = wp.min(samples.clear[group, sample, lane], hit.distance)
     samples.sides[group, sample, lane] = hit.side
     settings = surface.settings[hit.collider]
     offset = wp.dot(hit.normal, hit.place) + wp.min(settings[1], at_rest)
-    if wp.dot(hit.normal, hit.normal) > 0.5:  # not of a face without an area
+    if wp.dot(hit.normal, hit.normal) > 0.5:  # zero for faces of zero area
         _put_plane(out_planes, group, row, lane, hit.normal, offset, hit.displacement, settings[0])
 
 
@@ -198,14 +197,14 @@ def _choose(
     lane: int,
     planes: wp.array3d[float],
 ):
-    """Give a vertex the plane of a segment beside it whose middle is less in front of its own."""
+    """Replace the plane of a vertex by that of an adjacent segment whose midpoint is less far in front of its plane."""
     point = _vector(positions, group, vertex, lane)
     own = _normal(planes, group, vertex, lane)
     least = _gap(planes, group, vertex, lane, point)
     chosen = int(-1)
     for segment in range(vertex - 1, wp.min(vertex + 1, sample_count)):
         gap = _gap(middle_planes, group, segment, lane, _sample(positions, group, segment, lane, 1))
-        # A segment across a thin part has its ends on either side: it does not pull one through to the other.
+        # A segment across a thin part has its ends on both sides, and must not pull one end through the part.
         if gap < least and wp.dot(own, _normal(middle_planes, group, segment, lane)) >= 0.0:
             least = gap
             chosen = segment
@@ -214,8 +213,8 @@ def _choose(
     for row in range(PLANE):
         value = middle_planes[group, _index(chosen, PLANE, row), lane]
         planes[group, _index(vertex, PLANE, row), lane] = value
-    # The plane through the vertex that is as far behind it as the middle is behind its own: a segment whose middle
-    # touches moves as a whole, and one that lies in the groom as it does is not turned.
+    # The plane is shifted so that the vertex is as far in front of it as the midpoint of its own plane: a segment whose
+    # midpoint touches moves as a whole, and a segment that touches in the groom is not rotated.
     normal = _normal(planes, group, vertex, lane)
     planes[group, _index(vertex, PLANE, 3), lane] = wp.dot(normal, point) - least
 
@@ -235,11 +234,11 @@ def _look_in(
     samples: Samples,
     out_planes: wp.array3d[float],
 ):
-    """Look for a surface in those lanes of which `_put_needs` said so."""
+    """Query the surface for the lanes that `_put_needs` has selected."""
     row = sample + 1 - is_middle
     for lane in range(first_lane, first_lane + lanes_at_once):
         if wp.length_sq(_normal(out_planes, group, row, lane)) > 0.0:
-            continue  # it keeps its plane
+            continue  # the plane is kept
         needed = out_planes[group, _index(row, PLANE, 3), lane]
         is_beside = out_planes[group, _index(row, PLANE, 7), lane] > 0.0
         if is_beside:
@@ -266,7 +265,7 @@ def find_in(
     samples: Samples,
     out_planes: wp.array3d[float],
 ) -> int:
-    """Write the planes of some samples of some lanes; whether any of them looked for a surface."""
+    """Write the planes of some samples of some lanes; returns whether any of them queried the surface."""
     is_near = int(0)
     for sample in range(first_sample, first_sample + samples_at_once):
         is_any = _put_needs(
@@ -303,7 +302,7 @@ def find_in(
 
 @wp.func
 def any_moved(moved: wp.array3d[float], group: int, first_lane: int, lanes_at_once: int) -> int:
-    """Whether a strand of some lanes has moved."""
+    """Return whether a strand of some lanes has moved."""
     for lane in range(first_lane, first_lane + lanes_at_once):
         if moved[group, 0, lane] != 0.0:
             return 1

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A substep of strands that may touch colliders: the solver's stages, and between them the planes of contact.
+"""Substeps of strands with collisions: the stages of the solver, with contact queries between them.
 
-On a processor one kernel does it all for a group of strands, whose state stays in the nearest memory meanwhile: going
-through all strands once for each stage took twice as long where nothing touches. On a GPU each is a launch; from Python
-these would take longer than the GPU needs for them, so a frame's are recorded once and then replayed.
+On a CPU one kernel runs all stages for a group of strands, whose state stays in the cache: a pass over all strands for
+each stage took twice as long without contacts. On a GPU each stage is a launch; the launches of a frame are recorded
+once and replayed, because launching from Python would take longer than the kernels.
 """
 
 from dataclasses import replace
@@ -31,7 +31,7 @@ from .contact import Contacts, asking_of
 from .contact_queries import WIDTH, Asking, Samples, any_moved, find_in
 from .nearest_surface import Surface
 
-# Nothing differentiates this kernel; the solver's part says itself what it fuses (`fused` of lanes.h).
+# No gradients are needed. The solver fuses multiply-adds explicitly (`fused` of lanes.h).
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _ROUNDS = 4
@@ -41,9 +41,9 @@ _WIDTH = wp.constant(WIDTH)
 
 
 class TouchingStrands:
-    """Strands with their contacts, and memory for the planes of those that are at hand."""
+    """Strands with their contacts, and memory for the planes of the groups in progress."""
 
-    takes_groups = True  # on a processor; off: stage by stage there too
+    takes_groups = True  # on a CPU: all stages group by group; False: stage by stage, as on a GPU
 
     def __init__(self, rods: Rods, contacts: Contacts) -> None:
         self._rods, self._contacts = rods, contacts
@@ -51,8 +51,7 @@ class TouchingStrands:
         self._planes: list[tuple[Any, Any, Any]] = []  # of each share of the strands
 
     def advance(self, step: Step, first: int, end: int, surroundings: Surroundings) -> None:
-        """Advance by substeps first … end - 1, to whose ends colliders are posed. Raises `HairError` where counts do
-        not match."""
+        """Advance by substeps first … end - 1, and pose the colliders. Raises `HairError` if counts do not match."""
         colliders = self._contacts.colliders
         self._contacts.expect(step.count)
         if not (self._rods.device.is_cpu and self.takes_groups):
@@ -65,7 +64,7 @@ class TouchingStrands:
                 self._advance_groups(step, substep, substep + 1, surroundings)
 
     def _advance_stages(self, step, first, end, surroundings):
-        """One launch after the other, which are recorded: all that changes from frame to frame is in arrays."""
+        """Run the stages as recorded launches; data that changes between frames is in arrays."""
         rods, contacts, colliders = self._rods, self._contacts, self._contacts.colliders
         contacts.follow()
         for substep in range(first, end):
@@ -77,7 +76,7 @@ class TouchingStrands:
         around = (surroundings.airs, surroundings.drags, surroundings.accelerations)
         memory = contacts.memory() + [None if array is None else array.ptr for array in around]
         key = colliders.build_count, colliders.is_still, colliders.largest_distance, *memory
-        # The first substep after some of another size is like no other: the rest may be.
+        # The first substep after a change of size differs from the others.
         middle = end if step.carried == 1.0 else first + 1
         self._replay(key, step, first, middle, surroundings)
         if middle < end:
@@ -106,7 +105,7 @@ class TouchingStrands:
             step = replace(step, carried=1.0)
 
     def _advance_groups(self, step, first, end, surroundings):
-        """All stages of one group of strands after the other."""
+        """Run all stages group by group."""
         rods, contacts = self._rods, self._contacts
         contacts.follow()
         contacts.note_motion()
@@ -128,19 +127,19 @@ class TouchingStrands:
         rods.step_size = step.size
 
     def _planes_of(self, share_count):
-        """Memory for a group of each share: it has its planes only while it is at hand."""
+        """Return memory for one group of each share, which its groups use in turn."""
         while len(self._planes) < share_count:
             self._planes.append(self._contacts.planes_of(1))
         return self._planes[:share_count]
 
 
 def _ways_of_asking(step):
-    """Before the solve, after it, and after it was done again."""
+    """Return the `Asking` before the solve, after it, and after AGAIN."""
     return asking_of(step.size), asking_of(0.0, is_final=True), asking_of(0.0, is_final=True, is_again=True)
 
 
 def _for_each(array, group_count):
-    """The memory of one group, as that of many: one after the other has it."""
+    """Return a view of one group's memory as an array of many groups, which use it in turn."""
     _, rows, lanes = array.shape
     shape, strides = (group_count, rows, lanes), (0, *array.strides[1:])
     return wp.array(ptr=array.ptr, dtype=float, shape=shape, strides=strides, device=array.device)
@@ -164,7 +163,7 @@ def _advance_groups(
     around: Around,
     middle_planes: wp.array3d[float],
 ):
-    """round_count: `_ROUNDS`, which the compiler does not know, so that it has the solver once."""
+    """round_count: `_ROUNDS`, unknown to the compiler, so that the loop is not unrolled around the solver."""
     group = first + wp.tid()
     is_near = int(0)
     for index in range(round_count * (step.end - step.first)):

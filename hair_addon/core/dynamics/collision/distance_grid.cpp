@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The body of `least_distance` in distance_grid.py: of one point on either kind of device. Parameters:
+// The body of `least_distance` in distance_grid.py: for one point, on CPU and GPU. Parameters:
 //
 //   DistanceGrid grid
 //   vec3 point

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The least distance that a grid knows points to have from any surface [m]: a `GridPlace` or `DistanceGrid`, and its
-// distances. Included after lanes.h.
+// Lower bound of the distance [m] of points from any surface, by a `GridPlace` or `DistanceGrid` and its distances. To
+// be included after lanes.h.
 
 const auto least_distance = [&](const auto& grid, const float* distances, lanes x, lanes y, lanes z) {
   const auto size_of = [&](lanes a, lanes b, lanes c) { return exact_sqrt_of(a * a + b * b + c * c); };
-  // In a box that contains all triangles, the place that is nearest to a point, and the vertex beside that.
+  // The closest place to a point in a box that contains all triangles, and the grid vertex nearest to this place.
   const auto inside_of = [&](lanes along, int axis) {
     const lanes most = lanes(grid.size * static_cast<float>(grid.last[axis]));
     along = along < most ? along : most;
@@ -23,7 +23,7 @@ const auto least_distance = [&](const auto& grid, const float* distances, lanes 
   const auto from_vertex = [&](lanes along, ints vertex) { return along - to_lanes(vertex) * grid.size; };
   distance -= size_of(from_vertex(inside_x, i), from_vertex(inside_y, j), from_vertex(inside_z, k)) + grid.drift;
   distance = distance > 0.0f ? distance : lanes(0.0f);
-  // All triangles are on the other side of that place.
+  // All triangles are beyond this place.
   const lanes beyond = size_of(x - inside_x, y - inside_y, z - inside_z) - grid.drift;
   return size_of(distance, beyond > 0.0f ? beyond : lanes(0.0f), lanes(0.0f));
 };

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far points are from colliders at least, on a grid: which of them need not ask for the nearest surface.
+"""Lower bounds of the distance from colliders, on a grid: points that are far away need no surface query.
 
-A vertex of the grid knows its distance from the nearest cell that a triangle may touch. A point is no nearer to a
-surface than the vertex beside it is, less the way between the two; and a point outside the grid, which contains all
-triangles, no nearer than that place of the grid that is nearest to it is, across the way there.
+Each vertex of the grid stores its distance from the nearest cell that a triangle may touch. A lower bound at a point is
+the distance of the nearest vertex minus the distance between the two. Outside the grid, which contains all triangles,
+the bound at the closest place of the grid and the distance to this place are combined.
 """
 
 import math
@@ -16,14 +16,14 @@ from ...kernels import kernel_cache, native_code
 
 wp.set_module_options({"enable_backward": False})
 
-_FARTHEST = wp.constant(15)  # cells that are looked at: farther vertices know that they are as far as that
+_FARTHEST = wp.constant(15)  # largest stored distance in cells
 _MOST_CELLS_ALONG = 64
-_SLACK = wp.constant(1e-3)  # of a cell, that triangles are larger
+_SLACK = wp.constant(1e-3)  # enlargement of triangles, relative to a cell
 
 
 @wp.struct
 class GridPlace:
-    """Where a `DistanceGrid` is: its values but for `distances`."""
+    """The values of a `DistanceGrid` without `distances`."""
 
     low: wp.vec3
     last: wp.vec3i
@@ -33,29 +33,29 @@ class GridPlace:
 
 @wp.struct
 class DistanceGrid:
-    """For kernels. Vertices are at `low + size (i, j, k)`."""
+    """A grid for kernels, with vertices at `low + size (i, j, k)`."""
 
     low: wp.vec3
-    last: wp.vec3i  # vertices along each axis, less one
+    last: wp.vec3i  # number of vertices along each axis - 1
     size: float  # of a cell [m]
-    drift: float  # that triangles have moved since, at most [m]
+    drift: float  # largest motion of triangles since the grid was built [m]
     distances: wp.array3d[float]  # [m]
 
 
-# The least distance [m] that a point may have from any surface: zero near one.
+# Lower bound of the distance [m] of a point from any surface; zero near a surface.
 @wp.func_native(native_code.body(__file__, "distance_grid.cpp", WIDTH=1))
 def least_distance(grid: DistanceGrid, point: wp.vec3) -> float: ...
 
 
 def cell_size(extent: np.ndarray, cell_count: int) -> float:
-    """The size [m] of about as many cells as that in a box (3,) [m]."""
+    """Return the size [m] of cells for about `cell_count` cells in a box (3,) [m]."""
     longest = float(extent.max())
     along = min(max(math.cbrt(cell_count), 4.0), _MOST_CELLS_ALONG)
     return max(longest / along, (math.prod(np.maximum(extent, longest / along)) / cell_count) ** (1.0 / 3.0), 1e-6)
 
 
 def distance_grid(vertices: np.ndarray, triangles: np.ndarray, cell_count: int, device: Any) -> DistanceGrid:
-    """The grid of triangles (F, 3) with vertices (V, 3) [m], of about `cell_count` cells, at most 64 along an axis."""
+    """Return the grid of triangles (F, 3) with vertices (V, 3) [m], with about `cell_count` cells, 64 along an axis."""
     low, high = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)
     size = cell_size(high - low, cell_count)
     low = low - 0.5 * size
@@ -74,15 +74,15 @@ def distance_grid(vertices: np.ndarray, triangles: np.ndarray, cell_count: int, 
 def distances_by_kernels(
     places: np.ndarray, triangles: np.ndarray, counts: np.ndarray, size: float, device: Any
 ) -> wp.array:
-    """Distances (counts + 1) [m] as NumPy finds them on the processor; places (V, 3): of vertices, in cells [m: size].
+    """Return distances (counts + 1) [m], equal to those of NumPy, in a fiftieth of the time on a GPU.
 
-    A GPU takes a fiftieth of the processor's time.
+    places (V, 3): of vertices, in cells; size: of a cell [m].
     """
     shape = tuple(int(count) + 1 for count in counts)
     squares = wp.full(shape, _FARTHEST**2, dtype=int, device=device)
-    there = wp.array(places.astype(np.float32), dtype=wp.vec3, device=device)
+    vertices = wp.array(places.astype(np.float32), dtype=wp.vec3, device=device)
     faces = wp.array(np.ascontiguousarray(triangles, np.int32), dtype=int, device=device)
-    kernel_cache.launch(_touch, len(faces), inputs=[there, faces], outputs=[squares], device=device)
+    kernel_cache.launch(_touch, len(faces), inputs=[vertices, faces], outputs=[squares], device=device)
     for axis in np.eye(3, dtype=int).tolist():
         nearest = wp.empty_like(squares)
         kernel_cache.launch(_spread, shape, inputs=[squares, wp.vec3i(*axis)], outputs=[nearest], device=device)
@@ -99,7 +99,7 @@ def _touch(
     # outputs
     out_squares: wp.array3d[int],
 ):
-    """Zero at the vertices of cells that the box of a triangle touches."""
+    """Write zero at the vertices of cells that a triangle's bounding box touches."""
     triangle = wp.tid()
     a = places[triangles[triangle, 0]]
     b = places[triangles[triangle, 1]]
@@ -124,7 +124,7 @@ def _spread(
     # outputs
     out_squares: wp.array3d[int],
 ):
-    """Squared distances along one axis more."""
+    """Extend squared distances along one more axis."""
     i, j, k = wp.tid()
     place = wp.vec3i(i, j, k)
     along = wp.dot(axis, place)
@@ -152,11 +152,11 @@ def _put_roots(
 
 
 def _touched(places, triangles, counts):
-    """(I, J, K) bool of vertices: those of cells that the box of a triangle touches; places: in cells."""
+    """Return (I, J, K) bool: vertices of cells that a triangle's bounding box touches; places: in cells."""
     corners = [places[triangles[:, corner]] for corner in range(3)]
     first = np.floor(np.minimum(np.minimum(*corners[:2]), corners[2]) - _SLACK).astype(int)
     last = np.floor(np.maximum(np.maximum(*corners[:2]), corners[2]) + _SLACK).astype(int) + 1  # a vertex
-    # Boxes are counted as differences, whose sums along the axes they are.
+    # Boxes are accumulated as differences, and counted by cumulative sums along the axes.
     shape = counts + 2
     changes = np.zeros(math.prod(shape), np.int32)
     for axes in np.ndindex(2, 2, 2):
@@ -170,14 +170,14 @@ def _touched(places, triangles, counts):
 
 
 def _squares(is_touched):
-    """(I, J, K) squared distances from the nearest that is, in cells: along one axis after the other."""
+    """Return squared distances (I, J, K) from the nearest touched vertex, in cells, one axis after the other."""
     squares = np.where(is_touched, 0, _FARTHEST**2).astype(np.uint16)
     for axis in range(3):
         along = np.moveaxis(squares, axis, 0)
         nearest = along.copy()
         for way in range(1, min(_FARTHEST, len(along))):
-            there = along + np.uint16(way**2)
-            np.minimum(nearest[way:], there[:-way], out=nearest[way:])
-            np.minimum(nearest[:-way], there[way:], out=nearest[:-way])
+            shifted = along + np.uint16(way**2)
+            np.minimum(nearest[way:], shifted[:-way], out=nearest[way:])
+            np.minimum(nearest[:-way], shifted[way:], out=nearest[:-way])
         squares = np.moveaxis(nearest, 0, axis)
     return np.ascontiguousarray(squares)

@@ -1,26 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The nearest surface of a point, which side of it the point is on, and what a fast point has passed through."""
+"""Nearest surface of a point with its side, and surfaces that a fast point has crossed."""
 
 import warp as wp
 
 from .distance_grid import GridPlace
 
-BACK = wp.constant(1e-4)  # [m] before a point's last position, where its ray starts
-_AT_EDGE = wp.constant(1e-5)  # a barycentric coordinate that counts as zero
-_TINY = wp.constant(1e-6)  # [m]: nearer points take the normal of the face
+BACK = wp.constant(1e-4)  # offset of a ray's start before the point's last position [m]
+_AT_EDGE = wp.constant(1e-5)  # barycentric coordinates below count as zero
+_TINY = wp.constant(1e-6)  # distance below which the face normal is used [m]
 
 
 @wp.struct
 class Motion:
-    """How colliders move in one substep, and where their grid of distances is by its end."""
+    """Motion of the colliders in a substep, and their distance grid at its end."""
 
-    # How far a vertex moves, at most, but for their turn as a whole.
+    # Bound of the residual motion of a vertex besides the rigid motion.
     motion: float
-    # Where points that move with them come to, and how far they deform otherwise.
+    # Affine motion of points with the colliders, and bound of the residual.
     carry: wp.mat33
     carry_shift: wp.vec3
     deformation: float
-    # How they have since the beginning: place at rest = to_rest (x - moved).
+    # Motion since the beginning: rest coordinates = to_rest (x - moved).
     to_rest: wp.mat33
     moved: wp.vec3
     grid: GridPlace  # at rest
@@ -28,7 +28,7 @@ class Motion:
 
 @wp.struct
 class Surface:
-    """What kernels read of `Colliders`."""
+    """`Colliders` for kernels."""
 
     mesh: wp.uint64
     points: wp.array[wp.vec3]
@@ -38,27 +38,27 @@ class Surface:
     rims: wp.array[int]
     settings: wp.array[wp.vec3]
     largest_distance: float
-    distances: wp.array[float]  # of the grid; empty where there is none
+    distances: wp.array[float]  # of the grid; empty without a grid
     motions: wp.array[Motion]  # of the substeps of a frame
     substep: int  # the present one
 
 
 @wp.struct
 class Hit:
-    """The nearest surface: its distance from a point along the normal, negative inside; collider -1 where none is."""
+    """The nearest surface: distance of a point along the normal, negative inside; collider: -1 for no surface."""
 
     distance: float
-    gap: float  # the distance, positive on either side
+    gap: float  # absolute distance
     place: wp.vec3
     normal: wp.vec3
     displacement: wp.vec3
     collider: int
-    side: int  # of a double-sided collider, as `Samples.sides` keeps it
+    side: int  # of a double-sided collider, as in `Samples.sides`
 
 
 @wp.func
 def _at_rim(rims: int, barycentric: wp.vec3):
-    """Whether a point of a face is on an edge that has no other face."""
+    """Return whether a point of a face is on an edge without another face."""
     for corner in range(3):
         if barycentric[corner] < _AT_EDGE and (rims >> corner) & 1 == 1:
             return True
@@ -85,7 +85,7 @@ def _side_of(value: float):
 
 @wp.func
 def nearest(surface: Surface, point: wp.vec3, last: wp.vec3, radius: float, kept_side: int):
-    """The nearest surface within a radius; last: where the point was before the substep."""
+    """Return the nearest surface within a radius; last: position of the point before the substep."""
     hit = Hit()
     hit.collider = -1
     hit.gap = radius
@@ -101,7 +101,7 @@ def nearest(surface: Surface, point: wp.vec3, last: wp.vec3, radius: float, kept
     hit.displacement = _displacement(surface, face, barycentric)
     sign = query.sign
     if _at_rim(surface.rims[face], barycentric):
-        # There is no inside beyond a rim: the point may go around it.
+        # Beyond a rim there is no inside: points can move around it.
         sign = 1.0
     elif surface.settings[collider][2] > 0.5:
         side = wp.sign(float(kept_side))
@@ -116,15 +116,17 @@ def nearest(surface: Surface, point: wp.vec3, last: wp.vec3, radius: float, kept
     hit.normal = face_normal
     if hit.gap > _TINY and wp.min(barycentric) < _AT_EDGE:
         hit.normal = away * (sign / hit.gap)
-    else:  # more exact than the direction of a short way
+    else:  # more accurate than the direction of a short vector
         hit.distance = wp.dot(away, face_normal)
     return hit
 
 
 @wp.func
 def crossed(surface: Surface, point: wp.vec3, start: wp.vec3, limit: float):
-    """The surface that a point has passed through since `start`, where the surface has moved to meanwhile, if that is
-    farther than `limit`."""
+    """Return the surface that a point has crossed on its way from `start`, if this is farther than `limit`.
+
+    start: the last position, moved along with the surface.
+    """
     hit = Hit()
     hit.collider = -1
     way = point - start
@@ -140,7 +142,7 @@ def crossed(surface: Surface, point: wp.vec3, start: wp.vec3, limit: float):
     facing = wp.dot(normal, direction)
     is_sheet = surface.settings[collider][2] > 0.5
     if facing > 0.0 and not is_sheet:
-        return hit  # out of the inside
+        return hit  # from inside to outside
     side = float(_side_of(-facing))
     barycentric = wp.vec3(query.u, query.v, 1.0 - query.u - query.v)
     hit.collider = collider

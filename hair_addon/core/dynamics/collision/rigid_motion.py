@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How points on straight lines between two poses turn and move as a whole, and how far any moves otherwise."""
+"""Rigid motion of points that are interpolated linearly between two poses, and bounds of the residual motion."""
 
 import math
 
@@ -10,7 +10,7 @@ STILL = np.eye(3), np.zeros(3)
 
 
 class RigidMotion:
-    """Of points from `before` to `after`, (V, 3) float32 [m]: the rotation of least squares [Kabsch76]."""
+    """Least-squares rigid motion of points from `before` to `after`, (V, 3) float32 [m] [Kabsch76]."""
 
     def __init__(self, before: np.ndarray, after: np.ndarray) -> None:
         self._centre, end = (pose.astype(np.float64).mean(axis=0) for pose in (before, after))
@@ -25,12 +25,12 @@ class RigidMotion:
             self._angle, self._rest = 0.0, rest_of_none
 
     def between(self, first: ArrayLike, last: ArrayLike) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-        """The motion between two parts 0..1: (rotation (3, 3), translation [m]), and a bound of the rest [m].
+        """Return the motion between two times in [0, 1]: (rotation (3, 3), translation [m]), bound of the residual [m].
 
-        Of many pairs of parts (…) at once: rotations (…, 3, 3), translations (…, 3), bounds (…).
+        For many pairs of times (…) at once: rotations (…, 3, 3), translations (…, 3), bounds (…).
 
-        Points at part p are c + p d + (1 - p + p R) a + p e, for the centre c, its way d, offsets a and a rest e. Their
-        whole turns by φ(p) then, with tan φ = p sin θ / (1 - p + p cos θ).
+        Points at time p are c + p d + (1 - p + p R) a + p e, with the center c, its displacement d, offsets a and a
+        residual e. Their common rotation is by φ(p), with tan φ = p sin θ / (1 - p + p cos θ).
         """
         first, last = np.asarray(first, np.float64), np.asarray(last, np.float64)
         turn = self._turn(self._turned(last) - self._turned(first))
@@ -39,7 +39,7 @@ class RigidMotion:
         return (turn, self._shift(turn, first, last)), rest + self._rest_of(turn, first, last)
 
     def carried(self, first: ArrayLike, last: ArrayLike) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-        """As `between`, but by a matrix that also narrows as the lines do: the rest is what bends or grows, at most."""
+        """Return the motion as in `between`, but by a matrix that includes the contraction of linear interpolation."""
         first, last = np.asarray(first, np.float64), np.asarray(last, np.float64)
         carry = self._offsets(last) @ np.linalg.inv(self._offsets(first))
         return (carry, self._shift(carry, first, last)), self._rest_of(carry, first, last)
@@ -50,8 +50,8 @@ class RigidMotion:
 
     def _shift(self, matrix, first, last):
         first, last = first[..., None], last[..., None]
-        there = (matrix @ (self._centre + first * self._way)[..., None])[..., 0]
-        return self._centre + last * self._way - there
+        mapped = (matrix @ (self._centre + first * self._way)[..., None])[..., 0]
+        return self._centre + last * self._way - mapped
 
     def _rest_of(self, matrix, first, last):
         first, last = first[..., None, None], last[..., None, None]
@@ -62,7 +62,7 @@ class RigidMotion:
         return _each(lambda part: math.atan2(part * sine, 1.0 - part + part * cosine), part)
 
     def _turn(self, angle):
-        """The rotations by angles (…) about the axis: Rodrigues' formula."""
+        """Return the rotations by angles (…) about the axis, by Rodrigues' formula."""
         x, y, z = self._axis
         cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         sine, cosine = (_each(function, angle)[..., None, None] for function in (math.sin, math.cos))
@@ -70,13 +70,13 @@ class RigidMotion:
 
 
 def _each(function, values):
-    """A function of numbers, of each of some (…); as NumPy's differ from machine to machine."""
+    """Apply a function of Python's `math` to each value (…); results of NumPy's functions depend on the machine."""
     values = np.asarray(values)
     return np.array([function(value) for value in values.ravel().tolist()]).reshape(values.shape)
 
 
 def _norm(matrices):
-    """The largest factor by which matrices (…, 3, 3) lengthen."""
+    """Return the spectral norms of matrices (…, 3, 3)."""
     return np.linalg.norm(matrices, 2, axis=(-2, -1))
 
 
@@ -87,15 +87,15 @@ def _rotation(start, end):
 
 
 def _axis_and_angle(turn):
-    """Unit axis and angle of a rotation; none for one by nearly 180°."""
+    """Return unit axis and angle of a rotation; angle 0 for rotations near 180°."""
     twice = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     sine = 0.5 * np.linalg.norm(twice)
     angle = math.atan2(sine, 0.5 * (np.trace(turn) - 1.0))
-    if sine < 1e-9 or angle > 2.5:  # wider turns are narrowed to a line on the way
+    if sine < 1e-9 or angle > 2.5:  # linear interpolation collapses larger rotations to a line on the way
         return np.array([0.0, 0.0, 1.0]), 0.0
     return 0.5 * twice / sine, angle
 
 
 def largest(offsets: np.ndarray) -> float:
-    """The length of the longest of offsets (V, 3)."""
+    """Return the length of the longest of offsets (V, 3)."""
     return math.sqrt(np.einsum("vi,vi->v", offsets, offsets).max())

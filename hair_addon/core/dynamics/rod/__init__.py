@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides as elastic rods: the artist's settings, material in units of the SI, and the solver."""
+"""Guides as elastic rods: settings, material in SI units, and the solver."""
 
 from typing import TYPE_CHECKING
 

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Combed points ↔ simulated vertices, and what the vertices leave over.
+"""Conversion between combed points and simulated vertices, with the detail between the vertices.
 
-Vertices stand evenly along a guide. Between them runs a coarse curve h(u): cubic Hermite, with tangents from the frames
-of the segments. What it leaves over of each combed point is kept in frames R(u) that are interpolated between those of
-the segments, so it turns with them:
+Vertices are evenly spaced along a guide. The coarse curve h(u) between them is cubic Hermite, with tangents from the
+frames of the segments. The offset o of each combed point is stored in frames R(u) that are interpolated between those
+of the segments:
 
     p = h(u) + R(u) o
 
-Rigid motion is exact, a guide at rest is the combed one, and bent curls keep their length.
+Rigid motion is exact, a guide at rest equals the combed one, and bent curls keep their length.
 """
 
 from dataclasses import dataclass
@@ -26,16 +26,16 @@ from .rods import Rods
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-SHORTEST = 1e-5  # [m] of a guide that is simulated with a shape of its own
-SHORTEST_SEGMENT = 0.05  # of a guide that turns back on itself, in the mean of its segments
-_STAND_IN = 0.01  # [m] length of the straight strand that is simulated in place of a guide without length
+SHORTEST = 1e-5  # least length [m] of a guide that is simulated with its own shape
+SHORTEST_SEGMENT = 0.05  # least length of a segment relative to the mean, for guides that turn back on themselves
+_STAND_IN = 0.01  # length [m] of the straight strand that replaces a guide of zero length
 
 
 @dataclass(frozen=True)
 class Detail:
-    """What the coarse curves of S guides leave over of P combed points: arrays on one device.
+    """Offsets of P combed points from the coarse curves of S guides: arrays on one device.
 
-    places: (S, P) float32, where points lie, in segments from the root; offsets: (S, P) vec3 in the frames there [m].
+    places: (S, P) float32, in segments from the root; offsets: (S, P) vec3 in the frames at these places [m].
     """
 
     places: "wp.array2d[float]"
@@ -43,11 +43,11 @@ class Detail:
 
 
 def vertices_of(points: np.ndarray, vertex_count: int) -> np.ndarray:
-    """Combed guides (S, P, 3) [m] → (S, vertex_count, 3) float64 vertices, evenly along each, to be simulated.
+    """Return evenly spaced vertices (S, vertex_count, 3) float64 of combed guides (S, P, 3) [m], for simulation.
 
-    Segments that would have nearly no length, where a guide turns back on itself, go on in the direction before; a
-    guide without length becomes a short straight strand. `Detail` knows the difference, so the guide is the same.
-    Raises `HairError` for points that are not finite.
+    Segments of nearly zero length, where a guide turns back on itself, continue in the previous direction; a guide of
+    zero length becomes a short straight strand. `Detail` contains the difference, so the resulting guide is unchanged.
+    Raises `HairError` for non-finite points.
     """
     count, point_count = points.shape[:2]
     starts = np.arange(count + 1) * point_count
@@ -68,24 +68,24 @@ def vertices_of(points: np.ndarray, vertex_count: int) -> np.ndarray:
 
 
 def detail_of(points: np.ndarray, rods: Rods) -> Detail:
-    """The `Detail` of combed guides (S, P, 3) [m] whose `Rods` are where `vertices_of` has put them.
+    """Return the `Detail` of combed guides (S, P, 3) [m] whose `Rods` are at the vertices of `vertices_of`.
 
-    Raises `HairError` where these are not of the same strands.
+    Raises `HairError` if counts do not match.
     """
     require_count("guides", len(points), rods.strand_count)
     lengths = np.linalg.norm(np.diff(np.asarray(points, np.float64), axis=1), axis=2)
     along = np.concatenate([np.zeros((len(points), 1)), np.cumsum(lengths, axis=1)], axis=1)
     whole = along[:, -1:]
     places = along / np.where(whole > SHORTEST, whole, np.inf) * rods.segment_count
-    there = wp.array(places, dtype=float, device=rods.device)
+    places = wp.array(places, dtype=float, device=rods.device)
     combed = wp.array(np.ascontiguousarray(points, np.float32), dtype=wp.vec3, device=rods.device)
     offsets = wp.empty(points.shape[:2], dtype=wp.vec3, device=rods.device)
-    _launch(_leave_over, [Rows(there), Rows(combed)], offsets, rods)
-    return Detail(there, offsets)
+    _launch(_leave_over, [Rows(places), Rows(combed)], offsets, rods)
+    return Detail(places, offsets)
 
 
 def detailed_points(detail: Detail, rods: Rods) -> wp.array:
-    """(S, P) vec3 [m] on the rods' device: guides where their simulated vertices and frames are."""
+    """Return points (S, P) vec3 [m] on the rods' device of guides at their simulated vertices and frames."""
     require_count("guides", len(detail.places), rods.strand_count)
     points = wp.empty(detail.offsets.shape, dtype=wp.vec3, device=rods.device)
     _launch(_put_back, [Rows(detail.places), Rows(detail.offsets)], points, rods)
@@ -120,19 +120,19 @@ def _frame(frames: wp.array3d[float], group: int, lane: int, j: int):
 
 @wp.func
 def _tangent(frames: wp.array3d[float], group: int, lane: int, i: int):
-    """Of the coarse curve at a vertex: the mean direction of the segments beside it."""
+    """Return the tangent of the coarse curve at a vertex: the mean direction of the adjacent segments."""
     last = frames.shape[1] // 4 - 1
     z = wp.vec3(0.0, 0.0, 1.0)
     before = wp.quat_rotate(_frame(frames, group, lane, wp.max(i - 1, 0)), z)
     after = wp.quat_rotate(_frame(frames, group, lane, wp.min(i, last)), z)
     tangent = before + after
-    # Opposite directions have no mean.
+    # The mean of opposite directions is undefined.
     return wp.where(wp.length(tangent) > 1.0e-3, wp.normalize(tangent), after)
 
 
 @wp.func
 def _coarse(positions: wp.array3d[float], frames: wp.array3d[float], group: int, lane: int, place: float):
-    """h(u), cubic Hermite."""
+    """Return h(u), cubic Hermite."""
     segment = wp.min(int(place), positions.shape[1] // 3 - 2)
     t = place - float(segment)
     start = _point(positions, group, lane, segment)
@@ -151,7 +151,7 @@ def _coarse(positions: wp.array3d[float], frames: wp.array3d[float], group: int,
 
 @wp.func
 def _frame_at(frames: wp.array3d[float], group: int, lane: int, place: float):
-    """R(u), between the middles of neighbouring segments; beyond the first and the last it is theirs."""
+    """Return R(u), interpolated between the midpoints of segments; constant beyond the first and the last one."""
     last = frames.shape[1] // 4 - 1
     along = wp.clamp(place - 0.5, 0.0, float(last))
     segment = wp.min(int(along), wp.max(last - 1, 0))

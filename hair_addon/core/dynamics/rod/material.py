@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Material of strands: settings → masses, inertias, compliances and drag of each point and segment.
+"""Material of strands: masses, inertias, compliances and drag of each point and segment, from settings.
 
 With the radius r of a fibre of length L, its section A = π r², stiffness k and lengths l_j of segments:
 
@@ -7,10 +7,10 @@ With the radius r of a fibre of length L, its section A = π r², stiffness k an
     m_i = ρ A (l_(i-1) + l_i) / 2,    I_j = ρ A l_j³ / 12
     b_0 = l_0 / 2,    b_j = (l_(j-1) + l_j) / 2                             length of strand that joint j bends
 
-A guide stands for a wisp, whose n fibres are as heavy as they are stiff: only k says how much they stick together. Wet
-hair weighs 1.3 times as much, and swollen fibres have half their stiffness [Robbins12].
+A guide represents a wisp of n fibres; n scales weight and stiffness alike and cancels, and k describes how much fibres
+stick together. Wet hair weighs 1.3 times as much, and swollen fibres have half their stiffness [Robbins12].
 
-Drag of a cylinder in air across its axis, by its length [N s/m²], with Re = 2 r |v| / ν [White06]:
+Drag of a cylinder in air perpendicular to its axis, per length [N s/m²], with Re = 2 r |v| / ν [White06]:
 
     c_n = max(4πμ / (ln(2 L / r) + ½), ½ ρ_air 2 r |v| (1 + 10 Re^-⅔)),    c_t = c_n / 2
 """
@@ -26,14 +26,14 @@ from .settings import DynamicsSettings
 
 AIR_DENSITY = 1.2  # [kg/m³]
 AIR_VISCOSITY = 1.81e-5  # μ [Pa s]
-LEAST_STIFFNESS = 1e-3  # of a tip, in that of the root: without any a joint has no angle
+LEAST_STIFFNESS = 1e-3  # of a tip relative to the root: the angle of a joint without stiffness is undefined
 
-WET_WEIGHT, WET_SOFTNESS, WET_DRAG = 0.3, 0.5, 0.7  # what wetness 1 adds to weight, takes from stiffness, from drag
+WET_WEIGHT, WET_SOFTNESS, WET_DRAG = 0.3, 0.5, 0.7  # increase of weight, decrease of stiffness and of drag at wetness 1
 
 
 @dataclass(frozen=True)
 class Material:
-    """What S strands of M segments are made of, float64, in units of the SI."""
+    """Material of S strands of M segments, float64, in SI units."""
 
     lengths: np.ndarray  # (S, M) [m]
     masses: np.ndarray  # (S, M+1) [kg]
@@ -43,14 +43,14 @@ class Material:
     stretch_compliances: np.ndarray  # (S, M) 1 / (EA l) [1/(N m)]
     slow_drags: np.ndarray  # (S,) c_n / ρA of slow air [1/s]
     drag_squares: np.ndarray  # (S,) c_n / ρA per speed [1/m]
-    drag_roots: np.ndarray  # (S,) and per its cube root
+    drag_roots: np.ndarray  # (S,) c_n / ρA per cube root of speed
     damping_time: float  # [s]
 
 
 def material_of(settings: DynamicsSettings, lengths: np.ndarray, wetness: np.ndarray | None = None) -> Material:
-    """The `Material` of strands with lengths (S, M) [m] of segments in the groom, root to tip.
+    """Return the `Material` of strands with lengths (S, M) [m] of segments in the groom, root to tip.
 
-    wetness: (S,) of each strand, from 0 to 1; that of the settings for None. Raises `HairError` for segments without
+    wetness: (S,) of each strand in [0, 1], None for that of the settings. Raises `HairError` for segments of zero
     length.
     """
     lengths = np.asarray(lengths, np.float64)
@@ -85,7 +85,7 @@ def material_of(settings: DynamicsSettings, lengths: np.ndarray, wetness: np.nda
 
 
 def _point_lengths(lengths):
-    """(S, M+1) [m]: half of the segments beside each point."""
+    """Return (S, M+1) [m]: half of the lengths of the segments at each point."""
     halves = np.zeros((len(lengths), lengths.shape[1] + 1))
     halves[:, :-1] += lengths / 2.0
     halves[:, 1:] += lengths / 2.0
@@ -93,7 +93,7 @@ def _point_lengths(lengths):
 
 
 def _profile(lengths, tip):
-    """(S, M) stiffness of each joint in that of the root, linear along the strand."""
+    """Return the stiffness (S, M) of each joint relative to the root, linear along the strand."""
     whole = lengths.sum(axis=1, keepdims=True)
     along = (np.cumsum(lengths, axis=1) - lengths) / np.where(whole > 0.0, whole, 1.0)
     return np.maximum(1.0 + (tip - 1.0) * along, LEAST_STIFFNESS)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Named kinds of hair in motion, as data: {identifier: (label, tooltip, settings that differ from their defaults)}.
+"""Presets of dynamics: {identifier: (label, tooltip, settings that differ from their defaults)}.
 
-A preset sets how hair moves, and leaves alone what it is moved by, what it collides with, and how it is computed.
+A preset sets the material of the hair. It does not change external forces, collisions or the solver.
 """
 
 from dataclasses import replace
@@ -20,10 +20,10 @@ PRESETS: dict[str, tuple[str, str, dict[str, Any]]] = {
         {"bend_stiffness": 100.0, "hold": 20.0},
     ),
     "SHORT_FUR": ("Short Fur", "Stiff hair that stands", {"bend_stiffness": 1000.0}),
-    "WET": ("Wet", "Heavy, soft hair that feels less air", {"wetness": 1.0}),
+    "WET": ("Wet", "Heavy, soft hair with less air drag", {"wetness": 1.0}),
 }
 
-# What presets set.
+# Settings that presets change.
 NAMES = (
     *("bend_stiffness", "twist_stiffness", "stretch_stiffness", "tip_stiffness", "damping", "weight", "wetness"),
     *("hold", "hold_tip"),
@@ -31,6 +31,6 @@ NAMES = (
 
 
 def applied(settings: DynamicsSettings, identifier: str) -> DynamicsSettings:
-    """`DynamicsSettings` with those of a preset."""
+    """Return `DynamicsSettings` with the values of a preset."""
     defaults = {name: default for name, default, _details in declared(DynamicsSettings) if name in NAMES}
     return replace(settings, **defaults | PRESETS[identifier][2])

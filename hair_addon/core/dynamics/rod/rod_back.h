@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Back substitution from tip to root, the end of newton_step: λ, points and frames take their increments.
+// Back substitution from tip to root, the end of newton_step: updates λ, points and frames.
 
   const vector none{lanes(0.0f), lanes(0.0f), lanes(0.0f)};
   vector moment_after = none, pull_after = none;  // Gᵀ Δλ_b and Δλ_s / l of the next segment

@@ -5,16 +5,17 @@
 // A plane has its unit normal n, offset n·c + r, displacement s in this substep and friction μ. With x̃ the predicted
 // point, U the displacement that λ gives it without contact, T = 1 - n nᵀ and g = n·x̃ - offset:
 //
-//     p = -(g + n·U)                          what contact has to push; active where p > 0
-//     t = |T (x - x_before - s)|              how far the point slides, of the last pass
+//     p = -(g + n·U)                          displacement by contact; active where p > 0
+//     t = |T (x - x_before - s)|              sliding distance of the last pass
 //     a = 1 / (1 + μ p / max(t, CREEP h))     Coulomb: slides under μ p, creeps where it sticks
 //     x = x̃ - g n - (1 - a) T (x̃ - x_before - s) + F U - w n nᵀ U',   F = w n nᵀ + a T;   x̃ + U if not active
 //
-// F filters masses in the solve [Baraff98], and x follows from λ and the contact's state, so passes may change that at
-// will. w is `away_of` the point, and U' is U at the beginning of the pass: what the rod pushes, w would else let in.
-// In the first pass U is that of the last substep: it says who is pressed and who is lifted. There t is what Coulomb's
-// law gives, |T (x̃ + U - x_before - s)| - μ p, for a point that the rod hardly pulls; for one that the rod drags
-// along it is the last slide, as such a pull depends on a so much that the law would overshoot.
+// F filters masses in the solve [Baraff98]. x is a function of λ and the contact state, which passes may therefore
+// change freely. w is `away_of` the point, and U' is U at the beginning of the pass; this term cancels the penetration
+// that w would allow under the rod's pull. In the first pass U is that of the last substep, which determines the active
+// points. There t is given by Coulomb's law, |T (x̃ + U - x_before - s)| - μ p, for points with little pull by the rod.
+// For points that are dragged by the rod t is the last sliding distance, because the pull depends so strongly on a that
+// the law would overshoot.
 
 struct touch {
   vector n, point;
@@ -54,7 +55,7 @@ const auto touch_at = [&](int i, bool is_first, float carried) {
   return touch{chosen(is_pressed, n, vector{lanes(0.0f), lanes(0.0f), lanes(0.0f)}),
                chosen(is_pressed, pressed, predicted + pull), a, is_pressed};
 };
-// Lanes whose contacts differ from those that the last solve had.
+// Lanes whose contacts differ from those of the last solve.
 const auto changed_contacts = [&](ints asked) {
   ints is_changed = 0;
   for (int i = pinned + 1; i <= segment_count; ++i) {
@@ -66,7 +67,7 @@ const auto changed_contacts = [&](ints asked) {
   }
   return ints(asked & is_changed);
 };
-// Contacts of some lanes as λ gives them, and points with them.
+// Updates the contacts and points of some lanes from λ.
 const auto put_contacts = [&](bool is_first, float carried, ints asked) {
   for (int i = pinned + 1; i <= segment_count; ++i) {
     const touch now = touch_at(i, is_first, carried);

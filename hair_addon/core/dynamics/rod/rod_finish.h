@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A substep's end: what is still inside is moved out, velocities, and strands that broke are put back to their groom.
+// End of a substep: moves out points that are still inside, computes velocities, resets broken strands to their groom.
 
 lanes stretch = 0.0f, reach = 0.0f, whole = 0.0f;
 ints is_sound = -1;
 const float per_step = 1.0f / h;
 const bool has_found = around.found_planes.shape[0] > 0;
-ints is_pinched = 0;  // lanes that cannot be outside at their length: they are not torn, and come out later
+ints is_pinched = 0;  // lanes that cannot be outside at their length: they keep it, and come out later
 if (has_planes && has_found) {
-  // Inside a plane once more, after AGAIN: between two, of which each solve knew one.
+  // Inside a plane even after AGAIN: between two planes, of which each solve used one.
   ints is_inside = 0;
   for (int i = pinned + 1; i <= segment_count; ++i) {
     const float* const found = found_rows + size_t(8 * i) * STRIDE;
@@ -35,7 +35,7 @@ for (int i = 0; i <= segment_count; ++i) {
     point = chosen((inside < 0.0f) & (is_pinched == 0), point - n * inside, point);
     put_vector(x, i, point);
   }
-  // Divided by h, as it was multiplied by h: what h · (1 / h) is off by would grow with each substep.
+  // Divided by h: the rounding error of h · (1 / h) would grow with each substep.
   const vector moved = point - get_vector(x_before, i);
   put_vector(v, i, vector{moved.x / lanes(h), moved.y / lanes(h), moved.z / lanes(h)});
   if (i > 0) {
@@ -44,7 +44,7 @@ for (int i = 0; i <= segment_count; ++i) {
     stretch = higher_of(dot(segment, segment) / (size * size), stretch);
     reach = higher_of(dot(from_root, from_root), reach);
     whole += size;
-    is_sound = is_sound & (dot(point, point) < 1.0e30f);  // false where it is not a number
+    is_sound = is_sound & (dot(point, point) < 1.0e30f);  // false for NaN
   }
   last = point;
 }
@@ -55,12 +55,12 @@ for (int j = 0; j < segment_count; ++j) {
   }
   const quaternion frame = get_frame(q, j);
   const quaternion turn = times(frame, conjugate(get_frame(q_before, j)));
-  // Bounded where a frame has turned by nearly half a turn.
+  // Bounded for rotations near 180°.
   const lanes scale = 2.0f * per_step * turn.w / higher_of(turn.w * turn.w, lanes(0.01f));
   put_vector(spin, j, vector{turn.x * scale, turn.y * scale, turn.z * scale});
   is_sound = is_sound & (dot(vector{frame.x, frame.y, frame.z}, vector{frame.x, frame.y, frame.z}) < 2.0f);
 }
-const lanes most_reach = whole * (1.25f * most_stretch);  // 1.5 lengths for the usual 1.2
+const lanes most_reach = whole * (1.25f * most_stretch);  // 1.5 lengths for the default of 1.2
 is_sound = is_sound & (stretch < most_stretch * most_stretch) & (reach < most_reach * most_reach);
 if (any_of(is_sound == 0)) {
   for (int i = 0; i <= segment_count; ++i) {

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// One Newton step on all constraints of the lanes that are `stepping`; returns the largest |Δθ|² of each lane.
+// A Newton step on all constraints of the `stepping` lanes; returns the largest |Δθ|² of each lane.
 //
 // With s_j half of the rest rotation from frame j - 1 to frame j, and e_j = s_j⁻¹ (q_(j-1)⁻¹ q_j) s_j⁻¹:
 //
 //     stretch, shear  C_s = (x_(j+1) - x_j) / l_j - d_j        α_s = 1 / (EA l_j)
 //     bend, twist     C_b = 2 Im e_j                           α_b = b_j diag(1 / EI, 1 / EI, 1 / GJ)
 //
-// Half of the rotation on either side makes the strain of second order. (J W Jᵀ + α̃) Δλ = -(C + α̃ λ) is block
-// tridiagonal, with six rows a segment: C_b of its joint, then C_s. A Cholesky decomposition runs from root to tip, the
-// back substitution to the root [Deul18]. D and U are made of the same rounded G, d and [d]×: with the identities that
-// hold for exact ones in some of the blocks, single precision may lose the matrix's definiteness.
+// Half of the rotation on either side makes the strain second-order accurate. (J W Jᵀ + α̃) Δλ = -(C + α̃ λ) is block
+// tridiagonal, with six rows per segment: C_b of its joint, then C_s. A Cholesky decomposition runs from root to tip,
+// the back substitution from tip to root [Deul18]. All blocks of D and U are computed from the same rounded G, d and
+// [d]×: simplifying some of them by exact identities could make the matrix indefinite in single precision.
 //
-// is_first: λ starts at zero; the one that is stored is that of the last substep, times `carried`.
+// is_first: λ starts at zero; the stored λ is that of the last substep, times `carried`.
 
 const auto newton_step = [&](bool is_first, float carried, ints stepping, bool is_touching) {
   quaternion frame_a = pinned > 0 ? get_frame(q, pinned - 1) : root_frame;
@@ -21,7 +21,7 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
   quaternion half = get_frame(rest, pinned);
   quaternion e = bend_of(frame_a, frame_b, half);
   rows G = bend_gradient(e, times(frame_a, half));
-  lanes turning_a = 0.0f;  // w of the frame before
+  lanes turning_a = 0.0f;  // w of the previous frame
   vector point_a = get_vector(x, pinned);
   const auto size_of_bend = [&](int j) {
     const vector moment = get_vector(lambda, 2 * j);
@@ -42,13 +42,13 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
       fetch(length, j + 2, 1);
       fetch(mobility, j + 2, 1);
     }
-    // Geometric stiffness [Tournier15] turns less what is under tension: w = 1 / (I + |λ_s| + ½ (|λ_b| + |λ_b'|)).
+    // Geometric stiffness [Tournier15] reduces rotations under tension: w = 1 / (I + |λ_s| + ½ (|λ_b| + |λ_b'|)).
     const lanes compliance = get(bending, j);
     const vector tension = get_vector(lambda, 2 * j + 1);
     const lanes next_moment = j + 1 < segment_count ? size_of_bend(j + 1) : lanes(0.0f);
     const lanes geometric = carried * (exact_sqrt_of(dot(tension, tension)) + 0.5f * (moment + next_moment));
     moment = next_moment;
-    // A frame lighter than this is stiffer than single precision can tell from what it is joined to.
+    // A lighter frame would be so stiff that single precision could not resolve its motion relative to its neighbours.
     const lanes least_inertia = LEAST_INERTIA * h * h * (1.0f + damping) / compliance;
     const lanes turning = 1.0f / (higher_of(get(inertia, j), least_inertia) + geometric);
     put(kept(j, TURNING), 0, turning);
@@ -96,7 +96,7 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
     D[18] = -turning * d.x * d.z;
     D[19] = -turning * d.y * d.z;
     D[20] = diagonal - turning * d.z * d.z;
-    // Contact filters masses, F = 1 + (a - 1) 1 + (away - a) n nᵀ; both parts are zero where nothing touches.
+    // Contact filters masses, F = 1 + (a - 1) 1 + (away - a) n nᵀ; both terms are zero without contact.
     vector n_b;
     lanes less_b, normal_b;
     if (is_touching) {
@@ -124,7 +124,7 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
 #include "rod_reduce.h"
     if (j + 1 == segment_count) break;
 
-    // U_j, then Y = L⁻¹ U: six rows of its first three columns, three of the others, whose upper three are zero.
+    // U_j, then Y = L⁻¹ U: six rows of its first three columns, three of the others, whose upper rows are zero.
     const quaternion frame_c = get_frame(q, j + 1);
     half = get_frame(rest, j + 1);
     const quaternion e_next = bend_of(frame_b, frame_c, half);

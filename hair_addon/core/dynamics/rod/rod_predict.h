@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A substep's start: where gravity, air and hold take points without the rod's forces, and frames their spin.
+// Start of a substep: predicts points by gravity, air and hold, without the rod's forces, and frames by their spin.
 //
 // Air drag and hold are implicit. Both add to a point's mass: m' = m (1 + h c + h² k + 2 h √k), with the rate of drag c
-// [1/s] and the strength of hold k [1/s²]. So an equilibrium does not depend on h: forces upon a point at rest are
-// divided by the same m'. The part of drag along the strand that is less than the part across is explicit.
+// [1/s] and the strength of hold k [1/s²]. An equilibrium therefore does not depend on h: all forces on a point at rest
+// are divided by the same m'. The difference of drag along and across the strand is explicit.
 
 for (int i = 0; i <= segment_count; ++i) {
   if (i < segment_count) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// L Lᵀ = D_j - Yᵀ Y and y = L⁻¹ (R - Yᵀ y) of one segment, in newton_step: Y and y are those of the segment before.
+// L Lᵀ = D_j - Yᵀ Y and y = L⁻¹ (R - Yᵀ y) of a segment, in newton_step: Y and y are those of the previous segment.
 
 if (j > pinned) {
   const auto y_at = [&](int r, int c) { return c < 3 ? Y[3 * r + c] : Y[9 + 3 * r + c - 3]; };

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Points of the lanes that are `asked` in front of their planes, and segments as long as at rest, by turns: what the
-// solve leaves of a strand that is folded against a surface. A lane whose lengths are right is not moved any more.
-// In a notch a point has two planes, `others` too: it is kept in front of both. Returns the lanes whose lengths are not
-// right in the end. Stands in rod_solver.cpp, before its use.
+// Alternately moves points of the `asked` lanes in front of their planes and restores the lengths of segments, for
+// strands that are still folded against a surface after the solve. A lane with correct lengths is finished. In a notch
+// a point has a second plane in `others`, and is kept in front of both. Returns the lanes whose lengths are still
+// wrong. Included in rod_solver.cpp before its use.
 
 const auto repair = [&](ints asked, const float* planes, const float* others) {
   ints moving = asked;
@@ -11,7 +11,7 @@ const auto repair = [&](ints asked, const float* planes, const float* others) {
     const float *one = planes + size_t(8 * i) * STRIDE, *other = others + size_t(8 * i) * STRIDE;
     const vector n = get_vector(one, 0), m = get_vector(other, 0), point = get_vector(x, i);
     const lanes inside = get(one, 3) - dot(n, point), inside_other = get(other, 3) - dot(m, point);
-    // The nearest place in front of one plane, of the other, or of both: on the line where they meet.
+    // The closest place in front of one plane, of the other, or of both: on their line of intersection.
     const lanes along = dot(n, m), apart = 1.0f - along * along;
     const auto is_in = (inside > 0.0f) & (inside >= inside_other), is_in_other = (inside_other > 0.0f) & ~is_in;
     const auto is_both = (apart > LEAST_ANGLE) &
@@ -53,7 +53,7 @@ const auto repair = [&](ints asked, const float* planes, const float* others) {
   for (int i = pinned + 1; i <= segment_count; ++i) put_out(i);
   return pinched;
 };
-// Segments of some lanes no longer or shorter than by PINCHED, from root to tip.
+// Limits the strain of segments of some lanes to ± PINCHED, from root to tip.
 const auto bound_lengths = [&](ints asked) {
   if (!any_of(asked)) return;
   for (int i = pinned + 1; i <= segment_count; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Rotations as unit quaternions, x, y, z the imaginary part. Stands after vectors.h in a function's body.
+// Rotations as unit quaternions with imaginary part x, y, z. To be included after vectors.h in a function's body.
 
 struct quaternion {
   lanes x, y, z, w;
@@ -17,11 +17,11 @@ const auto unit = [&](const quaternion& a) {
 const auto chosen_rotation = [&](auto condition, const quaternion& a, const quaternion& b) {
   return quaternion{condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z, condition ? a.w : b.w};
 };
-// a turned by the Cayley map of a rotation vector, by the angle 2 atan(½ |turn|): its inverse is exact, on all devices.
+// a rotated by the Cayley map of a rotation vector, by the angle 2 atan(½ |turn|); its inverse is exact on all devices.
 const auto turned_by = [&](const vector& turn, const quaternion& a) {
   return unit(times(quaternion{0.5f * turn.x, 0.5f * turn.y, 0.5f * turn.z, lanes(1.0f)}, a));
 };
-// Where a rotation takes the z axis: the direction of a segment.
+// Image of the z axis under a rotation: the direction of a segment.
 const auto direction_of = [&](const quaternion& a) {
   return vector{2.0f * (a.x * a.z + a.w * a.y), 2.0f * (a.y * a.z - a.w * a.x), 1.0f - 2.0f * (a.x * a.x + a.y * a.y)};
 };
@@ -30,7 +30,7 @@ const auto rotated = [&](const quaternion& a, const vector& v) {
   const vector twice = cross(axis, v) * lanes(2.0f);
   return v + twice * a.w + cross(axis, twice);
 };
-// From a (part 0) to b (part 1), the shorter way; exact at either end, and everywhere where they are the same.
+// Interpolates from a (part 0) to b (part 1) along the shorter arc; exact at both ends, and everywhere if a equals b.
 const auto between = [&](const quaternion& a, const quaternion& b, float part) {
   if (part == 1.0f) return unit(b);
   const auto is_far = a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w < 0.0f;
@@ -38,7 +38,7 @@ const auto between = [&](const quaternion& a, const quaternion& b, float part) {
   return unit(quaternion{a.x + part * (c.x - a.x), a.y + part * (c.y - a.y), a.z + part * (c.z - a.z),
                          a.w + part * (c.w - a.w)});
 };
-// The bend of a joint, e = s⁻¹ (a⁻¹ b) s⁻¹ with a positive real part; s is half the rest rotation from frame a to b.
+// The bend of a joint, e = s⁻¹ (a⁻¹ b) s⁻¹ with positive real part; s is half of the rest rotation from frame a to b.
 const auto bend_of = [&](const quaternion& a, const quaternion& b, const quaternion& s) {
   const quaternion back = conjugate(s);
   const quaternion e = times(back, times(times(conjugate(a), b), back));
@@ -47,7 +47,7 @@ const auto bend_of = [&](const quaternion& a, const quaternion& b, const quatern
 struct rows {
   vector row[3];
 };
-// ∂(2 Im e)/∂θ_b = G = (e_w 1 - [e_v]×) R(a s)ᵀ by its rows; ∂(2 Im e)/∂θ_a is -G.
+// Rows of ∂(2 Im e)/∂θ_b = G = (e_w 1 - [e_v]×) R(a s)ᵀ; ∂(2 Im e)/∂θ_a is -G.
 const auto bend_gradient = [&](const quaternion& e, const quaternion& middle) {
   const quaternion& p = middle;
   const lanes xx = p.x * p.x, yy = p.y * p.y, zz = p.z * p.z, xy = p.x * p.y, xz = p.x * p.z, yz = p.y * p.z;

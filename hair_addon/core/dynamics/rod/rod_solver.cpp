@@ -1,29 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Substeps of LANES strands at once: on a processor the lanes of its vectors, on a GPU one strand a thread.
+// Substeps of LANES strands at once: in the lanes of vectors on a CPU, one strand per thread on a GPU.
 //
-// The body of `_advance` in rod_solver.py. An array (groups, rows, STRIDE) has a row for each number of a strand, with
-// that number of STRIDE strands. There are M segments, M + 1 points; the surface gives point 0 and the frame before
-// segment 0.
+// The body of `advance_block` in rod_solver.py. An array (groups, rows, STRIDE) has a row for each number of a strand,
+// with this number of STRIDE strands. There are M segments and M + 1 points; the surface determines point 0 and the
+// frame before segment 0.
 //
-//   int block                              a group of strands on a processor, a strand on a GPU
-//   int stages                             which parts of a substep: PREDICT, SOLVE, AGAIN, FINISH
+//   int block                              a group of strands on a CPU, a strand on a GPU
+//   int stages                             parts of a substep: PREDICT, SOLVE, AGAIN, FINISH
 //   int first, end                         substeps first … end - 1
-//   Numbers step                           what all strands share:
-//     first, end, count                    those of the launch, and how many there are in a frame
+//   Numbers step                           common to all strands:
+//     first, end, count                    substeps of the launch, number of substeps in a frame
 //     pinned                               points from the root that follow the surface beside point 0; M without SOLVE
 //     h                                    a substep [s]
-//     carried                              (h / h of the substep before the first)²
+//     carried                              (h / h of the previous substep)²
 //     gravity                              [m/s²]
 //     damping_time                         Kelvin-Voigt time τ of bending and twisting [s]
-//     twist_ratio                          compliance of twisting, in that of bending
-//     hold, hold_tip                       pull to the groom [1/s²], and its part at the tip
-//     most_stretch                         length of a segment by its rest length at which a strand is put back
+//     twist_ratio                          compliance of twisting / compliance of bending
+//     hold, hold_tip                       pull to the groom [1/s²], and its fraction at the tip
+//     most_stretch                         length / rest length of a segment at which a strand is reset
 //   RodArrays strands                      arrays of strands:
 //     positions, velocities                3 (M + 1) rows [m], [m/s]
 //     frames, spins                        4 M, 3 M rows: unit quaternions; angular velocities [1/s]
 //     multipliers                          6 M rows λ_b, λ_s
-//     slips                                M + 1 rows: how far a point slid in the last substep, -1 without contact [m]
+//     slips                                M + 1 rows: sliding distance in the last substep [m], -1 without contact
 //     lengths                              M rows [m]
 //     rests                                4 M rows: half of the rest rotation of a joint
 //     bend_compliances, stretch_compliances    M rows each, in the unit of mass of the inverse masses
@@ -35,19 +35,19 @@
 //     positions_before, predictions        3 (M + 1) rows each: between stages
 //     frames_before, mobilities            4 M, M + 1 rows: between stages
 //     resets                               1 row
-//     solved_again                         1 row: 1 where AGAIN has moved a strand
+//     solved_again                         1 row: 1 if AGAIN has moved the strand
 //   Around around                          arrays of points, each may be empty:
 //     planes                               8 (M + 1) rows: n, offset, displacement, friction of each point
-//     found_planes                         8 (M + 1) rows: planes after the solve, for AGAIN and FINISH; those for none
-//     airs, drags, accelerations           3, 1, 3 rows a point: [m/s], factor, [m/s²]
-//   array_t<float> scratches               of a GPU: KEPT M + CONTACT (M + 1) rows
+//     found_planes                         8 (M + 1) rows: planes after the solve, for AGAIN and FINISH; empty: planes
+//     airs, drags, accelerations           3, 1, 3 rows per point: [m/s], factor, [m/s²]
+//   array_t<float> scratches               on a GPU: KEPT M + CONTACT (M + 1) rows
 //
-// Groups lie apart by an array's first stride, which is zero where all groups share memory one after the other.
+// The first stride of an array separates groups; it is zero if groups reuse the same memory in turn.
 //
-// Constants: WIDTH, GROUP, MOST segments, and those that rod_solver.py explains.
+// Constants: WIDTH, GROUP, MOST segments, and those documented in rod_solver.py.
 
 {
-// On a GPU, loops over rows of small matrices: an index that is not known would put these in memory.
+// On a GPU, loops over small matrices are unrolled: indices unknown at compile time would put these in memory.
 #if defined(__CUDA_ARCH__)
 #define UNROLLED _Pragma("unroll")
 #else
@@ -58,16 +58,16 @@
 #include "rod_rotations.h"
 
 constexpr int PREDICT = 1, SOLVE = 2, FINISH = 4, AGAIN = 8;
-// What a segment keeps between factorisation and back substitution, and a point between contact passes.
+// Rows of a segment between factorisation and back substitution, and of a point between contact passes.
 constexpr int LOWER = 0, UPPER = 21, RIGHT = 48, GRADIENT = 54, TURNING = 63, KEPT = 64;
-constexpr int CONTACT = 8;  // n, a, predicted point, mobility that contact leaves along n
+constexpr int CONTACT = 8;  // n, a, predicted point, remaining mobility along n
 
 #if defined(__CUDA_ARCH__)
 constexpr int STRIDE = GROUP;
 const int group = block / GROUP, lane = block % GROUP;
 const auto get = [](const float* rows, int row) { return rows[size_t(row) * STRIDE]; };
 const auto put = [](float* rows, int row, lanes value) { rows[size_t(row) * STRIDE] = value; };
-// Asks for rows that are read soon: a strand a thread leaves a GPU little else to do while memory answers.
+// Prefetches rows that are read soon: with a strand per thread, a GPU has little other work to hide the latency.
 const auto fetch = [](const float* rows, int first, int count) {
   for (int row = first; row < first + count; ++row) {
     asm volatile("prefetch.global.L1 [%0];" ::"l"(rows + size_t(row) * STRIDE));
@@ -102,7 +102,7 @@ const auto put_frame = [&](float* rows, int j, const quaternion& value) {
   put(rows, 4 * j + 2, value.z);
   put(rows, 4 * j + 3, value.w);
 };
-// Cube root of a number that is not negative, by Halley's method.
+// Cube root of a non-negative number, by Halley's method.
 const auto cube_root = [&](lanes value) {
   const lanes a = higher_of(value, lanes(1.0e-9f));
   lanes root = lanes_of_bits(to_ints(to_lanes(bits_of_lanes(a)) * (1.0f / 3.0f)) + 0x2a514067);
@@ -154,9 +154,9 @@ alignas(64) float contacts[(MOST + 1) * CONTACT * WIDTH];
 const auto kept = [&](int j, int row) { return scratch + size_t(KEPT * j + row) * STRIDE; };
 const auto contact = [&](int i) { return contacts + size_t(CONTACT * i) * STRIDE; };
 
-// Mobility that contact leaves along the normal of point i: more of it where the rod is so stiff, seen from a substep,
-// that it would be bent by force to planes that contradict each other, by which Newton's method diverges. With the
-// stiffness κ = h² / (b m l²), which grows with l⁻⁴, points of short hair have 10⁶ times that of long hair.
+// Remaining mobility along the contact normal of point i. It is larger for rods that are stiff relative to a substep:
+// contradictory planes would bend them with such force that Newton's method diverges. The stiffness κ = h² / (b m l²)
+// grows with l⁻⁴: points of short hair are 10⁶ times as stiff as those of long hair.
 const auto away_of = [&](int i) {
   const lanes size = get(length, i - 1);
   const lanes stiffness = (h * h) * get(inverse_mass, i) / (get(bending, i - 1) * size * size);
@@ -164,7 +164,7 @@ const auto away_of = [&](int i) {
 };
 const float inverse_square = 1.0f / (h * h), damping = damping_time / h, inverse_damping = 1.0f / (1.0f + damping);
 for (int substep = first; substep < end; ++substep) {
-  // The root: positions linear, rotations nlerp, between the frame's two poses.
+  // The root between the frame's two poses: positions linear, rotations by nlerp.
   const float part = static_cast<float>(substep + 1) / static_cast<float>(count);
   const float part_before = static_cast<float>(substep) / static_cast<float>(count);
   const auto root_at = [&](float at) {
@@ -186,7 +186,7 @@ for (int substep = first; substep < end; ++substep) {
     const bool is_again = stages & AGAIN;
 #include "rod_newton.h"
 #include "rod_contact.h"
-    // Lanes with any plane; again, those of which a point is inside one of those that were found since.
+    // Lanes with any plane; for AGAIN, lanes with a point inside a plane that was found after the solve.
     ints touches = 0;
     for (int i = pinned + 1; has_planes && i <= segment_count; ++i) {
       float* plane = plane_rows + size_t(8 * i) * STRIDE;

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The direct solver of strands as Cosserat rods: substeps of many strands, each a chain of segments.
+"""Direct solver of strands as Cosserat rods: substeps of many strands, each a chain of segments.
 
-Points and segment frames [Kugelstadt16] with compliant constraints [Macklin16]; a chain's system of equations is block
-tridiagonal, and is solved directly [Deul18]. rod_solver.cpp and the files it includes are compiled for both kinds of
-device: on a processor `LANES` strands stand in the lanes of its vectors, on a GPU each has a thread.
+Points and segment frames [Kugelstadt16] with compliant constraints [Macklin16]; the system of equations of a chain is
+block tridiagonal, and is solved directly [Deul18]. rod_solver.cpp and the files it includes are compiled for CPU and
+GPU: on a CPU `LANES` strands share the lanes of vectors, on a GPU each has a thread.
 
-Arrays are (groups, rows, lanes) float32: a group is as many strands as `lane_count` says, and of each of its rows, one
-number of every strand lies together. `to_lanes` and `from_lanes` convert.
+Arrays are (groups, rows, lanes) float32: a group has `lane_count` strands, and each row has one number of every strand
+of the group, contiguously. `to_lanes` and `from_lanes` convert.
 """
 
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ from ...errors import HairError
 from ...kernels import kernel_cache, native_code, parallel
 from ...kernels.checks import require_count
 
-LANES = 16  # strands that a thread of the processor solves at once: 8 take a quarter longer, also in vectors of 8
-GPU_LANES = 32  # strands whose numbers lie together in the memory of a GPU: those of a warp
+LANES = 16  # strands of a CPU thread: 8 take a quarter longer, even with vectors of 8 numbers
+GPU_LANES = 32  # strands with contiguous numbers in GPU memory: a warp
 MOST_SEGMENTS = 64
 LEAST_GROUPS = 8  # fewer are not worth a thread
-BLOCK = 32  # threads of a GPU: few, as strands are few and each has much to do
+BLOCK = 32  # threads of a GPU block: few, because there are few strands with much work each
 
 PREDICT, SOLVE, FINISH, AGAIN = 1, 2, 4, 8  # parts of a substep
 WHOLE = PREDICT | SOLVE | FINISH
@@ -37,36 +37,36 @@ _CONSTANTS = {
     "WIDTH": LANES,
     "GROUP": GPU_LANES,
     "MOST": MOST_SEGMENTS,
-    "STEPS": 8,  # of Newton's method, at most
-    "PASSES": 4,  # of contact, at most
-    "TURN": 2e-3,  # |Δθ|² of a step that ends the solve: the error left over is half of that
-    "DRAG_ALONG": 0.5,  # drag along a slender body, in that across it
-    "AWAY": 1e-3,  # mobility that contact leaves along the normal: none at all would make the matrix singular
-    "MOST_AWAY": 1e-2,  # the same of stiff points: a third of it lets short hair break, and more weakens friction
-    "STIFF": 1e4,  # κ = h² / (b m l²) from which a point is stiff; hair of 10 cm has some hundreds
-    "CREEP": 1e-4,  # [m/s] of what friction holds
+    "STEPS": 8,  # maximum of Newton's method
+    "PASSES": 4,  # maximum of contact
+    "TURN": 2e-3,  # |Δθ|² of a step that ends the solve: the remaining error is half of it
+    "DRAG_ALONG": 0.5,  # drag along a slender body / drag across it
+    "AWAY": 1e-3,  # remaining mobility along the contact normal: zero would make the matrix singular
+    "MOST_AWAY": 1e-2,  # the same for stiff points: with a third of it short hair breaks, more weakens friction
+    "STIFF": 1e4,  # κ = h² / (b m l²) above which a point is stiff; hair of 10 cm has some hundreds
+    "CREEP": 1e-4,  # speed of points held by friction [m/s]
     "ROD_SHARE": 1.0,
-    "CHANGE": 0.05,  # of friction, that asks for another pass
-    "INSIDE": 5e-3,  # of a segment, that a point may be moved out, or a length be off, without another solve
-    "SWEEPS": 20,  # of a repair after that, at most
-    "PINCHED": 0.02,  # of a segment, that it may be too long or too short where a strand cannot be outside otherwise
-    "LEAST_ANGLE": 0.05,  # squared sine, of two planes that meet in a line that can be reached
-    "LEAST_INERTIA": 3e-6,  # of a frame, in h² (1 + τ / h) / the compliance of its joint; rounding shows from 1e-7 down
+    "CHANGE": 0.05,  # relative change of friction that requires another pass
+    "INSIDE": 5e-3,  # tolerance of penetration and length, relative to a segment, without another solve
+    "SWEEPS": 20,  # maximum of a repair
+    "PINCHED": 0.02,  # largest strain of segments in strands that cannot be outside otherwise
+    "LEAST_ANGLE": 0.05,  # least squared sine between two planes with a usable line of intersection
+    "LEAST_INERTIA": 3e-6,  # of a frame, in h² (1 + τ / h) / compliance of its joint; rounding is visible below 1e-7
 }
 
 
 @wp.struct
 class RodArrays:
-    """All that a substep reads and writes of S strands of M segments, (groups, rows, lanes) float32 on one device."""
+    """All arrays of S strands of M segments for a substep, (groups, rows, lanes) float32 on one device."""
 
-    # The state.
+    # State.
     positions: wp.array3d[float]  # 3 (M + 1) rows [m]
     velocities: wp.array3d[float]  # 3 (M + 1) [m/s]
     frames: wp.array3d[float]  # 4 M, unit quaternions x, y, z, w: a segment lies along its z axis
     spins: wp.array3d[float]  # 3 M, angular velocities [1/s]
-    multipliers: wp.array3d[float]  # 6 M, of each segment λ_b (3), λ_s (3)
-    slips: wp.array3d[float]  # M + 1, sliding in the last substep [m], -1 without contact
-    # What the material and the groom say.
+    multipliers: wp.array3d[float]  # 6 M, λ_b (3), λ_s (3) of each segment
+    slips: wp.array3d[float]  # M + 1, sliding distance in the last substep [m], -1 without contact
+    # Material and groom.
     lengths: wp.array3d[float]  # M [m]
     rests: wp.array3d[float]  # 4 M, half rest rotations of joints
     bend_compliances: wp.array3d[float]  # M, b / EI in units of the mean mass
@@ -75,17 +75,17 @@ class RodArrays:
     inertias: wp.array3d[float]  # M
     grooms: wp.array3d[float]  # 3 (M + 1), in the root's frame [m]
     groom_frames: wp.array3d[float]  # 4 M, in the root's frame
-    drag_rates: wp.array3d[float]  # 3: of slow air [1/s], per speed across [1/m], and per its cube root
-    # What the surface says.
+    drag_rates: wp.array3d[float]  # 3: of slow air [1/s], per speed across [1/m], and per cube root of speed
+    # Surface.
     roots: wp.array3d[float]  # ROOT_ROWS
     # Between the stages of a substep.
     positions_before: wp.array3d[float]  # 3 (M + 1)
-    predictions: wp.array3d[float]  # 3 (M + 1), where points go without the rod's forces and contact
+    predictions: wp.array3d[float]  # 3 (M + 1), positions without the rod's forces and contact
     frames_before: wp.array3d[float]  # 4 M
     mobilities: wp.array3d[float]  # M + 1
-    # Counted.
-    resets: wp.array3d[float]  # 1, how often a strand was put back to its groom
-    solved_again: wp.array3d[float]  # 1, whether AGAIN has moved it in this substep
+    # Counters.
+    resets: wp.array3d[float]  # 1, number of resets of a strand to its groom
+    solved_again: wp.array3d[float]  # 1, whether AGAIN has moved the strand in this substep
 
 
 ROWS = {
@@ -116,17 +116,17 @@ _FIXED_ROWS = {"drag_rates": 3, "roots": ROOT_ROWS, "resets": 1, "solved_again":
 
 
 def row_count(name: str, segment_count: int) -> int:
-    """Rows of one of the `RodArrays`."""
+    """Return the number of rows of one of the `RodArrays`."""
     rows = ROWS[name]
     return _FIXED_ROWS[name] if rows is None else rows[0] * segment_count + rows[1] * (segment_count + 1)
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What acts on points in a substep, each optional: (groups, rows a point times points, lanes) float32.
+    """External influences on points in a substep, all optional: (groups, rows per point × points, lanes) float32.
 
-    planes: `plane_row` says where; found_planes: the same after the solve, for AGAIN and FINISH; airs: velocity of the
-    air [m/s], 3 rows a point; drags: factor of air drag, 1; accelerations: [m/s²], 3.
+    planes: see `plane_row`; found_planes: planes after the solve, for AGAIN and FINISH; airs: velocity of the air
+    [m/s], 3 rows per point; drags: factor of air drag, 1 row; accelerations: [m/s²], 3 rows.
     """
 
     planes: wp.array | None = None
@@ -137,7 +137,7 @@ class Surroundings:
 
 
 EMPTY = Surroundings()
-_SHARED = (  # by a step and its `Numbers`
+_SHARED = (  # fields of both `Step` and `Numbers`
     "count",
     "pinned",
     "carried",
@@ -151,33 +151,33 @@ _SURROUNDING_ROWS = {"planes": PLANE_ROWS, "found_planes": PLANE_ROWS, "airs": 3
 
 
 def plane_row(point: int, field: int) -> int:
-    """The row of a number of a point's plane of contact, in the array of planes.
+    """Return the row of a field of a point's contact plane in the array of planes.
 
-    field: 0 to 2 the unit normal n, zero for none; 3 the offset n·c + r [m], with a point c of the surface and the
-    distance r to keep; 4 to 6 the displacement of the surface there in this substep [m]; 7 the friction μ.
+    field: 0 to 2 the unit normal n, zero for no plane; 3 the offset n·c + r [m], with a point c of the surface and the
+    distance r to keep; 4 to 6 the displacement of the surface at c in this substep [m]; 7 the friction μ.
     """
     return PLANE_ROWS * point + field
 
 
 @dataclass(frozen=True)
 class Step:
-    """The numbers of a frame's substeps that all strands share."""
+    """Parameters of a frame's substeps that all strands share."""
 
     size: float  # h [s]
     count: int = 1  # of substeps in the frame
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)  # [m/s²]
     damping_time: float = 0.0  # [s]
-    twist_ratio: float = 1.0  # compliance of twisting in that of bending
+    twist_ratio: float = 1.0  # compliance of twisting / compliance of bending
     hold: float = 0.0  # [1/s²]
     hold_tip: float = 1.0
     pinned: int = 0  # points from the root that follow the surface, beside the root itself
-    most_stretch: float = 1.2  # longer segments, in their rest length, break a strand
+    most_stretch: float = 1.2  # length / rest length of a segment beyond which a strand breaks
     carried: float = 1.0  # (h / h of the last substep)²
 
 
 @wp.struct
 class Numbers:
-    """A `Step` and which of its substeps, for kernels."""
+    """A `Step` with a range of substeps, for kernels."""
 
     first: int
     end: int
@@ -195,7 +195,7 @@ class Numbers:
 
 @wp.struct
 class Around:
-    """`Surroundings` for kernels: empty arrays for those that are not there."""
+    """`Surroundings` for kernels, with empty arrays for missing ones."""
 
     planes: wp.array3d[float]
     found_planes: wp.array3d[float]
@@ -225,12 +225,12 @@ def _advance_blocks(
 
 
 def lane_count(device: wp.DeviceLike) -> int:
-    """Strands of a group on a device."""
+    """Return the number of strands of a group on a device."""
     return LANES if wp.get_device(device).is_cpu else GPU_LANES
 
 
 def to_lanes(values: np.ndarray, lanes: int) -> np.ndarray:
-    """(S, …) numbers of strands → (groups, rows, lanes) float32; the last strand also fills the last group."""
+    """Convert numbers of strands (S, …) → (groups, rows, lanes) float32, padded with the last strand."""
     rows = np.asarray(values, np.float32).reshape(len(values), -1)
     group_count = -(-len(rows) // lanes)
     padded = np.concatenate([rows, np.repeat(rows[-1:], group_count * lanes - len(rows), axis=0)])
@@ -238,12 +238,12 @@ def to_lanes(values: np.ndarray, lanes: int) -> np.ndarray:
 
 
 def from_lanes(rows: np.ndarray, strand_count: int) -> np.ndarray:
-    """(groups, rows, lanes) → (S, rows) float32."""
+    """Convert (groups, rows, lanes) → (S, rows) float32."""
     return np.ascontiguousarray(rows.swapaxes(1, 2)).reshape(-1, rows.shape[1])[:strand_count]
 
 
 def scratch(segment_count: int, group_count: int, device: wp.DeviceLike) -> wp.array:
-    """Memory of `advance` on a GPU, where threads have none of their own; empty on a processor."""
+    """Return working memory of `advance` for a GPU, where threads have too little local memory; empty on a CPU."""
     is_cpu = wp.get_device(device).is_cpu
     row_count = _KEPT_ROWS * segment_count + _CONTACT_ROWS * (segment_count + 1)
     shape = (0, 0, 0) if is_cpu else (group_count, row_count, GPU_LANES)
@@ -260,13 +260,12 @@ def advance(
     surroundings: Surroundings = EMPTY,
     block_dim: int = BLOCK,
 ) -> None:
-    """Advance strands by substeps first … end - 1 of a frame's `step.count`; end: all that are left for None.
+    """Advance strands by substeps first … end - 1 of a frame's `step.count`; end: None for all remaining.
 
-    stages: PREDICT leaves in `positions` where points go without the rod's forces, for which planes of contact may then
-    be found; SOLVE moves them to where they end; AGAIN solves once more for strands of which a point is inside one of
-    `found_planes`, which then takes the place of its plane; FINISH moves out what is inside the planes found last, and
-    computes velocities. One launch does them all for strands that no planes hold. Raises `HairError` where counts do
-    not match.
+    stages: PREDICT writes positions without the rod's forces, for which contact planes can then be found; SOLVE
+    computes the final positions; AGAIN solves again for strands with a point inside one of `found_planes`, which
+    replaces its plane; FINISH moves out points inside the last planes, and computes velocities. Without planes, one
+    launch does all stages. Raises `HairError` if counts do not match.
     """
     numbers, around = kernel_inputs(arrays, step, scratch, first, end, surroundings)
     device, group_count = arrays.positions.device, len(arrays.positions)
@@ -280,14 +279,14 @@ def advance(
 
 
 def stages_of(arrays: RodArrays, step: Step, stages: int) -> int:
-    """Those of some stages that strands take: nothing is solved where nothing is free."""
+    """Return the stages to run: without SOLVE and AGAIN if all segments are pinned."""
     return stages & ~(SOLVE | AGAIN) if step.pinned == arrays.lengths.shape[1] else stages
 
 
 def kernel_inputs(
     arrays: RodArrays, step: Step, scratch: wp.array, first: int, end: int | None, surroundings: Surroundings
 ) -> tuple[Numbers, Around]:
-    """A step and surroundings as kernels take them. Raises `HairError` where counts do not match."""
+    """Return step and surroundings for kernels. Raises `HairError` if counts do not match."""
     end = step.count if end is None else end
     _check(arrays, step, scratch, surroundings)
     if first < 0 or end > step.count:
@@ -300,7 +299,7 @@ def kernel_inputs(
 
 
 def around_of(surroundings: Surroundings) -> Around:
-    """Surroundings as kernels take them."""
+    """Return surroundings for kernels."""
     around = Around()
     for name in _SURROUNDING_ROWS:
         if (array := getattr(surroundings, name)) is not None:
@@ -309,7 +308,7 @@ def around_of(surroundings: Surroundings) -> Around:
 
 
 def _check(arrays, step, scratch, surroundings):
-    """Raise `HairError` unless all that the kernel reads is there."""
+    """Raise `HairError` unless all arrays match."""
     group_count, segment_count = len(arrays.positions), arrays.lengths.shape[1]
     device = arrays.positions.device
     if not 1 <= segment_count <= MOST_SEGMENTS:
@@ -319,17 +318,17 @@ def _check(arrays, step, scratch, surroundings):
     if not (step.size > 0.0 and step.count >= 1):
         raise HairError(f"A substep of {step.size:g} s cannot be simulated.")
     expected = {name: row_count(name, segment_count) for name in ROWS}
-    given = {name: getattr(arrays, name) for name in expected}
+    present = {name: getattr(arrays, name) for name in expected}
     for name, rows in _SURROUNDING_ROWS.items():
         array = getattr(surroundings, name)
         if array is not None:
-            expected[name], given[name] = rows * (segment_count + 1), array
+            expected[name], present[name] = rows * (segment_count + 1), array
     if not device.is_cpu:
         expected["scratch"] = _KEPT_ROWS * segment_count + _CONTACT_ROWS * (segment_count + 1)
-        given["scratch"] = scratch
+        present["scratch"] = scratch
     lanes = lane_count(device)
     for name, rows in expected.items():
-        array = given[name]
+        array = present[name]
         require_count(f"groups of {name}", array.shape[0], group_count)
         require_count(f"rows of {name}", array.shape[1], rows)
         require_count(f"lanes of {name}", array.shape[2], lanes)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`Rods`: the state of simulated strands on a device, from a groom and a material.
 
-The surface gives each root a position and a rotation since the groom. The frame before segment 0 is that of segment 0
-in the groom, turned with the surface, so a strand leaves the surface at the angle that it was combed to.
+The surface determines the position of each root and its rotation relative to the groom. The frame before segment 0 is
+that of segment 0 in the groom, rotated with the surface: a strand leaves the surface at its combed angle.
 """
 
 from collections.abc import Mapping
@@ -22,20 +22,20 @@ from .settings import DynamicsSettings
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-# What a substep reads and the groom, material and roots do not say.
+# Arrays that a substep reads and that are not determined by groom, material and roots.
 STATE = ("positions", "velocities", "frames", "spins", "multipliers", "slips", "roots", "resets")
-_ROOT_END = wp.constant(rod_solver.ROOT_ROWS // 2)  # the row of a root's place at the end of the frame
+_ROOT_END = wp.constant(rod_solver.ROOT_ROWS // 2)  # first row of a root's pose at the end of the frame
 _NO_TURNS = np.zeros((0, 4))
 _FARTHEST = 1e30  # [m]
-MOST_STRETCH = 1.2  # of a segment, above which a strand is put back to its groom; more where hair is made to stretch
+MOST_STRETCH = 1.2  # of a segment, above which a strand is reset to its groom; larger for stretchable hair
 
 
 @dataclass(frozen=True)
 class RestShape:
-    """The shape that strands have without forces, and the multipliers that hold them in the groom; float64.
+    """The shape of strands without forces, and the multipliers of equilibrium in the groom; float64.
 
     lengths: (S, M) [m]; halves: (S, M, 4) half rest rotations of joints; frames: (S, M, 4) of segments in the groom;
-    multipliers: (S, M, 6) in the groom by h² [N m].
+    multipliers: (S, M, 6) in the groom, divided by h² [N m].
     """
 
     lengths: np.ndarray
@@ -45,7 +45,7 @@ class RestShape:
 
 
 def combed_shape(groom: np.ndarray) -> RestShape:
-    """The `RestShape` of strands (S, N, 3) [m] whose groom is their shape without forces: under gravity they sag."""
+    """Return the `RestShape` of strands (S, N, 3) [m] whose groom is their shape without forces: gravity bends them."""
     groom = np.asarray(groom, np.float64)
     frames = rotations.frames_along(groom)
     lengths = np.linalg.norm(np.diff(groom, axis=1), axis=2)
@@ -53,7 +53,7 @@ def combed_shape(groom: np.ndarray) -> RestShape:
 
 
 def half_rotations(frames: np.ndarray) -> np.ndarray:
-    """(S, M, 4) frames of segments → half the rotation from the one before to each, none for the first."""
+    """Return half of the rotation (S, M, 4) from each previous frame to the next one; the identity for the first."""
     before = np.concatenate([frames[:, :1], frames[:, :-1]], axis=1)
     return rotations.half(rotations.product(rotations.inverse(before), frames))
 
@@ -61,7 +61,7 @@ def half_rotations(frames: np.ndarray) -> np.ndarray:
 def step_of(
     settings: DynamicsSettings, material: Material, seconds: float, count: int, gravity: tuple[float, float, float]
 ) -> Step:
-    """The `Step` of a frame that takes some seconds, in a number of substeps; gravity: of the scene [m/s²]."""
+    """Return the `Step` of a frame with a duration [s] and a number of substeps; gravity: of the scene [m/s²]."""
     return Step(
         seconds / count,
         count,
@@ -76,14 +76,14 @@ def step_of(
 
 
 class Rods:
-    """S simulated strands of M segments, in the axes that groom and roots are given in [m]."""
+    """S simulated strands of M segments, in the coordinates of groom and roots [m]."""
 
     def __init__(
         self, groom: np.ndarray, material: Material, rest: RestShape | None = None, device: wp.DeviceLike = None
     ) -> None:
-        """Strands at rest in their groom, (S, M+1, 3) [m]; rest: `combed_shape` of it for None.
+        """Create strands at rest in their groom, (S, M+1, 3) [m]; rest: None for its `combed_shape`.
 
-        Raises `HairError` for points that are not finite, segments without length, and counts that do not match.
+        Raises `HairError` for non-finite points, segments of zero length, and counts that do not match.
         """
         groom = np.asarray(groom, np.float64)
         if not np.isfinite(groom).all():
@@ -94,7 +94,7 @@ class Rods:
         self.strand_count, self.segment_count = len(groom), groom.shape[1] - 1
         self.step_size = 0.0  # h of the last substep [s]
         rest = combed_shape(groom) if rest is None else rest
-        self._root_frames = rest.frames[:, 0]  # in the groom, as are these roots
+        self._root_frames = rest.frames[:, 0]  # in the groom, like the roots
         self._roots = groom[:, 0]
         self._start_turns, self._start = _NO_TURNS, self._doubles(_NO_TURNS)
         groups = -(-self.strand_count // self.lanes)
@@ -111,17 +111,17 @@ class Rods:
 
     @property
     def lanes(self) -> int:
-        """Strands of a group."""
+        """Number of strands of a group."""
         return rod_solver.lane_count(self.device)
 
     def set_material(self, material: Material, rest: RestShape) -> None:
-        """Give strands another material or rest shape; they go on from where they are."""
+        """Set the material and rest shape; the state is kept."""
         for name in ("lengths", "inertias", "bend_compliances", "stretch_compliances"):
             require_count(name, getattr(material, name).size, self.strand_count * self.segment_count)
         if not (np.isfinite(rest.lengths).all() and (rest.lengths > 0.0).all()):
             raise HairError("Simulated strands have segments without length.")
-        # In units near the mean mass, so that nothing nears the ends of single precision; powers of four, which round
-        # nothing, nor do the solver's roots of them: no strand depends on the masses of others.
+        # A unit near the mean mass avoids overflow in single precision. Powers of four, and the solver's square roots
+        # of them, are exact: no strand depends on the masses of others.
         unit = float(4.0 ** np.round(0.5 * np.log2(material.masses.mean())))
         self.arrays.multipliers.assign(self.arrays.multipliers.numpy() * np.float32(self._mass_unit / unit))
         self._mass_unit = unit
@@ -136,7 +136,7 @@ class Rods:
         self._held = rest.multipliers
 
     def set_groom(self, groom: np.ndarray, rest: RestShape) -> None:
-        """Give strands another groom (S, M+1, 3) [m], to which hold, pinned points and resets take them."""
+        """Set the groom (S, M+1, 3) [m], used by hold, pinned points and resets."""
         require_count("points", groom.size, self.strand_count * (self.segment_count + 1) * 3)
         back = rotations.inverse(rest.frames[:, :1])
         self._root_frames, self._roots = rest.frames[:, 0], np.asarray(groom, np.float64)[:, 0]
@@ -145,7 +145,7 @@ class Rods:
         self._put("groom_frames", rotations.product(back, rest.frames))
 
     def reset(self, positions: np.ndarray | None = None, turns: np.ndarray | None = None) -> None:
-        """Put strands at rest in their groom, where its surface is for None, else carried as in `move_roots`."""
+        """Reset strands to rest in their groom; positions and turns: as in `move_roots`, None for the groom's own."""
         roots = self._root_rows(self._roots if positions is None else positions, turns)
         grooms, frames = (self.read(name) for name in ("grooms", "groom_frames"))
         places, root_frames = roots[:, None, :3], roots[:, None, 3:]
@@ -160,9 +160,9 @@ class Rods:
         self.step_size = 0.0
 
     def move_roots(self, positions: np.ndarray, turns: np.ndarray | None = None) -> None:
-        """Say where roots are at the end of the next frame, which begins where the last one ended.
+        """Set the roots at the end of the next frame, which begins at the end of the last one.
 
-        positions: (S, 3) [m]; turns: (S, 4) rotations x, y, z, w of the surface since the groom, none for None.
+        positions: (S, 3) [m]; turns: (S, 4) rotations x, y, z, w of the surface relative to the groom, None for none.
         """
         require_count("coordinates of roots", np.size(positions), 3 * self.strand_count)
         positions, turns = np.reshape(positions, (-1, 3)), _NO_TURNS if turns is None else np.reshape(turns, (-1, 4))
@@ -176,7 +176,7 @@ class Rods:
         kernel_cache.launch(_move_roots, (len(roots), self.lanes), inputs=inputs, outputs=[roots], device=self.device)
 
     def set_start(self, turns: np.ndarray) -> None:
-        """Let turns of `move_roots` and `reset` be counted from others (S, 4): those of the surface in the groom."""
+        """Set the reference rotations (S, 4) of `move_roots` and `reset`: those of the surface in the groom."""
         require_count("numbers of rotations of roots", np.size(turns), 4 * self.strand_count)
         self._start_turns, self._start = turns, self._doubles(turns)
 
@@ -184,9 +184,9 @@ class Rods:
         return wp.array(np.asarray(rows, np.float64), dtype=wp.float64, device=self.device)
 
     def in_lanes(self, values: np.ndarray, is_padded: bool = True) -> wp.array:
-        """(S, rows) numbers → (groups, rows, lanes) float32 on the device; is_padded: lanes without a strand repeat.
+        """Convert numbers (S, rows) → (groups, rows, lanes) float32 on the device.
 
-        Otherwise these are zero.
+        is_padded: unused lanes repeat the last strand, otherwise they are zero.
         """
         rows = rod_solver.to_lanes(np.asarray(values), self.lanes)
         if not is_padded:
@@ -194,7 +194,7 @@ class Rods:
         return wp.array(rows, dtype=float, device=self.device)
 
     def carried_groom(self) -> wp.array:
-        """(groups, 3 (M + 1), lanes) float32 [m]: the groom where the surface has it at the end of the frame."""
+        """Return the groom (groups, 3 (M + 1), lanes) float32 [m] in the pose at the end of the frame."""
         grooms, roots = self.arrays.grooms, self.arrays.roots
         carried = wp.empty_like(grooms)
         shape = len(grooms), grooms.shape[1] // 3, self.lanes
@@ -202,10 +202,10 @@ class Rods:
         return carried
 
     def carry(self, chosen: np.ndarray, turns: np.ndarray, pivots: np.ndarray, places: np.ndarray) -> None:
-        """Take some strands along rigidly, as after a jump of the surface: x becomes place + turn (x - pivot).
+        """Move some strands rigidly, as after a jump of the surface: x becomes place + turn (x - pivot).
 
-        chosen: (S,) bool; turns: (S, 4) rotations x, y, z, w; pivots, places: (S, 3) [m]. Velocities turn with them,
-        and so do the roots, from where the next frame begins.
+        chosen: (S,) bool; turns: (S, 4) rotations x, y, z, w; pivots, places: (S, 3) [m]. Velocities and roots, the
+        start of the next frame, are transformed as well.
         """
         for count in (len(chosen), len(turns), len(pivots), len(places)):
             require_count("strands", count, self.strand_count)
@@ -225,7 +225,7 @@ class Rods:
         def roots_moved(halves):
             return np.concatenate([moved(halves[..., :3]), rotations.product(turns, halves[..., 3:])], axis=-1)
 
-        def pulls_turned(multipliers):  # those of joints are in their own frames
+        def pulls_turned(multipliers):  # multipliers of joints are relative to their frames
             return np.concatenate([multipliers[..., :3], rotations.rotated(turns, multipliers[..., 3:])], axis=-1)
 
         turned("positions", 3, moved)
@@ -244,46 +244,46 @@ class Rods:
         surroundings: Surroundings = rod_solver.EMPTY,
         block_dim: int = rod_solver.BLOCK,
     ) -> None:
-        """Simulate substeps of a frame, as `rod_solver.advance` does."""
+        """Simulate substeps of a frame; arguments as in `rod_solver.advance`."""
         step = self.begun(step)
         rod_solver.advance(self.arrays, step, self.scratch, first, end, stages, surroundings, block_dim)
         if stages & rod_solver.FINISH:
             self.step_size = step.size
 
     def begun(self, step: Step) -> Step:
-        """A step that goes on from the last one."""
-        if self.step_size == 0.0:  # the first: multipliers of the equilibrium, if the rest shape knows them
+        """Return a step that continues the last one."""
+        if self.step_size == 0.0:  # the first step starts with the rest shape's multipliers of equilibrium
             self._put("multipliers", self._held * (step.size**2 / self._mass_unit))
             self.step_size = step.size
         return replace(step, carried=(step.size / self.step_size) ** 2)
 
     def positions(self) -> np.ndarray:
-        """(S, M+1, 3) float32 [m]."""
+        """Return the positions (S, M+1, 3) float32 [m]."""
         return self.read("positions").reshape(self.strand_count, -1, 3)
 
     def velocities(self) -> np.ndarray:
-        """(S, M+1, 3) float32 [m/s]."""
+        """Return the velocities (S, M+1, 3) float32 [m/s]."""
         return self.read("velocities").reshape(self.strand_count, -1, 3)
 
     def reset_counts(self) -> np.ndarray:
-        """(S,) how often each strand broke and was put back to its groom, since `reset`."""
+        """Return the number (S,) of times that each strand broke and was reset to its groom, since `reset`."""
         return self.read("resets")[:, 0].astype(int)
 
     def stretch(self) -> np.ndarray:
-        """(S, M) lengths of segments in those at rest, less one."""
+        """Return the strain (S, M) of segments: length / rest length - 1."""
         sizes = np.linalg.norm(np.diff(self.positions().astype(np.float64), axis=1), axis=2)
         return sizes / self.read("lengths") - 1.0
 
     def save(self) -> dict[str, np.ndarray]:
-        """All that the next substep reads and the groom, material and settings do not say: {name: (S, rows) float32}.
+        """Return the state, without groom, material and settings: {name: (S, rows) float32}.
 
-        `load` of it goes on bit by bit, on any kind of device.
+        After `load` the simulation continues bit-identically, on any device.
         """
         state = {name: self.read(name) for name in STATE}
         return state | {"step_size": np.array([self.step_size])}
 
     def load(self, state: Mapping[str, np.ndarray]) -> None:
-        """Go on from a state that `save` gave; raises `HairError` unless it is one of such strands."""
+        """Continue from a state of `save`. Raises `HairError` if it does not match the strands."""
         for name in STATE:
             rows = np.asarray(state.get(name, ()))
             expected = self.strand_count, rod_solver.row_count(name, self.segment_count)
@@ -297,7 +297,7 @@ class Rods:
         self.step_size = float(size[0])
 
     def read(self, name: str) -> np.ndarray:
-        """(S, rows) float32 of one of `RodArrays`."""
+        """Return (S, rows) float32 of one of `RodArrays`."""
         return rod_solver.from_lanes(getattr(self.arrays, name).numpy(), self.strand_count)
 
     def _put(self, name, values):
@@ -318,7 +318,7 @@ class Rods:
 
 @wp.func
 def _product(a: wp.vec4d, b: wp.vec4d):
-    """As `rotations.product`, to the last bit."""
+    """Same as `rotations.product`, bit by bit."""
     x = a[3] * b[0] + b[3] * a[0] + (a[1] * b[2] - a[2] * b[1])
     y = a[3] * b[1] + b[3] * a[1] + (a[2] * b[0] - a[0] * b[2])
     z = a[3] * b[2] + b[3] * a[2] + (a[0] * b[1] - a[1] * b[0])
@@ -339,7 +339,7 @@ def _move_roots(
     # outputs
     roots: wp.array3d[float],
 ):
-    """The frame begins where the last one ended; the last strand also fills the last group."""
+    """Start the frame at the end of the last one; unused lanes repeat the last strand."""
     group, lane = wp.tid()
     strand = wp.min(group * roots.shape[2] + lane, positions.shape[0] - 1)
     for row in range(_ROOT_END):

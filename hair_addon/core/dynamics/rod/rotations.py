@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rotations as unit quaternions x, y, z, w in NumPy, any shape (…, 4), and frames along polylines.
 
-rod_rotations.h has twins for kernels.
+rod_rotations.h has the same functions for kernels.
 """
 
 import numpy as np
@@ -10,8 +10,8 @@ IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The rotation b, then a."""
-    # By components: NumPy's cross product of many takes three times as long as all of this.
+    """Return the product a b: the rotation b, then a."""
+    # By components: NumPy's cross product alone takes three times as long.
     ax, ay, az, aw = _components(a)
     bx, by, bz, bw = _components(b)
     x = aw * bx + bw * ax + (ay * bz - az * by)
@@ -21,12 +21,12 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def inverse(a: np.ndarray) -> np.ndarray:
-    """The opposite rotation."""
+    """Return the inverse rotation."""
     return a * np.array([-1.0, -1.0, -1.0, 1.0])
 
 
 def rotated(a: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Vectors (…, 3), rotated."""
+    """Rotate vectors (…, 3)."""
     ax, ay, az, aw = _components(a)
     x, y, z = _components(v)
     tx, ty, tz = 2.0 * (ay * z - az * y), 2.0 * (az * x - ax * z), 2.0 * (ax * y - ay * x)
@@ -35,13 +35,13 @@ def rotated(a: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def _components(a):
-    """Arrays (…) of each component; copies, as one beside the other is slow to read."""
+    """Return contiguous arrays (…) of each component, which are faster to read."""
     a = np.asarray(a)
     return a.transpose(a.ndim - 1, *range(a.ndim - 1)).copy()  # `moveaxis` takes longer than the copy
 
 
 def _together(*components):
-    """The inverse; `stack` takes twice as long for few strands."""
+    """Join components along the last axis; `np.stack` takes twice as long for few strands."""
     found = np.empty((*components[0].shape, len(components)), components[0].dtype)
     for place, component in enumerate(components):
         found[..., place] = component
@@ -49,17 +49,17 @@ def _together(*components):
 
 
 def unit(a: np.ndarray) -> np.ndarray:
-    """Vectors or quaternions of length one."""
+    """Normalize vectors or quaternions."""
     return a / np.linalg.norm(a, axis=-1, keepdims=True)
 
 
 def half(a: np.ndarray) -> np.ndarray:
-    """The rotation by half the angle, the shorter way."""
+    """Return the rotation by half the angle, along the shorter arc."""
     return unit(np.where(a[..., 3:] < 0.0, -a, a) + IDENTITY)
 
 
 def least_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The least rotation that takes unit vectors a to b; about any axis across where they are opposite."""
+    """Return the least rotation from unit vectors a to b; about any perpendicular axis if they are opposite."""
     real = 1.0 + np.sum(a * b, axis=-1, keepdims=True)
     other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
     is_opposite = real < 1e-9
@@ -68,10 +68,10 @@ def least_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def frames_along(points: np.ndarray) -> np.ndarray:
-    """Frames of the segments of polylines (S, N, 3) → (S, N-1, 4), z along each, without twist from one to the next.
+    """Return twist-free frames (S, N-1, 4) of the segments of polylines (S, N, 3), with z along each segment.
 
-    The first follows from its direction by the least rotation from z; a segment without length goes on as the one
-    before [Bishop75].
+    The first frame is the least rotation from z to its direction; segments of zero length repeat the previous frame
+    [Bishop75].
     """
     directions = np.diff(np.asarray(points, np.float64), axis=1)
     sizes = np.linalg.norm(directions, axis=2, keepdims=True)
@@ -89,10 +89,10 @@ def frames_along(points: np.ndarray) -> np.ndarray:
 
 
 def from_matrices(matrices: np.ndarray) -> np.ndarray:
-    """Rotation matrices (…, 3, 3) → (…, 4), the real part not negative."""
+    """Convert rotation matrices (…, 3, 3) → quaternions (…, 4) with non-negative real part."""
     m = np.asarray(matrices, np.float64)
     x, y, z = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
-    # The outer product of the quaternion with itself, by four: its longest row is the best one [Bar-Itzhack00].
+    # Four times the outer product of the quaternion with itself; the longest row is the most accurate [Bar-Itzhack00].
     rows = np.empty((*m.shape[:-2], 4, 4))
     rows[..., 0, 0], rows[..., 1, 1], rows[..., 2, 2] = 1 + x - y - z, 1 - x + y - z, 1 - x - y + z
     rows[..., 3, 3] = 1 + x + y + z

@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rest shapes that hang as they were combed, in closed form [Hsu23]: a groom that does not sag.
+"""Sag-free rest shapes, for which the groom is an equilibrium under gravity, in closed form [Hsu23].
 
-With the forces F_j = Σ m g of all points beyond segment j, whose rest length is l_j and direction d_j in equilibrium:
+With the forces F_j = Σ m g of all points beyond segment j, its rest length l_j and direction d_j in equilibrium:
 
     x_(j+1) - x_j = l_j (d_j + F_j / EA_j)                           stretch and shear
     τ_j = τ_(j+1) - l_j d_j × F_j,    G_jᵀ λ_j = τ_j                 moments, tip to root
     2 Im e_j = -α_j λ_j                                              bend and twist
 
-The half rest rotation s_j then follows from s e s = r, where r is the rotation from frame j - 1 to frame j:
-s = e^-½ (e^½ r e^½)^½ e^-½. G depends on s, so this is repeated.
+The half rest rotation s_j is the solution of s e s = r, where r is the rotation from frame j - 1 to frame j:
+s = e^-½ (e^½ r e^½)^½ e^-½. G depends on s, so this is iterated.
 
-That a groom is an equilibrium does not make it stable. One that stands up falls, as a column does, if its stiffness is
-less than that of Γ = ρA g L³ / EI = 7.84 [Greenhill81].
+The equilibrium may be unstable: an upright strand falls like a column if Γ = ρA g L³ / EI exceeds 7.84 [Greenhill81].
 """
 
 from dataclasses import dataclass
@@ -23,30 +22,30 @@ from .material import Material
 from .rods import RestShape, combed_shape, half_rotations
 
 ROUNDS = 20
-MOST_BEND = 0.5 * np.sqrt(3.0)  # sine of half of 120°, the most that a joint's rest may turn from the groom
+MOST_BEND = 0.5 * np.sqrt(3.0)  # sine of half of 120°, the largest rotation of a joint between groom and rest shape
 GREENHILL = 7.84
 
 
 @dataclass(frozen=True)
 class SagFree:
-    """A `RestShape` whose strands are at rest in their groom, but for clipped ones; clipped: (S,) joints of each."""
+    """A `RestShape` with strands at rest in their groom, except for clipped joints; clipped: (S,) number of these."""
 
     rest: RestShape
     clipped: np.ndarray
 
 
 def sag_free(groom: np.ndarray, material: Material, gravity: tuple[float, float, float]) -> SagFree:
-    """The `SagFree` of strands (S, M+1, 3) [m] of a `Material`; gravity: [m/s²] that it holds against."""
+    """Return the `SagFree` of strands (S, M+1, 3) [m] of a `Material` under gravity [m/s²]."""
     groom = np.asarray(groom, np.float64)
     forces = _forces(material, gravity)
     combed = combed_shape(groom)
     segments = np.diff(groom, axis=1)
     lengths = material.lengths
-    for _ in range(3):  # compliances are by segment, strains by rest length
+    for _ in range(3):  # strains depend on the rest lengths
         lengths, directions = _unstretched(segments, forces * (material.stretch_compliances * lengths)[..., None])
     frames = rotations.product(
         rotations.least_rotation(rotations.unit(segments), directions), combed.frames
-    )  # of the shear that forces across a segment make
+    )  # includes the shear by transverse forces
     moments = _moments(lengths, directions, forces)
     before = np.concatenate([frames[:, :1], frames[:, :-1]], axis=1)
     compliances = np.stack(
@@ -63,12 +62,12 @@ def sag_free(groom: np.ndarray, material: Material, gravity: tuple[float, float,
 
 
 def least_stiffness(groom: np.ndarray, material: Material, gravity: tuple[float, float, float]) -> float:
-    """The factor of `material`'s stiffness of bending at which strands (S, M+1, 3) [m] can hold their shape."""
+    """Return the factor of a material's bending stiffness at which all strands (S, M+1, 3) [m] are stable."""
     return float(least_stiffnesses(groom, material, gravity).max(initial=0.0))
 
 
 def least_stiffnesses(groom: np.ndarray, material: Material, gravity: tuple[float, float, float]) -> np.ndarray:
-    """(S,) float64: the same of each strand. Strands that hang, whose tip is the lowest point, need none."""
+    """Return `least_stiffness` (S,) float64 of each strand; 0 for hanging strands, whose tip is the lowest point."""
     down = np.asarray(gravity, np.float64)
     size = float(np.linalg.norm(down))
     if size == 0.0:
@@ -79,19 +78,19 @@ def least_stiffnesses(groom: np.ndarray, material: Material, gravity: tuple[floa
     joint_lengths = np.concatenate(
         [material.lengths[:, :1] / 2.0, (material.lengths[:, :-1] + material.lengths[:, 1:]) / 2.0], axis=1
     )
-    stiffness = (joint_lengths / material.bend_compliances).min(axis=1)  # EI, where it is least
+    stiffness = (joint_lengths / material.bend_compliances).min(axis=1)  # least EI
     load = material.masses.sum(axis=1) * size * lengths**2 / stiffness  # Γ
     return np.where(is_hanging, 0.0, load) / GREENHILL
 
 
 def _forces(material, gravity):
-    """(S, M, 3) [N]: what hangs on each segment."""
+    """Return the weight (S, M, 3) [N] of all points beyond each segment."""
     beyond = np.cumsum(material.masses[:, :0:-1], axis=1)[:, ::-1]
     return beyond[..., None] * np.asarray(gravity, np.float64)
 
 
 def _unstretched(segments, strains):
-    """Rest lengths l (S, M) and directions d of segments that are l (d + strain) under load."""
+    """Return rest lengths l (S, M) and directions d of segments that equal l (d + strain) under load."""
     along = np.sum(segments * strains, axis=-1)
     rest = 1.0 - np.sum(strains**2, axis=-1)
     lengths = (np.sqrt(along**2 + rest * np.sum(segments**2, axis=-1)) - along) / rest
@@ -99,13 +98,13 @@ def _unstretched(segments, strains):
 
 
 def _moments(lengths, directions, forces):
-    """(S, M, 3) [N m] at joints, tip to root."""
+    """Return the moments (S, M, 3) [N m] at joints, summed from tip to root."""
     turned = -lengths[..., None] * np.cross(directions, forces)
     return np.cumsum(turned[:, ::-1], axis=1)[:, ::-1]
 
 
 def _bent(halves, before, turns, moments, compliances):
-    """(multipliers, whether a joint is clipped, half rest rotations) from the half rest rotations of the last round."""
+    """Return (multipliers, whether joints are clipped, half rest rotations) from the last round's half rotations."""
     back = rotations.inverse(halves)
     bend = rotations.product(rotations.product(back, turns), back)
     bend = np.where(bend[..., 3:] < 0.0, -bend, bend)
@@ -121,7 +120,7 @@ def _bent(halves, before, turns, moments, compliances):
 
 
 def _multipliers(bend, moments):
-    """λ of (e_w 1 + [e_v]×) λ = moments: the inverse in closed form, of a unit quaternion e."""
+    """Solve (e_w 1 + [e_v]×) λ = moments in closed form, for a unit quaternion e."""
     axis, real = bend[..., :3], bend[..., 3:]
     real = np.maximum(real, 1e-6)
     along = np.sum(axis * moments, axis=-1, keepdims=True)

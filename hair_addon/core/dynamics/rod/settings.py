@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of the simulation of guides: material, forces, shape, collision, solver.
 
-All are in units of the SI, so a groom moves alike at any number of vertices, frame rate and number of substeps.
+Settings are in SI units: motion does not depend on the number of vertices, the frame rate or the number of substeps.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from ...params import Settings, param
 
 @dataclass(frozen=True)
 class DynamicsSettings(Settings):
-    """What simulated guides are made of, and what acts on them."""
+    """Settings of simulated guides: material, forces, collision and solver."""
 
     bend_stiffness: float = param(
         8.0,
@@ -22,11 +22,11 @@ class DynamicsSettings(Settings):
         soft_high=1e3,
     )
     twist_stiffness: float = param(
-        1.0, "Stiffness of twisting, as a multiple of what the stiffness of bending gives", low=1e-3, high=1e3
+        1.0, "Stiffness of twisting, as a multiple of the value for the stiffness of bending", low=1e-3, high=1e3
     )
     stretch_stiffness: float = param(
         1.0,
-        "Stiffness of stretching, as a multiple of hair's; at 1 hair does not stretch, lower values are for cartoons",
+        "Stiffness of stretching, relative to real hair; at 1 hair does not stretch, lower values are for cartoons",
         low=1e-5,
         high=1.0,
         precision=5,
@@ -41,10 +41,12 @@ class DynamicsSettings(Settings):
         high=0.5,
         precision=4,
     )
-    weight: float = param(1.0, "Weight of the hair, as a multiple of its fibers'", low=0.1, high=10.0, soft_high=4.0)
+    weight: float = param(
+        1.0, "Weight of the hair, as a multiple of the weight of its fibers", low=0.1, high=10.0, soft_high=4.0
+    )
     wetness: float = param(
         0.0,
-        "Water in the hair: makes it heavier and softer, and lets it clump and feel less air",
+        "Water in the hair; higher values make hair heavier and softer, let it clump, and reduce air drag",
         low=0.0,
         high=1.0,
         subtype="FACTOR",
@@ -66,7 +68,7 @@ class DynamicsSettings(Settings):
     )
     fibre_radius: float = param(
         4e-5,
-        "Radius of a fiber in meters, whatever the units of the scene; thicker fibers are stiffer for their weight",
+        "Radius of a fiber in meters, independent of scene units; thicker fibers are stiffer for their weight",
         label="Fiber radius",
         low=1e-6,
         high=1e-2,
@@ -79,7 +81,7 @@ class DynamicsSettings(Settings):
     force_fields: float = param(1.0, "Multiple of the scene's force fields", low=-1e3, high=1e3, soft_high=10.0)
     inertia: float = param(
         1.0,
-        "Part of the surface's rigid motion that the hair feels; lower values calm hair on fast characters",
+        "Fraction of the surface's rigid motion that affects the hair; lower values calm hair on fast characters",
         low=0.0,
         high=1.0,
         subtype="FACTOR",
@@ -89,7 +91,7 @@ class DynamicsSettings(Settings):
     )
     hold_tip: float = param(
         1.0,
-        "Strength of the pull to the combed shape at the tip, as a part of that at the root",
+        "Strength of the pull to the combed shape at the tip, as a fraction of that at the root",
         label="Tip hold",
         low=0.0,
         high=1.0,
@@ -99,7 +101,7 @@ class DynamicsSettings(Settings):
         True, "Let the combed shape be at rest under gravity, so that it does not sag", label="Sag-Free"
     )
     pinned: float = param(
-        0.0, "Part of each guide, from the root, that only follows the surface", low=0.0, high=1.0, subtype="FACTOR"
+        0.0, "Fraction of each guide, from the root, that only follows the surface", low=0.0, high=1.0, subtype="FACTOR"
     )
     collides_with_surface: bool = param(
         True, "Keep the hair outside the surface it grows on", label="Collide with surface"
@@ -129,7 +131,7 @@ class DynamicsSettings(Settings):
     )
     cell_size: float = param(
         0.0,
-        "Size of the cells in which friction and pressure between strands are found; 0 is automatic",
+        "Size of the cells in which friction and pressure between strands are computed; 0 is automatic",
         low=0.0,
         high=1e3,
         soft_high=0.1,
@@ -139,16 +141,16 @@ class DynamicsSettings(Settings):
     )
     vertex_count: int = param(
         25,
-        "Number of points of a simulated guide; curls need about 12 a turn",
+        "Number of points of a simulated guide; curls need about 12 for each turn",
         label="Points per guide",
         low=4,
         high=65,
     )
-    automatic_substeps: bool = param(True, "Take more substeps in frames of fast motion")
-    substeps: int = param(4, "Least number of steps that a frame is simulated in", low=1, high=64)
+    automatic_substeps: bool = param(True, "Use more substeps in frames of fast motion")
+    substeps: int = param(4, "Minimum number of simulation steps for each frame", low=1, high=64)
     teleport_distance: float = param(
         1.0,
-        "Distance in meters that a root may move in a frame; farther jumps take the hair along as it is",
+        "Distance in meters that a root may move in a frame; with larger jumps the hair moves along unchanged",
         above=0.0,
         high=1e6,
         soft_high=10.0,
@@ -156,7 +158,7 @@ class DynamicsSettings(Settings):
     time_scale: float = param(1.0, "Multiple of the speed of time", low=0.0, high=100.0, soft_high=4.0)
     preroll: int = param(
         0,
-        "Number of frames that are simulated before the first one, with the surface still",
+        "Number of frames to simulate before the first one, with the surface at rest",
         low=0,
         high=10_000,
         soft_high=250,

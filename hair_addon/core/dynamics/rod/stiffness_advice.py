@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a guide bends under its weight: what its settings mean, before anything is simulated.
+"""Bending of a guide under its weight, as an illustration of its settings before a simulation.
 
-The shape of a level cantilever of length L depends on one number,
+The shape of a level cantilever of length L depends on a single number,
 
     Γ = ρ A g L³ / EI        EI = k E π r⁴ / 4,    A = π r²
 
-its weight in units of its stiffness. For small Γ its tip sinks by Γ L / 8, for large Γ it hangs from its root.
+its weight relative to its stiffness. For small Γ the tip sinks by Γ L / 8, for large Γ the guide hangs from its root.
 """
 
 import functools
@@ -16,12 +16,12 @@ import numpy as np
 from .material import LEAST_STIFFNESS, WET_SOFTNESS, WET_WEIGHT
 from .settings import DynamicsSettings
 
-_SEGMENT_COUNT = 32  # sinks within 0.2 % of the elastica up to Γ = 60
+_SEGMENT_COUNT = 32  # within 0.2 % of the elastica up to Γ = 60
 _MOST_STEPS = 50
 
 
 def weight_ratio(settings: DynamicsSettings, length: float, gravity: float) -> float:
-    """Γ of a guide of some length [m] in gravity [m/s²], with the stiffness of its root."""
+    """Return Γ of a guide with a length [m] in gravity [m/s²], with the stiffness of its root."""
     radius = settings.fibre_radius
     weight = settings.weight * (1.0 + WET_WEIGHT * settings.wetness) * settings.density * math.pi * radius**2 * gravity
     softness = 1.0 - WET_SOFTNESS * settings.wetness
@@ -30,20 +30,20 @@ def weight_ratio(settings: DynamicsSettings, length: float, gravity: float) -> f
 
 
 def bend_under_weight(settings: DynamicsSettings, length: float, gravity: float) -> float:
-    """How far [m] the tip of a straight guide sinks that is clamped level; length [m], gravity [m/s²]."""
+    """Return the sag [m] of the tip of a straight guide that is clamped horizontally; length [m], gravity [m/s²]."""
     return length * tip_sink(weight_ratio(settings, length, abs(gravity)), settings.tip_stiffness)
 
 
 @functools.lru_cache(maxsize=64)
 def tip_sink(ratio: float, tip_stiffness: float = 1.0) -> float:
-    """How far the tip of a level cantilever sinks, in its length; ratio: Γ; tip_stiffness: in that of the root.
+    """Return the sag of a level cantilever's tip relative to its length; ratio: Γ; tip_stiffness: relative to the root.
 
     Segments at angles θ below the horizontal minimize ½ ∫ EI θ'² − ∫ (weight beyond) sin θ. The energy is convex
-    from the horizontal to the vertical, so Newton's method finds the only minimum there.
+    between horizontal and vertical, so Newton's method finds the unique minimum.
     """
     count = _SEGMENT_COUNT
     joints = np.arange(count) / count
-    joints[0] = 0.25 / count  # it stands for the half segment from the clamp
+    joints[0] = 0.25 / count  # the center of the half segment from the clamp
     stiffness = count * np.maximum(1.0 + (tip_stiffness - 1.0) * joints, LEAST_STIFFNESS)
     stiffness[0] *= 2.0
     load = ratio * (1.0 - (np.arange(count) + 0.5) / count) / count
