@@ -205,7 +205,7 @@ def _curves(given, kind=None):
 def _grown_on(given):
     """Return the mesh object for hair; prints a warning about inverted normals."""
     surface = blender.data.arguments.surface_object(given)
-    warning = blender.data.orientation.warning(surface)
+    warning = blender.data.usable_surfaces.inside_out_warning(surface)
     if warning is not None:
         blender.host.notices.say(warning[0].format(**warning[1]))
     return surface

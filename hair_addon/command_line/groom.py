@@ -96,7 +96,7 @@ def _styled(given, settings, surface):
 
 def _grow(surface, settings, console):
     """Return (guides, hair) that grow on a mesh object."""
-    said = blender.data.orientation.warning(surface)
+    said = blender.data.usable_surfaces.inside_out_warning(surface)
     if said is not None:
         console.warn(said[0].format(**said[1]))
     depsgraph = blender.data.scene.present_depsgraph()

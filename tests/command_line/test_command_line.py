@@ -194,7 +194,7 @@ def test_info_shows_the_content_of_a_file(lit, tmp_path):
     assert (guides["strands"], guides["points"], guides["hair"]) == (60, 60 * 41, ["Hair"])
     assert (hair["strands"], hair["guides"], hair["surface"], hair["warnings"]) == (500, "Guides", "Sphere", [])
     assert settings_file.from_object(
-        {"format": settings_file.FORMAT, "version": 2, "guides": guides["settings"], "hair": hair["settings"]}, blend
+        {"format": settings_file.FORMAT, "version": 1, "guides": guides["settings"], "hair": hair["settings"]}, blend
     ).hair == HairSettings(strand_count=500, radius=0.004, influence_distance=0.03)
     assert hair["bytes"] > 500 * 41 * 16
     said = run_here("info", blend).out

@@ -2,9 +2,13 @@
 """Checks that a mesh object can have hair: it exists, is evaluated, is not in Edit Mode, and can be painted."""
 
 import bpy
+import numpy as np
 
 from ...core.errors import HairError
+from ...core.geometry import orientation
+from ..host.caches import Cache
 from ..host.notices import name_of
+from . import scene
 
 
 def is_deleted(surface_object):
@@ -36,3 +40,45 @@ def require_paintable(surface_object):
     if surface_object.data.library is not None:
         sentence = 'The mesh of "{name}" is linked from another file and cannot store a new mask: make the mesh local.'
         raise HairError(sentence, name=name_of(surface_object))
+
+
+inside_out_cache = Cache()  # session_uid of a mesh → whether it is inside out
+
+
+def is_inside_out(mesh_object):
+    """Whether the mesh of an object, before its modifiers, is closed and its normals point inward.
+
+    The object's scale does not matter: hair grows out of mirrored objects too. The mesh is read once after each edit.
+    """
+    mesh = mesh_object.data
+    return inside_out_cache.get(mesh.session_uid, lambda: _is_inside_out(mesh))
+
+
+def _is_inside_out(mesh):
+    if not orientation.is_closed(scene.corner_values(mesh, ".corner_edge"), len(mesh.edges)):
+        return False
+    return orientation.signed_volume(scene.vertex_positions(mesh), scene.faces_of(mesh)) < 0.0
+
+
+def inside_out_warning(mesh_object):
+    """(sentence, values) for scripts and commands if a mesh is inside out, else None."""
+    if not is_inside_out(mesh_object):
+        return None
+    return '"{name}" is inside out: hair grows inward. Flip the normals of its mesh.', {"name": name_of(mesh_object)}
+
+
+def forget_orientation(mesh):
+    """Forget the orientation of an edited mesh."""
+    inside_out_cache.invalidate(mesh.session_uid)
+
+
+def is_whole(mesh):
+    """Whether all corner and vertex indices of a mesh's faces are valid."""
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    starts, totals = (np.empty(len(mesh.polygons), np.int32) for _ in range(2))
+    mesh.polygons.foreach_get("loop_start", starts)
+    mesh.polygons.foreach_get("loop_total", totals)
+    ends = starts.astype(np.int64) + totals
+    is_whole = corners.min(initial=0) >= 0 and corners.max(initial=-1) < len(mesh.vertices)
+    return is_whole and min(starts.min(initial=0), totals.min(initial=0)) >= 0 and ends.max(initial=0) <= len(corners)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.types import Curves, Object
 
-from ..data import orientation, rest_nodes, rest_sources, usable_surfaces
+from ..data import rest_nodes, rest_sources, usable_surfaces
 from ..data.strands import curves_objects, delivered_hair, follow_nodes
 from ..host.notices import name_of, text_of
 from ..settings.translations import interface_text
@@ -85,7 +85,7 @@ def _of_surface(surface, parts):
         return
     if any(abs(component - 1.0) > 1e-4 for component in surface.scale):
         yield Warning(interface_text("The scale is not applied."), "vellus.apply_scale")
-    if orientation.is_inside_out(surface):
+    if usable_surfaces.is_inside_out(surface):
         yield Warning(interface_text("The mesh is inside out: hair grows inward."), "vellus.flip_normals")
     lost = rest_nodes.lost_copies(surface)
     if lost is not None:

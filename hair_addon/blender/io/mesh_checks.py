@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.errors import HairError
 from ...core.files import alembic_reader
-from ..data import whole_meshes
+from ..data import usable_surfaces
 
 # The keyword of an .obj line, and the number of values that must follow.
 _OBJ_WORDS = {"v": 3, "vn": 3, "vt": 1, "f": 3}
@@ -76,7 +76,7 @@ def require_usd(path):
 def require_imported(path):
     """Raise `HairError` where an importer has made a mesh whose faces name vertices or corners that it lacks."""
     for mesh in bpy.data.meshes:
-        if not whole_meshes.is_whole(mesh):
+        if not usable_surfaces.is_whole(mesh):
             raise HairError(f"{path} is damaged: the faces of its mesh {mesh.name} do not match its points.")
 
 

@@ -6,7 +6,7 @@ import contextlib
 import bpy
 from bpy.app.handlers import persistent
 
-from ..data import orientation, surface_space
+from ..data import surface_space, usable_surfaces
 from ..data.strands import curves_objects
 from ..groom import bindings, frame_faces, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
@@ -19,12 +19,10 @@ from ..settings import animated, style_items
 from . import (
     copied_faces,
     events,
-    every_frame,
     file_changes,
     invalidation,
     live_hair,
     moving_surfaces,
-    older_files,
     refused_hair,
     reported,
     simulated_hair,
@@ -94,7 +92,7 @@ def after_depsgraph_update(scene, depsgraph):
     combed = {}
     for datablock in changed:
         if isinstance(datablock, bpy.types.Mesh):
-            orientation.mesh_changed(datablock)
+            usable_surfaces.forget_orientation(datablock)
         if isinstance(datablock, bpy.types.Curves):
             events.curves_reported(datablock)
             if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):
@@ -316,7 +314,6 @@ def after_load(*_args):
     live_hair.cancel_writing()
     invalidation.clear()
     file_changes.take_as_it_is()
-    older_files.renew()
     stale_marks.follow_applied()
     file_changes.follow(bpy.data.scenes)
     _hide_drawn_hair()
@@ -332,7 +329,6 @@ def _hide_drawn_hair():
 
 def _take_over():
     """Draw the hair that Blender drew while the add-on was disabled."""
-    older_files.renew()
     file_changes.follow(bpy.data.scenes)
     _hide_drawn_hair()
     composite.follow_all()
@@ -360,7 +356,7 @@ def after_render(scene, *_args):
 @persistent
 def after_playing(*_args):
     """Restore the playback settings that Play from Start has changed, and let Blender deform hair again."""
-    every_frame.end()
+    simulated_hair.end()
     moving_surfaces.resume()
 
 
@@ -399,7 +395,7 @@ def unregister():
     for timer in (_take_over, *offers, composite.repair):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
-    every_frame.end()
+    simulated_hair.end()
     moving_surfaces.resume()
     live_hair.write_all()
     composite.suspend()

@@ -4,7 +4,7 @@
 `events` invalidates single caches. Pure functions under `functools.cache` never become stale.
 """
 
-from ..data import guide_map_readers, orientation, scene, subdivided_surfaces
+from ..data import guide_map_readers, scene, subdivided_surfaces, usable_surfaces
 from ..data.pictures import drawn_meshes
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
@@ -17,7 +17,7 @@ from ..render import hair_cache
 from ..render.frames import composite
 from ..render.viewport import region_pictures, viewport
 from ..settings import animated
-from . import dynamics_state, every_frame, moving_surfaces, refused_hair, reported, simulated_hair, unlocked_renders
+from . import dynamics_state, moving_surfaces, refused_hair, reported, simulated_hair, unlocked_renders
 
 # Copies of Blender's data, and values computed from them. Undo and redo replace the data.
 COPIES = (
@@ -30,7 +30,7 @@ COPIES = (
     world_texture.light_cache,
     lights.frame_cache,
     animated.value_cache,
-    orientation.inside_out_cache,
+    usable_surfaces.inside_out_cache,
     simulated_guides.point_cache,
     reported.guide_cache,
     reported.painting_cache,
@@ -57,7 +57,7 @@ OTHERS = (
     simulated_hair.played_cache,
     dynamics_state.state_cache,
     dynamics_state.change_cache,
-    every_frame.before_cache,
+    simulated_hair.before_cache,
     unlocked_renders.noted_cache,
     composite.refused_cache,
     refused_hair.noted_cache,

@@ -12,12 +12,31 @@ import bpy
 from ...core.errors import HairError
 from ..data.strands import curves, simulated_guides
 from ..groom import bindings, hair_outside, pipeline, reweighed_hair, size_fitting, staleness, writing
+from ..groom.foreign import kept_following
 from ..groom.styles import painted_masks
-from ..host import running, running_operators
+from ..host import running
 from ..host.notices import text_of
 from ..render import hair_cache
 from ..settings import style_items
-from . import events, kept_strands, stale_marks
+from . import events, stale_marks
+
+
+def follow(hair, depsgraph, local=None):
+    """Let kept hair follow its guides; returns whether the guides have changed. An error becomes its status.
+
+    local: (N, 3) current points of the guides, if they have been read already.
+    """
+    try:
+        is_other = kept_following.follow(hair, depsgraph, local)
+    except HairError as error:
+        bindings.kept_cache.invalidate(hair.session_uid)
+        hair.vellus.status = str(error)
+        hair.vellus.is_stale = False
+        return True
+    if is_other:
+        events.strands_made(hair)
+    return is_other
+
 
 # Seconds without a change after which an interaction is over, unless its operator still runs.
 _PAUSE = 0.3
@@ -32,7 +51,7 @@ def follow_guides(hair, depsgraph, local=None):
     local: (N, 3) current points of the guides, if they have been read already.
     """
     if curves.is_hand_made(hair):
-        kept_strands.follow(hair, depsgraph, local)
+        follow(hair, depsgraph, local)
         return
     bound = bindings.of(hair)
     if bound is None:
@@ -98,7 +117,7 @@ def make_again(hair, depsgraph):
     if curves.follows_library(hair) and simulated_guides.is_shown(hair.vellus.guide_curves):
         _follow_linked(hair, depsgraph)
         return
-    if curves.is_hand_made(hair) and kept_strands.follow(hair, depsgraph):
+    if curves.is_hand_made(hair) and follow(hair, depsgraph):
         return
     if not running.has_window():
         pipeline.evaluate(hair, depsgraph)
@@ -253,7 +272,7 @@ def write_after_pause():
 
 def is_stroke_running():
     """Whether a modal operator moves guides in any window."""
-    return running_operators.is_running(_STROKES)
+    return running.is_running(_STROKES)
 
 
 def follow_masks(surfaces, depsgraph):
@@ -283,3 +302,20 @@ def _is_painted(hair, surfaces):
 
 def _is_set_while_painting(hair):
     return hair.vellus.is_stale and hair.surface.mode in painted_masks.PAINT_MODES and not is_ahead(hair)
+
+
+def update_once(parts, view_layer):
+    """Update Curves as if Auto Update were on for a moment; parts with Auto Update stay as they are."""
+    waiting = [part for part in parts if not part.vellus.is_live]
+    try:
+        for part in waiting:
+            part.vellus.is_live = True
+            part.vellus.is_stale = part.vellus.is_stale and not curves.is_combed(part)
+            part.update_tag()
+            if part.surface is not None and part.surface.data is not None:
+                part.surface.data.update_tag()  # the mesh may have been edited meanwhile
+        view_layer.update()
+        write_all()
+    finally:
+        for part in waiting:
+            part.vellus.is_live = False

@@ -9,7 +9,7 @@ import time
 import bpy
 
 from ..groom import paused_hair
-from ..host import running, running_operators, scene_time
+from ..host import running, scene_time
 from ..host.caches import Cache
 from ..render import hair_cache
 
@@ -96,4 +96,4 @@ def _cancel():
 
 
 def _is_transforming():
-    return running_operators.is_running(_TRANSFORMS)
+    return running.is_running(_TRANSFORMS)

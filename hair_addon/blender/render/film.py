@@ -5,7 +5,7 @@ import gpu
 import numpy as np
 
 from ...core.imaging import pixel_sampling
-from ..gpu import drawing, render_programs, surface_programs
+from ..gpu import drawing, picture_programs, surface_programs
 from ..gpu.visibility_buffer import VisibilityBuffer
 from . import motion_vectors, scene_drawing
 
@@ -58,7 +58,7 @@ class Film:
         self.clear()
 
     def _texture(self):
-        return gpu.types.GPUTexture(self.size, format=render_programs.FILM_FORMAT)
+        return gpu.types.GPUTexture(self.size, format=picture_programs.FILM_FORMAT)
 
     def clear(self):
         """Clear the sums, for another tile or motion sample."""
@@ -88,9 +88,9 @@ class Film:
         weighting = _weights_texture(weights)
         for name, texture in self._sums.items():
             samplers = {"picture": self._picture(name, drawn, view), "filter_weights": weighting}
-            self._add(render_programs.film_program(), samplers, texture)
+            self._add(picture_programs.film_program(), samplers, texture)
         if self._depth is not None:
-            program = render_programs.film_depth_program()
+            program = picture_programs.film_depth_program()
             program.bind()
             program.uniform_float("view_to_clip", view_to_clip[2:, 2:].ravel())
             samplers = {"segments": self.samples.segments, "depths": self.samples.nearest_depths()}
@@ -131,7 +131,7 @@ class Film:
 
     def show(self, picture=None):
         """Draw the mean of the samples, or another picture of this size, over the bound viewport."""
-        program = render_programs.film_view_program()
+        program = picture_programs.film_view_program()
         x, y, _width, _height = gpu.state.viewport_get()
         with (
             drawing.bound(program, {}, {"sums": picture or self._sums["Combined"]}),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..gpu import drawing, render_programs, uniforms
+from ..gpu import drawing, picture_programs, uniforms
 
 
 @dataclass(frozen=True)
@@ -101,14 +101,14 @@ def draw(drawn, motion, view, buffer, has_surfaces=True):
     has_surfaces: whether to include motion vectors of surfaces.
     """
     surfaces = zip(drawn.surfaces, _unique(drawn.surface_owners), strict=True) if has_surfaces else ()
-    with buffer.surfaces_of_part(render_programs.MOTION_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+    with buffer.surfaces_of_part(picture_programs.MOTION_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for (surface, _parts), owner in surfaces:
             record, samplers = motion.surface(owner)
             blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "motion": uniforms.uniform_buffer(record)}
-            with drawing.bound(render_programs.surface_motion_program(), blocks, samplers):
-                surface.corners.triangles.draw(render_programs.surface_motion_program())
+            with drawing.bound(picture_programs.surface_motion_program(), blocks, samplers):
+                surface.corners.triangles.draw(picture_programs.surface_motion_program())
     inputs = [({"motion": record}, samplers) for record, samplers in map(motion.hair, _unique(drawn.owners))]
-    return buffer.part_by(render_programs.strand_motion_program(), render_programs.MOTION_FORMAT, inputs)
+    return buffer.part_by(picture_programs.strand_motion_program(), picture_programs.MOTION_FORMAT, inputs)
 
 
 def places(drawn, world_to_view, view_to_clip):

@@ -12,7 +12,7 @@ from ...core.imaging import pixel_sampling
 from ...core.imaging.pixel_sampling import MOST_DRAWN
 from ...core.long_work import Stage, run_now
 from ..data import scene
-from ..data.pictures import camera_lens, panoramic_camera
+from ..data.pictures import cameras
 from ..gpu import drawing, world_texture
 from ..groom.dynamics import frame_folders
 from ..host import scene_time
@@ -38,7 +38,7 @@ def drawing_picture(settings, drawn=None, lens_passes=None):
     start_gpu()
     context = bpy.context
     depsgraph = scene.present_depsgraph()
-    lens = camera_lens.read_lens(context.scene, depsgraph)
+    lens = cameras.read_lens(context.scene, depsgraph)
     per_side, pass_count = settings.samples_per_side, 1
     if lens is not None:  # one pass per point on the lens
         sample_count = per_side**2
@@ -53,7 +53,7 @@ def drawing_picture(settings, drawn=None, lens_passes=None):
         frame_folders.require_readable([scene_time.frame_of(context.scene)], context.scene)
     yield Stage("Drawing shadows", 0.0)
     world_texture.check_image()
-    if context.scene.camera is not None and panoramic_camera.is_panoramic(context.scene.camera):
+    if context.scene.camera is not None and cameras.is_panoramic(context.scene.camera):
         raise HairError("Pictures are drawn by perspective and orthographic cameras: render a frame instead.")
     camera = scene.read_camera(context.scene, depsgraph, width, height)
     if drawn is None:

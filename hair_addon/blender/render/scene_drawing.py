@@ -5,7 +5,7 @@ from ..gpu import (
     ambient_visibility,
     drawing,
     level_of_detail,
-    render_programs,
+    picture_programs,
     surface_programs,
     surface_shading,
     surface_textures,
@@ -122,7 +122,7 @@ def draw_arrival(drawn, view, buffer):
     """Return a texture of light visibility for the content of a `VisibilityBuffer`, after its hair was added."""
     with buffer.surfaces_of_part(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         _draw_by_lights(drawn, view, "light/surface_irradiance.frag", are_holdouts_left_out=True)
-    return buffer.part_by(render_programs.strand_arrival_program())
+    return buffer.part_by(picture_programs.strand_arrival_program())
 
 
 def draw_hair_shadow(drawn, view, buffer):

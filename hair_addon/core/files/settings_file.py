@@ -3,7 +3,6 @@
 
 Its keys are the fields of the `Settings` classes; styles are a list in the order of application. Omitted settings have
 their defaults, or are computed from the surface; unknown keys are errors, because they would have no effect.
-Version 1 was a single look, the format of saved looks; version 2 had no styles.
 """
 
 import json
@@ -25,7 +24,7 @@ from .whole_file import whole_file
 S = TypeVar("S", bound=Settings)
 
 FORMAT = "Vellus groom settings"
-VERSION = 3
+VERSION = 1
 
 _LARGEST_FILE = 1_048_576  # bytes; all settings take some 2,000
 
@@ -142,7 +141,7 @@ def read_partial(path: str | Path) -> PartialSettings:
 
 def partial_of_object(found: dict[str, Any], path: str | Path) -> PartialSettings:
     """Convert the result of `read_object` to `PartialSettings`. Raises `HairError`, which names the file."""
-    sections = _migrated(found, path)
+    sections = _sections(found, path)
     styles, names = None, ()
     if "styles" in sections:
         styles, names = _styles(sections.pop("styles"), path)
@@ -220,34 +219,17 @@ def _kind(default):
 # Versions.
 
 
-def _migrated(found, path):
-    """Return the sections of a file of any version up to the present one."""
+def _sections(found, path):
+    """Return the sections of a file of this version. Raises `HairError`."""
     version = found.get("version")
-    is_ours = found.get("format") == FORMAT or version == 1
-    if not is_ours or type(version) is not int or version < 1:
+    if found.get("format") != FORMAT or type(version) is not int or version < 1:
         raise HairError("{path} is not a groom settings file.", path=path)
     if version > VERSION:
         sentence = (
             "{path} was saved by a newer Vellus: its version is {version}, and this Vellus reads up to version {known}."
         )
         raise HairError(sentence, path=path, version=version, known=VERSION)
-    while version < VERSION:
-        found = _MIGRATIONS[version](found)
-        version += 1
     return {name: value for name, value in found.items() if name not in ("format", "version")}
-
-
-def _sections_of_look(found):
-    """Migrate version 1, a look, whose appearance settings are at the top level."""
-    return {"appearance": {name: value for name, value in found.items() if name != "version"}}
-
-
-def _without_styles(found):
-    """Migrate version 2, which has no styles."""
-    return found | {"styles": []}
-
-
-_MIGRATIONS = {1: _sections_of_look, 2: _without_styles}  # version → its migration to the next
 
 
 # JSON.

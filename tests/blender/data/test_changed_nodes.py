@@ -5,7 +5,6 @@ import bpy
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.data.strands import follow_nodes
 from hair_addon.blender.live import invalidation
 from tests.support.dynamics.following import assert_follows, grow, update
 from tests.support.reading import points
@@ -65,7 +64,7 @@ def other_group(_hair):
 def shader_group(_hair):
     bpy.data.node_groups.remove(group())
     other = bpy.data.node_groups.new("Vellus Follow Surface", "ShaderNodeTree")
-    other["vellus_version"] = 2
+    other["vellus_version"] = 1
 
 
 WAYS = [rename_inputs, rename_group, remove_input, retype_input, add_inputs, empty_group, empty_modifier]
@@ -110,42 +109,3 @@ def test_a_surface_that_is_not_a_mesh_is_reported(lit, capfd):
     assert len(api.points(lit)) == 500
     said = capfd.readouterr()
     assert "Traceback" not in said.err + said.out
-
-
-def make_third(group):
-    """Take what version 3 did not have out of a group."""
-    nodes = group.nodes
-    output = next(node for node in nodes if node.type == "GROUP_OUTPUT")
-    carried = next(link.from_node for link in group.links if link.to_node == output)
-    before = carried.inputs["False"].links[0].from_socket
-    paused = carried.inputs["Switch"].links[0].from_node
-    in_viewport = next(node for node in nodes if node.bl_idname == "GeometryNodeIsViewport")
-    for node in (carried, paused, in_viewport):
-        nodes.remove(node)
-    group.links.new(before, output.inputs[0])
-    floats = next(n for n in nodes if "Name" in n.inputs and n.inputs["Name"].default_value == "root_distance")
-    start = next(link.to_node for link in group.links if link.from_node == floats)
-    nearest, used = start.inputs["True"].links[0].from_socket, start.outputs[0].links[0].to_socket
-    group.links.new(nearest, used)
-    slide = next(n for n in nodes if "Name" in n.inputs and n.inputs["Name"].default_value == "root_slide")
-    slid = next(link.to_node for link in group.links if link.from_node == slide)
-    group.links.new(slid.inputs[0].links[0].from_socket, slid.outputs[0].links[0].to_socket)
-    for node in (floats, start, slide, slid):
-        nodes.remove(node)
-    group.interface.remove(group.interface.items_tree["Paused"])
-    group["vellus_version"] = 3
-
-
-@pytest.mark.parametrize("is_changed", [False, True])
-def test_nodes_of_the_version_before_are_replaced_unless_an_artist_changed_them(hair, is_changed):
-    make_third(group())
-    if is_changed:
-        group().nodes.new("GeometryNodeSetPosition")
-    update()
-    assert not follow_nodes.pause(hair, True)
-    hair.data.vellus.hair.strand_count = 300
-    update()
-    assert follow_nodes.pause(hair, False) != is_changed
-    assert hair.data.vellus.status == "" and len(points(hair)) == 300
-    deform()
-    assert_follows(hair)

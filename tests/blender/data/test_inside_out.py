@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.data import orientation, scene
+from hair_addon.blender.data import scene, usable_surfaces
 from hair_addon.blender.host import notices
 from hair_addon.core.geometry import orientation as sides
 from tests.support.commands import TETRAHEDRON, run_here, write_obj
@@ -51,11 +51,11 @@ def test_only_closed_meshes_with_normals_inward_are_inside_out(blender_scene, ki
     made = MESHES[kind]()
     made.scale = scale
     bpy.context.view_layer.update()
-    assert not orientation.is_inside_out(made)
+    assert not usable_surfaces.is_inside_out(made)
     made.data.flip_normals()
     made.data.update()
     bpy.context.view_layer.update()
-    assert orientation.is_inside_out(made) == is_mesh_closed(made.data)
+    assert usable_surfaces.is_inside_out(made) == is_mesh_closed(made.data)
 
 
 def test_the_volume_is_that_of_the_mesh(blender_scene):
@@ -80,7 +80,7 @@ def test_flipping_lets_hair_grow_outward(blender_scene):
     assert np.linalg.norm(points(owner)[:, -1], axis=1).max() < 0.9
     bpy.context.view_layer.objects.active = owner
     bpy.ops.vellus.flip_normals()
-    assert not orientation.is_inside_out(ball)
+    assert not usable_surfaces.is_inside_out(ball)
     assert np.linalg.norm(points(owner)[:, -1], axis=1).min() > 1.1
     roots = np.linalg.norm(points(owner)[:, 0], axis=1)
     assert 0.95 < roots.min() and roots.max() < 1.001

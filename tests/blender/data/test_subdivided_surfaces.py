@@ -7,8 +7,6 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.data.strands import follow_nodes
-from hair_addon.blender.live import older_files
 from hair_addon.core.geometry import closest_point
 from hair_addon.core.geometry.mesh import positions
 from tests.support import render_probe
@@ -98,42 +96,6 @@ def test_a_finer_subdivision_turns_no_strands_either(cube):
     after = evaluated_points(hair)
     assert np.abs(after[:, 0] - before[:, 0]).max() > 1e-4  # another mesh
     assert turns(before, after).max() < np.radians(8.0)
-
-
-def make_older(curves_object):
-    """Let an object's strands follow by the nodes of the version before, without a smooth surface."""
-    modifier = follow_nodes.modifier_of(curves_object)
-    modifier.node_group = modifier.node_group.copy()
-    modifier.node_group["vellus_version"] = 2
-    modifier.properties.inputs.Socket_4.value = 0
-    update()
-
-
-def test_guides_of_older_files_stay_where_they_were_seen(cube):
-    grown = grow_straight(cube)
-    for curves_object in grown:
-        make_older(curves_object)
-    seen = [evaluated_points(curves_object) for curves_object in grown]
-    assert turns(points(grown[1]), seen[1]).max() > np.radians(20.0)
-    older_files.renew()
-    update()
-    assert not any(map(follow_nodes.is_older, grown))
-    # The hair between guides is computed again, whose neighbours turn apart no more.
-    np.testing.assert_allclose(evaluated_points(grown[0]), seen[0], atol=1e-5)
-    assert_follows(*grown)
-
-
-def test_opening_an_older_file_renews_it(cube, tmp_path):
-    grown = grow_straight(cube)
-    for curves_object in grown:
-        make_older(curves_object)
-    seen = evaluated_points(grown[0])
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"), compress=False)
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
-    opened = [bpy.data.objects[name] for name in ("Guides", "Hair")]
-    np.testing.assert_allclose(evaluated_points(opened[0]), seen, atol=1e-5)
-    assert not any(map(follow_nodes.is_older, opened))
-    assert_follows(*opened)
 
 
 def test_smooth_positions_are_computed_once(cube, monkeypatch):

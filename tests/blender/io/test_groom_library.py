@@ -165,7 +165,7 @@ def without_settings(asset):
 
 
 def other_settings(asset):
-    asset["vellus_groom"] = '{"format": "Vellus groom settings", "version": 3, "hair": {"radius": "thick"}}'
+    asset["vellus_groom"] = '{"format": "Vellus groom settings", "version": 1, "hair": {"radius": "thick"}}'
 
 
 @pytest.mark.parametrize("change", [not_finite, without_faces, without_settings, other_settings])

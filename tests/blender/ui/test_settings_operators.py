@@ -91,7 +91,7 @@ def test_one_undo_reverts_the_settings(hair, path):
         ("{", "invalid JSON"),
         ('{"format": "Vellus groom settings", "version": 99}', "newer Vellus"),
         (
-            '{"format": "Vellus groom settings", "version": 2, "hair": {"radius": -1}}',
+            '{"format": "Vellus groom settings", "version": 1, "hair": {"radius": -1}}',
             'value for "hair.radius"',
         ),
     ],

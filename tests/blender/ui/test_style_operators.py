@@ -231,7 +231,7 @@ def test_an_invalid_saved_preset_changes_nothing(styled, tmp_path, monkeypatch):
     monkeypatch.setattr(saved_styles.FILES, "folder", lambda create: tmp_path)
     before = groom_settings.settings_of(styled.data)
     (tmp_path / "bad.json").write_text(
-        '{"format": "Vellus groom settings", "version": 3, "styles": [{"kind": "PERM"}]}'
+        '{"format": "Vellus groom settings", "version": 1, "styles": [{"kind": "PERM"}]}'
     )
     with pytest.raises(RuntimeError, match=r"styles\[0\].kind"):
         bpy.ops.vellus.apply_saved_style(name="bad")

@@ -6,8 +6,6 @@ add-on. Nodes locate a root by its stored vertices, without a UV map. On a surfa
 as a finer subdivision for renders, strands begin at the nearest point of the surface at rest.
 """
 
-from collections import Counter
-
 import bpy
 
 from ....core import geometry
@@ -15,17 +13,8 @@ from ...host.notices import name_of
 from . import stored_roots
 
 _NAME = "Vellus Follow Surface"
-# Version of the nodes below. Groups of other versions, from older files, are not changed: on surfaces without
-# subdivision their result is the same. Hair switches to a new group if strands would rotate with the faces of a cage,
-# as in groups before `_SMOOTH_SINCE`, and if a group lacks nothing but the `_ADDED` nodes.
-_VERSION = 6
-_SMOOTH_SINCE = 3
-# Nodes that versions added: a group that lacks only these is replaced by a new one.
-_ADDED = {
-    4: ("GeometryNodeIsViewport", "FunctionNodeBooleanMath", "GeometryNodeSwitch"),
-    5: ("GeometryNodeInputNamedAttribute", "GeometryNodeSwitch"),
-    6: ("GeometryNodeInputNamedAttribute", "ShaderNodeVectorMath"),
-}
+# Version of the nodes below. New hair does not use groups of other versions.
+_VERSION = 1
 # Inputs of the group: identifiers, which stay when an artist renames inputs, and types.
 _INPUTS = {
     "Surface": ("Socket_1", "NodeSocketObject"),
@@ -61,22 +50,10 @@ def set_smoothness(curves_object, cage_corners):
 def _set(curves_object, inputs):
     for modifier in curves_object.modifiers:
         if modifier.type == "NODES" and _is_ours(modifier.node_group):
-            group = modifier.node_group
-            if (inputs["Cage Corners"] and _is_before(group, _SMOOTH_SINCE)) or _lacks_only_new(group):
-                modifier.node_group = _group()
             for name in inputs.keys() & set(_intact_inputs(modifier.node_group)):
                 socket = getattr(modifier.properties.inputs, _INPUTS[name][0])
                 if socket.value != inputs[name]:
                     socket.value = inputs[name]
-
-
-def _lacks_only_new(group):
-    """Whether a group is unchanged since an earlier version created it; groups that an artist has edited stay."""
-    if not _is_before(group, _VERSION) or _is_before(group, _SMOOTH_SINCE):
-        return False
-    added = Counter(kind for since, kinds in _ADDED.items() if group["vellus_version"] < since for kind in kinds)
-    kinds = Counter(node.bl_idname for node in group.nodes)
-    return kinds + added == Counter(node.bl_idname for node in _group().nodes)
 
 
 def is_paused(curves_object):
@@ -99,7 +76,7 @@ def _paused_input(modifier):
 
 
 def _pausable_modifiers(curves_object):
-    """Our modifiers whose nodes can be paused: older groups, and groups that an artist edited, may lack the input."""
+    """Our modifiers whose nodes can be paused: groups that an artist edited may lack the input."""
     found = (m for m in curves_object.modifiers if m.type == "NODES" and _is_ours(m.node_group))
     return [modifier for modifier in found if "Paused" in _intact_inputs(modifier.node_group)]
 
@@ -108,17 +85,6 @@ def modifier_of(curves_object):
     """The modifier that deforms an object's strands with their surface; None if an artist has removed it."""
     found = (m for m in curves_object.modifiers if m.type == "NODES" and _is_ours(m.node_group))
     return next(found, None)
-
-
-def is_older(curves_object):
-    """Whether an object's strands rotate with the flat faces of a cage, as in files of older versions."""
-    modifier = modifier_of(curves_object)
-    return modifier is not None and _is_before(modifier.node_group, _SMOOTH_SINCE)
-
-
-def _is_before(group, version):
-    found = group["vellus_version"]
-    return not isinstance(found, int) or found < version  # a damaged file may contain any type
 
 
 def modifiers_of_artist(curves_object):

@@ -13,7 +13,7 @@ from ....core.imaging.pixel_sampling import RenderSettings
 from ...data import whole_changes
 from ...data.pictures import composite_nodes
 from ...data.strands import curves_objects
-from ...host import running_operators
+from ...host import running
 from ...host.caches import Cache
 from ...settings import setting_properties
 from ..viewport import viewport
@@ -183,8 +183,8 @@ def is_in_sequence(blender_scene):
     """
     if not _is_of_another(blender_scene):
         return False
-    running = running_operators.found()
-    is_animation = any(one.bl_idname == "RENDER_OT_render" and one.properties.animation for one in running)
+    renders = (one for one in running.found() if one.bl_idname == "RENDER_OT_render")
+    is_animation = any(one.properties.animation for one in renders)
     return is_animation or bpy.app.background
 
 

@@ -10,7 +10,7 @@ from ....core.errors import HairError, memory_as_sentence
 from ....core.imaging import pixel_sampling
 from ....core.long_work import Stopped, no_progress, part_of
 from ...data import scene
-from ...data.pictures import camera_lens, panoramic_camera, rendered_files, view_cameras
+from ...data.pictures import cameras, rendered_files
 from ...gpu import drawing, world_texture
 from ...groom.dynamics import frame_folders
 from ...host import scene_time
@@ -104,7 +104,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         sample_count = view_layer.samples or blender_scene.vellus.sample_count
         passes = _passes(view_layer, blender_scene.render.use_motion_blur)
         film_settings = passes, blender_scene.render.film_transparent, blender_scene.render.filter_size
-        has_lens = camera_lens.read_lens(blender_scene, depsgraph, self.camera_override) is not None
+        has_lens = cameras.read_lens(blender_scene, depsgraph, self.camera_override) is not None
         lens_passes = -(-pixel_sampling.LENS_PASSES // len(offsets)) if has_lens else 1
         path_count = -(-light_paths.path_count(blender_scene, size) // len(offsets))
         film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count
@@ -125,7 +125,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             for number, (view, frame) in enumerate(frames.items()):
                 with drawing.ALONE:
                     camera = self._camera(depsgraph, view, size)
-                    lens = camera_lens.read_lens(blender_scene, depsgraph, self._camera_object(depsgraph, view))
+                    lens = cameras.read_lens(blender_scene, depsgraph, self._camera_object(depsgraph, view))
                     moving = None
                     if others:
                         now, around = motion_vectors.places(drawn, *camera), others[view]
@@ -163,14 +163,14 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         if view:
             self.active_view_set(view)
         camera = self.camera_override or depsgraph.scene.camera
-        return camera and view_cameras.camera_of_view(depsgraph.scene, camera.original, view).evaluated_get(depsgraph)
+        return camera and cameras.camera_of_view(depsgraph.scene, camera.original, view).evaluated_get(depsgraph)
 
     def _frame(self, depsgraph, view, size, window, settings):
         """The `Frame` or `PanoramicFrame` of a view. Raises `HairError`."""
         self._camera(depsgraph, view, size)  # raises an error if there is none
         camera = self._camera_object(depsgraph, view)
         shift = self.camera_shift_x(camera) if view and camera.type == "CAMERA" else None
-        panorama = panoramic_camera.read_panorama(depsgraph.scene, camera, size, shift)
+        panorama = cameras.read_panorama(depsgraph.scene, camera, size, shift)
         if panorama is None:
             return Frame(size, window, *settings)
         if self.use_spherical_stereo(camera):

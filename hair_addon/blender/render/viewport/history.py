@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
-from ...gpu import drawing, history_programs, strand_textures, uniforms
+from ...gpu import drawing, picture_programs, strand_textures, uniforms
 from .. import motion_vectors
 
 _COLOR, _PASSES = "RGBA16F", "R16F"
@@ -113,7 +113,7 @@ class History:
     def _allocate(self):
         formats = (_COLOR, _PASSES)
         self._shown, self._before, self._carried = (_Targets(self.size, formats, True) for _ in range(3))
-        blocks = tuple(-(-length // history_programs.BLOCK_SIDE) for length in self.size)
+        blocks = tuple(-(-length // picture_programs.BLOCK_SIDE) for length in self.size)
         self._blocks = [_Targets(blocks, (_COLOR, _COLOR), True) for _ in range(2)]
         self._block_batch = strand_textures.bare_vertices(6 * blocks[0] * blocks[1], "TRIS")
 
@@ -126,10 +126,10 @@ class History:
         self._is_relit = self._seen is not None and self._seen.is_still(_seen(drawn, camera))
         if not self._is_relit:
             return
-        size = tuple(-(-length // history_programs.BLOCK_SIDE) for length in buffer.size)
+        size = tuple(-(-length // picture_programs.BLOCK_SIDE) for length in buffer.size)
         if self._relit is None or self._relit[0].size != size:
             self._relit = [_Targets(size, (_COLOR, _COLOR), True) for _ in range(2)]
-        program = history_programs.blocks_program()
+        program = picture_programs.blocks_program()
         self._relit[0].fill(program, {"picture": buffer.color}, weight=1.0)
         self._relit[1].fill(program, {"picture": relight()}, weight=1.0)
 
@@ -171,7 +171,7 @@ class History:
         if has_hair or has_surfaces:
             steps = motion_vectors.Motion(before.places, now.places, now.places, self.size)
             motion = motion_vectors.draw(drawn, steps, view, buffer, has_surfaces)
-        program = history_programs.blocks_program()
+        program = picture_programs.blocks_program()
         for blocks, of in zip(self._blocks, ((self._before.textures[0], 1.0), light), strict=True):
             blocks.fill(program, {"picture": of[0]}, weight=of[1])
         (before_blocks, now_blocks), (picture, passes) = self._blocks, self._before.textures
@@ -188,13 +188,13 @@ class History:
             "depths": buffer.nearest_depths(),
             "segments": buffer.segments,
         }
-        self._carried.draw(self._block_batch, history_programs.carry_program(), samplers, {"history": record})
+        self._carried.draw(self._block_batch, picture_programs.carry_program(), samplers, {"history": record})
 
     def _mix(self, light, pass_count, part_left):
         sums, weight = light
         carried, passes = self._carried.textures
         samplers = {"sums": sums, "carried": carried, "carried_passes": passes}
-        program = history_programs.mix_program()
+        program = picture_programs.mix_program()
         self._shown.fill(program, samplers, weight=weight, pass_count=float(pass_count), part_left=part_left)
 
 

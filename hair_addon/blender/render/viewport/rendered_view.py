@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Viewports with Rendered shading: surfaces and hair, refined pass by pass while nothing moves."""
 
-from ...data.pictures import camera_lens
+from ...data.pictures import cameras
 from ...gpu import drawing
 from . import hair_picture, region_pictures, viewport
 from .view_film import ViewFilm
@@ -30,4 +30,4 @@ def _lens(context):
     if region_view.view_perspective != "CAMERA":
         return None
     camera = space.camera if space.use_local_camera else context.scene.camera
-    return camera_lens.read_lens(context.scene, context.evaluated_depsgraph_get(), camera)
+    return cameras.read_lens(context.scene, context.evaluated_depsgraph_get(), camera)

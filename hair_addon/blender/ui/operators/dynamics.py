@@ -15,7 +15,7 @@ from ...groom.selection import guides_of
 from ...groom.transfer import groom_settings
 from ...host import memory, scene_time
 from ...io import delivery
-from ...live import every_frame
+from ...live import simulated_hair
 from ...settings import properties
 from ...settings.translations import report_text
 from .base.hair_operator import HairOperator, needs_guides
@@ -41,7 +41,7 @@ class VELLUS_OT_play_dynamics(HairOperator, bpy.types.Operator):
         if context.screen.is_animation_playing:
             bpy.ops.screen.animation_cancel(restore_frame=False)
         scene_time.go_to(context.scene, start)
-        is_changed = every_frame.begin(context.scene)
+        is_changed = simulated_hair.begin(context.scene)
         bpy.ops.screen.animation_play()
         if is_changed:
             return "Every frame is played until playing stops: the simulation needs each of them", {}

@@ -22,7 +22,7 @@ from ...groom.selection import (
     reveal,
     surface_of,
 )
-from ...live.update_once import update_once
+from ...live.live_hair import update_once
 from ...render.viewport import viewport
 from ...settings import fitted_sizes, setting_properties
 from ...settings.translations import CONTEXT

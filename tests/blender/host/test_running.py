@@ -3,7 +3,7 @@
 
 from types import SimpleNamespace
 
-from hair_addon.blender.host import running_operators
+from hair_addon.blender.host import running
 
 
 def managers(*operators):
@@ -14,7 +14,7 @@ def managers(*operators):
 def test_handlers_without_an_operator_are_passed_over():
     """As Blender lists them after the type of a running operator was removed."""
     stroke = SimpleNamespace(bl_idname="SCULPT_CURVES_OT_brush_stroke")
-    assert running_operators.is_running("SCULPT_", managers(None, stroke))
-    assert not running_operators.is_running("TRANSFORM_", managers(None, stroke))
-    assert not running_operators.is_running("SCULPT_", managers(None))
-    assert not running_operators.is_running("SCULPT_")
+    assert running.is_running("SCULPT_", managers(None, stroke))
+    assert not running.is_running("TRANSFORM_", managers(None, stroke))
+    assert not running.is_running("SCULPT_", managers(None))
+    assert not running.is_running("SCULPT_")
