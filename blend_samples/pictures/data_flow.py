@@ -13,7 +13,7 @@ ADDON = ROOT / "hair_addon"
 
 # Box → (column, row, title, files of hair_addon, or of shaders/).
 BOXES = {
-    "surface": (0, 0, "Surface: mesh at rest and posed", ["blender/data/surfaces.py", "core/geometry/mesh.py"]),
+    "surface": (0, 0, "Surface: rest and pose", ["blender/data/surfaces.py", "core/geometry/mesh.py"]),
     "placement": (
         1,
         0,
@@ -43,7 +43,7 @@ BOXES = {
     ),
     "picture": (0, 2, "Viewport, render, file", ["blender/render/frames/engine.py", "blender/render/offscreen.py"]),
     "tables": (1, 3, "Lookup tables  (Eq. 14-17)", ["core/shading/tables/lookup_tables.py", "core/files/table_exr.py"]),
-    "paths": (2, 3, "Light Grid: paths among strands", ["core/shading/light_paths/grid_walk.py"]),
+    "paths": (2, 3, "Light Grid: light paths", ["core/shading/light_paths/grid_walk.py"]),
 }
 ARROWS = [
     ("surface", "placement"),
