@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..groom.dynamics import frame_folders
-from ..host import running, running_operators, scene_time
+from ..host import running, scene_time
 from ..render.frames import composite
 from ..settings.translations import error_text
 from . import refused_hair
@@ -42,5 +42,5 @@ def _is_by_command():
 
 def _is_animation():
     """Whether a window renders an animation: a still picture may be of a frame that is not baked."""
-    rendering = (one for one in running_operators.found() if one.bl_idname == "RENDER_OT_render")
+    rendering = (one for one in running.found() if one.bl_idname == "RENDER_OT_render")
     return running.has_window() and any(one.properties.animation for one in rendering)

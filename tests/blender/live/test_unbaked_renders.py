@@ -64,7 +64,7 @@ def test_what_is_refused_elsewhere_or_is_more_than_a_render_goes_on(scene, monke
 def test_a_window_says_so_after_an_animation(scene, monkeypatch, capsys, is_animation):
     rendering = SimpleNamespace(bl_idname="RENDER_OT_render", properties=SimpleNamespace(animation=is_animation))
     monkeypatch.setattr(unbaked_renders.running, "has_window", lambda: True)
-    monkeypatch.setattr(unbaked_renders.running_operators, "found", lambda: [rendering])
+    monkeypatch.setattr(unbaked_renders.running, "found", lambda: [rendering])
     handlers.before_rendering(scene)
     for _frame in range(2):
         handlers.before_rendered_frame(scene)
