@@ -177,7 +177,7 @@ def test_other_settings_take_effect_with_the_next_frame(rng):
     for _ in range(48):
         simulation.advance(pose, World(), FRAME)
     np.testing.assert_allclose(simulation.points(), groom, atol=1e-3)
-    with pytest.raises(HairError, match="Another number of points"):
+    with pytest.raises(HairError, match="change of the number of points"):
         simulation.change(DynamicsSettings(vertex_count=9))
 
 
