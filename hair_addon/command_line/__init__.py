@@ -36,9 +36,9 @@ def main(arguments, program):
     console.occupy_closed_streams()
     try:
         given = parser(program).parse_args(arguments)
-    except SystemExit as end:  # argparse ends by itself: 0 after --help, 2 for what it does not understand
+    except SystemExit as end:  # argparse exits by itself: 0 after --help, 2 for invalid arguments
         return end.code
-    except OSError:  # the help could not be written
+    except OSError:  # writing the help failed
         console.discard(sys.stdout)
         return 1
     with console.own_streams(given.verbose) as (out, errors), interruption.Interruption() as interrupted:
@@ -74,9 +74,9 @@ def run(given, said):
     except MemoryError:
         said.fail("Not enough memory: use fewer strands or points, or a smaller picture.")
         return 1
-    except BrokenPipeError:  # the reader is gone
+    except BrokenPipeError:  # the reader has closed the pipe
         return 1
-    except OSError as error:  # of a path that passed the checks: too long, or removed meanwhile
+    except OSError as error:  # a path that passed the checks may be too long, or removed in the meantime
         said.fail(f"{error.filename}: {error.strerror}." if error.filename else f"{error.strerror or error}.")
         return 1
     said.fail("stopped: unfinished results were not written.")

@@ -25,7 +25,7 @@ def add(verbs):
 
 
 def run(given, console):
-    """Open, make, write."""
+    """Open the file, make the cards and write them."""
     settings = options.changed(CardSettings(), given, declared(CardSettings))
     mesh_output.make(given, console, lambda hair: _cards(given, console, hair, settings))
 

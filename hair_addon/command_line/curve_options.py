@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options of commands that take curves from a file: which of them, in which unit, and which axis points up."""
+"""Options of commands that read curves from a file: selection, unit and up axis."""
 
 from ..core import lazy
 from ..core.errors import HairError
@@ -9,7 +9,7 @@ blender = lazy.Package("..blender", __package__)
 
 
 def add_axis(parser):
-    """Add the option of what points up, in the mesh and in curves."""
+    """Add the option for the up axis of the mesh and of curves."""
     parser.add_argument(
         "--up",
         choices=("X", "Y", "Z"),
@@ -18,7 +18,7 @@ def add_axis(parser):
 
 
 def add_curves(parser):
-    """Add the options of curves that come from a file."""
+    """Add the options for curves from a file."""
     parser.add_argument(
         "--guides-from", metavar="FILE", help="use the curves of a .blend, .usd*, .abc or .npz as guides"
     )
@@ -41,7 +41,7 @@ def add_curves(parser):
 
 
 def checked(given):
-    """The file that curves come from, None for none. Raises `HairError` for options that do not fit each other."""
+    """Path of the curve file, or None. Raises `HairError` for conflicting options."""
     came_from = given.guides_from or given.hair_from
     if given.guides_from and given.hair_from:
         raise HairError("--guides-from and --hair-from exclude each other.")

@@ -31,7 +31,7 @@ def add(verbs):
 
 
 def run(given, console):
-    """Open, write."""
+    """Open the file and export its hair."""
     settings = options.changed(ExportSettings(), given, declared(ExportSettings))
     blender.io.mesh_files.require_blend(given.input)
     blender.io.groom_export.require_writable(given.out)
@@ -50,7 +50,7 @@ def run(given, console):
 
 
 def chosen_hair(given):
-    """The hair Curves to export. Raises `HairError` for a name that no hair has."""
+    """Hair Curves to export. Raises `HairError` if no hair has the given name."""
     every = blender.io.groom_sources.all_hair()
     if not given.hair:
         return every

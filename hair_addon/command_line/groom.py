@@ -18,7 +18,7 @@ blender = lazy.Package("..blender", __package__)
 
 _SHARED = {name for name, *_ in declared(GuideSettings)} & {name for name, *_ in declared(HairSettings)}
 
-# Settings that only guides have.
+# Settings of guides only.
 _OF_GUIDES = [setting for setting in declared(GuideSettings) if setting[0] not in _SHARED]
 
 # Settings of hair that grows: hair that is kept as it came has a look, and as many guides as are derived.
@@ -45,7 +45,7 @@ def add(verbs):
 
 
 def run(given, console):
-    """Read, grow, write."""
+    """Read the mesh, grow the hair and write it."""
     settings = options.groom_settings(given)
     if given.preset:
         look = replace(PRESETS[given.preset][1], mode=settings.appearance.mode)
@@ -168,7 +168,7 @@ def _keep_curves(given, surface, settings, file_axes, console):
 
 
 def _play(given, made, found, console):
-    """Let kept hair play the frames of its file, from one beside the .blend that is written."""
+    """Write the frames of moving curves to a file beside the output .blend, which the hair plays."""
     path = blender.io.played_hair.path_beside(given.out, made.hair)
     order = made.rooted.point_order(found.starts)
     count = blender.io.played_hair.playing(made.hair, found.motion, order, path)(console.progress)

@@ -13,7 +13,7 @@ import time
 from .console import PROGRAM
 
 _LOOK = 0.2  # [s] between checks for an interruption
-_PATIENCE = 30.0  # [s] for a process to end that was asked to
+_PATIENCE = 30.0  # [s] to wait for a terminated process to exit
 
 
 class Failed:
@@ -27,7 +27,7 @@ class Failed:
 
     @property
     def cause(self):
-        """What ended it, in words."""
+        """Cause of the failure, for messages."""
         return f"signal {-self.status}" if self.status < 0 else f"status {self.status}"
 
     def __str__(self):
@@ -90,7 +90,7 @@ class _Helper:
 
     @property
     def is_at_work(self):
-        """Whether it runs, or has unread output."""
+        """Whether the process runs or has unread output."""
         return self._process.poll() is None or any(thread.is_alive() for thread in self._threads)
 
     @property
@@ -100,7 +100,7 @@ class _Helper:
 
     @property
     def complaint(self):
-        """What it said last of why it failed; empty if it said nothing."""
+        """Last error message of the process; empty if there is none."""
         return self._complaints[-1] if self._complaints else ""
 
     def stop(self, patience):

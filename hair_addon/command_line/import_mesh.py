@@ -31,8 +31,8 @@ def add(verbs):
 
 
 def run(given, console):
-    """Import, evaluate, write; read all curves."""
-    blender.host.memory.limit_this_process()  # a damaged file may ask for any amount
+    """Import, evaluate and write the mesh; read all curves."""
+    blender.host.memory.limit_this_process()  # a damaged file may request any amount of memory
     file_axes = None
     if given.out is not None:
         file_axes = blender.io.mesh_files.open_file(given.input, up=given.up).tolist()
@@ -43,9 +43,9 @@ def run(given, console):
 
 
 def open_apart(path, up, console, has_curves=False):
-    """`mesh_files.open_file` by a process of its own. Raises `HairError`, also where that process is ended.
+    """Run `mesh_files.open_file` in a separate process. Raises `HairError`, also if that process crashes.
 
-    has_curves: whether this process is going to read curves of the file, which are tried there.
+    has_curves: whether this process will read curves of the file; the separate process tries them first.
     """
     heard = []
     with tempfile.TemporaryDirectory(prefix="vellus_", ignore_cleanup_errors=True) as folder:
@@ -57,7 +57,7 @@ def open_apart(path, up, console, has_curves=False):
 
 
 def try_curves(path, console):
-    """Raise `HairError` where a process that reads the curves of a file is ended, or has an error to tell."""
+    """Raise `HairError` if a separate process that reads the curves of a file crashes or reports an error."""
     if blender.io.curve_files.is_read_natively(path):
         _run(path, ["--curves"], console, lambda _values: None)
 

@@ -23,7 +23,7 @@ def add(verbs):
 
 
 def run(given, console):
-    """Read and print."""
+    """Read the file and print its summary."""
     describe = {".npz": _arrays, ".json": _settings, ".exr": _tables}.get(given.input.suffix.lower())
     if describe is None:
         opening.open_file(given, console, has_curves=True)

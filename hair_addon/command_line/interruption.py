@@ -11,7 +11,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interruption:
-    """A context manager that records whether the command was asked to stop."""
+    """Context manager that records requests to stop the command."""
 
     def __init__(self):
         self._number = None
@@ -35,7 +35,7 @@ class Interruption:
 
     @property
     def is_asked(self):
-        """Whether to stop."""
+        """Whether a stop was requested."""
         return self._number is not None
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the commands that make meshes of hair have in common: input, output, report."""
+"""Input, output and report shared by the commands that convert hair to meshes."""
 
 import time
 

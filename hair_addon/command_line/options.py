@@ -13,12 +13,12 @@ from ..core.shading.appearance import shown_changes
 from . import dynamics_options
 from .console import PROGRAM
 
-# Settings that a shorter word names better on a command line.
+# Settings with shorter names on the command line.
 _OPTIONS = {"guide_count": "--guides", "strand_count": "--strands", "eta": "--ior"}
 _OPTIONS |= {"has_hair": "--strands", "has_guides": "--guides", "has_color": "--color"}
 _OPTIONS |= {"card_count": "--cards", "tube_count": "--tubes", "picture_count": "--pictures"}
 
-# Sections of a settings file whose settings have an option each.
+# Sections of a settings file with one option per setting.
 _SECTIONS = [name for name in settings_file.SECTIONS if name != "dynamics"]
 
 

@@ -13,9 +13,9 @@ from . import helpers, opening, options
 
 blender = lazy.Package("..blender", __package__)
 
-_Flag = argparse.BooleanOptionalAction  # templates of jobs have no options that may be left out
+_Flag = argparse.BooleanOptionalAction  # job templates cannot omit options
 _ENGINES = ("vellus", "cycles", "eevee")
-_SETTINGS = {"width", "height"}  # the scene's, unless they are given
+_SETTINGS = {"width", "height"}  # default to the scene's
 
 
 def add(verbs):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings as one word of a command line: name=value,name=value."""
+"""Settings in a single command-line argument: name=value,name=value."""
 
 import argparse
 
@@ -26,7 +26,7 @@ def parsed(text, settings_class, owner):
 
 
 def _value(name, text, default, details):
-    """Text as the type of a setting's default; choices in any case."""
+    """Convert text to the type of a setting's default; choices are case-insensitive."""
     if isinstance(default, bool):
         if text.lower() not in _FLAGS:
             raise argparse.ArgumentTypeError(f"{name} must be yes or no, not {text!r}")

@@ -17,7 +17,7 @@ def add(verbs):
 
 
 def run(given, console):
-    """Write, or print."""
+    """Write or print the settings or their schema."""
     if given.schema:
         values = settings_file.schema()
     else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""simulate: guides of a .blend → baked frames, which render then reads; repeating the command goes on."""
+"""simulate: guides of a .blend → baked frames for render; repeating the command resumes."""
 
 from ..core import lazy
 from ..core.errors import HairError
@@ -116,7 +116,7 @@ def _warn_of_memory(guides, console):
 
 
 def _named(name):
-    """The guide Curves of some name, or of an object of that name. Raises `HairError`."""
+    """Guide Curves with a name, or with an object of that name. Raises `HairError`."""
     found = blender.groom.selection.guides_named(name)
     if found is None:
         raise HairError(f'There are no guides "{name}" in the file.')

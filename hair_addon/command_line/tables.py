@@ -22,7 +22,7 @@ def add(verbs):
 
 
 def run(given, console):
-    """Bake and write."""
+    """Bake the tables and write them."""
     settings = lookup_tables.Settings()
     if given.settings:
         settings = api.table_settings(settings_file.read(given.settings))

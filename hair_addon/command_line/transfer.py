@@ -32,7 +32,7 @@ def add(verbs):
 
 
 def run(given, console):
-    """Open, transfer, write."""
+    """Open the file, transfer the hair and write the result."""
     settings = options.changed(TransferSettings(), given, declared(TransferSettings))
     blender.io.mesh_files.require_blend(given.input)
     blender.io.groom_files.require_writable(given.out)

@@ -24,7 +24,7 @@ def add(verbs):
 
 
 def run(given, console):
-    """Open, make, write."""
+    """Open the file, make the tubes and write them."""
     settings = options.changed(TubeSettings(), given, declared(TubeSettings))
     mesh_output.make(given, console, lambda hair: _tubes(console, hair, settings))
 

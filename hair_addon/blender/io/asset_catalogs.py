@@ -13,7 +13,7 @@ _HEAD = "# This is an Asset Catalog Definition file for Blender.\n#\n# Other lin
 
 @dataclass(frozen=True)
 class Catalog:
-    """The UUID of a catalog and the library's list of them; text: the list with it, None where it has it already."""
+    """UUID of a catalog; text: the library's list with the catalog added, None if the list has it already."""
 
     identifier: str
     path: Path
@@ -32,7 +32,7 @@ def read(folder: Path, catalog: str) -> Catalog:
         raise HairError("{path} cannot be read: {cause}.", path=path, cause=cause_of(error)) from error
     for line in text.splitlines():
         found = line.split(":")
-        if len(found) >= 2 and found[1] == catalog and _is_uuid(found[0]):  # Blender leaves out other lines
+        if len(found) >= 2 and found[1] == catalog and _is_uuid(found[0]):  # Blender ignores other lines
             return Catalog(found[0], path, None)
     made = str(uuid.uuid4())
     line = f"{made}:{catalog}:{catalog.replace('/', '-')}\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects that Blender's exporters are to write, and no others, whatever hides them."""
+"""Restrict Blender's exporters to chosen objects, hidden or not."""
 
 import contextlib
 
@@ -10,10 +10,10 @@ _SWITCHES = ("hide_select", "hide_viewport", "hide_render")
 
 @contextlib.contextmanager
 def only_chosen(objects):
-    """Select objects alone, shown in viewports and renders; afterwards all is as it was.
+    """Select only these objects and show them in viewports and renders; restore everything on exit.
 
-    Exporters leave out what cannot be selected, and some of them what is hidden in renders. Collections too hide
-    objects: for as long, these are in one of their own.
+    Exporters skip objects that cannot be selected, and some skip objects hidden in renders. Collections can hide
+    objects too, so the objects are linked to a temporary collection.
     """
     layer, switched = bpy.context.view_layer, [(one, *(getattr(one, name) for name in _SWITCHES)) for one in objects]
     selected = [other for other in layer.objects if other.select_get()]

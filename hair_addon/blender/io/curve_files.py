@@ -19,14 +19,14 @@ from . import curve_objects, strand_arrays, usd_curves
 
 _USD = (".usd", ".usdc", ".usda", ".usdz")
 
-# Ending → reader of a `CurveFile`, but for .blend files, which have objects.
+# Extension → reader that returns a `CurveFile`; .blend files are read as objects instead.
 _READERS = {
     **dict.fromkeys(_USD, usd_curves.read),
     ".abc": alembic_grooms.read,
     ".npz": array_grooms.read,
 }
 ENDINGS = (".blend", *_READERS)
-OF_OTHERS = (*_USD, ".abc")  # that other programs write too
+OF_OTHERS = (*_USD, ".abc")  # also written by other programs
 
 _OTHER = {"GUIDES": "HAIR", "HAIR": "GUIDES"}
 
@@ -61,7 +61,7 @@ class Found:
 
 
 def require_readable(path):
-    """Raise `HairError` unless there is a file of a kind that holds curves."""
+    """Raise `HairError` unless the file exists and its format can hold curves."""
     path = Path(path)
     if not path.is_file():
         raise HairError("{path} is not a file: check the path.", path=path)
@@ -79,14 +79,14 @@ def read(path, axis="Z"):
 
 
 def read_all(path):
-    """`read`, and the points of each time, which are only read when they are asked for. Raises `HairError`."""
+    """Like `read`, with the points of each time, loaded lazily. Raises `HairError`."""
     for one in read(path).sets:
         for index in range(0 if one.motion is None else len(one.motion.times)):
             one.motion.points_at(index)
 
 
 def is_read_natively(path):
-    """Whether a file is read by native code, which a damaged one may end."""
+    """Whether a file is read by native code, which can crash on damaged files."""
     return Path(path).suffix.lower() in _USD
 
 
@@ -147,7 +147,7 @@ def curves_of(path, wanted, surface_object, is_open=False):
 
 
 def reading(path):
-    """`read` as work in steps, in another thread. Raises `HairError`."""
+    """Run `read` in another thread, as work in steps. Raises `HairError`."""
     path = Path(path)
     require_readable(path)
     if path.suffix.lower() == ".blend":
@@ -190,7 +190,7 @@ def _name(path, chosen):
 
 
 def _now(curves):
-    """Curves that move, where they are at the scene's time, or the nearest that the file has."""
+    """Moving curves at the scene's time, or at the nearest time in the file."""
     if curves.motion is None:
         return curves
     return replace(curves, points=curves.motion.points_at(_present_index(curves.motion)))
@@ -243,7 +243,7 @@ def _listed(names):
 
 
 def _mesh(surface_object):
-    """The surface as it is now, a `TriMesh` in the world [m]."""
+    """Evaluated surface as a `TriMesh` in world space [m]."""
     surface = scene.read_surface(surface_object, scene.present_depsgraph())
     matrix = np.array(surface_object.matrix_world) * strand_arrays.metres_per_unit(bpy.context.scene)
     return TriMesh((surface.posed @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32), surface.mesh.triangles)
@@ -287,7 +287,7 @@ def _chosen_objects(path, came, wanted, is_open):
 
 
 def _guides_of(chosen, came):
-    """The objects of the guides that hair follows, in the order of the hair."""
+    """Objects of the guides that the hair follows, in the order of the hair."""
     followed = dict.fromkeys(one.data.vellus.guide_curves for one in chosen if one.type == "CURVES")
     shown = {one.data: one for one in came if one.type == "CURVES"}
     return [shown[guides] for guides in followed if guides in shown]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of a file as an object of the open scene, and objects of curves as one."""
+"""Objects for curves read from files, and joining of Curves objects."""
 
 import bpy
 import numpy as np

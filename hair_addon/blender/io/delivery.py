@@ -25,7 +25,7 @@ from . import hair_file, strand_arrays
 
 @dataclass(frozen=True)
 class Delivered:
-    """Hair that was delivered: the file, its frames, how many strands, and the size of the file [bytes]."""
+    """Delivered hair: the file, its frames, the number of strands and the file size [bytes]."""
 
     path: Path
     first: int
@@ -36,7 +36,7 @@ class Delivered:
 
 @dataclass
 class _Task:
-    """Hair that is being delivered."""
+    """Hair during delivery."""
 
     hair: Remembered
     probe: Remembered
@@ -86,7 +86,7 @@ def delivering(guides, path, blender_scene):
                 for task in tasks:
                     task.path = file.add(name_of(task.hair.find()), task.counts)
                 for index, time in enumerate(times):
-                    blender_scene = its_scene.find()  # another one after an undo
+                    blender_scene = its_scene.find()  # undo replaces it
                     go_to(blender_scene, time)
                     require_shown(its_guides.find(), time)
                     read = [_read(task, time) for task in tasks]
@@ -96,7 +96,7 @@ def delivering(guides, path, blender_scene):
             delivered_hair.close_files(path)
     cache_file = delivered_hair.open_file(path)
     baked = frame_folders.frames_of(its_guides.find())
-    # None are needed where guides begin to move after the last frame.
+    # No samples are needed if guides start to move after the last frame.
     key = "" if baked is None or baked.manifest is None else baked.manifest.key
     for task in tasks:
         hair = task.hair.find()
@@ -107,7 +107,7 @@ def delivering(guides, path, blender_scene):
 
 
 def take_off(guides):
-    """Let the hair of some guides follow them again; returns how many hair there are that did not. The file stays."""
+    """Let delivered hair follow its guides again; returns the number of hair that was changed. The file stays."""
     delivered = [hair for hair in curves.followers(guides) if delivered_hair.is_delivered(hair)]
     if not delivered:
         raise HairError('No hair of the guides "{name}" plays delivered frames.', name=name_of(guides))
@@ -120,7 +120,7 @@ def take_off(guides):
 
 
 def _deliverable(guides):
-    """Hair Curves that follow guides, and have objects in the view layer. Raises `HairError`."""
+    """Hair Curves that follow the guides and have objects in the view layer. Raises `HairError`."""
     layer = bpy.context.view_layer
     chosen = [hair for hair in curves.followers(guides) if selection.object_of(hair, layer) is not None]
     if not chosen:
@@ -133,7 +133,7 @@ def _deliverable(guides):
 
 
 def _times(blender_scene, frames, chosen):
-    """Times of samples, in order: also of what an exposure of the first and the last frame sees."""
+    """Sample times, in order, including the exposure of the first and the last frame."""
     steps = [_motion_steps(user) for hair in chosen for user in delivered_hair.objects_of(hair)]
     between = scene_time.exposure_times(blender_scene, max(steps))
     sampled = {frame + offset for frame in frames for offset in between}
@@ -154,17 +154,17 @@ def _begin(hair, stack):
 
 
 def _remove(remembered):
-    with contextlib.suppress(HairError):  # deleted meanwhile, by a script
+    with contextlib.suppress(HairError):  # deleted by a script in the meantime
         bpy.data.objects.remove(remembered.find())
 
 
 def _go_back(its_scene, time):
-    with contextlib.suppress(HairError):  # the scene was deleted meanwhile
+    with contextlib.suppress(HairError):  # the scene was deleted in the meantime
         go_to(its_scene.find(), time)
 
 
 def go_to(blender_scene, time):
-    """Change the time, and let hair follow as it does without a long operation."""
+    """Set the time and update hair as outside a long operation."""
     with running.set_aside():
         scene_time.go_to_time(blender_scene, time)
         live_hair.write_all()
@@ -172,7 +172,7 @@ def go_to(blender_scene, time):
 
 
 def require_shown(guides, time):
-    """Raise `HairError` where a baked frame could not be read: guides would be as combed."""
+    """Raise `HairError` if a baked frame could not be read: guides would have their combed shape."""
     if time > guides.vellus.dynamics.start_frame and not simulated_guides.is_shown(guides):
         raise HairError(
             'Frame {frame} of the guides "{name}" cannot be read: bake it again.',

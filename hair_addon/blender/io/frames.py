@@ -23,15 +23,15 @@ from ..render.frames import engine as render_engine
 from ..render.viewport import viewport
 from . import view_files
 
-# The user's names → Blender's names.
+# Names in options → Blender's names.
 ENGINES = {"vellus": viewport.ENGINE, "cycles": "CYCLES", "eevee": "BLENDER_EEVEE"}
 
-# Ending → (Blender's format, bits of a colour).
+# Extension → (Blender's format, bits per channel).
 _FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32")}
 
 
 def scene_size():
-    """{"width", "height"} of the open scene's pictures [pixels]."""
+    """{"width", "height"} of the open scene's renders [pixels]."""
     settings = bpy.context.scene.render
     part = settings.resolution_percentage / 100.0
     return {"width": max(1, int(settings.resolution_x * part)), "height": max(1, int(settings.resolution_y * part))}
@@ -85,9 +85,9 @@ def require_view_layer():
 
 
 def bind_simulated():
-    """Bind simulated hair in its start frame, so that the first frame that a process renders changes no bit of it.
+    """Bind simulated hair in its start frame: its bits are the same whichever frame a process renders first.
 
-    Strands are bound in the axes of the world, where a surface that turns is another by a rounding in each frame.
+    Strands are bound in world axes, where a rotating surface differs by rounding in each frame.
     """
     blender_scene = scene_time.present_scene()
     for guides in frame_folders.simulating():
@@ -98,15 +98,15 @@ def bind_simulated():
 
 
 def _number_width(pattern):
-    """Number of # in the last run of them in a name."""
+    """Length of the last run of # in a name."""
     name = pattern.name.rstrip("".join({*pattern.name} - {"#"}))
     return len(name) - len(name.rstrip("#"))
 
 
 def missing_files(numbers, allows_missing=False):
-    """A sentence on files of the open scene that are missing in frames of some numbers, "" without any.
+    """Sentence listing files that the open scene lacks in the given frames; "" if none are missing.
 
-    Raises `HairError` in place of the sentence unless `allows_missing`.
+    Raises `HairError` with that sentence unless `allows_missing`.
     """
     if not allows_missing:
         rendered_files.require(bpy.context.scene, numbers)
@@ -151,7 +151,7 @@ def write_frame(path, frame, engine, settings, partial=None, progress=no_progres
 
 @contextlib.contextmanager
 def _rendering(blender_scene, path, engine, settings):
-    """The scene's own settings of renders are others for the time that it takes."""
+    """Override the scene's render settings within the context."""
     wanted = [*_of_scene(blender_scene, path, engine, settings)]
     if settings.has_passes:
         wanted += [change for layer in blender_scene.view_layers for change in _of_layer(layer)]
@@ -167,7 +167,7 @@ def _of_scene(blender_scene, path, engine, settings):
     render, image = blender_scene.render, blender_scene.render.image_settings
     file_format, color_depth = _FORMATS[path.suffix.lower()]
     yield render, "engine", ENGINES[engine]
-    # Braces are template variables in this path, and are escaped by doubling.
+    # Braces delimit template variables in this path; double them to escape.
     yield render, "filepath", str(path.absolute()).replace("{", "{{").replace("}", "}}")
     yield render, "use_file_extension", False
     yield render, "resolution_x", settings.width

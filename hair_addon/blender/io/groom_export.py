@@ -32,7 +32,7 @@ class Exported:
 
 
 def require_writable(path):
-    """Raise `HairError` unless a groom could be written to a path, by its ending, with what Blender has."""
+    """Raise `HairError` unless this build of Blender can write a groom to a path, by its extension."""
     ending = path.suffix.lower()
     if ending not in export_settings.ENDINGS:
         raise HairError(
@@ -91,7 +91,7 @@ def _is_usd(path):
 
 
 def _go_to(blender_scene, time):
-    """Change the time, None: stay there."""
+    """Set the time; None leaves it unchanged."""
     if time is not None:
         delivery.go_to(blender_scene, time)
 
@@ -106,7 +106,7 @@ def _opened(partial, path, chosen, first_frame, blender_scene):
 
 
 def _simulated(chosen, frames):
-    """The guides of hair that simulate, where time passes; they have to be baked. Raises `HairError`."""
+    """Simulated guides of the hair, in exports of several frames. Raises `HairError` unless baked."""
     guides = {hair.vellus.guide_curves for hair in chosen} - {None}
     simulated = [one for one in guides if frame_folders.is_simulated(one)]
     if frames == [None]:
@@ -171,7 +171,7 @@ def _told(path):
 
 
 def _properties(chosen):
-    """The settings of each hair that has guides, as JSON."""
+    """Settings of each hair with guides, as JSON."""
     with_guides = [hair for hair in chosen if hair.vellus.guide_curves is not None]
     settings = {name_of(hair): settings_file.to_object(groom_settings.settings_of(hair)) for hair in with_guides}
     return json.dumps(settings, ensure_ascii=True, separators=(",", ":"))

@@ -28,7 +28,7 @@ _VERTEX_BYTES, _CORNER_BYTES, _POINT_BYTES = 16, 48, 24
 
 
 def require_writable(path):
-    """Raise `HairError` unless `write` could write a groom there."""
+    """Raise `HairError` unless `write` can write a groom to the path."""
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         raise HairError(f"Grooms are saved as {', '.join(ENDINGS)}, not as {ending or 'a file without an extension'}.")
@@ -56,7 +56,7 @@ def write(path, guides, hair, file_axes):
 
 
 def save_copy(path):
-    """Write all of the open file to another .blend, whole or not at all. Raises `HairError`."""
+    """Save a copy of the open file, atomically. Raises `HairError`."""
     with whole_file(path) as partial:
         bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
 
@@ -79,7 +79,7 @@ def arrays(guides, hair, file_axes):
 
 
 def _objects(guides, hair):
-    """The objects of guides, hair and their surface."""
+    """Objects of guides, hair and their surface."""
     layer = bpy.context.view_layer
     layer.update()
     found = (object_of(guides, layer), object_of(hair, layer), guides.surface)

@@ -29,7 +29,7 @@ from ..render import library_picture
 from . import asset_catalogs, strand_arrays
 
 ENDING = ".asset.blend"
-_MOST_NAME = 200  # bytes: Blender cuts longer ones
+_MOST_NAME = 200  # bytes: Blender truncates longer names
 _SETTINGS, _LEFT = "vellus_groom", "vellus_left"  # custom properties of the object
 _BLEND = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # first bytes of .blend files: plain, Zstandard, gzip
 
@@ -47,7 +47,7 @@ def path_of(folder: Path, name: str) -> Path:
 
 
 def _is_of_others(path, name):
-    """Whether there is a file, and not of this groom alone."""
+    """Whether the file exists and holds more than this groom."""
     if not path.exists():
         return False
     try:
@@ -57,7 +57,7 @@ def _is_of_others(path, name):
 
 
 def _require_replaceable(path):
-    """Raise `HairError` where there is a file that has more than grooms, or that is open."""
+    """Raise `HairError` if the file is open or holds more than grooms."""
     if not path.is_file():
         return
     if bpy.data.filepath and path.resolve() == Path(bpy.data.filepath).resolve():
@@ -139,7 +139,7 @@ def write(path: Path, grooms: Iterable[tuple[LibraryGroom, np.ndarray | None]], 
 
 
 def _make_way(name):
-    """Rename an object of this file of a name that an asset is to have; returns [(object, its name)]."""
+    """Rename the object of the open file that has the name of a new asset; returns [(object, previous name)]."""
     other = bpy.data.objects.get((name, None))
     if other is None:
         return []
@@ -197,7 +197,7 @@ def path_and_name(text: str) -> tuple[Path, str]:
 
 
 def names_in(path: Path) -> list[str]:
-    """Names of the assets in a .blend file that may be grooms, in alphabetical order. Raises `HairError`."""
+    """Names of possible groom assets in a .blend file, in alphabetical order. Raises `HairError`."""
     _require_blend(path)
     try:
         with bpy.data.libraries.load(str(path), assets_only=True) as (there, _wanted):
@@ -217,7 +217,7 @@ def _require_blend(path):
 
 
 def read(path: Path, name: str = "") -> LibraryGroom:
-    """The groom of a name in a .blend file, the only one for no name; nothing is added. Raises `HairError`."""
+    """Groom with a name in a .blend file, or the only one if the name is empty; adds nothing. Raises `HairError`."""
     names = names_in(path)
     if name and name not in names:
         raise HairError('{path} has no groom "{name}".', path=path, name=name)
@@ -244,7 +244,7 @@ def _datablocks():
 
 
 def _groom(asset, name, path):
-    """The `LibraryGroom` of an asset that was read. Raises `HairError`."""
+    """Convert a loaded asset to a `LibraryGroom`. Raises `HairError`."""
     text = None if asset is None else asset.get(_SETTINGS)
     if not isinstance(text, str) or asset.type != "CURVES" or asset.data.surface is None:
         raise HairError('"{name}" in {path} is not a groom saved by Vellus.', name=name, path=path)

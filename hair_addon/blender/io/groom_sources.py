@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair and guides of the scene as `GroomCurves`, to be exported."""
+"""Hair and guides of the scene as `GroomCurves`, for export."""
 
 from dataclasses import dataclass, replace
 
@@ -39,16 +39,16 @@ class Source:
 
 
 def hair_on(active):
-    """The hair that is exported with an active object: that on its surface that the view layer has objects of."""
+    """Hair exported for an active object: all hair on its surface with objects in the view layer."""
     layer = bpy.context.view_layer
-    layer.update()  # new objects may not be in it yet
+    layer.update()  # the view layer may lack new objects
     systems = hair_systems.systems_of(selection.surface_of(active), layer)
     hair = selection.hair_of(active)
     return [system for system in systems if system.vellus.kind == "HAIR"] or ([] if hair is None else [hair])
 
 
 def all_hair():
-    """All hair that the view layer has objects of, oldest first."""
+    """All hair with objects in the view layer, oldest first."""
     layer = bpy.context.view_layer
     layer.update()
     found = {o.data for o in layer.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"}
@@ -56,7 +56,7 @@ def all_hair():
 
 
 def sources_of(chosen, settings, per_metre):
-    """A `Source` for the guides and the strands of each hair; identities differ in all of the file."""
+    """A `Source` for the guides and strands of each hair; identities are unique in the file."""
     names, sources, first_id = group_names(chosen), [], 0
     for group, (hair, name) in enumerate(zip(chosen, names, strict=True)):
         guides = hair.vellus.guide_curves
@@ -95,7 +95,7 @@ def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
     widths = _widths(hair, shown, counts, per_metre)  # first: what follows may evaluate again
     guides = hair.vellus.guide_curves
     guide_count = 0 if guides is None else len(guides.curves)
-    # Without guides in the file there are none to name.
+    # Strands name guides only if the file has guides.
     depsgraph = scene.present_depsgraph()
     guide_map = guide_maps.of(hair, depsgraph) if guide_count and settings.has_guides else None
     ids, weights = (None, None) if guide_map is None else groom_curves.closest_guides(*guide_map, first_id)
@@ -218,13 +218,13 @@ def _copy(source, group, name, shift, matrix):
 
 
 def counts_of(sources):
-    """How many (guides, strands) there are."""
+    """Counts of (guides, strands)."""
     every = [source.curves for source in sources]
     return tuple(sum(c.curve_count for c in every if c.is_guide == is_guide) for is_guide in (True, False))
 
 
 def notes_of(chosen, sources, settings):
-    """What importers do with hair that has less than it could; sources: `sources_of` the same hair."""
+    """Notes on how importers will handle the hair; sources: `sources_of` the same hair."""
     without_map = {s.curves.group_id for s in sources if not s.curves.is_guide and s.curves.guide_ids is None}
     for group, (hair, name) in enumerate(zip(chosen, group_names(chosen), strict=True)):
         if name_of(hair) != name:

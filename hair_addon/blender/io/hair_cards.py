@@ -23,7 +23,7 @@ from . import hair_meshes
 class CardLevel:
     """A level of detail that was made: its object, {map: image}, number of cards, pictures and triangles.
 
-    notes: what of the hair is left out.
+    notes: which parts of the hair are omitted.
     """
 
     mesh_object: object
@@ -36,7 +36,7 @@ class CardLevel:
 
 @dataclass(frozen=True)
 class _Drawn:
-    """A level before it is in the scene."""
+    """A drawn level, not yet in the scene."""
 
     mesh: PolygonMesh
     maps: dict
@@ -67,7 +67,7 @@ def making_cards(hair, settings, folder=None):
 
 
 def _drawing(read, level, picture_count, parts):
-    """A level as work in steps, which is the part of the whole between two."""
+    """Draw a level, as work in steps that covers an interval of the total progress."""
     first, last = parts
     told = first, first + 0.1 * (last - first)
     flat = yield lambda progress: _flat_cards(read, level, picture_count, part_of(progress, *told))
@@ -109,7 +109,7 @@ def _flat_cards(read, level, picture_count, progress):
 
 
 def _stem(name, taken):
-    """What names of texture files begin with, as none of those that are taken do."""
+    """Unused prefix for names of texture files."""
 
     def begun(stem):
         return f"{stem}_Cards_LOD"
@@ -134,5 +134,5 @@ def _written(read, drawn, folder):
             made_meshes.hide(mesh_object)
         counts = level.card_count, level.picture_count, level.mesh.triangle_count
         made.append(CardLevel(mesh_object, its, *counts, read.notes))
-    card_images.keep(images, folder, stem)  # last: files that are replaced do not come back
+    card_images.keep(images, folder, stem)  # last: replaced files cannot be restored
     return made

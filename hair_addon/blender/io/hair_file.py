@@ -11,7 +11,7 @@ from ...core.errors import HairError
 from ..data.strands.delivered_hair import ROOT
 from ..host import paths
 
-_CREATOR = "creator"  # entry of the file that says who wrote it
+_CREATOR = "creator"  # entry that identifies the writer of the file
 _PROGRAM = "Vellus delivered hair"
 
 
@@ -43,7 +43,7 @@ def require_usd():
 
 
 def failed(path, error):
-    """A `HairError` with the cause that USD gives, among much else."""
+    """`HairError` with the cause extracted from USD's message."""
     cause = re.search(r"Error occurred writing file: ([^']*)", str(error))
     return HairError(
         "{path} cannot be written: {cause}.", path=path, cause=cause[1] if cause else "the disk may be full"
@@ -98,7 +98,7 @@ class HairFile:
 
     def __exit__(self, *_error):
         self._hair.clear()
-        self._stage = None  # lets go of the file
+        self._stage = None  # closes the file
 
     def add(self, name, counts):
         """Add hair by name; returns its path in the file. counts: (S,) points of its strands, the same at all times."""

@@ -79,13 +79,13 @@ def read_hair(hair):
 
 
 def strand_count(hair):
-    """Number of strands of hair Curves, as they are now; panels ask for it."""
+    """Current number of strands of hair Curves, for panels."""
     return len(hair.curves)
 
 
 @dataclass(frozen=True)
 class MadeTubes:
-    """The object of tubes, their number, its triangles, and what is left out."""
+    """Object of tubes, number of tubes and of triangles, and notes on omitted hair."""
 
     mesh_object: object
     tube_count: int

@@ -57,7 +57,7 @@ def _guides(datablock):
 
 
 def _baked(guides):
-    """What is baked of guides, and in what it is outdated; None where nothing is."""
+    """State of baked guides and what is outdated; None without baked frames."""
     frames = frame_folders.frames_of(guides)
     if frames is None or frames.manifest is None:
         return None
@@ -107,7 +107,7 @@ def _style(item):
 
 
 def _settings(read):
-    """Settings as {name: value}, or why they cannot be."""
+    """Settings as {name: value}, or the reason why they cannot be read."""
     try:
         return asdict(read())
     except HairError as error:
@@ -115,7 +115,7 @@ def _settings(read):
 
 
 def _warnings(datablock):
-    """Warnings that the panel would show."""
+    """Warnings shown in the panel."""
     state = datablock.vellus
     said = [warning.text for warning in diagnostics.warnings_of(datablock.surface, [datablock])]
     return said + [status for status in (state.status, state.shading_status, state.uv_status) if status]

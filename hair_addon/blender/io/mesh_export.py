@@ -46,7 +46,7 @@ ENDINGS = tuple(_FORMATS)
 
 
 def require_writable(path):
-    """Raise `HairError` unless meshes could be written to a path, by its ending, with what Blender has."""
+    """Raise `HairError` unless this build of Blender can write meshes to a path, by its extension."""
     ending = path.suffix.lower()
     if ending not in _FORMATS:
         raise HairError(
@@ -60,7 +60,7 @@ def require_writable(path):
 
 
 def has_textures(path):
-    """Whether the file at a path has textures in it."""
+    """Whether the format of a path embeds textures."""
     return _FORMATS[path.suffix.lower()][2]
 
 

@@ -59,7 +59,7 @@ _FORMATS = {
     ".abc": (_import_alembic, "wm.alembic_import", mesh_checks.require_alembic),
 }
 
-# Endings of files on which Blender's importers end the process where they are damaged, past all checks.
+# Formats whose importers can crash Blender on damaged files despite all checks.
 _END_BLENDER = {".ply", ".usd", ".usdc", ".usda", ".usdz", ".abc"}
 
 # Files without axes and units: read in metres.
@@ -67,12 +67,12 @@ _UP_IS_ASKED = {".obj", ".ply", ".stl"}
 
 
 def asks_for_axis(path):
-    """Whether a file does not say which of its axes points up."""
+    """Whether the format does not state its up axis."""
     return Path(path).suffix.lower() in _UP_IS_ASKED
 
 
 def ends_blender(path):
-    """Whether reading a file in this process may end it, where the file is damaged."""
+    """Whether a damaged file of this format can crash the process that reads it."""
     return Path(path).suffix.lower() in _END_BLENDER
 
 
@@ -82,7 +82,7 @@ def axis_of(file_axes):
 
 
 def require_readable(path):
-    """Raise `HairError` unless there is a file of a kind that `open_file` takes."""
+    """Raise `HairError` unless the file exists in a format that `open_file` supports."""
     path = Path(path)
     if path.is_dir():
         raise HairError(f"{path} is a folder: choose a file in it.")
@@ -97,7 +97,7 @@ def require_readable(path):
 
 
 def require_blend(path):
-    """Raise `HairError` unless there is a .blend."""
+    """Raise `HairError` unless the path is an existing .blend file."""
     require_readable(path)
     if path.suffix.lower() != ".blend":
         raise HairError(f"{path} is not a .blend file: rendering needs a scene with hair, a camera and lights.")
@@ -132,7 +132,7 @@ def open_file(path, *, up="Z", runs_scripts=False):
 
 
 def save_scene(path):
-    """Save what is open, once Blender has evaluated it, for `load_scene`."""
+    """Evaluate and save the open scene, for `load_scene`."""
     bpy.context.view_layer.update()
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
 
@@ -168,7 +168,7 @@ def scripts_kept_from_running():
 
 
 def find_surface(name=""):
-    """The mesh object of the open view layer, or the one of a name. Raises `HairError`."""
+    """The only mesh object of the view layer, or the one with a name. Raises `HairError`."""
     meshes = [o for o in bpy.context.view_layer.objects if o.type == "MESH"]
     if name:
         meshes = [o for o in meshes if o.name == name]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands as an artist's modifiers make them: what renders show is what files and meshes have."""
+"""Strands with the artist's modifiers applied: files and meshes match renders."""
 
 import bpy
 import numpy as np
@@ -32,7 +32,7 @@ def curves_of(datablock):
 
 
 def notes_of(datablock):
-    """What is said of hair Curves whose modifiers are left out."""
+    """Notes on hair Curves whose modifiers are ignored."""
     if curves_of(datablock) is None:
         names = ", ".join(_modifiers(selection.object_of(datablock, bpy.context.view_layer)))
         sentence = 'Modifiers of "{name}" are left out, as they change its number of points or are hidden: {names}.'
@@ -40,7 +40,7 @@ def notes_of(datablock):
 
 
 def _modifiers(shown):
-    """Names of the modifiers of an object, or None, that an artist has added."""
+    """Names of the modifiers added by the artist to an object, which may be None."""
     if shown is None:
         return []
     delivered = delivered_hair.modifier_of(shown)

@@ -15,7 +15,7 @@ from . import hair_file, strand_arrays
 
 
 def path_beside(blend_path, hair):
-    """The file that hair of a .blend plays."""
+    """Path of the file that the hair of a .blend plays."""
     return blend_path.with_name(f"{blend_path.stem}_{name_of(hair)}.usdc")
 
 

@@ -23,7 +23,7 @@ from ..host import paths, scene_time
 from . import frames, view_files
 
 _VERSION = 1
-_PAUSE = 0.5  # [s] between checks of other processes' frames
+_PAUSE = 0.5  # [s] between checks for frames of other processes
 
 
 def description(input_path, engine, settings):
@@ -144,13 +144,13 @@ def make(pattern, numbers, write, told=no_progress):
 
 
 def missing_frames(pattern, numbers):
-    """The numbers of the frames that are not done; what killed processes have left of others is removed."""
+    """Numbers of missing frames; removes partial files of killed processes."""
     _sweep(pattern, numbers)
     return [number for number in numbers if not _is_done(frames.path_of(pattern, number))]
 
 
 def _files(pattern, numbers):
-    """The files of all frames, one after the other."""
+    """Files of all frames, in order."""
     return (file for number in numbers for file in view_files.files_of(frames.path_of(pattern, number)))
 
 

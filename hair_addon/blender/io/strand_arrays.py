@@ -35,7 +35,7 @@ def world_points(datablock):
 
 
 def shown_points(datablock):
-    """The same with an artist's modifiers, where `modified_strands` has curves that they have made."""
+    """Like `world_points`, with the artist's modifiers where `modified_strands` provides curves."""
     shown = _shown(datablock)
     if shown is None:
         return world_points(datablock)
@@ -57,7 +57,7 @@ def counts_of(datablock):
 
 
 def shown_rows(datablock, per_metre=1.0) -> Rows:
-    """What `world_rows` gives, with an artist's modifiers, where `modified_strands` has curves that they have made."""
+    """Like `world_rows`, with the artist's modifiers where `modified_strands` provides curves."""
     shown = _shown(datablock)
     if shown is None:
         return world_rows(datablock, per_metre)
@@ -125,7 +125,7 @@ def other_places(datablock):
 
 
 def bring_up_to_date():
-    """Let strands follow what was changed, and objects that are new be evaluated."""
+    """Update strands after changes and evaluate new objects."""
     live_hair.write_all()
     with scene_time.outside_drivers():
         bpy.context.view_layer.update()
@@ -143,7 +143,7 @@ def shape_of(datablock):
 
 
 def world_scale(datablock):
-    """Metres in a unit of a Curves datablock's local coordinates, the mean. Raises `HairError`."""
+    """Mean metres per unit of a Curves datablock's local coordinates. Raises `HairError`."""
     matrix = _to_world(datablock)[:3, :3]
     return float(abs(np.linalg.det(matrix))) ** (1.0 / 3.0) * metres_per_unit(bpy.context.scene)
 

@@ -15,7 +15,7 @@ from . import table_plots
 def baking_tables(settings, folder, has_plots=False):
     """Bake `lookup_tables.Settings` into a folder, as work in steps; returns the paths of the files.
 
-    has_plots: whether a picture of each table is written beside it. Raises `HairError`.
+    has_plots: whether to write a plot of each table beside it. Raises `HairError`.
     """
     device = preferences.device()
     tables = yield lambda progress: lookup_tables.bake(settings, device, progress)

@@ -19,7 +19,7 @@ _PART = ("0", "0.5", "1")
 
 
 def plot_tables(tables, dual):
-    """`Tables` and `DualTables` → {name: ImBuf}, a picture for each table."""
+    """`Tables` and `DualTables` → {name: ImBuf}, one plot per table."""
     settings = tables.settings
     view = "cos θo" if settings.mode == "energy" else "cos θd"
     is_cosines = settings.axes == "COSINES"
@@ -63,7 +63,7 @@ class _Panel:
 
 
 def _image(table, title, axes):
-    """A table (H, W, 1 or 3) as an image: white is the brightest but for a thousandth, the scale is a square root."""
+    """Image of a table (H, W, 1 or 3): square-root scale, white at the 99.9th percentile."""
     white = max(float(np.quantile(table, 0.999)), 1e-6)
     tones = 255.0 * np.sqrt(np.clip(table / white, 0.0, 1.0))
     rows, columns = ((np.arange(_PANEL) * count) // _PANEL for count in table.shape[:2])
@@ -72,7 +72,7 @@ def _image(table, title, axes):
 
 
 def _curves(values, title, x_axis):
-    """Values (W, 3) as a curve for each channel."""
+    """Plot values (W, 3) as one curve per channel."""
     low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
     high = high if high > low else low + 1.0
     inside = np.full((_PANEL, _PANEL, 3), _BACKGROUND, np.uint8)

@@ -54,7 +54,7 @@ def read(path: Path) -> CurveFile:
 
 
 def _names(prims):
-    """Names of prims, by which people choose them: their own, or their paths where these are not unique."""
+    """Names of prims for users to choose from: prim names, or paths where names are not unique."""
     own = [prim.GetName() for prim in prims]
     return [name if own.count(name) == 1 else str(prim.GetPath()) for prim, name in zip(prims, own, strict=True)]
 
@@ -84,7 +84,7 @@ def _sets_of(path, prim, name, timing, notes) -> Iterator[CurveSet]:
         scale = abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0)
         radii = (0.5 * scale * radii).astype(np.float32)
 
-    stage = prim.GetStage()  # is there as long as its points are wanted
+    stage = prim.GetStage()  # kept alive while its points are needed
 
     def points_at(index):
         assert stage
@@ -104,7 +104,7 @@ def _sets_of(path, prim, name, timing, notes) -> Iterator[CurveSet]:
 
 def _placed(points, matrix):
     placed = np.broadcast_to(matrix[:3, 3], points.shape).copy()
-    for axis in range(3):  # a product of matrices would take several times as long
+    for axis in range(3):  # a matrix product is several times slower
         placed += points[:, axis, None] * matrix[:3, axis]
     return placed
 

@@ -26,7 +26,7 @@ from . import hair_file
 
 PER_METRE = 1.0
 
-MATERIALS = "materials"  # name of their scope, which no group may have
+MATERIALS = "materials"  # scope of materials: a reserved group name
 
 _ROOT = "/groom"
 
@@ -113,7 +113,7 @@ class UsdGroomWriter:
         made.AddTransformOp().Set(Gf.Matrix4d(np.asarray(matrix, np.float64).T.tolist()))  # rows of vectors
 
     def notes(self):
-        """What importers will do with what was written."""
+        """Notes on how importers handle the written file."""
         return [note for _made, check, *_ in self._added for note in check.notes()]
 
 

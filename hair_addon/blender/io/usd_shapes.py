@@ -47,7 +47,7 @@ class _Curves:
 
     @property
     def rows(self):
-        """Which points are those of the curves that are kept."""
+        """Indices of the points of valid curves."""
         return np.flatnonzero(np.repeat(self.is_kept, self.counts))
 
     @property
@@ -96,7 +96,7 @@ def drawn(prim, time, lines=None, keeps_splines=True) -> Drawn:
 
 
 def _array(prim, name, time, kind, width=1):
-    """An attribute's values (N,) or (N, width), none where there are none."""
+    """Values (N,) or (N, width) of an attribute, empty if it has none."""
     value = prim.GetAttribute(name).Get(time) if prim.HasAttribute(name) else None
     shape = (width,) if width > 1 else ()
     values = np.asarray([] if value is None else value)
@@ -171,7 +171,7 @@ def _nurbs(prim, time, points, counts, lines):
 
 
 def _rise(knots, counts):
-    """Whether each curve's knots rise."""
+    """Whether the knots of each curve ascend."""
     is_last = np.zeros(len(knots), bool)
     is_last[curve_offsets(counts)[1:] - 1] = True
     return bool(((np.diff(knots) >= 0.0) | is_last[:-1]).all())
@@ -230,7 +230,7 @@ def _widths(prim, time, curves, short_ends=None):
     sizes = {"constant": 1, "vertex": counts.sum(), "varying": ends.sum(), "uniform": len(counts)}
     if short_ends is not None:
         sizes["short"] = short_ends.sum()
-    # Files often say nothing of it, or the wrong thing: what has the right number of values is meant.
+    # Files often omit the interpolation or state a wrong one: infer it from the number of values.
     fitting = [one for one in (scope, *sizes) if sizes.get(one) == len(values)]
     if not fitting:
         return _Widths(is_odd=True)
@@ -240,7 +240,7 @@ def _widths(prim, time, curves, short_ends=None):
     if fitting[0] in ("constant", "uniform"):
         every = np.broadcast_to(values, len(counts)) if fitting[0] == "constant" else values
         return _Widths(of_ends=np.repeat(every[kept], kept_ends))
-    # Values that are missing are those of the first and of the last end; closed curves end where they begin.
+    # Repeat the first and last values for missing ends; closed curves end where they begin.
     there = ends if fitting[0] == "varying" else short_ends
     own, along = each(kept_ends)
     if curves.is_closed:

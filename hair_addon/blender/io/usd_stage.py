@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""USD stages that are read: opened whole or refused, the curves that are drawn, and their place at each time."""
+"""Reading of USD stages: validated opening, drawn curves and their transforms over time."""
 
 import re
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ class Found:
     scattered: int
 
     def notes(self, path: Path) -> Iterator[HairError]:
-        """What is said of those that are left out."""
+        """Notes on omitted prims."""
         for count, why in (
             (self.invisible, "are invisible"),
             (self.proxies, "are proxies"),
@@ -37,7 +37,7 @@ class Found:
 
 @contextmanager
 def errors_named(path: Path):
-    """Raise `HairError` for errors of USD."""
+    """Convert USD errors to `HairError`."""
     bpy.utils.expose_bundled_modules()
     from pxr import Tf
 
@@ -60,7 +60,7 @@ def opened(path: Path):
         from pxr import Usd
 
         stage = Usd.Stage.Open(str(path))
-        stage.Reload()  # what another stage of this process holds open may be an older state of the file
+        stage.Reload()  # another stage in this process may hold an older version of the file
         missing = _missing(stage)
     if missing:
         named = ", ".join(missing[:_MOST_NAMED]) + ("…" if len(missing) > _MOST_NAMED else "")
@@ -69,7 +69,7 @@ def opened(path: Path):
 
 
 def _cause_of(error):
-    """USD's first error, without where in its sources that arose."""
+    """First USD error, without its source location."""
     text = str(error)
     line = re.search(r":(\d+):\d+: parse error", text)
     if line is not None:
@@ -114,7 +114,7 @@ def curves_of(stage, time) -> Found:
 
 
 def _prototypes(stage):
-    """Paths of what point instancers scatter, which is not drawn where it stands."""
+    """Paths of point instancer prototypes, which are not drawn in place."""
     from pxr import Usd, UsdGeom
 
     walk = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
@@ -151,7 +151,7 @@ def matrix_of(prim, time) -> np.ndarray:
 
 
 def primvar(prim, name: str, time):
-    """The values of a primvar, one for each index where it has such; None without any."""
+    """Values of a primvar, expanded by its indices if it has any; None if it has no values."""
     from pxr import UsdGeom
 
     found = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
@@ -159,7 +159,7 @@ def primvar(prim, name: str, time):
 
 
 def is_skinned(prim) -> bool:
-    """Whether a skeleton bends a prim."""
+    """Whether a skeleton deforms a prim."""
     from pxr import UsdSkel
 
     bound = UsdSkel.BindingAPI(prim)

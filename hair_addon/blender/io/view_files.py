@@ -7,7 +7,7 @@ import bpy
 
 from ...core.errors import HairError
 
-_OF_STEREO = {"left", "right"}  # the views that Blender renders of stereo pictures, by their names
+_OF_STEREO = {"left", "right"}  # names of the views that Blender renders for stereo
 
 
 def files_of(path):
