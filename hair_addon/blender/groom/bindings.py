@@ -41,19 +41,19 @@ class BoundHair:
     settings: HairSettings
     root_key: str  # of `staleness.root_key`
     parting_key: str  # of `partings.Partings`
-    guides: Strands  # as they were when the hair followed them last
-    guide_uid: int | None  # session_uid of their Curves, None until these are made
+    guides: Strands  # guides that the hair last followed
+    guide_uid: int | None  # session_uid of the guides' Curves, None until they exist
     surface: Surface
     styles: StyledHair
-    shares: np.ndarray | None = None  # (S, k) float32, the weights of each strand's guides as they are combed now
+    shares: np.ndarray | None = None  # (S, k) float32, weights of each strand's guides for the combed guides
     growing: Future | None = None  # of `points`
-    free: Future | None = None  # of the points that follow guides, where `points` are kept outside of something
-    fits: Fits = field(default_factory=Fits)  # which of the settings are fitted to the surface
+    free: Future | None = None  # of the interpolated points, if `points` were moved out of colliders
+    fits: Fits = field(default_factory=Fits)  # settings that are fitted to the surface
     is_written: bool = False  # whether the datablock holds these points
-    has_moved_only: bool = False  # whether only points, and perhaps the guide map, are unwritten
+    has_moved_only: bool = False  # whether only points, and possibly the guide map, are unwritten
     is_map_written: bool = False  # whether the datablock holds this guide map
     written_radii: np.ndarray | None = None  # (P,) in the datablock, None if they may have changed
-    is_report_due: bool = False  # whether Blender has not reported our write yet, which is to be ignored
+    is_report_due: bool = False  # whether Blender has yet to report our write, which is ignored
     straight: "BoundHair | None" = None  # the same without styles while viewports show that: alone it follows strokes
     is_behind: bool = False  # whether points have to grow again: what viewports show followed `guides` without them
 
@@ -65,7 +65,7 @@ class BoundHair:
 
     @property
     def radii(self) -> np.ndarray:
-        """(P,) float32 along every strand, in the surface's local units."""
+        """(P,) float32 radii along each strand, in the surface's local units."""
         return self.styles.radius_factor * groom.strand_radii(self.settings) / np.float32(self.surface.scale)
 
     @property
@@ -76,7 +76,7 @@ class BoundHair:
 
     @cached_property
     def reach(self) -> "Reach":
-        """The strands that follow each guide."""
+        """Strands that follow each guide."""
 
         return interpolation.guide_weights.reach(self.binding.guide_weights, len(self.guides))
 
@@ -99,7 +99,7 @@ class BoundHair:
         moves_all = self.is_behind or len(combed) == len(guides)
         moved = np.arange(strand_count) if moves_all else self._reached(combed)
         if len(moved):
-            # Beyond a half, selecting the moved ones would take longer.
+            # If more than half have moved, updating all is faster than selecting.
             self.grow(moved if len(moved) <= strand_count // 2 else None)
             self._points_have_moved()
         return moved
@@ -121,17 +121,17 @@ class BoundHair:
         return combed
 
     def hold(self, points: np.ndarray) -> None:
-        """Have these points in place of those that follow guides, until they grow again."""
+        """Override the interpolated points until they grow again."""
         self.free, self.growing = self.growing, Future()
         self.growing.set_result(points)
 
     def let_go(self) -> None:
-        """Have the points that follow guides again, after `hold`."""
+        """Restore the interpolated points after `hold`."""
         if self.free is not None:
             self.growing, self.free = self.free, None
 
     def is_due(self) -> None:
-        """Note that points are to be written again, though none has moved."""
+        """Mark the points for writing although none has moved."""
         self._points_have_moved()
 
     def _points_have_moved(self):
@@ -175,7 +175,7 @@ class BoundHair:
 
     @property
     def shown(self) -> "BoundHair":
-        """Whose points viewports show: those without styles where there are such."""
+        """Hair shown in viewports: the one without styles if it exists."""
         return self if self.straight is None else self.straight
 
     def show_styles(self, is_styled: bool) -> None:
@@ -188,7 +188,7 @@ class BoundHair:
             self.straight.grow()
 
     def catch_up(self) -> None:
-        """Bring points up to guides that only what viewports show has followed."""
+        """Grow the points for guides that only the viewport display has followed."""
         if self.is_behind:
             self.grow()
 
@@ -216,7 +216,7 @@ kept_cache = Cache()  # session_uid of kept hair Curves → `kept_following.Kept
 
 
 def keep(datablock: Curves, bound: BoundHair) -> None:
-    """Store the binding of a hair Curves datablock."""
+    """Cache the binding of a hair Curves datablock."""
     before = of(datablock)
     if before is not None:
         bound.written_radii = before.written_radii
@@ -233,7 +233,7 @@ def grow_in_place_of(datablock: Curves | None, bound: BoundHair) -> None:
         binding_cache.invalidate(datablock.session_uid)
         bound.written_radii = before.written_radii
         if before.free is None and before.growing is not None and before.growing.exception() is None:
-            # An array of its own, by which what is drawn is known.
+            # A new array: drawing identifies data by its array.
             bound.growing = Future()
             bound.growing.set_result(before.points.view())
     bound.grow()
@@ -261,11 +261,11 @@ def invalidate(datablock: Curves) -> None:
 
 
 def is_reported() -> None:
-    """Note that Blender has reported all our writes: the next report is of another change."""
+    """Mark all our writes as reported by Blender: the next report is a different change."""
     for bound in binding_cache.values():
         bound.is_report_due = False
 
 
 def has_unwritten() -> bool:
-    """Whether any hair is ahead of its datablock."""
+    """Whether any hair is newer than its datablock."""
     return any(not bound.is_written for bound in binding_cache.values())

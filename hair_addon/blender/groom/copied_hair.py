@@ -104,13 +104,13 @@ def _let_follow(hair, guides):
 
 
 def sharing(hair: Curves) -> list[Curves]:
-    """The other hair Curves in scenes that follow the guides of one."""
+    """Other hair Curves in scenes that follow the same guides."""
     guides = hair.vellus.guide_curves
     return [] if guides is None else [one for one in followers_shown(guides) if one != hair]
 
 
 def are_elsewhere(hair: Curves) -> bool:
-    """Whether hair follows guides that grow on another surface than its own."""
+    """Whether hair follows guides on a different surface."""
     guides = hair.vellus.guide_curves
     return guides is not None and None not in (guides.surface, hair.surface) and guides.surface != hair.surface
 
@@ -139,7 +139,7 @@ def make_own_guides(hair_list: Sequence[Curves], depsgraph: Depsgraph) -> list[C
 def _copied(guides, surface_object, surface):
     own = guides.copy()
     own.surface = surface_object
-    own.vellus.cache_identity = own.vellus.delivered_key = ""  # of frames that are baked of the first
+    own.vellus.cache_identity = own.vellus.delivered_key = ""  # identifies the baked frames of the original
     surface_space.forget_applied(own)
     curves_objects.link_object(name_of(guides), own, surface_object, is_rendered=False)
     roots = curves.read_roots(own, surface, surface.from_local(curves.first_points(own)))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Problems with a surface or its hair, each with the operator that fixes it.
 
-Panels call this with every redraw, so it reads no geometry but of an edited mesh, once.
+Panels call this on every redraw: it reads geometry only once after a mesh is edited.
 """
 
 from collections.abc import Iterable
@@ -145,6 +145,6 @@ def _of_guides(parts):
 
 
 def sharing_note(hair: Curves) -> str:
-    """Which other hair follows the same guides, as a translated sentence; empty where none does."""
+    """Translated sentence naming other hair that follows the same guides; empty if there is none."""
     names = ", ".join(name_of(other) for other in copied_hair.sharing(hair))
     return interface_text("The same guides are followed by: {names}", names=names) if names else ""

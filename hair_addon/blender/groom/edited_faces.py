@@ -24,9 +24,9 @@ left_cache = Cache(capacity=32)
 
 @dataclass(frozen=True)
 class _Edit:
-    """What has become of the vertices that strands were rooted between."""
+    """Mapping of the vertices that strands were rooted between."""
 
-    surface: Surface  # as it is now
+    surface: Surface  # current state
     matching: np.ndarray  # (V,) int32: each vertex of before now, -1 where it is gone
     before: np.ndarray  # (W, 3) float32: where those of now were; those that are new, where they are
 
@@ -74,7 +74,7 @@ def follow_moved(strands: Curves, surface: Surface, before: np.ndarray) -> None:
 
 
 def _between(strands):
-    """The hair between guides that can be written."""
+    """Writable hair between guides."""
     followers = (hair for hair in curves.followers(strands) if not curves.is_hand_made(hair) and len(hair.curves))
     return [hair for hair in followers if not attributes.is_from_library(hair)]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides on an edited mesh: transformed with the surface, and rooted again where faces have changed."""
+"""Guides on an edited mesh: transform with the surface, and new roots on changed faces."""
 
 import enum
 from collections.abc import Callable
@@ -43,7 +43,7 @@ def follow_surface(
     change.
     """
     if surface_space.has_other_surface(guide_curves):
-        return Followed.NOTHING  # to which they are about to be attached
+        return Followed.NOTHING  # they are about to be attached to it
     state = guide_curves.vellus
     surface = scene.read_surface(guide_curves.surface, depsgraph)
     if state.topology == surface.turned_topology:
@@ -108,7 +108,7 @@ def _carry(guide_curves, surface, change, depsgraph):
     for hair in between:
         bound = bindings.of(hair)
         if bound is not None and not bound.is_written:
-            hair.vellus.is_stale = True  # what goes along is what its Curves hold
+            hair.vellus.is_stale = True  # only data stored in the Curves is transformed
     targets = [guide_curves, *between]
     applied_transforms.note(targets, surface, change)
     surface = scene.read_surface(guide_curves.surface, depsgraph)

@@ -18,7 +18,7 @@ from .selection import curves_on
 
 _UV_MAP = "Hair"
 
-_LARGEST_UNWRAPPED = 1e9  # in local units: Blender never ends to unwrap meshes of 1e12
+_LARGEST_UNWRAPPED = 1e9  # in local units: unwrapping a mesh of size 1e12 never ends in Blender
 
 # Roots on seams may be found on either side of them.
 _TOLERATED = 0.002
@@ -38,7 +38,7 @@ def delete(parts: Iterable[Curves]) -> None:
         bpy.data.materials.remove(material)
     for left in [g for g in guides if g.users == 0]:
         bpy.data.hair_curves.remove(left)
-    bpy.context.view_layer.update()  # otherwise it still lists the objects, as None
+    bpy.context.view_layer.update()  # otherwise it still lists deleted objects as None
 
 
 def restore_object(guides: Curves) -> Object:
@@ -124,7 +124,7 @@ def apply_scale(surface_object: Object, view_layer: ViewLayer) -> None:
     scale = tuple(surface_object.scale)
     if not all(scale):
         raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(surface_object))
-    all_guides = curves_on(surface_object, "GUIDES")  # those too that are not live
+    all_guides = curves_on(surface_object, "GUIDES")  # including guides without live updates
     for guides in all_guides:
         curves.require_editable(guides)
     to_world_before = surface_space.to_world(surface_object)

@@ -43,7 +43,7 @@ _OF_STYLES = {
 
 
 def follow() -> None:
-    """Give settings the new names of what was renamed. Nothing becomes stale by that."""
+    """Update names in settings after renaming, without marking anything stale."""
     for datablock in bpy.data.hair_curves:
         is_own = datablock.library is None and datablock.override_library is None
         if datablock.vellus.kind != "NONE" and is_own:
@@ -95,7 +95,7 @@ def _object(datablock, key, name, found):
     known_name, uid = object_cache.get(place) or ("", 0)
     if known_name != name or (found is not None and found.session_uid == uid):
         return found
-    object_cache.invalidate(place)  # so that one that was deleted is sought once
+    object_cache.invalidate(place)  # so that a deleted object is searched for only once
     return next((one for one in bpy.data.objects if one.session_uid == uid), None)
 
 

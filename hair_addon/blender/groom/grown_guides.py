@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that grow on a surface that was read, and are draped there where their settings say so, or new hair is to."""
+"""Growing of guides, and draping if settings request it or hair is new."""
 
 from dataclasses import dataclass, replace
 
@@ -18,13 +18,13 @@ from ..settings import preferences
 from ..settings.translations import error_text
 
 HANGING = 0.5  # gravity from which new hair hangs, of a dome: less makes fur, which stands
-_QUICK = 1.0  # [s] that draping new hair may take
-_GROWN = 0.6  # part of the progress
+_QUICK = 1.0  # [s] limit for draping new hair
+_GROWN = 0.6  # fraction of the progress
 
 
 @dataclass(frozen=True)
 class GrownGuides:
-    """Guides, and a sentence that says why they are not draped where they should be."""
+    """Guides, and the reason if they could not be draped."""
 
     strands: Strands
     status: str = ""

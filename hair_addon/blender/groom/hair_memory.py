@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether there is memory for guides and strands, before any of it is taken."""
+"""Memory checks for guides and strands before allocation."""
 
 from bpy.types import Curves
 
@@ -35,5 +35,5 @@ def guide_bytes(settings: GuideSettings, face_count: int) -> int:
 
 
 def require_guides(settings: GuideSettings, face_count: int) -> None:
-    """As `require_strands`."""
+    """Raise `HairError` if guides need more memory than is available."""
     memory.require_for_hair(guide_bytes(settings, face_count))

@@ -14,7 +14,7 @@ from ..host import notices, scene_time
 from ..settings import preferences, properties
 from .bindings import BoundHair
 
-_SKIN = 1e-5  # [m] that hair keeps from the surface it grows on
+_SKIN = 1e-5  # [m] distance of hair from its own surface
 
 
 def is_wanted(hair: Curves) -> bool:

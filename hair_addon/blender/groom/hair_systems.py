@@ -19,7 +19,7 @@ from .selection import active_of_kind, make_active, object_of, painted_hair, sur
 def systems_of(surface: Object, view_layer: ViewLayer) -> list[Curves]:
     """The Curves of the hair systems on a mesh object, as far as a view layer has objects of them; oldest first."""
     if surface is None or not any(c.surface == surface for c in bpy.data.hair_curves):
-        return []  # panels ask with every redraw, and a view layer may have thousands of objects
+        return []  # panels call this on every redraw, and a view layer may have thousands of objects
     curves = {o.data for o in view_layer.objects if o is not None and o.type == "CURVES"}
     hair = {c for c in curves if c.vellus.kind == "HAIR"}
     followed = {c.vellus.guide_curves for c in hair}

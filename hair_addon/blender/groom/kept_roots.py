@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Roots that guides and hair keep when they are made again."""
+"""Roots reused when guides and hair are regenerated."""
 
 from bpy.types import Curves
 
@@ -24,7 +24,7 @@ def of(target: Curves | None, surface: Surface, key: str, count: int | None) -> 
     if on_cage is not None or target.vellus.topology == surface.topology:
         return on_cage
     firsts, shown = surface.from_local(curves.first_points(target)), scene.shown_surface(target.surface, surface)
-    if target.vellus.topology == shown.topology:  # where these were, before the surface was edited
+    if target.vellus.topology == shown.topology:  # their positions before the surface was edited
         stored = stored_roots.points(target, shown, is_complete=True)
         firsts = firsts if stored is None else mesh.positions(shown.mesh, stored)
     return curves.nearest_roots(surface, firsts)

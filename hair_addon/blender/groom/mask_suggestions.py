@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The vertex group that new hair on a mesh grows in, before an artist picks one: by its name."""
+"""Suggested mask for new hair: a vertex group chosen by its name."""
 
 import bpy
 from bpy.types import Object

@@ -28,7 +28,7 @@ def is_paused(datablock: Curves) -> bool:
 def pause(surfaces: set[Object]) -> None:
     """Pause what grows on surfaces that move, unless anything but Vellus may show or read it."""
     if not running.has_window() or running.job() is not None or _is_read_elsewhere():
-        if is_any():  # all objects are gone through, which is too much for each frame
+        if is_any():  # iterating over all objects is too slow for each frame
             resume()
         return
     for datablock in bpy.data.hair_curves:
@@ -41,7 +41,7 @@ def pause(surfaces: set[Object]) -> None:
             continue
         users = [user for user in bpy.data.objects if user.type == "CURVES" and user.data == datablock]
         if all(map(_may_pause, users)) and not _are_read_by_others(users):
-            # All of them, as some may be linked or have other nodes.
+            # Check all objects: some may be linked or have other nodes.
             is_done = [follow_nodes.pause(user, True) for user in users]
             if any(is_done):
                 paused_cache.keep(datablock.session_uid, True)
@@ -66,7 +66,7 @@ def _may_pause(curves_object):
     if curves_object.mode != "OBJECT" or curves_object.display_type != "BOUNDS":
         return False
     if curves_object.override_library is not None:
-        return False  # a paused input would be an override of its own
+        return False  # a paused input would create a library override
     following = follow_nodes.modifier_of(curves_object)
     return all(m == following or not m.show_viewport for m in curves_object.modifiers)
 

@@ -93,7 +93,7 @@ def interpolating_hair(
     place, its_guides, its_target = map(Remembered, (guide_curves.surface, guide_curves, target))
     bound = yield from _binding_hair(guide_curves, settings, depsgraph, target, styles)
     writing.require_count(its_target.find(), len(bound.binding.positions), len(bound.radii))
-    # Only now, as nothing comes between it and the writing.
+    # Last, so that nothing comes between this and writing.
     bindings.grow_in_place_of(its_target.find(), bound)
     return writing.write_strands(its_target.find(), place.find(), its_guides.find(), bound)
 
@@ -147,7 +147,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
 def _known_binding(target, settings, key, parting_key, guides, surface):
     """Return the `BoundHair` whose guides a search would find again; otherwise None.
 
-    So changes of weights, limits and widths need no search.
+    Changes of weights, limits and widths therefore need no search.
     """
     bound = None if target is None else bindings.of(target)
     if bound is None or (bound.root_key, bound.parting_key) != (key, parting_key):
@@ -288,12 +288,12 @@ def _bind(surface, guides, settings, ground, roots, progress):
 
 
 def _trees_on(surface, guides, settings, ground):
-    """A function that makes the `ClumpTrees` of hair."""
+    """Function that builds the `ClumpTrees` of hair."""
     return lambda: hair_styles.clump_trees(surface.mesh, guides.roots, settings, **ground)
 
 
 def _styled(read, binding, guides, settings, surface, ground, progress=no_progress):
-    """The `StyledHair` of hair that is new."""
+    """`StyledHair` of new hair."""
     make_trees = _trees_on(surface, guides, settings, ground)
     return styled_hair.bind(read, binding, guides, settings, surface, make_trees, progress)
 
@@ -308,7 +308,7 @@ def _growing(bound, progress):
 def _known_by(bound, progress):
     """The `BoundHair` when all about its strands is known but where their points are."""
     progress("Growing strands", 0.8)
-    _ = bound.binding.leaders, bound.binding.identities  # now, and not while other threads need the CPU
+    _ = bound.binding.leaders, bound.binding.identities  # before other threads need the CPU
     return bound
 
 
@@ -325,7 +325,7 @@ def restyle(
     guide_curves, settings = inputs_of(target)
     if bound is None or bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
-    if not bindings.can_read_masks(bound, target, depsgraph):  # what binds the hair again says what is wrong
+    if not bindings.can_read_masks(bound, target, depsgraph):  # rebinding the hair reports the error
         return False
     device = bound.binding.positions.device
     guides = curves.read_shown_guides(guide_curves, bound.surface, device, bound.guides)
@@ -342,9 +342,9 @@ def restyle(
 
 
 def evaluate(target: Curves, depsgraph: Depsgraph) -> None:
-    """Make Curves again from the settings and inputs they keep. What is wrong becomes their status.
+    """Regenerate Curves from their stored settings and inputs. Errors become their status.
 
-    Combed Curves are not changed: only an operator replaces them.
+    Combed Curves are unchanged: only an operator replaces them.
     """
     state = target.vellus
     state.is_stale = False

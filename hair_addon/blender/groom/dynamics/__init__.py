@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that are simulated, baked and draped: worlds of Blender read, frames kept in files."""
+"""Simulation, baking and draping of guides, with frames cached in files."""
 
 from typing import TYPE_CHECKING
 

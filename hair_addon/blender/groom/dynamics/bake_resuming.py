@@ -23,19 +23,19 @@ from . import broken_guides, guide_simulation
 from .broken_guides import Broken
 from .guide_simulation import FrameInput, GuideSimulation
 
-_PAUSE = 0.1  # [s] of visits between two reports of progress
+_PAUSE = 0.1  # [s] between progress reports
 
 
 @dataclass
 class Task:
-    """Guides that are being baked."""
+    """Guides during a bake."""
 
     name: str
     guides: Remembered
     simulated: GuideSimulation
     writer: Writer
-    done: int  # the last frame that is there
-    there: FrameCache  # frames that were baked before
+    done: int  # last existing frame
+    there: FrameCache  # frames baked earlier
     broken: int = 0
     worst: Broken = broken_guides.NONE
     seconds: float = 0.0  # that the frame at hand has taken so far
@@ -49,7 +49,7 @@ class Task:
 
 
 def digest_of(guides: Curves, scene: Scene, settings: "guide_simulation.DynamicsSettings") -> str:
-    """Digest of the animation in the present frame. Raises `HairError`."""
+    """Digest of the animation in the current frame. Raises `HairError`."""
     return frame_animation.digest_of(guides, scene, scenes.present_depsgraph(), settings)
 
 

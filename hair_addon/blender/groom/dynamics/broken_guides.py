@@ -22,7 +22,7 @@ class Broken:
 
     @property
     def notes(self) -> tuple[tuple[str, str], ...]:
-        """Notes of a manifest; none where no guide broke."""
+        """Notes for a manifest; empty if no guide broke."""
         return ((_NOTE, f"{self.count} {self.frame}"),) if self.count else ()
 
     def said_of(self, guides: Curves) -> HairError:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the settings of dynamics mean for guides of the present length.
+"""Notes on the effect of dynamics settings at the current guide length.
 
-Panels ask with every redraw, so geometry is read once after each change.
+Panels call these on every redraw, so geometry is read once after each change.
 """
 
 import math
@@ -18,11 +18,11 @@ from ...settings.translations import error_text, interface_text
 from ..guides import guide_states
 from . import frame_folders, guide_simulation
 
-LONGEST = 1.5  # [m]: longer hair is probably of a character that is not modeled to scale
+LONGEST = 1.5  # [m]: longer hair suggests a character that is not modeled to scale
 
 
 def bend_note(guides: Curves, blender_scene: Scene) -> str:
-    """How far guides bend under their weight, as a translated sentence; empty without gravity."""
+    """Translated sentence on how far guides bend under their weight; empty without gravity."""
     try:
         settings = properties.dynamics_of(guides.vellus)
     except HairError as error:
@@ -59,13 +59,13 @@ def stiffness_note(guides: Curves) -> str:
 
 
 def rounded_up(stiffness: float) -> float:
-    """A stiffness to two digits, and not less."""
+    """Round a stiffness up to two digits."""
     unit = 10.0 ** (math.floor(math.log10(stiffness)) - 1)
     return float(f"{math.ceil(stiffness / unit) * unit:.2g}")
 
 
 def size_note(guides: Curves, blender_scene: Scene) -> str:
-    """What to do about guides that are too long to be hair, as a translated sentence; empty where they are not."""
+    """Translated advice for guides that are too long to be hair; empty otherwise."""
     length = _length(guides, blender_scene)
     if is_hand_made(guides) or not length > LONGEST:
         return ""
@@ -90,6 +90,6 @@ def _length(guides, blender_scene):
 
 
 def _in_words(metres, blender_scene):
-    """A length with two digits, in the units of the scene."""
+    """Format a length with two digits, in scene units."""
     system = blender_scene.unit_settings.system
     return bpy.utils.units.to_string("METRIC" if system == "NONE" else system, "LENGTH", metres, precision=2)

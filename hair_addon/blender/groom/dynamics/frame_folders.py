@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the baked frames of guides are: a folder of theirs in the cache folder that they name."""
+"""Folders of baked frames: one per guides, inside the cache folder that the guides name."""
 
 import contextlib
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ from ...host.notices import name_of
 
 _CLOSE = 1e-5  # parts of coordinates
 
-folder_cache = Cache()  # session_uid of guide Curves → (folder, FrameCache): what was read of it
+folder_cache = Cache()  # session_uid of guide Curves → (folder, its loaded FrameCache)
 
 
 def folder_of(guides: Curves) -> Path:
@@ -116,7 +116,7 @@ def remember() -> None:
     """Store in the open file where its frames are, before it is saved: under another name they play, too."""
     for guides in simulating():
         baked = frames_of(guides)
-        with contextlib.suppress(HairError):  # the folder leads nowhere
+        with contextlib.suppress(HairError):  # the folder path is invalid
             if baked is None or baked.manifest is None or baked.folder != folder_of(guides):
                 continue
             if not attributes.is_from_library(guides):
@@ -225,7 +225,7 @@ def is_simulated(guides: Curves) -> bool:
 
 
 def forget(guides: Curves) -> None:
-    """Read the folder again when it is next asked for: frames were written or removed."""
+    """Drop the cached folder contents after frames were written or removed."""
     folder_cache.invalidate(guides.session_uid)
 
 
@@ -237,6 +237,6 @@ def have_changed(guides: Curves) -> None:
 
 
 def has_frames(guides: Curves) -> bool:
-    """Whether frames of some guides are known: panels ask with every redraw, so no file is read."""
+    """Whether baked frames of the guides are known. Reads no file: panels call this on every redraw."""
     _folder, baked = folder_cache.get(guides.session_uid) or (None, None)
     return baked is not None and baked.manifest is not None

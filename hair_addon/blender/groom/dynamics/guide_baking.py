@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baking: guides simulated frame by frame into files, which playing and rendering then read.
+"""Baking: simulate guides frame by frame into files for playback and rendering.
 
-Baking goes on where it was stopped, from the last state that was written, and comes to the same bits.
+Baking resumes from the last written state and gives identical bits.
 """
 
 import contextlib
@@ -35,13 +35,13 @@ from .broken_guides import Broken
 SOLVER_VERSION = 3  # of all that frames follow from beside settings: raised when they come out otherwise
 STATE_FRAMES = 24  # between states
 _PARTING = "parting"  # a part of `key_of`
-_BEYOND = 1  # frames after the last one, for motion blur
+_BEYOND = 1  # extra frames after the last, for motion blur
 
 _baking = False
 
 
 def is_baking() -> bool:
-    """Whether guides are being baked: then a change of frame is none of the artist's."""
+    """Whether a bake is running, so that frame changes are not the artist's."""
     return _baking
 
 
@@ -75,7 +75,7 @@ class BakedFrame:
 
 
 def memory_of(guides_list: Sequence[Curves]) -> int:
-    """Memory that baking guides takes while it runs [bytes]."""
+    """Memory used while baking guides [bytes]."""
     counts = [(guides.vellus.dynamics.vertex_count, len(guides.curves)) for guides in guides_list]
     return sum(cost.simulation_bytes(*count) for count in counts)
 
@@ -153,7 +153,7 @@ def baking(
     with contextlib.ExitStack() as stack:
         stack.callback(_end, its_scene, present, [Remembered(guides) for guides in guides_list])
         stack.enter_context(quiet_hair.unevaluated(guides_list, scene))
-        begun = [_begin(guides, last, scene) for guides in guides_list]  # what is refused has changed nothing
+        begun = [_begin(guides, last, scene) for guides in guides_list]  # a refused bake must change nothing
         tasks = [_open(*one, last, starts_over, stack) for one in begun]
         yield Stage("Baking", 0.0)
         yield from bake_resuming.going_on(tasks, its_scene)
@@ -161,7 +161,7 @@ def baking(
         counts = [0] * len(tasks)
         for frame in range(first + 1, last + _BEYOND + 1):
             due = [(index, task) for index, task in enumerate(tasks) if task.done == frame - 1]
-            scene = its_scene.find()  # another one after an undo
+            scene = its_scene.find()  # undo replaces it
             started = _now()
             scene_time.go_to(scene, frame)
             depsgraph = scenes.present_depsgraph()
@@ -203,12 +203,12 @@ def _end(its_scene, present, baked):
     """Go back to the frame where the scene was; guides are shown there, as baked, after the next update."""
     global _baking
     try:
-        with contextlib.suppress(HairError):  # the scene was deleted meanwhile
+        with contextlib.suppress(HairError):  # the scene was deleted in the meantime
             scene_time.go_to(its_scene.find(), present)
     finally:
         _baking = False
     for remembered in baked:
-        with contextlib.suppress(HairError):  # deleted meanwhile, by a script
+        with contextlib.suppress(HairError):  # deleted by a script in the meantime
             frame_folders.have_changed(remembered.find())
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Combed guides that fall on their surface, and keep where they come to rest as their shape."""
+"""Draping: combed guides fall on their surface and take their resting shape."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def drape(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) -> i
 
 
 def draping(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) -> Work[int]:
-    """`drape` as work in steps: guides stay as they are until all have come to rest."""
+    """Run `drape` as work in steps; guides are unchanged until all are at rest."""
     guides = guide_tools.read(datablock, settings, depsgraph)
     dynamics_settings = _softened(datablock, settings)
     blender_scene = depsgraph.scene
@@ -65,7 +65,7 @@ def draping(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) ->
 
 
 def seconds(datablock: Curves, settings: DrapeSettings, face_count: int) -> float:
-    """How long `drape` takes [s], estimated; face_count: triangles of the surface."""
+    """Estimated duration of `drape` [s]; face_count: triangles of the surface."""
     substeps = properties.dynamics_of(datablock.vellus).substeps * _FRAMES * settings.seconds
     return cost.drape_seconds(len(datablock.curves), face_count, round(substeps))
 

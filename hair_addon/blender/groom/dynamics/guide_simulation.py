@@ -95,7 +95,7 @@ class GuideSimulation:
         self.simulation.advance(self._root_pose(frame.pose), frame.world, frame.seconds)
         self.errors = (*frame.errors, *self.simulation.notes)
         points = frame.pose.to_rest(self.simulation.points())
-        points[:, 0] = self.roots  # to the last bit, as what follows compares roots
+        points[:, 0] = self.roots  # exact, because later stages compare roots
         return points
 
     def _change(self, frame):
@@ -260,13 +260,13 @@ def _keep_stiffness(guides, frame, local):
 
 
 def _load(settings):
-    """A measure of how much stiffness the material needs, whatever its own is."""
+    """Measure of the stiffness that the material needs, independent of its own stiffness."""
     one = replace(settings, bend_stiffness=1.0)
     return dynamics.rod.stiffness_advice.weight_ratio(one, 1.0, abs(settings.gravity)) or 1.0
 
 
 def in_metres(settings: DynamicsSettings, metres: float) -> DynamicsSettings:
-    """Settings whose lengths are in units of the world → the same in metres."""
+    """Convert settings with lengths in world units to metres."""
     return replace(
         settings, cell_size=metres * settings.cell_size, collision_distance=metres * settings.collision_distance
     )

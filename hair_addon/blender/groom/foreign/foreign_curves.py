@@ -14,7 +14,7 @@ from ...data import scene
 from ...data.strands import attributes, curves
 from ...host.notices import name_of
 
-_NAME = "Vellus Curves to Polylines"  # of nodes and their modifier that are there while curves are read
+_NAME = "Vellus Curves to Polylines"  # name of the temporary nodes and modifier
 
 # Settings that make a tube, a ribbon or a face of a legacy curve object, and their neutral values.
 _THIN = {"bevel_depth": 0.0, "extrude": 0.0, "bevel_object": None, "dimensions": "3D"}
@@ -74,7 +74,7 @@ def read(curves_object: Object, applies_modifiers: bool) -> SeenCurves:
     if not _is_evaluated(curves_object, applies_modifiers):
         return _read(curves_object.data)
     with _as_polylines(curves_object, applies_modifiers):
-        geometry = _evaluated(curves_object)  # whose curves are gone when it is
+        geometry = _evaluated(curves_object)  # its curves are freed with it
         return _read(geometry.curves)
 
 
@@ -101,7 +101,7 @@ def take(curves_object: Object, applies_modifiers: bool) -> Curves:
 
 
 def _is_evaluated(curves_object, applies_modifiers):
-    """Whether the evaluated curves may differ from the stored ones."""
+    """Whether evaluated curves may differ from stored ones."""
     if curves_object.type == "CURVE" or attributes.curve_types(curves_object.data).max(initial=0) > attributes.POLY:
         return True
     return applies_modifiers and any(modifier.show_viewport for modifier in curves_object.modifiers)
@@ -197,7 +197,7 @@ def _write_radii(datablock, bevel):
 
 
 def _replace_data(curves_object, replacement):
-    """Give an object other Curves under the same name; the old ones are removed."""
+    """Replace an object's Curves, keep their name and remove the old datablock."""
     before, name = curves_object.data, curves_object.data.name
     before.user_remap(replacement)
     bpy.data.hair_curves.remove(before)

@@ -33,7 +33,7 @@ from . import foreign_curves
 from .foreign_curves import SeenCurves
 
 _SWITCH = Param("")
-_GROUP = "Hair"  # the vertex group of the area with guides
+_GROUP = "Hair"  # vertex group of the area with guides
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class PlacedCurves:
 def find_surface(
     curves_object: Object, view_layer: ViewLayer, selected: Iterable[Object] = (), name: str = ""
 ) -> Object:
-    """The mesh object that an object's curves grow on. Raises `HairError`.
+    """Mesh object on which an object's curves grow. Raises `HairError`.
 
     The one of a name; else the surface that the curves name, the one mesh among the selected objects, the mesh that
     they are parented to, or the only mesh there is.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several objects with curves that become guides or hair together, as one object: one hair system."""
+"""Joining of several objects with curves into one object, used as one hair system."""
 
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -45,7 +45,7 @@ class KeptHair:
     guides: Curves
     rooted: RootedCurves
     mean_error: float  # root mean square of strands' distances to their reproduction, as parts of their lengths
-    high_error: float  # that 95 % of the strands stay below
+    high_error: float  # 95th percentile of the same errors
 
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
         """[(sentence, values)] to report to the user."""

@@ -14,7 +14,7 @@ from ...host.notices import name_of
 
 
 def systems_of(surface: Object | None) -> list[ParticleSystem]:
-    """The particle systems of a mesh object that are hair."""
+    """Hair particle systems of a mesh object."""
     if surface is None or surface.type != "MESH":
         return []
     return [system for system in surface.particle_systems if system.settings.type == "HAIR"]

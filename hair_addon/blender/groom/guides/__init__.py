@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tools that change, add and remove guides."""
+"""Tools that edit, add and remove guides."""
 
 from typing import TYPE_CHECKING
 

@@ -21,7 +21,7 @@ _SHIPPED = {
 
 _OFF_SURFACE = 0.02  # of the median length of guides: how far above the surface strokes keep them
 
-_fitted = {}  # name of a brush → its settings as they were left here
+_fitted = {}  # name of a brush → settings last written by the add-on
 
 
 def fit(guides: Curves, sculpt: CurvesSculpt) -> None:
@@ -67,7 +67,7 @@ def _fit(brush, settings):
     group = brush.curves_sculpt_settings
     present = _settings_of(group)
     if present not in (_rounded(_SHIPPED), _fitted.get(brush.name)):
-        return  # an artist's choice
+        return  # chosen by the artist
     for name, value in settings.items():
         setattr(group, name, value)
     _fitted[brush.name] = _settings_of(group)
@@ -78,7 +78,7 @@ def _settings_of(group):
 
 
 def _rounded(settings):
-    """Settings as they can be compared: Blender's numbers have single precision."""
+    """Round settings to Blender's single precision, for comparison."""
     return settings | {"curve_length": float(np.float32(settings["curve_length"]))}
 
 
@@ -86,5 +86,5 @@ def _lengths(guides):
     """(G,) lengths in local units."""
     offsets, points = curves.curve_offsets(guides), curves.read_points(guides)
     steps = np.linalg.norm(np.diff(points, axis=0, append=points[-1:]), axis=1)
-    steps[offsets[1:] - 1] = 0.0  # from a curve to the next
+    steps[offsets[1:] - 1] = 0.0  # between curves
     return np.add.reduceat(steps, offsets[:-1])

@@ -23,7 +23,7 @@ Additions = tuple[np.ndarray, np.ndarray, SurfacePoints]
 
 
 def change_count(datablock: Curves, settings: CountSettings, depsgraph: Depsgraph) -> int:
-    """Add guides between those that are there, or remove crowded ones; returns how many there are then.
+    """Add guides between existing ones or remove crowded ones; returns the new number of guides.
 
     Raises `HairError` before anything changes.
     """
@@ -59,7 +59,7 @@ def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) ->
 
 
 def write(guides: CombedGuides, additions: list[Additions], removed: np.ndarray) -> None:
-    """Add guides and remove others, (R,) indices of those that were there. One at least has to be left."""
+    """Add guides and remove (R,) indices of existing ones. At least one guide must remain."""
     datablock, surface, roots = guides.datablock, guides.surface, guides.roots
     for points, sources, new_roots in additions:
         if len(points):
@@ -114,7 +114,7 @@ def _between(guides, count, mask, depsgraph):
 
 
 def _density(guides, mask, depsgraph):
-    """Where new guides may stand: (V,) weights or None, and `Texture` or None.
+    """Density of new guides: (V,) weights or None, and `Texture` or None.
 
     Inside the mask that guides were placed by, and inside the tool's own mask.
     """

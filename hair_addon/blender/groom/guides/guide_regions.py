@@ -32,7 +32,7 @@ def regions_of(guides: Curves, depsgraph: Depsgraph) -> np.ndarray | None:
 
 
 def is_parted(guides: Curves) -> bool:
-    """Whether `regions_of` has anything to read."""
+    """Whether `regions_of` has partings to read."""
     return bool(_parted_hair(guides))
 
 
@@ -43,7 +43,7 @@ def _parted_hair(guides):
 def parting_keys(guides: Curves) -> tuple[str, ...]:
     """What parted the hair between guides when it was grown: changes where `regions_of` may."""
     followers = curves.followers(guides)
-    bound = [bindings.of(hair) for hair in followers]  # newer than what is written
+    bound = [bindings.of(hair) for hair in followers]  # newer than the datablock
     keys = [
         hair.vellus.parting_key if own is None else own.parting_key for hair, own in zip(followers, bound, strict=True)
     ]

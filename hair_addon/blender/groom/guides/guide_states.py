@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What panels say of guides with every redraw: whether they are combed, and how long they are.
+"""State of guides for panels: whether they are combed, and their length.
 
 Read once after each change of the guides.
 """

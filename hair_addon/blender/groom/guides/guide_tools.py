@@ -161,7 +161,7 @@ def to_shape(guides: CombedGuides) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def write_shapes(guides: CombedGuides, after: np.ndarray) -> int:
-    """Write points (N, 3) [m] of guides; returns how many have changed. Raises `HairError`."""
+    """Write points (N, 3) [m] of guides; returns the number changed. Raises `HairError`."""
     if not np.abs(after).max() < _FARTHEST:  # also refuses NaN
         raise HairError("The guides would extend too far from their surface: use smaller values.")
     is_moved = (after != guides.points).any(axis=1)
@@ -174,7 +174,7 @@ def write_shapes(guides: CombedGuides, after: np.ndarray) -> int:
 
 
 def change_lengths(datablock: Curves, settings: LengthSettings, depsgraph: Depsgraph) -> int:
-    """Give guides other lengths; returns how many have changed. Raises `HairError` before anything changes."""
+    """Change the lengths of guides; returns the number changed. Raises `HairError` before anything changes."""
     guides = read(datablock, settings, depsgraph)
     resized = grooming.guide_lengths.resized
     return reshape(guides, lambda points, chosen: resized(points, settings, guides.weights[chosen]))
@@ -267,7 +267,7 @@ def _regions(guides, settings, depsgraph):
 
 
 def is_any_selected(datablock: Curves) -> bool:
-    """Whether guides are selected in Sculpt Mode or Edit Mode, and others are not."""
+    """Whether some but not all guides are selected in Sculpt Mode or Edit Mode."""
     return guide_curves.selection(datablock, curves.curve_offsets(datablock)) is not None
 
 

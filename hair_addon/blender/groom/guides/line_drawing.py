@@ -31,12 +31,12 @@ def drawn_for(active: Object | None) -> Curves | None:
 
 
 def draw_parting(hair: Curves, context: Context) -> None:
-    """Begin to draw part lines of hair, or go on with those that it has. Raises `HairError`."""
+    """Start drawing part lines of hair, or continue existing ones. Raises `HairError`."""
     _begin(hair, hair.vellus.hair, "part_lines", "Parting", context)
 
 
 def draw_flow(guides: Curves, context: Context) -> None:
-    """Begin to draw flow lines of guides, or go on with those that they have. Raises `HairError`."""
+    """Start drawing flow lines of guides, or continue existing ones. Raises `HairError`."""
     if guide_states.of(guides).is_combed:
         raise HairError("Combed guides do not follow flow lines: regenerate the guides first, or comb them.")
     _begin(guides, guides.vellus.guides, "flow_lines", "Flow", context)
@@ -71,7 +71,7 @@ def _begin(target, group, field, title, context):
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
     selection.make_active(lines, context.view_layer)
-    surface.select_set(True)  # the tool draws on what is selected
+    surface.select_set(True)  # the tool draws on selected objects
     bpy.ops.object.mode_set(mode="EDIT")
     setattr(group, field, lines.name)
     paint = context.tool_settings.curve_paint_settings
@@ -86,7 +86,7 @@ def _new_lines(name, surface):
     data.dimensions = "3D"
     lines = bpy.data.objects.new(name, data)
     (surface.users_collection or [bpy.context.scene.collection])[0].objects.link(lines)
-    lines.parent = surface  # whose coordinates they have, and which carries them
+    lines.parent = surface  # lines use its coordinates and move with it
     lines.show_in_front, lines.hide_render = True, True
     return lines
 
