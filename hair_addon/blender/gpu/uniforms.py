@@ -186,7 +186,7 @@ STEP = Block(
         "mask": "int",
         "level": "int",
         "first_centre": "int",
-        "numbers": ("vec4", 6),  # NUMBERS of core/styling/program_rows.py, four by four
+        "numbers": ("vec4", 6),  # NUMBERS of core/styling/program.py, four by four
     },
 )
 

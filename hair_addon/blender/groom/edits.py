@@ -8,7 +8,7 @@ import numpy as np
 from bpy.types import Curves, Depsgraph, Object, ViewLayer
 
 from ...core.errors import HairError
-from ...core.geometry import mesh, uv_check
+from ...core.geometry import mesh, uv_maps
 from ..data import scene, surface_space
 from ..data.strands import curves, curves_objects
 from ..host.notices import name_of
@@ -93,7 +93,7 @@ def check_uvs(surface_object: Object, depsgraph: Depsgraph) -> float:
     mesh.check_mesh(surface.mesh)
     if surface.corner_uvs is None:
         raise HairError('"{name}" has no UV map: make one.', name=name_of(surface_object))
-    share = uv_check.misleading_fraction(surface.mesh, surface.corner_uvs)
+    share = uv_maps.misleading_fraction(surface.mesh, surface.corner_uvs)
     for part in _parts_on(surface_object):
         part.vellus.uv_status = "UVs overlap" if share > _TOLERATED else ""
     return share

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError, cause_of
-from ...core.files import alembic_grooms, array_grooms, curve_file, curve_units
+from ...core.files import alembic, array_grooms, curve_file, curve_units
 from ...core.files.curve_file import Convention, Motion
 from ...core.geometry.mesh import TriMesh
 from ...core.geometry.strands import curve_offsets
@@ -22,7 +22,7 @@ _USD = (".usd", ".usdc", ".usda", ".usdz")
 # Extension → reader that returns a `CurveFile`; .blend files are read as objects instead.
 _READERS = {
     **dict.fromkeys(_USD, usd_curves.read),
-    ".abc": alembic_grooms.read,
+    ".abc": alembic.grooms.read,
     ".npz": array_grooms.read,
 }
 ENDINGS = (".blend", *_READERS)

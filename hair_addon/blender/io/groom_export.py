@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...core.errors import HairError, cause_of
-from ...core.files import export_settings, settings_file, unreal_groom
+from ...core.files import export_settings, settings_file
+from ...core.files.alembic import unreal_groom
 from ...core.files.whole_file import require_place, whole_file
 from ...core.long_work import Stage
 from ..groom.dynamics import frame_folders

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
-from ...core.files import alembic_reader
+from ...core.files import alembic
 from ..data import usable_surfaces
 
 # The keyword of an .obj line, and the number of values that must follow.
@@ -49,7 +49,7 @@ def require_alembic(path):
         count = file.read(8)
     if header[5] != 0xFF or len(count) < 8 or root + 8 + 8 * struct.unpack("<Q", count)[0] > size:
         raise HairError(f"{path} is not a complete Alembic file: it is truncated.")
-    alembic_reader.require_whole(path)
+    alembic.reader.require_whole(path)
 
 
 def require_usd(path):

@@ -17,7 +17,7 @@ from ..geometry import resampling
 from ..geometry.mesh import TriMesh, positions
 from ..geometry.mirror import ACROSS_X, Mirror
 from ..geometry.strands import Strands, from_numpy
-from ..geometry.texture import Texture
+from ..geometry.uv_maps import Texture
 from ..grooming import groom_defaults
 from ..grooming.groom import GuideSettings, distribute_guides
 from ..kernels import kernel_setup

@@ -8,11 +8,6 @@ from ..lazy import submodules
 if TYPE_CHECKING:
     from . import (
         alembic,
-        alembic_curves,
-        alembic_grooms,
-        alembic_reader,
-        alembic_shapes,
-        alembic_transforms,
         array_file,
         array_grooms,
         curve_file,
@@ -22,13 +17,11 @@ if TYPE_CHECKING:
         frame_manifest,
         groom_curves,
         library_settings,
-        ogawa,
         plain_file,
         settings_file,
         style_presets,
         table_cache,
         table_exr,
-        unreal_groom,
         whole_file,
     )
 else:

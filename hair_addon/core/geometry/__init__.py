@@ -31,10 +31,9 @@ if TYPE_CHECKING:
         smooth_surface,
         strands,
         surface_deform,
-        texture,
         transform,
         turned_faces,
-        uv_check,
+        uv_maps,
         vertex_turns,
     )
 else:

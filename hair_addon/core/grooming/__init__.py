@@ -20,15 +20,11 @@ if TYPE_CHECKING:
         guide_count,
         guide_growth,
         guide_lengths,
-        guide_lift,
-        guide_mirror,
-        guide_segments,
-        guide_smoothing,
+        guide_shapes,
         guide_tool_settings,
         guide_trim,
         hair_styles,
         rooted_curves,
-        strand_clusters,
         transfer_settings,
     )
 else:

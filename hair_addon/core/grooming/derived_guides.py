@@ -7,6 +7,7 @@ import numpy as np
 
 from .. import grooming, interpolation
 from ..errors import HairError
+from ..geometry import clusters
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
 from ..geometry.strands import Strands, from_numpy, lengths
 from ..interpolation.hair_binding import HairBinding
@@ -76,7 +77,7 @@ def derive(
     """
     groom.load_kernels("cpu", part_of(progress, 0.0, 0.1))
     progress("Choosing guides", 0.1)
-    sources = grooming.strand_clusters.representatives(points, guide_count)
+    sources = grooming.derived_guides.representatives(points, guide_count)
     at_roots = positions(mesh, roots)
     arms = points - at_roots[:, None]
     guide_arms = arms[sources] - arms[sources, :1]
@@ -145,3 +146,23 @@ class _Reproduction:
     def guide_map(self):
         shares = self.weights.weights.numpy()
         return np.where(shares > 0.0, self.weights.indices.numpy(), -1), shares
+
+
+_SHAPE = 0.5  # weight of distances between shapes relative to distances between roots
+_SAMPLES = 4  # points of a strand that describe its shape
+
+
+def representatives(points: np.ndarray, count: int) -> np.ndarray:
+    """Return ascending indices, at most `count`, of representatives of strands (S, P, 3) [m]; S > 0."""
+    features = _features(points)
+    if count >= len(features):
+        return np.arange(len(features))
+    return np.sort(clusters.medoids(features, clusters.clusters(features, count), count))
+
+
+def _features(points):
+    """Return features (S, 3 + 3 k) float32: the root of each strand, and points along it relative to the root."""
+    along = np.rint(np.linspace(0.0, points.shape[1] - 1, _SAMPLES + 1)[1:]).astype(np.int64)
+    roots = points[:, 0].astype(np.float32)
+    shapes = (points[:, along] - points[:, :1]) * (_SHAPE / np.sqrt(_SAMPLES))
+    return np.concatenate([roots - roots.mean(axis=0), shapes.reshape(len(points), -1)], axis=1).astype(np.float32)

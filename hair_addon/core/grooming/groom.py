@@ -17,7 +17,7 @@ from .. import geometry, grooming, interpolation, placement, styling
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, check_points, positions
 from ..geometry.mirror import ACROSS_X, Mirror
 from ..geometry.strands import Strands
-from ..geometry.texture import Texture
+from ..geometry.uv_maps import Texture
 from ..interpolation.hair_binding import HairBinding
 from ..interpolation.regions import Regions
 from ..kernels import kernel_setup

@@ -17,7 +17,7 @@ import numpy as np
 from .. import geometry
 from ..errors import HairError
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, interpolate
-from ..geometry.texture import Texture
+from ..geometry.uv_maps import Texture
 from ..params import Settings, from_surface
 
 S = TypeVar("S", bound=Settings)

@@ -14,7 +14,7 @@ from .. import geometry
 from ..errors import HairError
 from ..geometry.landmark_warp import Warp
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, check_points, normals, positions
-from .guide_segments import rotations
+from .guide_shapes import rotations
 
 _OUTSIDE = 1e-3  # tolerance for coordinates outside all faces, relative to the UV layout's size
 

@@ -9,7 +9,7 @@ from ..geometry.mesh import TriMesh
 from ..kernels import parallel
 from ..kernels.checks import require_count
 from ..kernels.parallel import Rows
-from .guide_segments import joined, only, split, turned
+from .guide_shapes import joined, only, split, turned
 from .guide_tool_settings import AttractSettings
 
 # No gradients are needed. Without fused multiply-add all devices round alike.

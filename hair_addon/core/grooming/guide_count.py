@@ -9,7 +9,7 @@ import numpy as np
 from .. import grooming, placement
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
 from ..geometry.strands import Strands
-from ..geometry.texture import Texture
+from ..geometry.uv_maps import Texture
 from ..interpolation.regions import Regions
 from . import following, groom
 from .groom import HairSettings
@@ -48,7 +48,7 @@ def new_roots(
         places = positions(mesh, roots)
         density = placement.coverage.coverage(mesh, places)
         if density is not None:
-            within = _AROUND * grooming.guide_mirror.nearest(places, places, 5)[1][:, 4]
+            within = _AROUND * grooming.guide_copies.nearest(places, places, 5)[1][:, 4]
     return placement.insertion.insert(
         mesh, roots, count, density=density, texture=texture, around=around, within=within, device=device
     )

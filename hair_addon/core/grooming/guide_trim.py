@@ -9,7 +9,7 @@ from ..geometry.strands import lengths as lengths_of
 from ..kernels import parallel
 from ..kernels.parallel import Rows
 from .guide_lengths import cut
-from .guide_segments import only
+from .guide_shapes import only
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
 from ..geometry.mirror import Mirror
-from ..geometry.texture import Texture
+from ..geometry.uv_maps import Texture
 from .domain import Domain
 from .exact_cells import CutCells
 from .farthest import farthest

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
         lean,
         masks,
         program,
-        program_rows,
         random_numbers,
         smooth,
         stack,

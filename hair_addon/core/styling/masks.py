@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.mesh import SurfacePoints
-from ..geometry.texture import Texture
+from ..geometry.uv_maps import Texture
 from ..interpolation.hair_binding import HairBinding
 from ..kernels.checks import require_count, require_indices
 

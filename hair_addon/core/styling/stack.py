@@ -23,8 +23,7 @@ from . import program as programs
 from .base import StyleSettings, TreeSettings
 from .clump_trees import HAIR, ClumpTrees, Owner
 from .guide_styles import FollowedGuides, leans
-from .program import mask_key
-from .program_rows import Program
+from .program import Program, mask_key
 from .steps import StrandData
 from .style_inputs import Inputs
 

@@ -2,7 +2,7 @@
 """The kernel that applies a program of styles to strands: one launch for all steps.
 
 steps.cpp and the files it includes are compiled for both kinds of device. A program is two arrays of rows, one a step:
-whole numbers (`CHOICES`) and numbers (`NUMBERS`), as program_rows.py says. program.py writes them.
+whole numbers (`CHOICES`) and numbers (`NUMBERS`), as program.py writes them.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from ..errors import HairError
 from ..kernels import native_code, parallel
 from ..kernels.checks import require_count, require_indices
 from . import kinds, style_text
-from .program_rows import CHOICES, NUMBERS, Program
+from .program import CHOICES, NUMBERS, Program
 
 # Nothing differentiates these kernels. A GPU's approximate divisions and roots move hair by less than 2e-6 of its size;
 # where more would follow from them, steps.cpp asks for exact ones.

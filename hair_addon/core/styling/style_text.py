@@ -8,7 +8,7 @@
 import re
 from collections.abc import Iterable
 
-from . import frizz, kinds, program_rows
+from . import frizz, kinds, program
 from .base import Step
 from .random_numbers import PURPOSES
 
@@ -23,7 +23,7 @@ def constants() -> dict[str, int]:
 
     return {
         **kinds.STEP_KINDS,
-        **{f"{name.upper()}_NUMBER": place for place, name in enumerate(program_rows.SHARED)},
+        **{f"{name.upper()}_NUMBER": place for place, name in enumerate(program.SHARED)},
         **PURPOSES,
         "WAVES": frizz.WAVES_AN_OCTAVE,
         "MOST_OCTAVES": frizz.MOST_OCTAVES,
@@ -53,7 +53,7 @@ def ordered(step: Step) -> list[float]:
 
 
 def _declarations(step):
-    place = len(program_rows.SHARED)
+    place = len(program.SHARED)
     lines = []
     for name in kinds.STEPS[step].NUMBERS:
         array = _ARRAY.fullmatch(name)

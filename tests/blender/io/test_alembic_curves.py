@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.core.files import alembic_grooms
+from hair_addon.core.files import alembic
 from tests.support.commands import load, run_here
 from tests.support.dynamics.following import update
 from tests.support.exchange.alembic_files import of_maya
@@ -35,7 +35,7 @@ def test_blenders_curves_are_read_as_they_are_seen_in_every_frame(scene, lines, 
         carrier.keyframe_insert("location", frame=frame)
     path = tmp_path / "curves.abc"
     bpy.ops.wm.alembic_export(filepath=str(path), as_background_job=False, start=1, end=4)
-    (found,) = alembic_grooms.read(path).sets
+    (found,) = alembic.grooms.read(path).sets
     placed = found.placed(1.0, "Y")
     assert found.name == "Imported" and found.is_smooth.all() == (kind == "CATMULL_ROM")
     np.testing.assert_allclose(placed.radii, 0.002, rtol=1e-6)

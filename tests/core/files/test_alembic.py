@@ -6,7 +6,7 @@ import io
 import numpy as np
 import pytest
 
-from hair_addon.core.files.alembic import TYPES, AlembicWriter, Property
+from hair_addon.core.files.alembic.writer import TYPES, AlembicWriter, Property
 from tests.support.exchange import alembic_reader
 
 KINDS = sorted(set(TYPES) - {"string"})

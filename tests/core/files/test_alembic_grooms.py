@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.files import alembic_grooms
+from hair_addon.core.files import alembic
 from hair_addon.core.files.curve_file import Convention
 from tests.support.exchange.alembic_files import ANY_ORDER, BEZIER, BSPLINE, CATMULL_ROM, CUBIC, HERMITE, LINEAR, File
 
 
 def read(file, path, *children):
     file.write(path, *children)
-    return alembic_grooms.read(path)
+    return alembic.grooms.read(path)
 
 
 @pytest.fixture
@@ -158,7 +158,7 @@ def test_instances_show_curves_again(path):
 def test_what_is_no_archive_is_refused_in_a_sentence(path, content, said):
     path.write_bytes(content)
     with pytest.raises(HairError, match=said):
-        alembic_grooms.read(path)
+        alembic.grooms.read(path)
 
 
 def small_file():
@@ -186,7 +186,7 @@ def test_mutants_of_a_file_give_curves_or_a_sentence(path, rng):
     """Bytes, numbers and ends that are changed: what is read is finite in number, and nothing else is raised."""
     whole = small_file()
     path.write_bytes(whole)
-    assert [len(one) for one in alembic_grooms.read(path).sets] == [1, 1, 1]
+    assert [len(one) for one in alembic.grooms.read(path).sets] == [1, 1, 1]
     refused = 0
     for _ in range(250):
         mutant = bytearray(whole)
@@ -200,7 +200,7 @@ def test_mutants_of_a_file_give_curves_or_a_sentence(path, rng):
                 mutant[place : place + 8] = struct.pack("<Q", number)
         path.write_bytes(mutant[: int(rng.integers(8, len(whole)))] if rng.random() < 0.2 else mutant)
         try:
-            for one in alembic_grooms.read(path).sets:
+            for one in alembic.grooms.read(path).sets:
                 assert len(one.points) == one.counts.sum() < 10_000
                 if one.motion is not None:
                     assert len(one.motion.points_at(1)) == len(one.points)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.files import groom_curves, unreal_groom
+from hair_addon.core.files import groom_curves
+from hair_addon.core.files.alembic import unreal_groom
 from hair_addon.core.files.groom_curves import GroomCurves
 from tests.support.exchange import alembic_reader
 

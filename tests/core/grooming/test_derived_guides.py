@@ -6,9 +6,8 @@ import pytest
 
 from hair_addon.core.geometry import strands
 from hair_addon.core.grooming import following, groom, groom_defaults
-from hair_addon.core.grooming.derived_guides import derive
+from hair_addon.core.grooming.derived_guides import derive, representatives
 from hair_addon.core.grooming.groom import HairSettings
-from hair_addon.core.grooming.strand_clusters import representatives
 from hair_addon.core.interpolation import guide_fitting, interpolation
 from tests.support.meshes import subdivided_sphere
 from tests.support.strands.combed import lengths, standing

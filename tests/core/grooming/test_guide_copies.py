@@ -6,7 +6,7 @@ import pytest
 
 from hair_addon.core.geometry.mirror import ACROSS_X
 from hair_addon.core.grooming.guide_copies import Places, copied, matched, upright_rotations
-from hair_addon.core.grooming.guide_segments import unit
+from hair_addon.core.grooming.guide_shapes import unit
 from hair_addon.core.grooming.guide_tool_settings import CopySettings
 from tests.support.strands.combed import lengths, segment_lengths, wavy
 

@@ -7,7 +7,7 @@ import pytest
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.mesh import TriMesh, positions
 from hair_addon.core.geometry.mirror import Mirror
-from hair_addon.core.grooming.guide_mirror import images, mirroring
+from hair_addon.core.grooming.guide_copies import images, mirroring
 from tests.support.meshes import flat_grid
 from tests.support.strands.combed import lengths, standing
 

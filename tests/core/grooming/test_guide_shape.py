@@ -6,10 +6,9 @@ import pytest
 
 from hair_addon.core.geometry.closest_point import SurfaceQuery
 from hair_addon.core.geometry.mesh import positions
-from hair_addon.core.grooming import guide_segments
+from hair_addon.core.grooming import guide_shapes
 from hair_addon.core.grooming.guide_attraction import attracted
-from hair_addon.core.grooming.guide_lift import lifted
-from hair_addon.core.grooming.guide_smoothing import smoothed
+from hair_addon.core.grooming.guide_shapes import lifted, smoothed
 from hair_addon.core.grooming.guide_tool_settings import AttractSettings, LiftSettings, SmoothSettings
 from tests.support.meshes import flat_grid, subdivided_sphere
 from tests.support.strands.combed import lengths, segment_lengths, standing, wavy
@@ -92,7 +91,7 @@ def test_straight_guides_stay_straight(rng):
 
 
 def bending(points):
-    directions, _lengths = guide_segments.split(points)
+    directions, _lengths = guide_shapes.split(points)
     return angles(directions[:, 1:], directions[:, :-1]).sum(axis=1)
 
 
@@ -107,7 +106,7 @@ def test_smoothing_bends_less_the_more_of_it_there_is(rng):
 def test_lifting_turns_most_at_the_root(ball, rng):
     points, _roots, normals = standing(ball, 60, rng, spread=2.0)
     changed = lifted(points, normals, LiftSettings(amount=0.6), np.ones(60))
-    (was, _), (now, _) = guide_segments.split(points), guide_segments.split(changed)
+    (was, _), (now, _) = guide_shapes.split(points), guide_shapes.split(changed)
     turns = angles(was, now) / np.maximum(angles(was, normals[:, None]), 1e-6)
     assert (turns[:, 1:-1] >= turns[:, 2:] - 1e-6).all()
     np.testing.assert_allclose(turns[:, 1], 0.6, atol=0.05)
@@ -117,7 +116,7 @@ def test_lifting_turns_most_at_the_root(ball, rng):
 def test_a_full_lift_starts_along_the_normal_and_its_reach_ends(ball, rng):
     points, _roots, normals = standing(ball, 60, rng, spread=2.0)
     changed = lifted(points, normals, LiftSettings(amount=1.0, reach=0.5), np.ones(60))
-    (was, _), (now, _) = guide_segments.split(points), guide_segments.split(changed)
+    (was, _), (now, _) = guide_shapes.split(points), guide_shapes.split(changed)
     assert angles(now[:, 0], normals).max() < 0.02
     np.testing.assert_allclose(now[:, 14:], was[:, 14:], atol=1e-5)
 
@@ -165,9 +164,9 @@ def test_upright_guides_lie_down_somewhere(ball):
 
 
 def test_rotations_are_the_least(rng):
-    start, end = (guide_segments.unit(rng.normal(size=(50, 3))) for _ in range(2))
+    start, end = (guide_shapes.unit(rng.normal(size=(50, 3))) for _ in range(2))
     end[0], end[1] = start[0], -start[1]
-    found = guide_segments.rotations(start, end)
+    found = guide_shapes.rotations(start, end)
     np.testing.assert_allclose(np.einsum("nij,nj->ni", found, start), end, atol=1e-9)
     np.testing.assert_allclose(found @ np.swapaxes(found, 1, 2), np.tile(np.eye(3), (50, 1, 1)), atol=1e-9)
     turn = np.arccos(np.clip((np.trace(found, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0))
@@ -177,9 +176,9 @@ def test_rotations_are_the_least(rng):
 def test_blending_ends_at_both_shapes(rng):
     one, other = wavy(rng), wavy(rng)
     other += one[:, :1] - other[:, :1]
-    np.testing.assert_allclose(guide_segments.blended(one, other, np.zeros(30)), one, atol=1e-6)
-    np.testing.assert_allclose(guide_segments.blended(one, other, np.ones(30)), other, atol=1e-6)
-    half = guide_segments.blended(one, other, np.full(30, 0.5))
+    np.testing.assert_allclose(guide_shapes.blended(one, other, np.zeros(30)), one, atol=1e-6)
+    np.testing.assert_allclose(guide_shapes.blended(one, other, np.ones(30)), other, atol=1e-6)
+    half = guide_shapes.blended(one, other, np.full(30, 0.5))
     np.testing.assert_allclose(segment_lengths(half), 0.5 * (segment_lengths(one) + segment_lengths(other)), rtol=1e-4)
 
 

@@ -14,7 +14,7 @@ from hair_addon.core.geometry.curvature import bend_density
 from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh
 from hair_addon.core.geometry.mirror import Mirror
 from hair_addon.core.geometry.sampling import sample_surface
-from hair_addon.core.geometry.texture import Texture
+from hair_addon.core.geometry.uv_maps import Texture
 from hair_addon.core.placement import cvt, voronoi
 from hair_addon.core.placement.domain import Domain
 from hair_addon.core.placement.exact_cells import CutCells

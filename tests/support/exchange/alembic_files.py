@@ -5,7 +5,7 @@ import io
 
 import numpy as np
 
-from hair_addon.core.files.alembic import AlembicWriter, Property
+from hair_addon.core.files.alembic.writer import AlembicWriter, Property
 
 CURVES, TRANSFORM = {"schema": "AbcGeom_Curve_v2"}, {"schema": "AbcGeom_Xform_v3"}
 LINEAR, CUBIC, ANY_ORDER = 1, 0, 2

@@ -24,8 +24,7 @@ from hair_addon.blender.settings import translations
 from hair_addon.command_line import info, setting_pairs
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import (
-    alembic_grooms,
-    alembic_reader,
+    alembic,
     array_file,
     array_grooms,
     curve_file,
@@ -293,8 +292,8 @@ def readers():
         "arrays": Reader("core/files/array_grooms.py", groom, array_grooms.read, _are_the_arrays),
         "compressed arrays": Reader("core/files/foreign_arrays.py", packed, array_grooms.read, _are_the_arrays),
         "list of arrays": Reader("command_line/info.py", groom, info._arrays, anything),
-        "Alembic": Reader("core/files/alembic_reader.py", abc, alembic_grooms.read, are_curves),
-        "whole Alembic": Reader("core/files/alembic_reader.py", abc, alembic_reader.require_whole, anything),
+        "Alembic": Reader("core/files/alembic/reader.py", abc, alembic.grooms.read, are_curves),
+        "whole Alembic": Reader("core/files/alembic/reader.py", abc, alembic.reader.require_whole, anything),
         "language": Reader("blender/settings/translations.py", po, translations.read_po, _are_texts, is_text=True),
         "catalogs": Reader(
             "blender/io/asset_catalogs.py",

@@ -60,7 +60,7 @@ def draping(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) ->
     after = guides.points.copy()
     for (chosen, places), points in zip(falling, settled, strict=True):
         at_rest = guides.carried_back((points / metres).astype(np.float32), chosen)
-        after[places] = grooming.guide_segments.blended(guides.points[places], at_rest, guides.weights[chosen])
+        after[places] = grooming.guide_shapes.blended(guides.points[places], at_rest, guides.weights[chosen])
     return guide_tools.write_shapes(replace(guides, datablock=remembered.find()), after)
 
 

@@ -46,13 +46,13 @@ def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) ->
     mesh, mirror = guides.surface.mesh, guides.surface.mirror
     plane = mirror if settings.direction == "FROM_POSITIVE" else mirror.flipped()
     places = mesh_math.positions(mesh, guides.roots)
-    found = grooming.guide_mirror.mirroring(mesh, places, plane, guides.weights >= 0.5)
+    found = grooming.guide_copies.mirroring(mesh, places, plane, guides.weights >= 0.5)
     additions = []
     for count in np.unique(guides.counts[found.sources]):
         chosen = np.flatnonzero(guides.counts[found.sources] == count)
         sources, image_roots = found.sources[chosen], found.roots[chosen]
         points = guides.points[guides.of_count(int(count), sources)]
-        made = grooming.guide_mirror.images(mesh, points, guides.roots[sources], image_roots, plane)
+        made = grooming.guide_copies.images(mesh, points, guides.roots[sources], image_roots, plane)
         additions.append((made, sources, image_roots))
     write(guides, additions, found.removed)
     return len(found.sources)

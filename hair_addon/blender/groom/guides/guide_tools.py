@@ -200,14 +200,14 @@ def trim(datablock: Curves, settings: TrimSettings, depsgraph: Depsgraph) -> int
 def smooth(datablock: Curves, settings: SmoothSettings, depsgraph: Depsgraph) -> int:
     """Smooth guides along their length; returns and raises as above."""
     guides = read(datablock, settings, depsgraph)
-    smoothed = grooming.guide_smoothing.smoothed
+    smoothed = grooming.guide_shapes.smoothed
     return reshape(guides, lambda points, chosen: smoothed(points, settings, guides.weights[chosen]))
 
 
 def lift(datablock: Curves, settings: LiftSettings, depsgraph: Depsgraph) -> int:
     """Turn guides toward the surface normal; returns and raises as above."""
     guides = read(datablock, settings, depsgraph)
-    lifted = grooming.guide_lift.lifted
+    lifted = grooming.guide_shapes.lifted
     return reshape(
         guides, lambda points, chosen: lifted(points, guides.normals[chosen], settings, guides.weights[chosen])
     )

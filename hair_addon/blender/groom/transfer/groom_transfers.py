@@ -151,7 +151,7 @@ def _places(source: Ground, target: Ground, roots, warp, settings):
 
 
 def _has_overlap(surface):
-    return geometry.uv_check.misleading_fraction(surface.mesh, surface.corner_uvs) > _OVERLAPPING
+    return geometry.uv_maps.misleading_fraction(surface.mesh, surface.corner_uvs) > _OVERLAPPING
 
 
 def _through_landmarks(own, others):

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from .alembic_reader import Archive, Damaged, Property
+from .reader import Archive, Damaged, Property
 
 # Operation → number of its channels.
 _SCALE, _TRANSLATE, _ROTATE, _MATRIX, _ROTATE_X, _ROTATE_Y, _ROTATE_Z = range(7)

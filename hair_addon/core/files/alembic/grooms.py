@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import HairError
-from . import alembic_shapes, alembic_transforms, unreal_groom
-from .alembic_reader import Archive, Damaged, Property
-from .curve_file import Convention, CurveFile, CurveSet, Motion
-from .groom_curves import GUIDE_SLOTS
+from ...errors import HairError
+from ..curve_file import Convention, CurveFile, CurveSet, Motion
+from ..groom_curves import GUIDE_SLOTS
+from . import shapes, transforms, unreal_groom
+from .reader import Archive, Damaged, Property
 
 # Default convention of programs, by the beginning of their names; all have Y up.
 _OF_BLENDER = Convention(1.0, "Y")
@@ -117,21 +117,21 @@ def _names(nodes):
 def _sets_of(archive, node, name, application, notes) -> Iterator[CurveSet]:
     """Yield the `CurveSet`s of an object, none if it has no curves; appends warnings to notes."""
     stack = [node.transforms[depth] for depth in sorted(node.transforms)]
-    shape = alembic_shapes.Shape(archive, node.properties, is_of_blender=application == "Blender")
+    shape = shapes.Shape(archive, node.properties, is_of_blender=application == "Blender")
     drawn = shape.drawn()
     for sentence, count in drawn.notes:
         notes.append(HairError(sentence, name=name, path=archive.path, count=count))
     if not len(drawn.counts):
         return
-    times = alembic_transforms.times_of([shape.points, *(one[".vals"] for one in stack if ".vals" in one)])
+    times = transforms.times_of([shape.points, *(one[".vals"] for one in stack if ".vals" in one)])
     first = float(times[0]) if len(times) else 0.0
-    matrix = alembic_transforms.matrix_at(archive, stack, first)
+    matrix = transforms.matrix_at(archive, stack, first)
     scale = abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0)
     radii = None if drawn.widths is None else (0.5 * scale * drawn.widths).astype(np.float32)
 
     def points_at(index):
         with _damage_as_error(archive.path), Archive(archive.path) as reopened:
-            placed = alembic_transforms.matrix_at(reopened, stack, float(times[index]))
+            placed = transforms.matrix_at(reopened, stack, float(times[index]))
             return _placed(shape.points_at(reopened, float(times[index]), drawn), placed)
 
     motion = Motion(times, points_at) if len(times) > 1 else None
@@ -169,7 +169,7 @@ class _Parameters:
         for place in self._places:
             if name not in place:
                 continue
-            values = alembic_shapes.parameter(self._archive, place[name])
+            values = shapes.parameter(self._archive, place[name])
             if not kind:
                 return values if isinstance(values, list) else None
             if not isinstance(values, list) and values.dtype.kind in kind and values.shape[1:] in ((), (width,)):

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry import bezier_segments
-from ..geometry.bezier_segments import each
-from ..geometry.strands import curve_offsets
-from .alembic_reader import Archive, Damaged, Property
-from .alembic_transforms import values_at
+from ...geometry import bezier_segments
+from ...geometry.bezier_segments import each
+from ...geometry.strands import curve_offsets
+from .reader import Archive, Damaged, Property
+from .transforms import values_at
 
 _CUBIC, _LINEAR, _ANY_ORDER = 0, 1, 2
 _BASES = {1: "bezier", 2: "bspline", 3: "catmullRom"}

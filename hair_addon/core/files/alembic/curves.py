@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import ogawa
-from .alembic import TYPES, AlembicWriter, Object, Property, serialized
+from .writer import TYPES, AlembicWriter, Object, Property, serialized
 
 # Number of values of a parameter: one, one for each curve, one for each point.
 SCOPES = {"constant": "con", "uniform": "uni", "vertex": "vtx"}

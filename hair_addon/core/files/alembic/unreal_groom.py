@@ -14,11 +14,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import HairError
-from . import groom_curves
-from .alembic import AlembicWriter
-from .alembic_curves import Curves, CurvesWriter, Parameter
-from .groom_curves import Check, GroomCurves, Rows
+from ...errors import HairError
+from .. import groom_curves
+from ..groom_curves import Check, GroomCurves, Rows
+from .curves import Curves, CurvesWriter, Parameter
+from .writer import AlembicWriter
 
 VERSION = (1, 5)
 PER_METRE = 100.0

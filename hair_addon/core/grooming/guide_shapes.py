@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides as directions and lengths of their segments, for tools that rotate and scale segments without moving roots.
-
-Arrays are float64, so that segments keep their lengths within single precision.
-"""
+"""Smoothing of guides along their length: directions of segments diffuse; roots and lengths are preserved."""
 
 import numpy as np
+
+from .guide_tool_settings import LiftSettings, SmoothSettings
 
 
 def split(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -84,3 +83,35 @@ def arc_shares(lengths: np.ndarray) -> np.ndarray:
     """Return the normalized arc length (S, P-1) of each segment's midpoint, in [0, 1]; lengths (S, P-1) [m]."""
     ends = np.cumsum(lengths, axis=1)
     return (ends - 0.5 * lengths) / np.where(ends[:, -1:] > 0.0, ends[:, -1:], 1.0)
+
+
+def lifted(points: np.ndarray, normals: np.ndarray, settings: LiftSettings, weights: np.ndarray) -> np.ndarray:
+    """Return lifted guides (S, P, 3) float32 [m]; segments keep their lengths.
+
+    points (S, P, 3) [m]; normals (S, 3): unit, at the roots; weights (S,) in [0, 1].
+    """
+    directions, lengths = split(points)
+    with np.errstate(over="ignore"):  # for the smallest reach
+        fade = np.clip(1.0 - arc_shares(lengths) / settings.reach, 0.0, 1.0)
+    # Smoothstep: guides bend without a kink.
+    shares = settings.amount * np.asarray(weights, np.float64)[:, None] * fade * fade * (3.0 - 2.0 * fade)
+    upward = np.broadcast_to(np.asarray(normals, np.float64)[:, None], directions.shape)
+    return only(points, joined(points, turned(directions, upward, shares), lengths), weights)
+
+
+def smoothed(points: np.ndarray, settings: SmoothSettings, weights: np.ndarray) -> np.ndarray:
+    """Return smoothed guides (S, P, 3) float32 [m]; segments keep their lengths, straight guides are unchanged.
+
+    points (S, P, 3) [m]; weights (S,) in [0, 1]. Each step moves a direction toward the mean of its neighbors; the
+    first and the last direction are their own second neighbors.
+    """
+    directions, lengths = split(points)
+    if directions.shape[1] < 2:
+        return np.array(points, np.float32)
+    share = (0.5 * settings.strength * weights)[:, None, None]
+    for _ in range(settings.iterations):
+        before = np.concatenate([directions[:, :1], directions[:, :-1]], axis=1)
+        after = np.concatenate([directions[:, 1:], directions[:, -1:]], axis=1)
+        moved = unit(directions + share * (0.5 * (before + after) - directions))
+        directions = np.where(moved.any(axis=2, keepdims=True), moved, directions)
+    return only(points, joined(points, directions, lengths), weights)

@@ -16,7 +16,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..errors import HairError, cause_of
+from ...errors import HairError, cause_of
 
 # Number in the file → NumPy's type of a value; None for strings.
 _KINDS: Mapping[int, str | None] = {
