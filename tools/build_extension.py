@@ -26,7 +26,7 @@ sys.path.insert(0, str(ROOT))
 from hair_addon.core.files import file_lock  # noqa: E402
 from tools import compile_kernels, manual_pages  # noqa: E402
 
-# How a wheel's file name ends → which Blender runs it.
+# Suffix of a wheel's file name → Blender platform.
 PLATFORM_TAGS = {"linux-x64": "_x86_64.whl", "windows-x64": "-win_amd64.whl", "macos-arm64": "_arm64.whl"}
 
 
@@ -182,7 +182,7 @@ def build(target: str, is_for_tests: bool = False) -> Path:
 
 
 def main() -> None:
-    """The command line."""
+    """Run the command line."""
     platforms = manifest()["platforms"]
     parser = argparse.ArgumentParser(description="Build the extension's zip.")
     parser.add_argument("platform", nargs="?", default=compile_kernels.this_platform(), choices=[*platforms, "all"])

@@ -49,7 +49,7 @@ _X86 = (
 COMPARED = tuple(
     f"core.{name}." for name in ("dynamics.rod", "geometry", "grooming", "interpolation", "placement", "styling")
 )
-# The best first.
+# Best first.
 PROCESSORS = {"linux-x64": _X86, "windows-x64": _X86, "macos-arm64": (Processor("apple-m1", ()),)}
 
 
@@ -141,7 +141,7 @@ def are_up_to_date(folder):
 
 
 def main():
-    """The command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Compile the extension's kernels for this platform.")
     parser.add_argument("folder", type=Path, help="output folder; its content is replaced")
     parser.add_argument("--tests", action="store_true", help="for older processors, only what tests compare")

@@ -115,7 +115,7 @@ def find_or_install():
         with open(place.with_name(f".{place.name}.lock"), "w") as lock:
             import fcntl  # not on Windows, which does not get as far as this
 
-            fcntl.flock(lock, fcntl.LOCK_EX)  # until it is closed
+            fcntl.flock(lock, fcntl.LOCK_EX)  # open until closed
             if not _is_installed(place):
                 _install(place)
     return DesktopBlender(Path("/usr/bin/blender"), place)
@@ -151,7 +151,7 @@ def _install(folder):
             _call(["debootstrap", "--variant=minbase", "sid", str(folder)], environment)
         try:
             _call(_inside(folder, [*apt, *_PACKAGES], []), environment)
-        except subprocess.CalledProcessError:  # lists of another day name packages that are gone
+        except subprocess.CalledProcessError:  # outdated package lists name removed packages
             _call(_inside(folder, ["apt-get", "update", "--quiet"], []), environment)
             _call(_inside(folder, [*apt, *_PACKAGES], []), environment)
     except subprocess.CalledProcessError as error:

@@ -153,7 +153,7 @@ def save_sample(path):
     head.light()
     bpy.ops.vellus.add_hair(density_group="scalp", length=0.1, gravity=0.8, strand_count=5000)
     bpy.data.hair_curves["Hair"].vellus.marschner.size = 64
-    bpy.data.hair_curves["Hair Guides"].vellus.simulates = True  # else its panel is gray
+    bpy.data.hair_curves["Hair Guides"].vellus.simulates = True  # otherwise its panel is grayed out
     for style in ("CLUMP", "CURL"):
         bpy.ops.vellus.add_style(style=style)
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -205,7 +205,7 @@ class Window:
 
     def narrow(self):
         """Drag the sidebar's edge until the sidebar has its width."""
-        for _try in range(30):  # a busy machine loses events
+        for _try in range(30):  # a busy machine drops events
             offset = self.sidebar.width - SIDEBAR_WIDTH
             if offset == 0:
                 return
@@ -265,7 +265,7 @@ def take(pictures):
     every = [name for names in PANELS.values() for name in names]
     window.show_panels(every)  # before any is drawn: whether a panel is open is decided then
     space.show_region_ui = True
-    space.show_object_viewport_curves = False  # software drivers take their time for hair
+    space.show_object_viewport_curves = False  # software drivers draw hair slowly
     window.run(bpy.ops.wm.redraw_timer, type="DRAW_WIN_SWAP", iterations=1)
     window.sidebar.active_panel_category = "Hair"
     yield from pause(0.5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Break the solver of dynamics on purpose, and say which laws notice: `python tools/mutations.py [NAME ...]`.
+"""Mutate the dynamics solver and report which laws fail: `python tools/mutations.py [NAME ...]`.
 
 Each mutation is applied to a copy of the checkout, where the tests of its gates run (`pytest.mark.gate`). A mutation
 that no gate notices means that a law is missing, or too loose: then the exit status is 1. `--gates V5 V14` asks these
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCES = Path("hair_addon", "core", "dynamics")
 TESTS = "tests/core/dynamics"
 KERNELS = ROOT / "build" / "mutation-kernels"  # Warp's cache, so that each mutation is compiled once
-SECONDS = 600  # that the tests of a gate may take
+SECONDS = 600  # limit for the tests of a gate
 PASSED, FAILED = 0, 1  # exit statuses of pytest
 
 

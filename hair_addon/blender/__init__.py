@@ -29,14 +29,14 @@ CLASSES = (
     *asset_shelf.CLASSES,
 )
 
-_PATIENCE = 0.5  # [s] between two looks at whether a render has ended
+_PATIENCE = 0.5  # [s] between checks whether a render has ended
 
 
 def require_registered():
     """Register the add-on in a checkout. Raises `HairError` where it is an extension that is disabled."""
     if hasattr(bpy.types.Curves, "vellus"):
         return
-    if __package__.startswith("bl_ext."):  # Blender would register it once more when it is enabled
+    if __package__.startswith("bl_ext."):  # Blender would register it twice when it is enabled
         raise HairError("The add-on is disabled: enable Vellus in Blender's preferences.")
     register()
 

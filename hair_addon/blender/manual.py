@@ -110,5 +110,5 @@ def register():
 
 
 def unregister():
-    """Take them away again."""
+    """Unregister the manual's pages."""
     bpy.utils.unregister_manual_map(manual_map)

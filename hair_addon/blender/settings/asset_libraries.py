@@ -41,7 +41,7 @@ def folder_of(name):
 
 
 def show_changes(name):
-    """Let all windows read the assets of a library again, whose files have changed."""
+    """Reload a library's assets in all windows after its files have changed."""
     library = bpy.context.preferences.filepaths.asset_libraries.get(name)
     if library is not None:
         # A shelf that is not shown yet may have read all libraries for another mode, without a context to refresh in.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Properties that store nothing: what they show is read and written elsewhere."""
+"""Properties without storage: values are read from and written to other data."""
 
 import bpy
 

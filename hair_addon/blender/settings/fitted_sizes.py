@@ -27,7 +27,7 @@ def fitted(settings_class):
 
 
 def flag_of(name):
-    """The name of the flag of a size."""
+    """Name of the flag of a size."""
     return _PREFIX + name
 
 

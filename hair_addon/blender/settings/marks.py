@@ -17,7 +17,7 @@ def mark_shading(group, _context):
 
 
 def mark_shown(group, _context):
-    """Let viewports show them otherwise: nothing is computed again."""
+    """Redraw viewports without recomputing."""
     group.id_data.update_tag()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A choice among pictures: an enumeration whose items have icons, and which is stored nowhere."""
+"""Choice among pictures: an enumeration with icons that is not stored."""
 
 import bpy
 
@@ -44,5 +44,5 @@ def attach(name, group_class):
 
 
 def detach(name):
-    """Take it away again."""
+    """Remove the group."""
     delattr(bpy.types.WindowManager, name)

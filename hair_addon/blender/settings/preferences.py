@@ -35,7 +35,7 @@ class VellusPreferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, _context):
-        """Rows of all preferences: Blender draws none by itself."""
+        """Draw rows of all preferences: Blender draws none by itself."""
         self.layout.use_property_split = True
         for name in ("device", "stroke_device"):
             self.layout.prop(self, name)

@@ -23,7 +23,7 @@ class SavedFiles:
         return sorted((path.stem for path in found), key=str.casefold)
 
     def change_time(self, name):
-        """When a file was last written [ns], 0 where there is none."""
+        """Time of the last write to a file [ns]; 0 if it does not exist."""
         try:
             return self.path(name, create=False).stat().st_mtime_ns
         except OSError:
@@ -34,7 +34,7 @@ class SavedFiles:
         folder = self.folder(create)
         if folder is None:
             raise HairError("Only the installed extension can save looks and styles: install it.")
-        stem = stem_of(name)  # no separators, no paths out of the folder
+        stem = stem_of(name)  # rejects separators and paths outside the folder
         if not stem.strip("_. "):
             raise HairError("The name is empty: type one.")
         return folder / f"{stem}.json"
@@ -47,7 +47,7 @@ class SavedFiles:
             raise HairError("{name} cannot be removed: {cause}.", name=name, cause=error) from error
 
     def folder(self, create):
-        """None where we are no extension."""
+        """Folder of the files; None when not run as an extension."""
         if not preferences.is_extension():
             return None
         folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path=self._folder_name, create=create)

@@ -18,7 +18,7 @@ class VELLUS_AST_grooms(bpy.types.AssetShelf):
 
     @classmethod
     def poll(cls, context):
-        # Blender also asks while it has no area to draw in, and `context.object` is missing there.
+        # Blender also polls without an area to draw in, where `context.object` is missing.
         return context.mode == "OBJECT" and surface_of(context.view_layer.objects.active) is not None
 
     @classmethod
@@ -37,10 +37,10 @@ CLASSES = (VELLUS_AST_grooms,)
 
 
 def register():
-    """Add our entry to the menu of assets."""
+    """Add the entry to the asset menu."""
     bpy.types.ASSETBROWSER_MT_context_menu.append(_in_asset_menu)
 
 
 def unregister():
-    """Take it out."""
+    """Remove the entry from the asset menu."""
     bpy.types.ASSETBROWSER_MT_context_menu.remove(_in_asset_menu)

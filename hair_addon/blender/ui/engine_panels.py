@@ -12,7 +12,7 @@ _NOT_OURS = (
     *("RENDER_PT_freestyle", "VIEWLAYER_PT_freestyle", "MATERIAL_PT_freestyle", "RENDER_PT_stereoscopy"),
     *("RENDER_PT_gpencil", "RENDER_PT_grease_pencil", "RENDER_PT_simplify_greasepencil"),
     *("PARTICLE_PT", "DATA_PT_lightprobe", "DATA_PT_volume", "EEVEE_MATERIAL_PT_viewport_settings"),
-    "DATA_PT_light",  # without power
+    "DATA_PT_light",  # lacks the power of lights
 )
 _OURS = ("DATA_PT_EEVEE_light", "EEVEE_WORLD_PT_surface", "EEVEE_MATERIAL_PT_context_material")
 _OURS += ("EEVEE_MATERIAL_PT_surface", "DATA_PT_light_animation")

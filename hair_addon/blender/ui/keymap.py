@@ -25,7 +25,7 @@ def register():
 
 
 def unregister():
-    """Leave clicks to Blender."""
+    """Unregister the selection click."""
     config = bpy.context.window_manager.keyconfigs.addon
     if config is None:
         return

@@ -62,7 +62,7 @@ def present_swatch(look):
     """Icon of the mean color of an `Appearance`."""
     color = appearance.mean_color(look)
     shown = bytes(np.rint(255.0 * np.array(Color(color).from_scene_linear_to_srgb()).clip(0.0, 1.0)).astype(np.uint8))
-    key = f"color {shown.hex()}"  # sliders that are dragged need a few hundred at most
+    key = f"color {shown.hex()}"  # dragging sliders needs a few hundred at most
     previews = _collection()
     if key not in previews:
         _fill(previews.new(key), color)

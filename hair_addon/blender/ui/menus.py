@@ -26,7 +26,7 @@ _GUIDE_TOOLS = (
     ),
 )
 
-_MOST_REFUSALS = 5  # that a menu lists
+_MOST_REFUSALS = 5  # entries listed in a menu
 
 
 def draw_guide_tools(layout):
@@ -165,6 +165,6 @@ def register():
 
 
 def unregister():
-    """Take our entries out of them."""
+    """Remove the menu entries."""
     for menu, entry in _ENTRIES:
         getattr(bpy.types, menu).remove(entry)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Looks and style presets that are chosen by a click on their picture: built-in ones, and one's own."""
+"""Picture menus for looks and style presets, built-in and saved."""
 
 import bpy
 
@@ -35,7 +35,7 @@ def _own_look():
     hair = hair_of(bpy.context.object)
     try:
         return None if hair is None else properties.own_look_of(hair.vellus)
-    except HairError:  # which is the status of the hair
+    except HairError:  # already shown as the status of the hair
         return None
 
 
@@ -66,7 +66,7 @@ def _styles():
 
 
 def _icon(name):
-    """The number of one of Blender's own icons."""
+    """Number of a Blender icon."""
     return bpy.types.UILayout.bl_rna.functions["prop"].parameters["icon"].enum_items[name].value
 
 
@@ -94,10 +94,10 @@ CLASSES = (VellusPictures,)
 
 
 def register():
-    """Let the window manager have the menus."""
+    """Register the menus on the window manager."""
     picture_choices.attach(_ATTRIBUTE, VellusPictures)
 
 
 def unregister():
-    """Take them away again."""
+    """Unregister the menus."""
     picture_choices.detach(_ATTRIBUTE)

@@ -15,7 +15,7 @@ from ..settings.translations import interface_text
 # Blender's own property split gives names 40 % of the width, which cuts them in a sidebar of its default width.
 NAME_SHARE = 0.54
 
-# Too long for one line: the name is above the value.
+# Names too long for one line are drawn above the value.
 WIDE = ("neighbour_limit", "mode", "multiple_scattering")
 
 _GROWTH = ("length_variation", "tilt", "gravity", "drape")
@@ -180,7 +180,7 @@ def style_rows(layout, item):
 
 
 def profile_rows(layout, item):
-    """The course of a style's amount from root to tip."""
+    """Profile of a style's amount from root to tip."""
     rows(layout, style_items.group_of(item), ProfiledSettings, _PROFILE)
 
 
@@ -206,7 +206,7 @@ def material_rows(layout, owner, wetness):
 
 
 def fibre_rows(layout, owner):
-    """What a single fiber is."""
+    """Material and thickness of a single fiber."""
     rows(layout, owner, DynamicsSettings, _FIBRE)
 
 
@@ -222,7 +222,7 @@ def hold_rows(layout, owner):
 
 
 def collision_rows(layout, owner):
-    """Meshes that guides collide with, and how."""
+    """Collision of guides with meshes."""
     row(layout, owner, "collides_with_surface")
     search_row(layout, owner, "colliders", bpy.data, "collections")
     if owner.collides_with_surface or owner.colliders:

@@ -134,7 +134,7 @@ class VELLUS_OT_use_as_hair(LongOperator, bpy.types.Operator):
             setting_rows.row(self.layout, self.properties, name)
 
     def seconds(self, context):
-        return 1.0  # more than a moment for any hair
+        return 1.0  # takes noticeable time for any hair
 
     def work(self, context):
         require_foreign(context.object)
@@ -183,7 +183,7 @@ _UNIT_NAMES = {
 
 @dataclass(frozen=True)
 class _Imported:
-    """What was made of the curves, and sentences to tell the artist."""
+    """Result of an import, and sentences to report."""
 
     made: Any
     notes: list[HairError]
@@ -230,7 +230,7 @@ class VELLUS_OT_import_groom(BrowsedOperator, bpy.types.Operator):
         setting_rows.row(column, self.properties, "guide_count")
 
     def seconds(self, context):
-        return float("inf")  # how many curves there are is in the file
+        return float("inf")  # the number of curves is stored in the file
 
     def work(self, context):
         path, surface = paths.resolve(self.filepath), surface_of(context.object)
@@ -315,7 +315,7 @@ class VELLUS_OT_convert_particles(HairOperator, bpy.types.Operator):
                 used = run_now(kept_hair.using_as_hair(made, surface, depsgraph, settings))
             else:
                 used = hand_made_guides.use_as_guides(made, surface, depsgraph, hair_settings=HairSettings())
-        context.view_layer.update()  # which new objects are not in yet
+        context.view_layer.update()  # to include new objects
         shown = object_of(used.hair, context.view_layer)
         if shown is not None:
             make_active(shown, context.view_layer)

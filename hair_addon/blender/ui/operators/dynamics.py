@@ -76,7 +76,7 @@ class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):
         return baked
 
     def _say_memory(self, byte_count):
-        """Warn of work that takes much of the free memory; Esc stops it."""
+        """Warn about work that needs much of the free memory; Esc stops it."""
         part = memory.share_of_free(byte_count)
         if memory.MUCH < part <= memory.MOST:
             said = "Baking takes {percent}% of the free memory"
@@ -111,7 +111,7 @@ class VELLUS_OT_free_dynamics(HairOperator, bpy.types.Operator):
         return baked is not None and baked.manifest is not None
 
     def invoke(self, context, event):
-        """Ask first."""
+        """Ask for confirmation."""
         return context.window_manager.invoke_confirm(self, event)
 
     def change(self, context):
@@ -130,7 +130,7 @@ Blender without Vellus show the same hair"""
     applies = needs_guides
 
     def seconds(self, context):
-        return float("inf")  # how long the animation itself takes is not known
+        return float("inf")  # the duration of the animation itself is unknown
 
     def work(self, context):
         guides = guides_of(context.object)

@@ -53,7 +53,7 @@ class GuideTool(HairOperator):
         return self.execute(context)
 
     def change(self, context):
-        """Change the guides, and say how many."""
+        """Change the guides and report the number changed."""
         settings = setting_properties.to_settings(self, self.Settings)
         return self.message(self.apply(guides_of(context.object), settings, context.evaluated_depsgraph_get()))
 
@@ -62,18 +62,18 @@ class GuideTool(HairOperator):
         return "{count} guides changed", {"count": count}
 
     def draw(self, context):
-        """The tool's settings, and those that all tools have."""
+        """Draw the tool's settings and those shared by all tools."""
         self.draw_settings(self.layout)
         self.draw_choice(self.layout, surface_of(context.object))
 
     def draw_settings(self, layout):
-        """The rows of the tool's own settings."""
+        """Draw the rows of the tool's own settings."""
         for name, _default, _details in declared(self.Settings):
             if name not in _COMMON:
                 setting_rows.row(layout, self.properties, name)
 
     def draw_choice(self, layout, surface):
-        """The rows that say which guides are changed."""
+        """Draw the rows that choose the affected guides."""
         setting_rows.row(layout, self.properties, "selected_only")
         if surface is not None:
             setting_rows.search_row(layout, self.properties, "mask", surface, "vertex_groups")
@@ -108,7 +108,7 @@ class VELLUS_OT_trim_guides(GuideTool, bpy.types.Operator):
     __annotations__ = setting_properties.annotations(TrimSettings)
 
     def invoke(self, context, event):
-        """Cut with the object that is selected too, or open a dialog to pick one."""
+        """Cut with the other selected object, or open a dialog to pick one."""
         surface = surface_of(context.object)
         others = [o for o in context.selected_objects if o not in (context.object, surface) and o.type != "CURVES"]
         if len(others) == 1:
@@ -171,7 +171,7 @@ class VELLUS_OT_copy_guide_shape(GuideTool, bpy.types.Operator):
     __annotations__ = setting_properties.annotations(CopySettings)
 
     def invoke(self, context, event):
-        """Copy, or open a dialog where nothing says what."""
+        """Copy, or open a dialog if no source guides are selected or named."""
         if not self.source and not bpy.app.background and not guide_tools.is_any_selected(guides_of(context.object)):
             return context.window_manager.invoke_props_dialog(self)
         return super().invoke(context, event)

@@ -85,7 +85,7 @@ class VELLUS_OT_apply_groom(BrowsedOperator, bpy.types.Operator):
         return surface_of(context.object) is not None
 
     def invoke(self, context, event):
-        """Take the asset that the operator was called for, or ask for a file."""
+        """Use the asset that the operator was called for, or open the file browser."""
         asset = getattr(context, "asset", None)
         try:
             found = asset_libraries.referenced(self)

@@ -106,7 +106,7 @@ class VELLUS_OT_export_groom(BrowsedOperator, bpy.types.Operator):
     applies = needs_hair
 
     def seconds(self, context):
-        return float("inf")  # how long an animation takes is not known
+        return float("inf")  # the duration of an animation is unknown
 
     def work(self, context):
         path = paths.resolve(self.filepath)

@@ -48,7 +48,7 @@ class VELLUS_OT_bake_tables(BrowsedOperator, bpy.types.Operator):
 
     @classmethod
     def applies(cls, _context):
-        return True  # to no hair too
+        return True  # also without hair
 
     def prefill(self, context):
         """Fill unset properties with the settings of the hair, if there is one."""

@@ -45,7 +45,7 @@ class _GivesStyles(LongOperator):
     """Operators that give hair styles: where locks stand is found in a thread."""
 
     applies = needs_hair
-    has_run = True  # kernels of styles are loaded as those of hair are
+    has_run = True  # kernels of styles are loaded like those of hair
 
     def styles(self, context):
         """The styles to be given, as far as they need time."""

@@ -216,7 +216,7 @@ class VELLUS_OT_comb_guides(HairOperator, bpy.types.Operator):
         make_active(guides, view_layer)
         try:
             bpy.ops.object.mode_set(mode="SCULPT_CURVES")
-        except RuntimeError as error:  # hidden by a library or a driver
+        except RuntimeError as error:  # hidden by a library or driver
             sentence = '"{name}" cannot be combed: {cause}.'
             raise HairError(sentence, name=guides.name, cause=cause_of(error)) from error
         brushes.collide(guides.data)
@@ -235,7 +235,7 @@ class _DrawLines(HairOperator):
 
     @staticmethod
     def begin(target, context):
-        """Begin to draw lines of Curves. Raises `HairError`."""
+        """Start drawing lines of Curves. Raises `HairError`."""
         raise NotImplementedError
 
     @classmethod

@@ -43,12 +43,12 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
         setting_rows.guide_rows(layout, group, surface, are_combed=guide_states.of(guides).is_combed)
         setting_rows.row(layout, guides.vellus, "is_live")
         write_stale(layout, context, guides.vellus)
-        if len(guides.curves) != group.guide_count:  # some were added or removed
+        if len(guides.curves) != group.guide_count:  # guides were added or removed
             layout.label(text=interface_text("{count} guides", count=len(guides.curves)), icon="INFO", translate=False)
         if surface is not None:
             _draw_work(layout, context, surface, group)
         if guides_again(context.object) is not None:
-            column = layout.column(align=True)  # in one line it would be cut in a sidebar of its default width
+            column = layout.column(align=True)  # one line would be clipped at the default sidebar width
             column.operator("vellus.distribute_guides", text="Regenerate Guides", icon="FILE_REFRESH")
             column.label(text="(Discards Combing)", icon="BLANK1")
         else:
@@ -56,7 +56,7 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
 
 
 def _draw_combed(layout, context, guides):
-    """Say, before a slider is moved, which ones have no effect."""
+    """Show which settings have no effect on combed guides."""
     said = interface_text("Combed: gray settings have no effect. Guide Tools change guides and keep their combing.")
     write(layout, context, said, "INFO")
     length = guide_states.of(guides).length / context.scene.unit_settings.scale_length

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Popover of presets by name: the built-in ones, one's own, and a button that saves another."""
+"""Popover of built-in and saved presets by name, with a button to save a new one."""
 
 import bpy
 
@@ -26,11 +26,11 @@ class PresetMenu:
 
     @staticmethod
     def saved():
-        """(name, icon or 0) of each of one's own."""
+        """(name, icon or 0) of each saved preset."""
         raise NotImplementedError
 
     def draw(self, _context):
-        """All of them."""
+        """Draw all presets."""
         layout = self.layout
         layout.emboss = "PULLDOWN_MENU"
         layout.operator_context = "EXEC_DEFAULT"

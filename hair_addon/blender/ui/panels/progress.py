@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Progress: the bar of long work, at the top of the tab while there is any."""
+"""Progress bar of long work, at the top of the tab while work is running."""
 
 import bpy
 

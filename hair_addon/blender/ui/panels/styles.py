@@ -17,7 +17,7 @@ from .. import picture_menus, setting_rows
 from .preset_menu import PresetMenu
 from .tab import HairTab, split, write
 
-_ROWS = 5  # of a list that holds less; as high as its buttons
+_ROWS = 5  # minimum rows of the list, as high as its buttons
 
 
 def _active_of(context):
@@ -32,7 +32,7 @@ class VELLUS_UL_styles(bpy.types.UIList):
     bl_idname = "VELLUS_UL_styles"
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index=0, _flag=0):
-        """One style."""
+        """Draw a style."""
         row = layout.row(align=True)
         row.prop(item, "name", text="", emboss=False)
         row.prop(style_items.group_of(item), "is_on", text="")
@@ -105,7 +105,7 @@ def _draw_points(layout, context, hair):
     """Offer the points that curls want where strands have fewer."""
     try:
         wanted, present = points_wanted(hair), hair.vellus.hair.point_count
-    except HairError:  # which is the status of the hair
+    except HairError:  # already shown as the status of the hair
         return
     if wanted > present:
         said = interface_text("Smooth curls need {wanted} points per strand.", wanted=wanted)

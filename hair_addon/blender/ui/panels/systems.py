@@ -9,7 +9,7 @@ from .. import setting_rows
 from ..operators.systems import is_combing
 from .tab import HairTab, draw_combing
 
-_ROWS = 3  # of a list that holds less
+_ROWS = 3  # minimum rows of the list
 
 
 class VELLUS_UL_systems(bpy.types.UIList):
@@ -24,7 +24,7 @@ class VELLUS_UL_systems(bpy.types.UIList):
         return shown, []
 
     def draw_item(self, context, layout, _data, curves, _icon, _active_data, _active_property, _index=0, _flag=0):
-        """One system."""
+        """Draw a hair system."""
         shown = object_of(curves, context.view_layer)
         is_hair = curves.vellus.kind == "HAIR"
         row = layout.row(align=True)

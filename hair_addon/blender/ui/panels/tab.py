@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all panels of the Hair tab share: their place, and text that fits the sidebar."""
+"""Base of all panels in the Hair tab: location, and text that fits the sidebar."""
 
 import textwrap
 
@@ -32,7 +32,7 @@ def split(layout):
 
 
 def write(layout, context, text, icon="NONE"):
-    """A sentence, translated already, over as many lines as the sidebar's width asks for."""
+    """Draw a translated sentence, wrapped to the width of the sidebar."""
     room = context.region.width / context.preferences.system.ui_scale - _ICON_AND_MARGINS
     text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
     lines = textwrap.wrap(text, max(int(room / _CHARACTER_WIDTH), _NARROWEST)) or [""]
@@ -58,13 +58,13 @@ def write_stale(layout, context, state):
 
 
 def draw_combing(layout, context):
-    """The button that starts combing, or stops it."""
+    """Draw the button that starts or stops combing."""
     text, icon = ("Stop Combing", "CHECKMARK") if is_combing(context) else ("Comb Guides", "SCULPTMODE_HLT")
     layout.operator("vellus.comb_guides", text=text, icon=icon)
 
 
 def megabytes(count):
-    """Bytes as an artist reads them."""
+    """Format bytes for display."""
     return f"{count / 1e6:.0f} MB" if count >= 1e7 else f"{count / 1e6:.1f} MB"
 
 

@@ -9,7 +9,7 @@ from ...groom.selection import hair_of
 from ..setting_rows import others, row, rows
 from .tab import HairTab, split
 
-# The classic mode's alone.
+# Classic mode only.
 _GLINTS = ("caustic", "glint_gain", "glint_width", "glint_fade", "glint_limit", "eccentricity")
 
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Base of long operators that show their settings, and what they will make, before they begin."""
+"""Base of long operators that show their settings and an estimate of the result before they start."""
 
 from ....host import running
 from .modal import LongOperator
 
-_WIDTH = 360  # of the dialog [pixels]
+_WIDTH = 360  # width of the dialog [pixels]
 
 
 class AskedOperator(LongOperator):
@@ -13,7 +13,7 @@ class AskedOperator(LongOperator):
     _is_asking = False
 
     def invoke(self, context, event):
-        """Ask, or begin."""
+        """Open the dialog, or start."""
         names = set(self.properties.bl_rna.properties.keys()) - {"rna_type"}  # which always counts as set
         is_given = any(map(self.properties.is_property_set, names))
         if is_given or not running.has_window():
@@ -22,9 +22,9 @@ class AskedOperator(LongOperator):
         return context.window_manager.invoke_props_dialog(self, width=_WIDTH)
 
     def execute(self, context):
-        """Compute at once, or begin after the dialog, which Blender does not wait for."""
+        """Compute at once, or start after the dialog: Blender does not wait for dialogs."""
         if not self._is_asking:
             return super().execute(context)
         self._is_asking = False
-        # Work that goes on is an undo step of its own when it is done.
+        # Work that continues pushes its own undo step when done.
         return self.begin_anew() & {"FINISHED"} or {"CANCELLED"}

@@ -12,7 +12,7 @@ class BrowsedOperator(LongOperator):
     _is_browsing = False
 
     def invoke(self, context, event):
-        """Ask where to write, or begin."""
+        """Open the file browser, or start."""
         if self.properties.is_property_set(self.asked):
             return super().invoke(context, event)
         try:

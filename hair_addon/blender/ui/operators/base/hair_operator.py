@@ -41,11 +41,11 @@ class HairOperator:
         return context.object is not None and len(done) > 0 and done[-1].bl_idname == cls.__name__
 
     def change(self, context):
-        """Do it; returns (sentence, values) to report, or None."""
+        """Run the operator; returns (sentence, values) to report, or None."""
         raise NotImplementedError
 
     def execute(self, context):
-        """`change`, or report why not."""
+        """Run `change` and report its message or its `HairError`."""
         try:
             with memory_as_sentence(), whole_changes.whole_change(getattr(context, "object", None)):
                 said = self.change(context)

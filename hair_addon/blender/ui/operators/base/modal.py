@@ -14,7 +14,7 @@ from ....host import memory, running
 from ....settings.translations import interface_text, report_text
 from .hair_operator import HairOperator
 
-PATIENCE = 0.4  # [s]: what takes longer gets a progress bar
+PATIENCE = 0.4  # [s]: longer work gets a progress bar
 
 # Navigation does not affect the computation.
 _NAVIGATION = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE"}
@@ -24,7 +24,7 @@ class LongOperator(HairOperator):
     """Mixin of operators that implement `work`, `seconds` and `message`."""
 
     has_run = False  # in this session: its kernels are loaded
-    _takes_much = False  # whether the artist has agreed that the next one does, of the free memory
+    _takes_much = False  # whether the artist has confirmed the memory use of the next run
     _asks = _is_confirming = False
     _said = ""  # in the status bar
 
@@ -33,7 +33,7 @@ class LongOperator(HairOperator):
         raise NotImplementedError
 
     def _whole_work(self, context):
-        """`work` and what comes after it, which leave nothing behind where they fail; gives the report."""
+        """Run `work` and its follow-up, undone completely on failure; returns the report."""
 
         def working(_changed):
             made = yield from self.work(context)
@@ -44,7 +44,7 @@ class LongOperator(HairOperator):
         return whole_changes.whole(working)(getattr(context, "object", None))
 
     def seconds(self, context):
-        """How long the work will take, estimated."""
+        """Estimated duration of the work [s]."""
         raise NotImplementedError
 
     def message(self, made):
@@ -52,17 +52,17 @@ class LongOperator(HairOperator):
         raise NotImplementedError
 
     def stopped(self):
-        """The report of work that was canceled."""
+        """Report for canceled work."""
         return report_text("Canceled: nothing was changed.")
 
     def prefill(self, context):
-        """Read settings from the object to regenerate."""
+        """Read settings from the object that is regenerated."""
 
     def after(self, context, made):
         """Select the result."""
 
     def invoke(self, context, event):
-        """Compute at once, or begin to."""
+        """Compute at once, or start in a thread."""
         self._event, self._asks = event, running.has_window() and not type(self)._takes_much
         LongOperator._takes_much = False
         self.prefill(context)
@@ -89,7 +89,7 @@ class LongOperator(HairOperator):
             return self.refuse(error)
 
     def begin(self, context):
-        """Read the input now and compute in a thread."""
+        """Read the input and start computing in a thread."""
         try:
             if running.job() is not None:
                 raise HairError("Hair is being computed: wait until it is done, or press Esc to cancel.")
@@ -115,7 +115,7 @@ class LongOperator(HairOperator):
         return run("INVOKE_DEFAULT", **values)
 
     def _confirm(self, context, much):
-        """Ask whether work is to take so much memory; Blender executes the operator if it is."""
+        """Ask for confirmation of the memory use; Blender executes the operator if confirmed."""
         self._is_confirming = True
         title = interface_text("Use {percent}% of the Free Memory?", percent=much.percent)
         said = interface_text("These strands take {needed} GB.", needed=much.needed)
@@ -129,7 +129,7 @@ class LongOperator(HairOperator):
     def modal(self, context, event):
         """Wait for the thread; write when it is done."""
         job = running.job()
-        if job is None:  # the add-on was switched off
+        if job is None:  # the add-on was disabled
             return self._end(context, {"CANCELLED"})
         if event.type == "ESC" and event.value == "PRESS":
             job.stop()
