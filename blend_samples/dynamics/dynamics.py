@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""make dynamics: strips of hair that moves, plots of its solver, and a film by the command line, in out/dynamics.
+"""make dynamics: strips of moving hair, plots of its solver, and a film by the command line, in out/dynamics.
 
 `python blend_samples/dynamics/dynamics.py shaking plots` makes some of them. Each strip comes with its figures.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A film of hair that moves: baked by the command `simulate`, rendered with motion blur by the command `render`.
+"""A film of moving hair: baked by the command `simulate`, rendered with motion blur by the command `render`.
 
 Writes film.blend, frames/film_####.png and film.mp4. Both commands go on where they stopped.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plots of the solver beside what it should give: elastica, Kirchhoff's rods, a chain's damping, a capstan.
+"""Plots of the solver beside reference solutions: elastica, Kirchhoff's rods, a chain's damping, a capstan.
 
 Strands, settings and references are those of the tests in tests/core/dynamics.
 """

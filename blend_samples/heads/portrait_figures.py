@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a photographer looks for in the demo's portrait, as numbers of a picture of it.
+"""Photographic measures of the demo's portrait, computed from its picture.
 
 `python blend_samples/heads/portrait_figures.py out/demo/dual_scattering.png`; luminance is that of the display, linear.
 """

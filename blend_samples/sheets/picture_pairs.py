@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far two pictures of the same hair differ, in colour and in structure, and sheets of such pairs."""
+"""Differences in colour and structure between two pictures of the same hair, and sheets of such pairs."""
 
 import numpy as np
 

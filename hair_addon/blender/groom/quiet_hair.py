@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair and guides that Blender need not evaluate while frames are baked, where nobody looks at them."""
+"""Disabling of hair and guides while frames are baked without a window, to skip their evaluation."""
 
 import contextlib
 from collections.abc import Generator, Sequence
@@ -28,7 +28,7 @@ def unevaluated(guides_list: Sequence[Curves], scene: Scene) -> Generator[None]:
             curves_object.hide_viewport = True
         yield
     finally:
-        for curves_object in bpy.data.objects:  # one that was deleted meanwhile is not among them
+        for curves_object in bpy.data.objects:  # excludes objects deleted in the meantime
             if curves_object.session_uid in uids:
                 curves_object.hide_viewport = False
 
@@ -40,7 +40,7 @@ def _may_hide(curves_object):
 
 
 def _needed(guides_list: Sequence[Curves]) -> list[Object]:
-    """The meshes that guides grow on and collide with."""
+    """Meshes that guides grow on and collide with."""
     needed = [guides.surface for guides in guides_list if guides.surface is not None]
     for guides in guides_list:
         needed += simulated_world.colliders(properties.dynamics_of(guides.vellus).colliders)

@@ -49,7 +49,7 @@ def kept_by(strands: Curves, surface: Surface, change: Affine) -> Points | None:
         now = posed_strands.carried(change.points(seen), motions[1], places, counts, is_back=True)
         now = now - slide
         if not may_float:
-            now[starts] = points[starts]  # where strands are rooted, to the last bit
+            now[starts] = points[starts]  # exactly where strands are rooted
         return now
 
     return kept

@@ -18,7 +18,7 @@ def is_shown(hair: Curves) -> bool:
 
 
 def followers_shown(guides: Curves) -> list[Curves]:
-    """The hair Curves that follow some guides and have an object."""
+    """Hair Curves that follow the guides and have an object."""
     return [hair for hair in followers(guides) if is_shown(hair)]
 
 
@@ -151,7 +151,7 @@ def parts_of(active: Object | None) -> list[Curves]:
 
 
 def drawn_with(active: Object | None) -> list[Curves]:
-    """The hair that drawing is switched on and off for: the active one, or all in the file."""
+    """Hair whose drawing is toggled: the active hair, or all hair in the file."""
     hair = active_of_kind(active, "HAIR")
     return [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR"] if hair is None else [hair]
 
@@ -171,7 +171,7 @@ def object_of(curves: Curves, view_layer: ViewLayer) -> Object | None:
 
 
 def make_active(chosen: Object, view_layer: ViewLayer) -> None:
-    """Select an object and nothing else."""
+    """Select only this object and make it active."""
     for other in _there(view_layer):
         other.select_set(other == chosen)
     view_layer.objects.active = chosen

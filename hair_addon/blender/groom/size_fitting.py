@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sizes of guides and hair that are fitted to their surface: again where its mask or their number has changed.
+"""Sizes of guides and hair fitted to the surface, and refitted when the mask or the count changes.
 
-Nothing else fits them again, so that hair is as thick in each frame of a surface that moves.
+No other change refits them: hair keeps its thickness in all frames of a moving surface.
 """
 
 from dataclasses import dataclass, replace

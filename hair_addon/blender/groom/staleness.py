@@ -14,7 +14,7 @@ from ..data.strands import curves, drawn_lines, partings
 from ..host.notices import text_of
 from ..settings import setting_properties
 
-_HALF = 16  # digits of a root key that are of settings
+_HALF = 16  # digits of a root key that encode settings
 
 
 def root_key(settings: Settings, density: np.ndarray | None, image: np.ndarray | None = None) -> str:

@@ -41,7 +41,7 @@ class ReadStyles:
     applied: Affine = field(default_factory=Affine.identity)
 
     def is_same(self, other: "ReadStyles") -> bool:
-        """Whether hair styled by one is hair styled by the other."""
+        """Whether both style hair identically."""
         if not np.array_equal(self.applied.matrix, other.applied.matrix):
             return False
         return self._active == other._active and _are_same(self.inputs, other.inputs)
@@ -64,7 +64,7 @@ class StyledHair:
 
     @property
     def radius_factor(self) -> np.float32:
-        """By how much styles thicken strands."""
+        """Factor by which styles thicken strands."""
         return np.float32(program.radius_factor(self.read.styles))
 
     def continue_from(self, other: "StyledHair") -> None:
@@ -84,7 +84,7 @@ class StyledHair:
 
     @cached_property
     def trees(self) -> ClumpTrees:
-        """The clump trees of the hair; made when a style needs them."""
+        """Clump trees of the hair, built when a style needs them."""
         return self.make_trees() if self.styling is None else self.styling.trees
 
     def lend_trees(self) -> Callable[[], ClumpTrees]:
@@ -106,7 +106,7 @@ def read_styles(
     """The `ReadStyles` of hair on a surface; guide_curves, hair: None for what is new. Raises `HairError`."""
     if not styles:
         return ReadStyles()
-    styles = [setting_properties.as_stored(settings) for settings in styles]  # as Curves will give them back
+    styles = [setting_properties.as_stored(settings) for settings in styles]  # rounded as Curves store them
     applied = Affine.identity() if hair is None else surface_space.applied(hair)
     inputs = style_inputs.read(surface_object, surface, guide_curves, styles, depsgraph)
     return ReadStyles(tuple(styles), inputs, applied)

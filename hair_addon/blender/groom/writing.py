@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides and hair written into Curves, with their settings and what tells later whether they are out of date."""
+"""Writing of guides and hair to Curves, with their settings and the keys that detect outdated data."""
 
 from collections.abc import Sequence
 from concurrent.futures import Future
@@ -22,7 +22,7 @@ from .bindings import BoundHair
 from .grown_guides import GrownGuides
 from .size_fitting import Fits
 
-# Of the guides' own Curves, by their length: so they are seen on a surface of any size.
+# Relative to the guides' length, so that guides are visible on a surface of any size.
 _GUIDE_RADIUS = 1.0 / 300.0
 
 

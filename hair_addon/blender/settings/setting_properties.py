@@ -78,7 +78,7 @@ def _is_length(default, details):
 
 
 def _coarse_property(name, details):
-    """What shows a length of a property group in coarser steps."""
+    """Property that shows a length of a property group in coarser steps."""
     common = {"name": _title(label_of(name, details)), "description": details.description}
     common |= {"translation_context": CONTEXT, "subtype": details.subtype, "unit": details.unit}
     limits = _limits(replace(details, soft_high=100.0 * details.soft_high), False)
@@ -119,7 +119,7 @@ def _radius_of(millimeters):
 
 def _unit_length():
     """Meters in a unit of the scene."""
-    scene = getattr(bpy.context, "scene", None)  # there is none while add-ons are registered
+    scene = getattr(bpy.context, "scene", None)  # no scene exists while add-ons are registered
     return 1.0 if scene is None else scene.unit_settings.scale_length
 
 
@@ -139,7 +139,7 @@ def _limits(details, is_integer):
 def to_settings(owner, settings_class, skip=()):
     """The `Settings` that an operator or property group holds, those of `skip` at their defaults.
 
-    Raises `HairError` for what the range forbids.
+    Raises `HairError` for values out of range.
     """
     fields = [field for field in declared(settings_class) if field[0] not in skip]
     try:
@@ -243,12 +243,12 @@ def assign(owner, settings, skip=(), fits=()):
 
 def values_of(owner, names):
     """{name: value} of an operator's or group's properties, for comparison."""
-    values = {name: text_of(owner, name) for name in names}  # as any of them may be text
+    values = {name: text_of(owner, name) for name in names}  # any value may be text
     return {n: value[:] if isinstance(value, bpy.types.bpy_prop_array) else value for n, value in values.items()}
 
 
 def prefill(operator, group, settings_class):
-    """Begin an operator with the settings of a property group."""
+    """Initialize an operator with the settings of a property group."""
     for name, _default, _details in declared(settings_class):
         setattr(operator, name, getattr(group, name))
     show(operator, group, settings_class)

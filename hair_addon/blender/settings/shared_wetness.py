@@ -24,7 +24,7 @@ def of_hair(state):
 def of_guides(state):
     """The wetness of the wettest guides: that of their wettest hair, or their own where that is more.
 
-    A guide is as wet as the strands around it on the mean, where variation leaves some with less. Raises `HairError`.
+    A guide has the mean wetness of the strands around it, as variation dries some. Raises `HairError`.
     """
     return _wettest(state, _wet_styles(state))
 

@@ -31,7 +31,7 @@ _GROUPS = {kind: _group_class(kind) for kind in KINDS}
 
 
 def _renamed(item, name, present, _is_set):
-    """A name that no other style has; keys by name follow."""
+    """Unique name for a style; keyframes by name follow."""
     state = item.id_data.vellus
     others = [other for other in names_of(state) if other != present]
     name = unique_name(name.strip() or LABELS[item.kind], others)
