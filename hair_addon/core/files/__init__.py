@@ -7,7 +7,6 @@ from ..lazy import submodules
 
 if TYPE_CHECKING:
     from . import (
-        alembic,
         array_file,
         array_grooms,
         curve_file,
