@@ -13,7 +13,7 @@ from tests.support.each_file import ROOT, each_file
 
 ADDON = ROOT / "hair_addon"
 MODULES = sorted(ADDON.rglob("*.py"))
-NATIVE = sorted(path for path in ADDON.rglob("*") if path.suffix in {".cpp", ".cu", ".h", ".strand"})
+NATIVE = sorted(path for path in ADDON.rglob("*") if path.suffix in {".cpp", ".h", ".strand"})
 SHADERS = sorted(path for path in (ROOT / "shaders").rglob("*") if path.suffix in {".glsl", ".frag", ".vert", ".comp"})
 SCRIPTS = [path for name in ("tests", "tools", "blend_samples") for path in sorted((ROOT / name).rglob("*.py"))]
 SCRIPTS += [ROOT / "__init__.py", ROOT / "tools" / "bootstrap.sh", ROOT / ".ci" / "run"]
@@ -305,7 +305,7 @@ def test_every_benchmark_is_long(path):
     assert tests and not unmarked, unmarked
 
 
-@each_file(path for path in NATIVE if path.suffix != ".cu")
+@each_file(NATIVE)
 def test_no_compiler_fuses_as_it_likes(path):
     """A strand is the same bits on every processor and beside any others: `fused` of lanes.h says what is fused."""
     text = path.read_text(encoding="utf-8")

@@ -8,8 +8,7 @@ import re
 from pathlib import Path
 
 SHADERS = Path(__file__).resolve().parents[1] / "shaders"
-STYLES = SHADERS.parent / "hair_addon" / "core" / "styling"
-SOURCES = sorted([*SHADERS.rglob("*.*"), *STYLES.glob("*.strand")])
+SOURCES = sorted([*SHADERS.rglob("*.*"), *(SHADERS.parent / "hair_addon" / "core").rglob("*.strand")])
 GLSL = [path for path in SOURCES if path.suffix != ".md"]
 
 # Keywords of C++ and of the language that GLSL lets be names, and what Blender's backend defines as macros.

@@ -21,7 +21,7 @@ LOCKED = {entry.split("==")[0]: entry for entry in re.split(r"\n(?=\S)", LOCK)}
 
 TEXT_FOLDERS = ["hair_addon", "shaders", "tests", "tools", "blend_samples", ".ci"]
 TEXT_SUFFIXES = {"", ".py", ".sh", ".md", ".toml", ".txt", ".lock", ".glsl", ".frag", ".vert", ".comp"}
-TEXT_SUFFIXES |= {".cpp", ".cu", ".h", ".strand"}
+TEXT_SUFFIXES |= {".cpp", ".h", ".strand"}
 TEXTS = [path for folder in TEXT_FOLDERS for path in sorted((ROOT / folder).rglob("*"))] + sorted(ROOT.glob("*"))
 TEXTS = [path for path in TEXTS if path.is_file() and path.suffix in TEXT_SUFFIXES and path != Path(__file__)]
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 CACHE = ROOT / "build" / "kernel-cache"  # Warp's own: after a change only what it changes is compiled again
-SOURCE_SUFFIXES = {".py", ".cpp", ".cu", ".h", ".strand"}
+SOURCE_SUFFIXES = {".py", ".cpp", ".h", ".strand"}
 sys.path.insert(0, str(ROOT))
 
 README = """\

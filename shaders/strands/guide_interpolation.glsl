@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A strand between its guides: core/interpolation/guide_weights.py and interpolation.py, [Report12] section 2.4.
 
+#include "strands/lanes.glsl"
+#include "guide_sum.strand"
+
 // Tangent and bitangent of a unit normal [Duff17].
 void root_frame(vec3 normal, out vec3 tangent, out vec3 bitangent)
 {
@@ -45,12 +48,4 @@ float faded(float first, float per_range, float value)
 float limited_part(float facing, float apart, vec4 limits)
 {
   return faded(limits.x, limits.y, facing) * (1.0 - faded(0.5 * limits.z, limits.w, apart));
-}
-
-// The segment of Eq. 10, stretched by `keep_length`, 0 to 1, towards the mean length of the guides' segments.
-vec3 stretched(vec3 segment, float mean_length, float keep_length)
-{
-  // If guides cancel out, the direction is rounding: the length counts as at least a thousandth of the mean.
-  float found = max(length(segment), max(1e-3 * mean_length, 1e-30));
-  return segment * (1.0 + keep_length * (mean_length / found - 1.0));
 }

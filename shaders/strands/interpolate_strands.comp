@@ -73,16 +73,16 @@ void main()
   begin_strand(made, place, range, making.point_count, making.row_strands);
   vec3 offset = vec3(0.0);
   for (int point = 1; point < making.point_count; point++) {
-    vec3 sum = vec3(0.0);
+    float x = 0.0;
+    float y = 0.0;
+    float z = 0.0;
     float mean_length = 0.0;
     for (int slot = 0; slot < SLOTS; slot++) {
-      vec4 segment = texelFetch(segments, guide[slot] + ivec2(point - 1, 0), 0);
-      sum.xy += turn[slot] * segment.x + vec2(-turn[slot].y, turn[slot].x) * segment.y;
-      sum.z += share[slot] * segment.z;
-      mean_length += share[slot] * segment.w;
+      vec4 its = texelFetch(segments, guide[slot] + ivec2(point - 1, 0), 0);
+      add_guide(x, y, z, mean_length, share[slot], turn[slot].x, turn[slot].y, its.x, its.y, its.z, its.w);
     }
-    sum = stretched(sum, mean_length, making.keep_length);
-    offset += tangent * sum.x + bitangent * sum.y + normal * sum.z;
+    float stretch = stretch_of(x, y, z, mean_length, making.keep_length);
+    offset += stretch * (tangent * x + bitangent * y + normal * z);
     put_point(point, offset);
   }
   end_strand(made);

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import gpu
 
-from ...core import styling
+from ...core import interpolation, styling
 from ...core.errors import HairError
 from ..host.caches import Cache
 
 FOLDER = Path(__file__).resolve().parents[3] / "shaders"
-STYLES = Path(styling.__file__).parent  # .strand files, which C++ includes too
+STRAND_FOLDERS = tuple(Path(package.__file__).parent for package in (interpolation, styling))  # of .strand files
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 
@@ -44,8 +44,9 @@ def expand(name, replaced=None, texts=None):
 
 
 def _read(file):
-    path = (STYLES if file.endswith(".strand") else FOLDER) / file
-    if not path.is_file():
+    folders = STRAND_FOLDERS if file.endswith(".strand") else (FOLDER,)
+    path = next((folder / file for folder in folders if (folder / file).is_file()), None)
+    if path is None:
         raise HairError(f"The shader file {file} is missing: reinstall Vellus.")
     return path.read_text(encoding="utf-8")
 

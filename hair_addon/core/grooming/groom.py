@@ -354,6 +354,7 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
     on_device = [
         placement.exact_cells,
         interpolation.guide_weights,
+        interpolation.interpolation,
         grooming.guide_growth,
         geometry.bspline,
         geometry.hash_grid,
@@ -372,9 +373,9 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         geometry.sampling,
     ]
     if device == "cpu":
-        _load_kernels(device, [*on_device, interpolation.interpolation, *on_processor], progress, most_threads)
+        _load_kernels(device, [*on_device, *on_processor], progress, most_threads)
     else:
-        _load_kernels(device, [*on_device, interpolation.gpu_interpolation], part_of(progress, 0.0, 0.8), most_threads)
+        _load_kernels(device, on_device, part_of(progress, 0.0, 0.8), most_threads)
         _load_kernels("cpu", on_processor, part_of(progress, 0.8, 1.0), most_threads)
 
 

@@ -10,7 +10,6 @@ if TYPE_CHECKING:
         carried_strands,
         clump_centers,
         cpu_weights,
-        gpu_interpolation,
         guide_fitting,
         guide_regions,
         guide_weights,

@@ -15,10 +15,10 @@ normals are. With a frame F (tangent, bitangent, normal) at either root it is F_
 about the normal. So guides are transformed to their frames once, a neighbour costs five multiplications per point
 instead of nine, and the strand's frame is applied to the sum.
 
-On the processor eight segments of a strand are computed at once, in vector registers: interpolation.cpp is written in
-Clang's vectors, which Warp compiles for the processor that it runs on: AVX, NEON. Sums stay in registers over all
-guides, segments are added up to points by a scan over lanes [Harris07], and a strand is written once. GPUs have
-gpu_interpolation.py.
+interpolation.cpp makes eight segments of a strand at once, in vector registers of a processor (Clang's vectors, which
+Warp compiles for the processor that it runs on: AVX, NEON) or in a thread's registers of a GPU. Sums stay in registers
+over all guides, segments are added up to points, and a strand is written once. The equations stand in guide_sum.strand,
+which the shader that interpolates where strands are drawn includes too.
 """
 
 from collections.abc import Callable
@@ -29,12 +29,11 @@ from ..geometry.hash_grid import LIMIT
 from ..kernels import native_code, parallel
 from ..kernels.checks import require_count
 from ..kernels.parallel import Rows
-from .gpu_interpolation import CANCELLED, LONGEST, by_lanes, framed_offset
 from .guide_weights import GuideWeights, frame
 
 wp.set_module_options({"enable_backward": False})
 
-LANES = 8
+SEGMENTS = 8  # that are computed at once
 
 
 def interpolate(
@@ -64,17 +63,11 @@ def interpolate(
     if out is not None:
         require_count("strands to fill", len(out), len(roots))
         require_count("points to fill", out.shape[1], guide_points.shape[1])
-    given = roots, normals, guide_points, guide_normals, guide_weights, keep_length, out
-    return _by_vectors(*given, under_way) if roots.device.is_cpu else by_lanes(*given)
-
-
-def _by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep_length, out, under_way):
-    """What `interpolate` returns; all arrays on the processor."""
     guide_count, point_count = guide_points.shape
-    group_count = -(-(point_count - 1) // LANES)
-    offsets = wp.empty((guide_count, group_count, 4 * LANES), dtype=float, device=roots.device)
+    group_count = -(-(point_count - 1) // SEGMENTS)
+    offsets = wp.empty((guide_count, group_count, 4 * SEGMENTS), dtype=float, device=roots.device)
     parallel.launch(
-        _offsets_in_vectors,
+        _put_offsets,
         guide_count,
         inputs=[Rows(guide_points), Rows(guide_normals)],
         outputs=[offsets],
@@ -83,7 +76,7 @@ def _by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep
     )
     points = parallel.empty_vectors((len(roots), point_count), roots.device) if out is None else out
     parallel.launch(
-        _strands_in_vectors,
+        _put_strands,
         len(roots),
         inputs=[
             Rows(roots),
@@ -101,10 +94,8 @@ def _by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep
     return points
 
 
-@wp.func_native(
-    native_code.body(__file__, "interpolation.cpp", LANES=LANES, SLOT_LIMIT=LIMIT, CANCELLED=CANCELLED, LONGEST=LONGEST)
-)
-def _sum_in_vectors(
+@wp.func_native(native_code.body(__file__, "interpolation.cpp", WIDTH=SEGMENTS, SEGMENTS=SEGMENTS, SLOT_LIMIT=LIMIT))
+def _sum_guides(
     strand: int,
     root: wp.vec3,
     tangent: wp.vec3,
@@ -120,7 +111,7 @@ def _sum_in_vectors(
 
 
 @wp.kernel
-def _strands_in_vectors(
+def _put_strands(
     roots: wp.array[wp.vec3],
     normals: wp.array[wp.vec3],
     offsets: wp.array3d[float],
@@ -134,7 +125,7 @@ def _strands_in_vectors(
     strand = wp.tid()
     normal = normals[strand]
     tangent, bitangent = frame(normal)
-    _sum_in_vectors(
+    _sum_guides(
         strand,
         roots[strand],
         tangent,
@@ -149,8 +140,18 @@ def _strands_in_vectors(
     )
 
 
+@wp.func
+def _framed_offset(guide_points: wp.array2d[wp.vec3], guide: int, point: int, normal: wp.vec3):
+    """Eq. 7's offset to a point after the root, in the guide's frame, and its length; zero past the tip."""
+    tangent, bitangent = frame(normal)
+    if point >= guide_points.shape[1]:
+        return wp.vec4()
+    offset = guide_points[guide, point] - guide_points[guide, point - 1]
+    return wp.vec4(wp.dot(tangent, offset), wp.dot(bitangent, offset), wp.dot(normal, offset), wp.length(offset))
+
+
 @wp.kernel
-def _offsets_in_vectors(
+def _put_offsets(
     guide_points: wp.array2d[wp.vec3],
     guide_normals: wp.array[wp.vec3],
     # outputs
@@ -158,7 +159,7 @@ def _offsets_in_vectors(
 ):
     guide = wp.tid()
     for group in range(out_offsets.shape[1]):
-        for lane in range(wp.static(LANES)):
-            offset = framed_offset(guide_points, guide, 1 + wp.static(LANES) * group + lane, guide_normals[guide])
+        for lane in range(wp.static(SEGMENTS)):
+            offset = _framed_offset(guide_points, guide, 1 + wp.static(SEGMENTS) * group + lane, guide_normals[guide])
             for part in range(4):
-                out_offsets[guide, group, wp.static(LANES) * part + lane] = offset[part]
+                out_offsets[guide, group, wp.static(SEGMENTS) * part + lane] = offset[part]

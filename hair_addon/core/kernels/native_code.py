@@ -2,7 +2,7 @@
 """C++ and CUDA source of Warp's native functions, read from files beside the modules that declare them.
 
 Warp generates a native function's signature from its Python declaration, so a file contains only the body; a comment
-at its top lists the parameters. Files for the CPU end in `.cpp`, for the GPU in `.cu`, shared headers in `.h`.
+at its top lists the parameters. Bodies end in `.cpp` and are compiled for CPU and GPU, shared headers in `.h`.
 """
 
 import re
