@@ -92,6 +92,142 @@ class CutCells:
         return sum_cells(_cells, len(self._pieces.centres), [self._pieces, sites], [self._cells], sites, self._device)
 
 
+@wp.struct
+class Polygon:
+    """A part of a piece, in the plane of the piece and from its centre."""
+
+    xs: ring
+    ys: ring
+    across: labels  # the site beyond the edge that starts at each corner, -1: an edge of the piece
+    count: int  # corners; 0: nothing is left
+    farthest: float  # squared distance of a corner from the site, less that of the centre
+
+
+@wp.func
+def _farther(farthest: float, x: float, y: float, sx: float, sy: float):
+    """`Polygon.farthest` with one more corner; sx, sy: the site."""
+    return wp.max(farthest, x * x + y * y - 2.0 * (x * sx + y * sy))
+
+
+@wp.func
+def _whole(pieces: Pieces, piece: int, sx: float, sy: float):
+    """The `Polygon` of a whole piece."""
+    whole = Polygon()
+    whole.count = 3
+    whole.farthest = 0.0
+    for corner in range(3):
+        p = pieces.corners[piece, corner]
+        whole.xs[corner] = p[0]
+        whole.ys[corner] = p[1]
+        whole.across[corner] = -1
+        whole.farthest = _farther(whole.farthest, p[0], p[1], sx, sy)
+    return whole
+
+
+@wp.func
+def _clipped(given: Polygon, nx: float, ny: float, level: float, other: int, sx: float, sy: float):
+    """The part of a convex `Polygon` where nx x + ny y is at most `level`, the border with another site."""
+    kept = Polygon()
+    clipped = int(0)
+    farthest = float(-1.0e30)
+    last = given.count - 1
+    last_side = given.xs[last] * nx + given.ys[last] * ny - level
+    for corner in range(given.count):
+        side = given.xs[corner] * nx + given.ys[corner] * ny - level
+        if (side > 0.0) != (last_side > 0.0) and clipped < MOST_CORNERS:
+            t = last_side / (last_side - side)
+            x = given.xs[last] + t * (given.xs[corner] - given.xs[last])
+            y = given.ys[last] + t * (given.ys[corner] - given.ys[last])
+            kept.xs[clipped] = x
+            kept.ys[clipped] = y
+            # Leaving the cell, the new edge is the border; entering, the rest of the old edge.
+            if side > 0.0:
+                kept.across[clipped] = other
+            else:
+                kept.across[clipped] = given.across[last]
+            farthest = _farther(farthest, x, y, sx, sy)
+            clipped += 1
+        if side <= 0.0 and clipped < MOST_CORNERS:
+            kept.xs[clipped] = given.xs[corner]
+            kept.ys[clipped] = given.ys[corner]
+            kept.across[clipped] = given.across[corner]
+            farthest = _farther(farthest, given.xs[corner], given.ys[corner], sx, sy)
+            clipped += 1
+        last = corner
+        last_side = side
+    kept.count = clipped
+    kept.farthest = farthest
+    return kept
+
+
+@wp.func
+def _moments(cell: Polygon, sx: float, sy: float):
+    """(area, integrals of x, of y times 3, and of x² + y² times 12) of a `Polygon` from the site."""
+    area = float(0.0)
+    mx = float(0.0)
+    my = float(0.0)
+    second = float(0.0)
+    x0 = cell.xs[0] - sx
+    y0 = cell.ys[0] - sy
+    for corner in range(1, cell.count - 1):
+        x1 = cell.xs[corner] - sx
+        y1 = cell.ys[corner] - sy
+        x2 = cell.xs[corner + 1] - sx
+        y2 = cell.ys[corner + 1] - sy
+        part = 0.5 * ((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
+        x = x0 + x1 + x2
+        y = y0 + y1 + y2
+        area += part
+        mx += part * x
+        my += part * y
+        second += part * (x0 * x0 + y0 * y0 + x1 * x1 + y1 * y1 + x2 * x2 + y2 * y2 + x * x + y * y)
+    return area, mx, my, second
+
+
+@wp.func
+def _reach(farthest: float, power: float, own_detour: float):
+    """The distance from a site [m] beyond which no other site takes anything of a polygon."""
+    radius_sq = wp.max(farthest + power - own_detour, 0.0)
+    return wp.sqrt(radius_sq) + wp.sqrt(radius_sq + own_detour)
+
+
+@wp.func
+def _cell_of(
+    site: int, piece: int, pieces: Pieces, sites: Sites, sx: float, sy: float, power: float, own_detour: float
+):
+    """The `Polygon` of a piece that is in a site's cell; power: squared distance from its centre, with the detour."""
+    centre = pieces.centres[piece]
+    e1 = pieces.first_axes[piece]
+    e2 = pieces.second_axes[piece]
+    normal = wp.cross(e1, e2)
+    cell = _whole(pieces, piece, sx, sy)
+    reach = _reach(cell.farthest, power, own_detour)
+    slot = int(0)
+    while slot < candidate_count(sites, site) and cell.count > 0:
+        if slot < sites.counts[site]:
+            if sites.apart[site, slot] > reach:
+                break
+        other = candidate(sites, site, slot)
+        slot += 1
+        if other != site:
+            offset = sites.places[other] - centre
+            nx = 2.0 * (wp.dot(offset, e1) - sx)
+            ny = 2.0 * (wp.dot(offset, e2) - sy)
+            detour = detour_of(
+                normal, pieces.islands[piece], pieces.detours[piece], sites.normals[other], sites.islands[other]
+            )
+            level = wp.length_sq(offset) + detour - power
+            if nx == 0.0 and ny == 0.0 and level == 0.0 and other < site:
+                cell.count = 0  # of coincident sites, the first one gets the cell
+            worst = float(-1.0)
+            for corner in range(cell.count):
+                worst = wp.max(worst, cell.xs[corner] * nx + cell.ys[corner] * ny - level)
+            if worst > 0.0:
+                cell = _clipped(cell, nx, ny, level, other, sx, sy)
+                reach = _reach(cell.farthest, power, own_detour)
+    return cell
+
+
 @wp.func
 def _add_cut(
     piece: int,
@@ -107,12 +243,9 @@ def _add_cut(
 
     A separate function, so that its local arrays are initialized only for pieces that are cut.
     """
-    centre = pieces.centres[piece]
     e1 = pieces.first_axes[piece]
     e2 = pieces.second_axes[piece]
     normal = wp.cross(e1, e2)
-    island = pieces.islands[piece]
-    detour = pieces.detours[piece]
     weight = pieces.weights[piece]
     listed = cell_list()
     listed[0] = nearest
@@ -121,106 +254,15 @@ def _add_cut(
     while visited < listed_count:
         site = listed[visited]
         visited += 1
-        offset = sites.places[site] - centre
+        offset = sites.places[site] - pieces.centres[piece]
         sx = wp.dot(offset, e1)
         sy = wp.dot(offset, e2)
-        own_detour = detour_of(normal, island, detour, sites.normals[site], sites.islands[site])
-        power = wp.length_sq(offset) + own_detour
-
-        xs = ring()
-        ys = ring()
-        across = labels()  # the site beyond the edge that starts at each corner
-        count = int(3)
-        farthest = float(0.0)
-        for corner in range(3):
-            p = pieces.corners[piece, corner]
-            xs[corner] = p[0]
-            ys[corner] = p[1]
-            across[corner] = -1
-            farthest = wp.max(farthest, wp.dot(p, p) - 2.0 * (p[0] * sx + p[1] * sy))
-        radius_sq = wp.max(farthest + power - own_detour, 0.0)
-        reach = wp.sqrt(radius_sq) + wp.sqrt(radius_sq + own_detour)
-
-        slot = int(0)
-        while slot < candidate_count(sites, site) and count > 0:
-            if slot < sites.counts[site]:
-                if sites.apart[site, slot] > reach:
-                    break
-            other = candidate(sites, site, slot)
-            slot += 1
-            if other != site:
-                other_offset = sites.places[other] - centre
-                nx = 2.0 * (wp.dot(other_offset, e1) - sx)
-                ny = 2.0 * (wp.dot(other_offset, e2) - sy)
-                level = (
-                    wp.length_sq(other_offset)
-                    + detour_of(normal, island, detour, sites.normals[other], sites.islands[other])
-                    - power
-                )
-                if nx == 0.0 and ny == 0.0 and level == 0.0 and other < site:
-                    count = 0  # of coincident sites, the first one gets the cell
-                worst = float(-1.0)
-                for corner in range(count):
-                    worst = wp.max(worst, xs[corner] * nx + ys[corner] * ny - level)
-                if worst > 0.0:
-                    clipped_xs = ring()
-                    clipped_ys = ring()
-                    clipped_across = labels()
-                    clipped = int(0)
-                    last = count - 1
-                    last_side = xs[last] * nx + ys[last] * ny - level
-                    farthest = float(-1.0e30)
-                    for corner in range(count):
-                        side = xs[corner] * nx + ys[corner] * ny - level
-                        if (side > 0.0) != (last_side > 0.0) and clipped < MOST_CORNERS:
-                            t = last_side / (last_side - side)
-                            x = xs[last] + t * (xs[corner] - xs[last])
-                            y = ys[last] + t * (ys[corner] - ys[last])
-                            clipped_xs[clipped] = x
-                            clipped_ys[clipped] = y
-                            # Leaving the cell, the new edge is the border; entering, the rest of the old edge.
-                            if side > 0.0:
-                                clipped_across[clipped] = other
-                            else:
-                                clipped_across[clipped] = across[last]
-                            farthest = wp.max(farthest, x * x + y * y - 2.0 * (x * sx + y * sy))
-                            clipped += 1
-                        if side <= 0.0 and clipped < MOST_CORNERS:
-                            clipped_xs[clipped] = xs[corner]
-                            clipped_ys[clipped] = ys[corner]
-                            clipped_across[clipped] = across[corner]
-                            x = xs[corner]
-                            y = ys[corner]
-                            farthest = wp.max(farthest, x * x + y * y - 2.0 * (x * sx + y * sy))
-                            clipped += 1
-                        last = corner
-                        last_side = side
-                    xs = clipped_xs
-                    ys = clipped_ys
-                    across = clipped_across
-                    count = clipped
-                    radius_sq = wp.max(farthest + power - own_detour, 0.0)
-                    reach = wp.sqrt(radius_sq) + wp.sqrt(radius_sq + own_detour)
-
-        if count > 2:
-            area = float(0.0)
-            mx = float(0.0)
-            my = float(0.0)
-            second = float(0.0)
-            x0 = xs[0] - sx
-            y0 = ys[0] - sy
-            for corner in range(1, count - 1):
-                x1 = xs[corner] - sx
-                y1 = ys[corner] - sy
-                x2 = xs[corner + 1] - sx
-                y2 = ys[corner + 1] - sy
-                part = 0.5 * ((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
-                x = x0 + x1 + x2
-                y = y0 + y1 + y2
-                area += part
-                mx += part * x
-                my += part * y
-                second += part * (x0 * x0 + y0 * y0 + x1 * x1 + y1 * y1 + x2 * x2 + y2 * y2 + x * x + y * y)
+        detour = detour_of(
+            normal, pieces.islands[piece], pieces.detours[piece], sites.normals[site], sites.islands[site]
+        )
+        cell = _cell_of(site, piece, pieces, sites, sx, sy, wp.length_sq(offset) + detour, detour)
+        if cell.count > 2:
+            area, mx, my, second = _moments(cell, sx, sy)
             height = wp.dot(offset, normal)
             mass = weight * area
             # From the site to the part of its cell: within the plane, and perpendicular to it.
@@ -228,9 +270,9 @@ def _add_cut(
             wp.atomic_add(out_masses, site, fixed(mass))
             for axis in range(3):
                 wp.atomic_add(out_moments, site, axis, fixed(moment[axis]))
-            wp.atomic_add(out_energies, site, fixed(weight * second / 12.0 + mass * (height * height + own_detour)))
-        for corner in range(count):
-            other = across[corner]
+            wp.atomic_add(out_energies, site, fixed(weight * second / 12.0 + mass * (height * height + detour)))
+        for corner in range(cell.count):
+            other = cell.across[corner]
             if other >= 0 and listed_count < MOST_CELLS:
                 known = bool(False)
                 for place in range(listed_count):
