@@ -57,12 +57,15 @@ const int group_count = offsets.shape[1];
     }
   };
 #else
-  const auto read_segments = [](lanes* to, const float* from) ALWAYS_INLINE { __builtin_memcpy(to, from, sizeof(lanes)); };
-  // The same sums by an inclusive scan over the lanes [Harris07]: vectors are moved up by some lanes, zeros come below.
+  const auto read_segments = [](lanes* to, const float* from) ALWAYS_INLINE {
+    __builtin_memcpy(to, from, sizeof(lanes));
+  };
+  // The same by an inclusive scan over the lanes [Harris07]: vectors are moved up by some lanes, with zeros below.
   const auto add_up = [](lanes* along, float& last) ALWAYS_INLINE {
-    const auto up_by_1 = [](lanes v) { return __builtin_shufflevector(lanes(0.0f), v, 0, 8, 9, 10, 11, 12, 13, 14); };
-    const auto up_by_2 = [](lanes v) { return __builtin_shufflevector(lanes(0.0f), v, 0, 0, 8, 9, 10, 11, 12, 13); };
-    const auto up_by_4 = [](lanes v) { return __builtin_shufflevector(lanes(0.0f), v, 0, 0, 0, 0, 8, 9, 10, 11); };
+    const lanes zeros = 0.0f;
+    const auto up_by_1 = [&](lanes v) { return __builtin_shufflevector(zeros, v, 0, 8, 9, 10, 11, 12, 13, 14); };
+    const auto up_by_2 = [&](lanes v) { return __builtin_shufflevector(zeros, v, 0, 0, 8, 9, 10, 11, 12, 13); };
+    const auto up_by_4 = [&](lanes v) { return __builtin_shufflevector(zeros, v, 0, 0, 0, 0, 8, 9, 10, 11); };
     along[0] += up_by_1(along[0]);
     along[0] += up_by_2(along[0]);
     along[0] += up_by_4(along[0]) + last;
