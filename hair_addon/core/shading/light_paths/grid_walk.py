@@ -145,7 +145,7 @@ def _shading_normal(medium: Medium, face: int, u: float, v: float, flat: wp.vec3
 
 @wp.func
 def _inverse_of(direction: wp.vec3):
-    """One over each component of a direction, which is as good as none below a limit."""
+    """Component-wise reciprocal of a direction; `FAR` below the limit."""
     inverse = wp.vec3(FAR, FAR, FAR)
     for axis in range(3):
         if wp.abs(direction[axis]) >= _LEAST:
@@ -189,14 +189,8 @@ def _comes_near(medium: Medium, turn: int, from_centre: wp.vec3, side: float, di
 
 
 @wp.func
-def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int):
-    """`Met` within a distance [m] of a ray; own: the strand that it leaves, -1: none."""
-    met = Met()
-    met.kind = PASSED
-    end = float(most)
-
-    # The part of the ray in the grid, and its first voxel.
-    inverse = _inverse_of(direction)
+def _part_in_grid(medium: Medium, position: wp.vec3, direction: wp.vec3, inverse: wp.vec3, most: float):
+    """The distances [m] at which a ray enters and leaves the grid, up to `most`; the second is less without a part."""
     here = float(0.0)
     last = float(most)
     for axis in range(3):
@@ -209,19 +203,81 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
             other = (medium.corner[axis] + size - position[axis]) * inverse[axis]
             here = wp.max(here, wp.min(one, other))
             last = wp.min(last, wp.max(one, other))
-    step = wp.vec3i(1, 1, 1)
-    across = wp.vec3(0.0, 0.0, 0.0)  # length of a voxel along the ray
-    for axis in range(3):
-        across[axis] = wp.abs(inverse[axis]) * medium.voxel
-        if direction[axis] < 0.0:
-            step[axis] = -1
+    return here, last
+
+
+@wp.func
+def _trace_cell(
+    medium: Medium,
+    index: int,
+    centre: wp.vec3,
+    side: float,
+    position: wp.vec3,
+    direction: wp.vec3,
+    own: int,
+    end: float,
+    met: Met,
+):
+    """(distance, `Met`) of the nearest segment of a cell in front of `end`; both as given without one."""
+    for turn in range(medium.starts[index], medium.starts[index + 1]):
+        if _comes_near(medium, turn, position - centre, side, direction):
+            segment = medium.segments[turn]
+            if medium.strands[segment] != own:
+                distance, offset = crossing(medium, segment, position, direction)
+                if distance < end:
+                    end = distance
+                    met.kind = STRAND
+                    met.index = segment
+                    met.offset = offset
+    return end, met
+
+
+@wp.func
+def _trace_brick(
+    medium: Medium,
+    brick: int,
+    corner: wp.vec3,
+    here: float,
+    to: float,
+    position: wp.vec3,
+    direction: wp.vec3,
+    inverse: wp.vec3,
+    own: int,
+    end: float,
+    met: Met,
+):
+    """The same for the cells of a voxel that a ray enters at `here` and leaves at `to` [m]; corner: of the voxel."""
     along = medium.along_voxel
     side = medium.voxel / float(along)
-    cells = wp.vec3i(along, along, along)
+    cell = _first_cell((position + direction * here - corner) / side, wp.vec3i(along, along, along))
+    leave = _leaves(corner, cell, side, position, direction, inverse)
+    staying = 3 * along
+    while staying > 0:
+        staying -= 1
+        to_cell = wp.min(leave[0], wp.min(leave[1], leave[2]))
+        centre = corner + side * wp.vec3(float(cell[0]) + 0.5, float(cell[1]) + 0.5, float(cell[2]) + 0.5)
+        index = ((brick * along + cell[2]) * along + cell[1]) * along + cell[0]
+        end, met = _trace_cell(medium, index, centre, side, position, direction, own, end, met)
+        if to_cell >= wp.min(end, to):
+            staying = 0
+        for axis in range(3):
+            if staying > 0 and to_cell == leave[axis]:
+                cell[axis] = cell[axis] + wp.where(direction[axis] < 0.0, -1, 1)
+                leave[axis] = leave[axis] + wp.abs(inverse[axis]) * medium.voxel / float(along)
+                if cell[axis] < 0 or cell[axis] >= along:
+                    staying = 0
+    return end, met
+
+
+@wp.func
+def _trace_strands(medium: Medium, position: wp.vec3, direction: wp.vec3, own: int, most: float, met: Met):
+    """The same for the whole grid."""
+    end = float(most)
+    inverse = _inverse_of(direction)
+    here, last = _part_in_grid(medium, position, direction, inverse, most)
     voxel = _first_cell((position + direction * here - medium.corner) / medium.voxel, medium.shape)
     leave = _leaves(medium.corner, voxel, medium.voxel, position, direction, inverse)
-
-    going = medium.shape[0] + medium.shape[1] + medium.shape[2]  # more voxels are on no ray, whatever its numbers are
+    going = medium.shape[0] + medium.shape[1] + medium.shape[2]  # no ray crosses more voxels, whatever its numbers are
     if here >= last:
         going = 0
     while going > 0:
@@ -230,43 +286,27 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
         brick = medium.bricks[(voxel[2] * medium.shape[1] + voxel[1]) * medium.shape[0] + voxel[0]]
         if brick >= 0:
             corner = medium.corner + medium.voxel * wp.vec3(float(voxel[0]), float(voxel[1]), float(voxel[2]))
-            cell = _first_cell((position + direction * here - corner) / side, cells)
-            leave_cell = _leaves(corner, cell, side, position, direction, inverse)
-            staying = 3 * along
-            while staying > 0:
-                staying -= 1
-                to_cell = wp.min(leave_cell[0], wp.min(leave_cell[1], leave_cell[2]))
-                centre = corner + side * wp.vec3(float(cell[0]) + 0.5, float(cell[1]) + 0.5, float(cell[2]) + 0.5)
-                index = ((brick * along + cell[2]) * along + cell[1]) * along + cell[0]
-                for turn in range(medium.starts[index], medium.starts[index + 1]):
-                    if _comes_near(medium, turn, position - centre, side, direction):
-                        segment = medium.segments[turn]
-                        if medium.strands[segment] != own:
-                            distance, offset = crossing(medium, segment, position, direction)
-                            if distance < end:
-                                end = distance
-                                met.kind = STRAND
-                                met.index = segment
-                                met.offset = offset
-                if to_cell >= wp.min(end, wp.min(to, last)):
-                    staying = 0
-                for axis in range(3):
-                    if staying > 0 and to_cell == leave_cell[axis]:
-                        cell[axis] = cell[axis] + step[axis]
-                        leave_cell[axis] = leave_cell[axis] + across[axis] / float(along)
-                        if cell[axis] < 0 or cell[axis] >= along:
-                            staying = 0
+            until = wp.min(to, last)
+            end, met = _trace_brick(medium, brick, corner, here, until, position, direction, inverse, own, end, met)
         if to >= wp.min(end, last):
             going = 0
         here = to
         for axis in range(3):
             if going > 0 and to == leave[axis]:
-                voxel[axis] = voxel[axis] + step[axis]
-                leave[axis] = leave[axis] + across[axis]
+                voxel[axis] = voxel[axis] + wp.where(direction[axis] < 0.0, -1, 1)
+                leave[axis] = leave[axis] + wp.abs(inverse[axis]) * medium.voxel
                 if voxel[axis] < 0 or voxel[axis] >= medium.shape[axis]:
                     going = 0
+    return end, met
 
-    # Behind the strand no surface is looked for.
+
+@wp.func
+def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int):
+    """`Met` within a distance [m] of a ray; own: the strand that it leaves, -1: none."""
+    met = Met()
+    met.kind = PASSED
+    end, met = _trace_strands(medium, position, direction, own, most, met)
+    # Surfaces are looked for in front of the strand only.
     if medium.has_mesh > 0:
         found = wp.mesh_query_ray(medium.mesh, position, direction, end)
         if found.result:
