@@ -6,14 +6,19 @@ and their inputs, so `evaluate` can regenerate them.
 """
 
 from collections.abc import Callable, Sequence
+from typing import TypedDict
 
+import numpy as np
 from bpy.types import Curves, Depsgraph, Object
 
 from ...core.errors import HairError, memory_as_sentence
 from ...core.geometry import strands
+from ...core.geometry.mesh import TriMesh
+from ...core.geometry.texture import Texture
 from ...core.grooming import following, groom, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
+from ...core.interpolation.regions import Regions
 from ...core.long_work import Work, no_progress, part_of, run_now
 from ...core.styling.base import StyleSettings
 from ..data import masks, scene, surface_space, whole_changes
@@ -265,22 +270,32 @@ def _as_written(guides, surface, device):
     return strands.from_numpy(surface.from_local(points), guides.roots, device)
 
 
-def _ground(surface, shown, mask, parting, device):
-    """What strands and clump sites stand on: arguments of `groom.bind_hair`. mask: (density, texture).
+class _Ground(TypedDict):
+    """The surface as strands and clump sites are placed on it: arguments of `groom.bind_hair`, which describes them."""
 
-    shown: the surface as modifiers subdivide it now, on which lines are drawn.
-    """
+    density: np.ndarray | None
+    texture: Texture | None
+    regions: Sequence[Regions]
+    lines: np.ndarray | None
+    drawn_on: np.ndarray | None
+    shape: TriMesh | None
+    is_mirrored: bool
+    device: str
+
+
+def _ground(surface, shown, mask, parting, device) -> _Ground:
+    """The `_Ground` of a surface. mask: (density, texture); shown: as modifiers subdivide it now, lines drawn on it."""
     density, texture = mask
-    return {
-        "density": density,
-        "texture": texture,
-        "regions": parting.regions,
-        "lines": drawn_lines.at_rest(parting.lines, shown, surface, device),
-        "drawn_on": surface.drawn_on,
-        "shape": surface.shape,
-        "is_mirrored": surface.names_otherwise,
-        "device": device,
-    }
+    return _Ground(
+        density=density,
+        texture=texture,
+        regions=parting.regions,
+        lines=drawn_lines.at_rest(parting.lines, shown, surface, device),
+        drawn_on=surface.drawn_on,
+        shape=surface.shape,
+        is_mirrored=surface.names_otherwise,
+        device=device,
+    )
 
 
 def _bind(surface, guides, settings, ground, roots, progress):
