@@ -21,7 +21,7 @@ import OpenEXR
 import hair_addon
 from blend_samples.heads import head, portrait
 from hair_addon.blender.render import offscreen
-from hair_addon.core.files.whole_file import whole_file
+from hair_addon.core.files.atomic_file import atomic_file
 
 COUNT = 24
 SIZE, LENS = 540, 120.0  # pixels of a side of a picture, [mm]: it holds the hair
@@ -70,7 +70,7 @@ def _build(path):
             key.interpolation = "LINEAR"
     scene.frame_end, scene.render.resolution_x, scene.render.resolution_y = COUNT, SIZE, SIZE
     scene.camera.data.lens = LENS
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
 
 

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from blend_samples.dynamics import dynamics_scene
-from hair_addon.core.files.whole_file import whole_file
+from hair_addon.core.files.atomic_file import atomic_file
 
 ROOT = Path(__file__).resolve().parents[2]
 LAST = 40  # frame
@@ -69,7 +69,7 @@ def _build(head_file, path):
     hair = dynamics_scene.objects()[2].data.vellus.hair
     hair.strand_count, hair.radius = STRAND_COUNT, RADIUS
     bpy.context.view_layer.update()
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
 
 

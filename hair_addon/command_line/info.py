@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 from ..core import lazy
 from ..core.errors import HairError
-from ..core.files import foreign_arrays, settings_file, table_exr
+from ..core.files import settings_file, table_exr, untrusted_arrays
 from ..core.shading.tables import table_axes
 from . import opening, options
 
@@ -52,12 +52,12 @@ def _arrays(path):
     """Return shapes and types from the headers."""
     if path.exists() and not path.is_file():  # opening a pipe without a writer would block
         raise HairError(f"{path} cannot be read: it is not a file.")
-    with foreign_arrays.opened(path) as archive:
-        return {"arrays": {name: _array(archive, name) for name in foreign_arrays.names(archive)}}
+    with untrusted_arrays.opened(path) as archive:
+        return {"arrays": {name: _array(archive, name) for name in untrusted_arrays.names(archive)}}
 
 
 def _array(archive, name):
-    shape, kind = foreign_arrays.header(archive, name)
+    shape, kind = untrusted_arrays.header(archive, name)
     return {"shape": list(shape), "type": str(kind), "bytes": math.prod(shape) * kind.itemsize}
 
 

@@ -6,7 +6,7 @@ import time
 
 from ..core import lazy
 from ..core.errors import HairError
-from ..core.files.whole_file import partial_of
+from ..core.files.atomic_file import partial_of
 from ..core.imaging.pixel_sampling import DRAWING_FIELDS, PictureSettings
 from ..core.params import declared
 from . import helpers, opening, options

@@ -39,10 +39,10 @@ OTHERS = {
     "blender/settings/fitted_sizes.py": "a property of an operator",
     "command_line/helpers.py": "lines of a process that was started, left out where they are not JSON",
     "core/files/frame_cache.py": "arrays that array_file.py has read",
-    "core/files/plain_file.py": "bytes for the readers",
+    "core/files/untrusted_file.py": "bytes for the readers",
     "core/files/table_cache.py": "a number, 0 for anything else",
     "core/files/alembic/unreal_groom.py": "writes",
-    "core/files/whole_file.py": "writes",
+    "core/files/atomic_file.py": "writes",
     "core/kernels/kernel_entries.py": "compared with a digest: test_kernel_cache.py",
     "core/kernels/native_code.py": "the add-on's own sources",
 }

@@ -17,7 +17,7 @@ NAN, INF = math.nan, math.inf
 
 @pytest.fixture(autouse=True)
 def nothing_said():
-    notices.said_cache.clear()
+    notices.printed_cache.clear()
 
 
 def lamp(kind, owner, name, value):

@@ -109,14 +109,14 @@ def test_other_hair_follows_its_settings_where_one_mesh_was_deleted(hair, capfd,
 
 def test_an_error_that_nobody_expects_is_reported_when_other_hair_is_done(two, monkeypatch, capfd):
     bad, good = two
-    make = live_hair.make_again
+    make = live_hair.regenerate
 
     def make_some(hair, depsgraph):
         if hair == bad.data:
             raise RuntimeError("Nobody expects this.")
         make(hair, depsgraph)
 
-    monkeypatch.setattr(live_hair, "make_again", make_some)
+    monkeypatch.setattr(live_hair, "regenerate", make_some)
     bad.data.vellus.hair.strand_count = good.data.vellus.hair.strand_count = 25
     update()
     assert (len(bad.data.curves), len(good.data.curves)) == (500, 25)

@@ -335,7 +335,7 @@ def break_shader():
     screen("broken")
     screen("broken_again")
     file.write_text(text)
-    shaders.complaint_cache.clear()
+    shaders.error_cache.clear()
     yield
     show("mended")
 

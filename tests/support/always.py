@@ -7,7 +7,7 @@ import sys
 import bpy
 import numpy as np
 
-from hair_addon.blender.data.strands import curves as curves_door
+from hair_addon.blender.data.strands import curves as curve_data
 from hair_addon.blender.host import running
 from hair_addon.blender.live import events, handlers
 from hair_addon.blender.render import hair_cache
@@ -94,14 +94,14 @@ def nothing_was_raised():
 
 def hair_is_what_its_settings_say():
     for datablock in ours():
-        positions = curves_door.read_points(datablock)
+        positions = curve_data.read_points(datablock)
         assert np.isfinite(positions).all(), datablock.name
         state = datablock.vellus
         if state.is_stale or state.status or not len(datablock.curves):
             continue
         if state.kind == "HAIR":
             assert len(datablock.curves) == state.hair.strand_count, datablock.name
-        elif not curves_door.is_combed(datablock):
+        elif not curve_data.is_combed(datablock):
             assert len(datablock.curves) == state.guides.guide_count, datablock.name
 
 

@@ -46,7 +46,7 @@ def bake(folder, numbers, wanted=None):
 
 
 def said(cache):
-    return [str(error) for error in cache.take_complaints()]
+    return [str(error) for error in cache.take_errors()]
 
 
 def check_whole(folder, most_complaints=0):

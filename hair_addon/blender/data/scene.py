@@ -43,7 +43,7 @@ def read_surface(surface_object, depsgraph):
     try:
         posed = vertex_positions(mesh)
         rest = _rest_positions(mesh, posed)
-        faces = faces_read_again(surface_object, mesh)
+        faces = cached_faces(surface_object, mesh)
         uv_map, loop_uvs = _loop_uvs(mesh)
         is_turned = surface_space.is_turned(surface_object)
         is_divided = rest is not posed and subdivided_surfaces.is_divided(surface_object)
@@ -144,7 +144,7 @@ def faces_of(mesh):
     return _faces_of_corners(mesh, corner_values(mesh, ".corner_vert"))
 
 
-def faces_read_again(mesh_object, mesh):
+def cached_faces(mesh_object, mesh):
     """`faces_of` the evaluated mesh of an object; the last read `Faces` of the object if they are the same.
 
     Reading the starts of polygons is the slowest part. With the same vertices and edges at corners and the same number

@@ -131,7 +131,7 @@ def _triangle_corners(faces, rest):
 
 def turned_back(corners, faces, undivided):
     """(T, 3) corners of triangles in their order before the faces, or those of the cage, were flipped."""
-    turned = geometry.turned_faces.turned_cage(faces, undivided) if undivided else None
+    turned = geometry.flipped_faces.turned_cage(faces, undivided) if undivided else None
     if turned is None:
         return corners[_turned_order(faces)]
     quads = turned.corners.reshape(-1, 4)

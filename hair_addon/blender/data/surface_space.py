@@ -102,7 +102,7 @@ def applied(curves):
 def note_applied(curves, change, rest_before=None, vertices=None):
     """Note that an `Affine` was applied to the local coordinates.
 
-    rest_before: (V, 3) rest positions until then, in the current order of vertices; vertices: (V,) of `TurnedFaces` if
+    rest_before: (V, 3) rest positions until then, in the current order of vertices; vertices: (V,) of `FlippedFaces` if
     the order has changed.
     """
     values = {"matrix": (change @ applied(curves)).matrix.ravel(), "turns": _turns(curves) + int(change.is_mirroring)}

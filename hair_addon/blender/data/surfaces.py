@@ -133,11 +133,11 @@ class Surface:
 
     @cached_property
     def _turnings(self):
-        """{bit mask of vertices: `Turning`}."""
+        """{bit mask of vertices: `VertexRotations`}."""
         return {}
 
     def turning(self, vertices):
-        """The `Turning` of vertices, indices in any shape, cached for all poses. Raises `HairError`."""
+        """The `VertexRotations` of vertices, indices in any shape, cached for all poses. Raises `HairError`."""
         require_indices("vertices", vertices, len(self.rest))
         is_chosen = np.zeros(len(self.rest), bool)
         is_chosen[vertices] = True
@@ -149,7 +149,7 @@ class Surface:
             self._turnings[key] = geometry.vertex_turns.turning(self.smooth_rest, self.faces, chosen)
         return self._turnings[key]
 
-    def is_at_rest_as(self, other):
+    def has_same_rest(self, other):
         """Whether strands generated on one surface also fit the other."""
         own, others = ((s.rest, s.mesh.triangles, s.to_world_axes) for s in (self, other))
         are_divided_alike = (self.cage_corners, self.undivided_corners) == (other.cage_corners, other.undivided_corners)
@@ -190,7 +190,7 @@ class Surface:
         # A mirrored object's triangles are wound the other way, like those of the rest shape mirrored at its origin.
         return TriMesh(-self.rest if self.is_mirrored else self.rest, self.mesh.triangles)
 
-    def shape_made_on(self, rest, applied):
+    def former_shape(self, rest, applied):
         """`shape`, or else the mesh, at the time strands were made; rest: (V, 3) rest positions then, None: as now.
 
         applied: `Affine` from the local coordinates of that time to the current ones.
@@ -213,7 +213,7 @@ class Surface:
         return self.root_vertices(points), self.swap_winding(points).barycentric
 
     @property
-    def names_otherwise(self):
+    def has_flipped_winding(self):
         """Whether triangles are wound opposite to those that identify strands: Blender's, before any flip."""
         return self.is_mirrored != self.is_turned
 
@@ -241,10 +241,10 @@ class Surface:
 
     @cached_property
     def turned(self):
-        """The `TurnedFaces` of the faces, or of the cage's faces, as Blender flips them."""
+        """The `FlippedFaces` of the faces, or of the cage's faces, as Blender flips them."""
         count = self.undivided_corners
-        found = geometry.turned_faces.turned_cage(self.faces, count) if count else None
-        return geometry.turned_faces.turned(self.faces) if found is None else found
+        found = geometry.flipped_faces.turned_cage(self.faces, count) if count else None
+        return geometry.flipped_faces.turned(self.faces) if found is None else found
 
     @cached_property
     def turned_topology(self):
@@ -286,7 +286,7 @@ class Surface:
 
     def identities(self, roots):
         """(S,) int32 identities and (S,) float32 random numbers in [0, 1), independent of the other strands."""
-        return geometry.root_frames.identities(roots, self.names_otherwise)
+        return geometry.root_frames.identities(roots, self.has_flipped_winding)
 
     def uvs(self, points):
         """(N, 2) float32 UV coordinates of surface points; zeros without a UV map."""
@@ -301,7 +301,7 @@ class Surface:
 
     def swap_winding(self, points):
         """The same points with barycentric coordinates in Blender's order of corners, or back."""
-        return points.wound_otherwise() if self.is_mirrored else points
+        return points.with_flipped_winding() if self.is_mirrored else points
 
 
 def _is_even(axes):

@@ -169,13 +169,13 @@ def runs_of_strand(record):
     return -(-(int(record["drawn_points"]) - 1) // scene_programs.RUN_LENGTH)
 
 
-# The strands that `walk_strands` rasterizes, and the denominator of the first share: as in
+# The strands that `rasterize_strands` rasterizes, and the denominator of the first share: as in
 # shaders/visibility/rasterize_segment.glsl.
 WALK_ALL, WALK_FIRST, WALK_OTHERS = range(3)
 _FIRST_SHARE = 8
 
 
-def walk_strands(strands, program, record, blocks, samplers, images, constants, part=WALK_ALL):
+def rasterize_strands(strands, program, record, blocks, samplers, images, constants, part=WALK_ALL):
     """Run a compute program that rasterizes the segments of strands; record: of `strand_record`.
 
     blocks: {instance: GPUUniformBuf}, the record as "view", and "lights"; samplers, images: {name: texture} that the

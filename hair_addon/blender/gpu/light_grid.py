@@ -4,7 +4,7 @@
 import gpu
 import numpy as np
 
-from ...core.imaging.texture_sides import beside_powers
+from ...core.imaging.texture_sides import avoid_powers_of_two
 from ..host.caches import Cache
 
 _GREATEST = 60000.0  # within the range of half floats
@@ -14,7 +14,7 @@ none_cache = Cache(capacity=1)
 
 def upload(means):
     """A texture of (Z, Y, X, 4) `voxel_means.shares`, linear between voxels, whose sides avoid powers of two."""
-    beside = beside_powers(means.shape[:3]) - means.shape[:3]
+    beside = avoid_powers_of_two(means.shape[:3]) - means.shape[:3]
     texels = np.clip(means, -_GREATEST, _GREATEST).astype(np.float32)
     texels = np.pad(texels, [*((0, more) for more in beside), (0, 0)], mode="edge")
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())

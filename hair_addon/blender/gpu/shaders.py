@@ -74,7 +74,7 @@ def are_compiled(makers):
 
 
 COLOR = (("color", "VEC4"),)  # default (output, type) of fragment shaders
-complaint_cache = Cache()  # files of a program → their compile error
+error_cache = Cache()  # files of a program → their compile error
 
 
 def compile_drawing(info, vertex, fragment, targets=COLOR, replaced=None):
@@ -100,7 +100,7 @@ def compile_compute(info, file, replaced=None, texts=None):
 
 def _create(info, files, vertex_lines, lines):
     """Create a program. Raises `HairError` from the driver's log; a failed program is not compiled again."""
-    known = complaint_cache.get(files)
+    known = error_cache.get(files)
     if known is not None:
         raise HairError(known)
     try:
@@ -108,7 +108,7 @@ def _create(info, files, vertex_lines, lines):
     except Exception as error:
         where = complaint(_console_of(gpu.shader.create_from_info, info), vertex_lines, lines) or str(error)
         sentence = f"The shader {files[-1]} does not compile on this graphics driver: {where}"
-        raise HairError(complaint_cache.keep(files, sentence)) from error
+        raise HairError(error_cache.keep(files, sentence)) from error
 
 
 def _console_of(failing, *arguments):

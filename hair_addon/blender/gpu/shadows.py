@@ -178,10 +178,10 @@ class ShadowMaps:
         placed = [(*one, {"view": uniforms.uniform_buffer(one[1]), "lights": lights}) for one in placed]
         fronts, counts = map(scene_programs.strand_shadow_program, (True, False))
         for strands, record, blocks in placed:
-            drawing.walk_strands(strands, fronts, record, blocks, samplers, images, {})
+            drawing.rasterize_strands(strands, fronts, record, blocks, samplers, images, {})
         self._fill_fronts(layer)
         for strands, record, blocks in placed:
-            drawing.walk_strands(strands, counts, record, blocks, samplers, images, {})
+            drawing.rasterize_strands(strands, counts, record, blocks, samplers, images, {})
         self._filter(shadow_programs.counts_program(), self._hair_layers, layer, images)
         self._is_empty = True
 

@@ -12,7 +12,7 @@ import gpu
 import numpy as np
 
 from ...core import geometry
-from ...core.imaging.texture_sides import beside_powers
+from ...core.imaging.texture_sides import avoid_powers_of_two
 from ...core.kernels.checks import require_count, require_indices
 from ..host.caches import Cache
 from . import drawing, surface_programs, uniforms
@@ -58,7 +58,7 @@ class _Corners:
         """Each corner's vertex, as two 16-bit numbers, and its UV: shaders/surfaces/surface_corner.glsl."""
         count = len(self.vertices)
         width = min(count, _ROW_CORNERS)
-        texels = np.zeros((beside_powers(-(-count // width)) * width, 4), np.float32)
+        texels = np.zeros((avoid_powers_of_two(-(-count // width)) * width, 4), np.float32)
         texels[:count, 0], texels[:count, 1] = self.vertices & 0xFFFF, self.vertices >> 16
         if self.uvs is not None:
             texels[:count, 2:] = self.uvs
@@ -168,7 +168,7 @@ def packed_colors(colors):
 
 def _row_of(count):
     """Number of vectors per row of a texture of `count` vectors: a third of a small number."""
-    return min(int(beside_powers(-(-count // 3))), _ROW_VERTICES)
+    return min(int(avoid_powers_of_two(-(-count // 3))), _ROW_VERTICES)
 
 
 def _texture_of(vectors, known):
@@ -176,7 +176,7 @@ def _texture_of(vectors, known):
     if known is not None and known[0] is not None and np.array_equal(vectors, known[0]):
         return known[1]
     row = _row_of(len(vectors))
-    row_count = beside_powers(-(-len(vectors) // row))
+    row_count = avoid_powers_of_two(-(-len(vectors) // row))
     texels = np.ascontiguousarray(vectors, np.float32).ravel()
     if row_count * row > len(vectors):
         texels = np.append(texels, np.zeros(3 * (row_count * row - len(vectors)), np.float32))

@@ -316,7 +316,7 @@ class VisibilityBuffer:
             constants = {"first_run": first_run, "are_tiles_known": int(are_tiles_known)}
             program = scene_programs.segments_program(is_depth, placed.is_round, self._clip_planes is not None)
             first_run += placed.run_count
-            drawing.walk_strands(placed.strands, program, placed.record, blocks, samplers, images, constants, part)
+            drawing.rasterize_strands(placed.strands, program, placed.record, blocks, samplers, images, constants, part)
 
     def nearest_depths(self):
         """`depths` of hair, and of surfaces elsewhere."""

@@ -95,7 +95,7 @@ def _rest_before(strands, surface):
 
 
 def _vertices_before(strands, surface):
-    """The vertices of `TurnedFaces` where strands are rooted on the faces of before a turn that gave others numbers."""
+    """The vertices of `FlippedFaces` if strands are rooted on the faces before a flip that renumbered others."""
     return surface.turned.vertices if strands.vellus.topology == surface.turned_topology else None
 
 
@@ -117,7 +117,7 @@ def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgra
         if delivered_hair.modifier_of(user) is not None:
             continue  # its frames stay in the coordinates of before
         if user.parent == strands.surface:
-            curves_objects.stand_on(user, strands.surface)
+            curves_objects.attach_to_surface(user, strands.surface)
         else:  # its place in the world is the artist's
             user.matrix_world = user.matrix_world @ left.inverse.as_blender()
     bindings.invalidate(strands)
@@ -162,7 +162,7 @@ def is_due(strands: Curves) -> bool:
     surface_object = strands.surface
     if surface_object is None or strands.vellus.kind == "NONE" or strands.library is not None:
         return False
-    return any(curves_objects.stands_apart(user) for user in curves_objects.objects_of(strands))
+    return any(curves_objects.has_own_transform(user) for user in curves_objects.objects_of(strands))
 
 
 def rooted_as(moved: np.ndarray, points: np.ndarray, roots: np.ndarray, moved_roots: np.ndarray) -> np.ndarray:

@@ -40,14 +40,14 @@ def attach(
     if kept:
         curves.require_overridable(surface_object)
         usable_surfaces.require_evaluated(surface_object)
-        curves_objects.keep_rest(surface_object)
+        curves_objects.store_rest_positions(surface_object)
         surface = scene.read_surface(surface_object, depsgraph)
         carried = {part: _Carried(part, changes[part], surface, depsgraph) for part in kept}
     followed = {part for part in parts if part.vellus.followed == staleness.guides_digest(part.vellus.guide_curves)}
     for part in parts:
         part.surface = surface_object
         for user in curves_objects.objects_of(part):
-            curves_objects.stand_on(user, surface_object)
+            curves_objects.attach_to_surface(user, surface_object)
         if part in changes:
             surface_space.note_applied(part, changes[part])
             bindings.invalidate(part)

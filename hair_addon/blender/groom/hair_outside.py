@@ -37,7 +37,7 @@ def keep_outside(hair: Curves, bound: BoundHair) -> None:
         world, _errors = simulated_world.read(blender_scene, depsgraph, settings, pose, hair.surface, ways)
         obstacles = [replace(one, distance=_SKIN) if one.vertices is pose.vertices else one for one in world.obstacles]
         there = pose.to_world(bound.points)
-        moved, is_moved = dynamics.outside.kept_outside(there, obstacles, preferences.device())
+        moved, is_moved = dynamics.outside.moved_outside(there, obstacles, preferences.device())
     except HairError as error:
         notices.say(str(error))
         return

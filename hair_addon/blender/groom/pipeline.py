@@ -132,7 +132,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     ground = _ground(surface, scene.shown_surface(guide_curves.surface, surface), mask, parting, device)
     if target is not None:
         made_on = surface_space.made_on(target, surface.rest)
-        ground["shape"] = surface.shape_made_on(made_on, surface_space.applied(target))
+        ground["shape"] = surface.former_shape(made_on, surface_space.applied(target))
 
     def compute(progress):
         if known is None:
@@ -158,7 +158,7 @@ def _known_binding(target, settings, key, parting_key, guides, surface):
     if bound is None or (bound.root_key, bound.parting_key) != (key, parting_key):
         return None
     most = bound.binding.candidates.indices.shape[1] - 1
-    is_same = bound.surface.is_at_rest_as(surface) and bound.guides.roots.is_same(guides.roots)
+    is_same = bound.surface.has_same_rest(surface) and bound.guides.roots.is_same(guides.roots)
     return bound if is_same and settings.neighbour_limit <= most else None
 
 
@@ -293,7 +293,7 @@ def _ground(surface, shown, mask, parting, device) -> _Ground:
         lines=drawn_lines.at_rest(parting.lines, shown, surface, device),
         drawn_on=surface.drawn_on,
         shape=surface.shape,
-        is_mirrored=surface.names_otherwise,
+        is_mirrored=surface.has_flipped_winding,
         device=device,
     )
 

@@ -20,7 +20,7 @@ def read(surface_object: Object | None, depsgraph: Depsgraph, target: Curves | N
     """
     if target is None or not curves.follows_library(target):
         require_mesh(surface_object)
-        curves_objects.keep_rest(surface_object)
+        curves_objects.store_rest_positions(surface_object)
     surface, bound = scene.read_surface(surface_object, depsgraph).sized_cage, target and bindings.of(target)
     if bound is not None and (bound.surface.is_same(surface) or _is_as_bound(bound, surface, target)):
         surface = bound.surface

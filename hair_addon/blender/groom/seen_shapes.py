@@ -24,7 +24,7 @@ def kept_by(strands: Curves, surface: Surface, change: Affine) -> Points | None:
 
     None where they stay as they are. surface: to which it was applied.
     """
-    if not surface.is_deformed or change.keeps_axes or not len(strands.curves):
+    if not surface.is_deformed or change.is_uniform_scale or not len(strands.curves):
         return None
     back = change.inverse
     before = replace(
@@ -34,9 +34,9 @@ def kept_by(strands: Curves, surface: Surface, change: Affine) -> Points | None:
         smooth_rest=back.points(surface.smooth_rest),
     )
     pose = posed_strands.pose_of(surface)
-    stored, may_float = stored_roots.slid_places(strands), stored_roots.may_float(strands)
+    stored, may_start_off_surface = stored_roots.slid_places(strands), stored_roots.may_start_off_surface(strands)
     firsts = curves.first_points(strands)
-    vertices, weights, *slides = pose.rooted(strands.vellus.topology, stored, firsts, may_float)
+    vertices, weights, *slides = pose.rooted(strands.vellus.topology, stored, firsts, may_start_off_surface)
     motions = [one.motion_at(vertices) for one in (posed_strands.pose_of(before), pose)]
     counts, places = curves.point_counts(strands), (vertices, weights)
     slide = np.repeat(slides[0], counts, axis=0) if slides else np.zeros((1, 3), np.float32)
@@ -48,7 +48,7 @@ def kept_by(strands: Curves, surface: Surface, change: Affine) -> Points | None:
         seen = posed_strands.carried(back.points(points + slide), motions[0], places, counts)
         now = posed_strands.carried(change.points(seen), motions[1], places, counts, is_back=True)
         now = now - slide
-        if not may_float:
+        if not may_start_off_surface:
             now[starts] = points[starts]  # exactly where strands are rooted
         return now
 

@@ -9,13 +9,13 @@ from .caches import Cache
 
 LARGEST = 1e15  # squares of single-precision numbers must stay finite
 
-said_cache = Cache()  # sentence → True
+printed_cache = Cache()  # sentence → True
 
 
 def say(sentence):
     """Print a message, unless it was printed before."""
-    if said_cache.get(sentence) is None:
-        said_cache.keep(sentence, True)
+    if printed_cache.get(sentence) is None:
+        printed_cache.keep(sentence, True)
         print(f"Vellus: {sentence}", file=sys.stderr)
 
 

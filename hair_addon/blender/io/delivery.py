@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.errors import HairError
 from ...core.files import file_names
-from ...core.files.whole_file import require_place, whole_file
+from ...core.files.atomic_file import atomic_file, require_writable_path
 from ...core.long_work import Stage
 from ..data import scene, whole_changes
 from ..data.strands import curves, delivered_hair, simulated_guides
@@ -73,7 +73,7 @@ def delivering(guides, path, blender_scene):
     frame_folders.require_frames(guides, range(frames.start, frames.stop + 1))
     chosen = _deliverable(guides)
     hair_file.require_ours(path)
-    require_place(path)
+    require_writable_path(path)
     times = _times(blender_scene, frames, chosen)
     present, its_scene, its_guides = scene_time.time_of(blender_scene), Remembered(blender_scene), Remembered(guides)
     with contextlib.ExitStack() as stack:
@@ -81,7 +81,7 @@ def delivering(guides, path, blender_scene):
         tasks = [_begin(hair, stack) for hair in chosen]
         units = scene_time.frame_rate(blender_scene), strand_arrays.metres_per_unit(blender_scene)
         yield Stage("Delivering", 0.0)
-        with whole_file(path) as partial:
+        with atomic_file(path) as partial:
             with hair_file.HairFile(partial, path, *units) as file:
                 for task in tasks:
                     task.path = file.add(name_of(task.hair.find()), task.counts)

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import HairError, cause_of
-from ...core.files.whole_file import new_partial_of, require_place, whole_files
+from ...core.files.atomic_file import atomic_files, new_partial_of, require_writable_path
 from ...core.imaging import picture_checks
 from ...core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME, PassSettings
 from ...core.long_work import no_progress
@@ -70,7 +70,7 @@ def require_pattern(pattern, frame_count, has_passes=False):
         str(pattern.absolute()).encode()
     except UnicodeEncodeError as error:
         raise HairError(f"{str(pattern)!a} cannot be written: Blender accepts only UTF-8 paths.") from error
-    require_place(path_of(pattern, 1))
+    require_writable_path(path_of(pattern, 1))
 
 
 def _require_layers(path, has_passes):
@@ -94,7 +94,7 @@ def bind_simulated():
         scene_time.go_to(blender_scene, guides.vellus.dynamics.start_frame)
         for hair in curves.followers(guides):
             if hair.vellus.is_live and not curves.follows_library(hair):
-                live_hair.make_again(hair, scene.present_depsgraph())
+                live_hair.regenerate(hair, scene.present_depsgraph())
 
 
 def _number_width(pattern):
@@ -132,7 +132,7 @@ def write_frame(path, frame, engine, settings, partial=None, progress=no_progres
         raise HairError("The scene has no camera: add one.")
     files, partial = view_files.files_of(path), partial or new_partial_of(Path(path))
     partials = view_files.files_of(partial)
-    with whole_files(files, partials), _rendering(blender_scene, partial, engine, settings):
+    with atomic_files(files, partials), _rendering(blender_scene, partial, engine, settings):
         missing_files([frame], allows_missing)
         frame_folders.require_readable([frame], blender_scene)
         scene_time.go_to(blender_scene, frame)

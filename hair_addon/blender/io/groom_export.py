@@ -9,7 +9,7 @@ from pathlib import Path
 from ...core.errors import HairError, cause_of
 from ...core.files import export_settings, settings_file
 from ...core.files.alembic import unreal_groom
-from ...core.files.whole_file import require_place, whole_file
+from ...core.files.atomic_file import atomic_file, require_writable_path
 from ...core.long_work import Stage
 from ..groom.dynamics import frame_folders
 from ..groom.transfer import groom_settings
@@ -43,7 +43,7 @@ def require_writable(path):
         )
     if _is_usd(path):
         hair_file.require_usd()
-    require_place(path)
+    require_writable_path(path)
 
 
 def exporting(path, chosen, settings, blender_scene):
@@ -71,7 +71,7 @@ def exporting(path, chosen, settings, blender_scene):
             raise HairError("Neither hair nor guides would be exported: choose one of them.")
         if not _is_usd(path) and instances:
             sources += groom_sources.copies_of(sources, instances)
-        with whole_file(path) as partial, _opened(partial, path, chosen, frames[0], blender_scene) as writer:
+        with atomic_file(path) as partial, _opened(partial, path, chosen, frames[0], blender_scene) as writer:
             numbers = yield _adding(writer, sources, path)
             for name, matrix in instances if _is_usd(path) else ():
                 writer.add_instance(name, matrix)

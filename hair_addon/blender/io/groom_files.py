@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
-from ...core.files.whole_file import require_place, require_room, whole_file
+from ...core.files.atomic_file import atomic_file, require_room, require_writable_path
 from ...core.geometry.strands import curve_offsets
 from ..data import scene
 from ..data.strands import attributes, exported_curves
@@ -34,7 +34,7 @@ def require_writable(path):
         raise HairError(f"Grooms are saved as {', '.join(ENDINGS)}, not as {ending or 'a file without an extension'}.")
     if ending in _OPERATORS and not paths.has_operator(_OPERATORS[ending]):
         raise HairError(f"{path} cannot be written: this build of Blender lacks its exporter, {_OPERATORS[ending]}.")
-    require_place(path)
+    require_writable_path(path)
 
 
 def write(path, guides, hair, file_axes):
@@ -47,7 +47,7 @@ def write(path, guides, hair, file_axes):
     if ending == ".blend":
         save_copy(path)
         return
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         if ending == ".npz":
             np.savez(partial, **arrays(guides, hair, file_axes))
         else:
@@ -57,7 +57,7 @@ def write(path, guides, hair, file_axes):
 
 def save_copy(path):
     """Save a copy of the open file, atomically. Raises `HairError`."""
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
 
 

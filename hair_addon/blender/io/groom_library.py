@@ -15,7 +15,7 @@ import numpy as np
 from ...core import geometry, grooming
 from ...core.errors import HairError, cause_of
 from ...core.files import file_names, settings_file
-from ...core.files.whole_file import require_place, whole_files
+from ...core.files.atomic_file import atomic_files, require_writable_path
 from ...core.geometry.mesh import SurfacePoints, check_mesh
 from ...core.long_work import Stage, Work
 from ..data import scene, whole_changes
@@ -88,7 +88,7 @@ def saving(
     if len(name.encode()) > _MOST_NAME:
         raise HairError("The name is too long: use at most {most} bytes.", most=_MOST_NAME)
     target = path if path.suffix.lower() == ".blend" else path_of(path, name)
-    require_place(target)
+    require_writable_path(target)
     _require_replaceable(target)
     depsgraph = scene.present_depsgraph()
     groom = library_groom.take(hair, name, depsgraph)
@@ -127,7 +127,7 @@ def write(path: Path, grooms: Iterable[tuple[LibraryGroom, np.ndarray | None]], 
                 renamed += _make_way(groom.name)
                 made.append(_asset(groom, picture, "" if listed is None else listed.identifier))
             new_list = [] if listed is None or listed.text is None else [listed.path]
-            with whole_files([path, *new_list]) as partials:
+            with atomic_files([path, *new_list]) as partials:
                 bpy.data.libraries.write(str(partials[0]), set(made), compress=True)
                 for partial in partials[1:]:
                     partial.write_text(listed.text, encoding="utf-8")
@@ -250,7 +250,7 @@ def _groom(asset, name, path):
         raise HairError('"{name}" in {path} is not a groom saved by Vellus.', name=name, path=path)
     surface_object = asset.data.surface
     try:
-        ground = grooming.groom_transfer.Ground(*groom_assets.read_surface(surface_object))
+        ground = grooming.groom_transfer.TransferSurface(*groom_assets.read_surface(surface_object))
         check_mesh(ground.mesh)
         points, counts = curves.read_points(asset.data), np.diff(curves.curve_offsets(asset.data))
         settings = settings_file.from_object(settings_file.object_of_text(text, path), path)

@@ -9,7 +9,7 @@ from ...core.cards import atlas, outlines, ribbons, texels
 from ...core.cards.polygon_mesh import PolygonMesh
 from ...core.errors import HairError
 from ...core.files import file_names
-from ...core.files.whole_file import require_place
+from ...core.files.atomic_file import require_writable_path
 from ...core.geometry import clusters
 from ...core.long_work import Stage, part_of
 from ..data import whole_changes
@@ -54,7 +54,7 @@ def making_cards(hair, settings, folder=None):
     settings.require_size(hair_meshes.strand_count(hair))
     if folder is not None:
         folder = folder.absolute()  # Blender takes other paths of images from the folder of the .blend file
-        require_place(folder / "texture.png")
+        require_writable_path(folder / "texture.png")
     yield Stage("Reading strands", 0.0)
     read = hair_meshes.read_hair(hair)
     levels = settings.levels(len(read.points))

@@ -6,7 +6,7 @@ import contextlib
 import bpy
 
 from ...core.errors import HairError
-from ...core.files.whole_file import require_place, whole_file
+from ...core.files.atomic_file import atomic_file, require_writable_path
 from ..data.made import armature_weights
 from ..host import paths
 from .chosen_objects import only_chosen
@@ -56,7 +56,7 @@ def require_writable(path):
         )
     if not paths.has_operator(_FORMATS[ending][1]):
         raise HairError(f"{path} cannot be written: this build of Blender lacks its exporter, {_FORMATS[ending][1]}.")
-    require_place(path)
+    require_writable_path(path)
 
 
 def has_textures(path):
@@ -73,5 +73,5 @@ def write(path, objects):
     export = _FORMATS[path.suffix.lower()][0]
     rigs = [modifier.object for one in objects for modifier in armature_weights.armatures_of(one)]
     chosen = [*dict.fromkeys([*objects, *rigs])]
-    with contextlib.nullcontext() if export is _blend else only_chosen(chosen), whole_file(path) as partial:
+    with contextlib.nullcontext() if export is _blend else only_chosen(chosen), atomic_file(path) as partial:
         export(str(partial.absolute()))  # exporters name textures from there

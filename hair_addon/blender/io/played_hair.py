@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.files.whole_file import whole_file
+from ...core.files.atomic_file import atomic_file
 from ..data.strands import curves, delivered_hair
 from ..groom import selection
 from ..host import scene_time
@@ -31,7 +31,7 @@ def playing(hair, motion, order, path: Path):
     back = np.linalg.inv(matrix)
 
     def write(progress):
-        with whole_file(path) as partial:
+        with atomic_file(path) as partial:
             with hair_file.HairFile(partial, path, rate, scale) as file:
                 place = file.add(name_of(hair), counts)
                 for index, time in enumerate(motion.times):

@@ -14,8 +14,8 @@ import time
 from pathlib import Path
 
 from ...core.errors import HairError, cause_of
+from ...core.files.atomic_file import atomic_file, leftovers, require_writable_path
 from ...core.files.file_lock import claim, claim_of
-from ...core.files.whole_file import leftovers, require_place, whole_file
 from ...core.imaging import picture_checks
 from ...core.long_work import no_progress
 from ..data.pictures import rendered_files
@@ -47,7 +47,7 @@ def begin(pattern, numbers, described, replaces=False):
     there of these frames, and make them again.
     """
     record = record_of(pattern)
-    require_place(record)
+    require_writable_path(record)
     folder = next((path for path in _files(pattern, numbers) if path.is_dir()), None)
     if folder is not None:
         raise HairError(f"{folder} is a folder: move it, or choose another file name.")
@@ -84,7 +84,7 @@ def _begin(pattern, numbers, record, described, replaces):
         return
     else:
         _require_none(pattern, numbers)
-    with whole_file(record) as partial:
+    with atomic_file(record) as partial:
         partial.write_text(json.dumps(described, indent=1) + "\n", encoding="utf-8")
 
 

@@ -78,8 +78,8 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
         points, counts = local.reshape(-1, 3), np.full(*local.shape[:2])
     pose = posed_strands.read_pose(datablock.surface, scene.present_depsgraph())
     starts, stored = strands.curve_offsets(counts), stored_roots.slid_places(datablock)
-    may_float = stored_roots.may_float(datablock)
-    places = pose.rooted(datablock.vellus.topology, stored, points[starts[:-1]], may_float)
+    may_start_off_surface = stored_roots.may_start_off_surface(datablock)
+    places = pose.rooted(datablock.vellus.topology, stored, points[starts[:-1]], may_start_off_surface)
 
     def carried(some):
         its = points[starts[some.start] : starts[some.stop]]

@@ -4,7 +4,7 @@
 import imbuf
 
 from ...core.files import table_exr
-from ...core.files.whole_file import whole_file
+from ...core.files.atomic_file import atomic_file
 from ...core.long_work import Stage
 from ...core.shading.tables import dual_scattering, lookup_tables
 from ..host import paths
@@ -24,7 +24,7 @@ def baking_tables(settings, folder, has_plots=False):
     written = table_exr.write_tables(folder, tables, paths.addon_version())
     written += table_exr.write_dual_tables(folder, dual, paths.addon_version())
     for name, picture in table_plots.plot_tables(tables, dual).items() if has_plots else ():
-        with whole_file(folder / f"{name}.png") as partial:
+        with atomic_file(folder / f"{name}.png") as partial:
             imbuf.write(picture, filepath=str(partial))
         written.append(folder / f"{name}.png")
     return written

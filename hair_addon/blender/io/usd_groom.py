@@ -19,8 +19,8 @@ import numpy as np
 
 from ...core.files import groom_curves
 from ...core.files.alembic.unreal_groom import VERSION
+from ...core.files.atomic_file import new_partial_of
 from ...core.files.groom_curves import Check
-from ...core.files.whole_file import new_partial_of
 from ...core.shading import appearance
 from . import hair_file
 

@@ -118,11 +118,11 @@ def _of_played(played, frame):
         return "Simulated up to frame {frame}; frames after it were skipped: play from there", {"frame": played.frame}
     simulation = played.simulated.simulation
     values = {"frame": played.frame, "count": simulation.substeps}
-    if simulation.asked_substeps > simulation.substeps:
+    if simulation.required_substeps > simulation.substeps:
         return (
             "Simulated up to frame {frame} with {count} substeps per frame, but motion needs {asked}:"
             " use Automatic Substeps",
-            {**values, "asked": simulation.asked_substeps},
+            {**values, "asked": simulation.required_substeps},
         )
     return "Simulated up to frame {frame} with {count} substeps per frame", values
 

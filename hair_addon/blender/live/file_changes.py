@@ -13,7 +13,7 @@ def follow(blender_scenes):
     copied_hair.follow()
 
 
-def take_as_it_is():
+def accept_state():
     """Take the state after loading, an import or an undo as the state that strands were made with."""
     followed_names.follow()
     animated.remember(is_made_with=True)

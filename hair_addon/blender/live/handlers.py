@@ -218,7 +218,7 @@ def _evaluate_hair(hair, depsgraph, combed):
         # Guides that are reported for the first time may be the guides that the hair was made with.
         state.is_stale = state.is_stale or (follows and staleness.is_left_by_undo(hair))
     elif state.is_stale and not live_hair.is_ahead(hair):
-        live_hair.make_again(hair, depsgraph)
+        live_hair.regenerate(hair, depsgraph)
     elif follows:
         live_hair.follow_guides(hair, depsgraph, combed[state.guide_curves])
     if state.is_shading_stale:
@@ -299,7 +299,7 @@ def before_saving(*_args):
 def after_import(*_args):
     """Make names of styles readable for Blender's rename operators; resume surfaces that were saved paused."""
     moving_surfaces.resume()
-    file_changes.take_as_it_is()
+    file_changes.accept_state()
     for hair in _of_kind("HAIR"):
         style_items.make_names_readable(hair.vellus)
 
@@ -313,7 +313,7 @@ def after_load(*_args):
     after_import()
     live_hair.cancel_writing()
     invalidation.clear()
-    file_changes.take_as_it_is()
+    file_changes.accept_state()
     stale_marks.follow_applied()
     file_changes.follow(bpy.data.scenes)
     _hide_drawn_hair()
@@ -343,7 +343,7 @@ def after_undo(*_args):
     live_hair.cancel_writing()
     moving_surfaces.resume()  # the undo step may have been saved paused
     invalidation.data_replaced()
-    file_changes.take_as_it_is()
+    file_changes.accept_state()
 
 
 @persistent

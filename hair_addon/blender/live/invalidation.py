@@ -64,10 +64,10 @@ OTHERS = (
     frame_folders.folder_cache,
     followed_names.object_cache,
     guide_simulation.stiffness_cache,
-    shaders.complaint_cache,
+    shaders.error_cache,
     surface_shading.texture_cache,
     surface_textures.surface_cache,
-    notices.said_cache,
+    notices.printed_cache,
 )
 
 # If a bound program is freed and a new one gets its address, the GPU module takes the new one for bound, so programs

@@ -58,7 +58,7 @@ def follow_guides(hair, depsgraph, local=None):
         is_simulated = simulated_guides.is_shown(hair.vellus.guide_curves)
         if hair.vellus.followed and not is_simulated and not staleness.is_left_by_undo(hair):
             return  # was written for these guides, in another session or before an undo
-        make_again(hair, depsgraph)
+        regenerate(hair, depsgraph)
         return
     try:
         guides = _shown_guides(hair, bound, local)
@@ -68,7 +68,7 @@ def follow_guides(hair, depsgraph, local=None):
         hair.vellus.status = str(error)
         return
     if moved is None:
-        make_again(hair, depsgraph)
+        regenerate(hair, depsgraph)
     elif len(moved):
         if is_made:
             hair_cache.follow_where_drawn(hair.session_uid, bound.shown)
@@ -97,7 +97,7 @@ def show_styles(depsgraph):
             continue
         is_styled, bound = not _is_combed_straight(state), bindings.of(hair)
         if bound is None and not is_styled and state.is_live and not text_of(state, "status"):
-            make_again(hair, depsgraph)  # as the first stroke would; a refusal sets the status, so not again
+            regenerate(hair, depsgraph)  # as the first stroke would; a refusal sets the status, so not again
             bound = bindings.of(hair)
         if bound is not None and is_styled != (bound.straight is None):
             bound.show_styles(is_styled)
@@ -112,7 +112,7 @@ def _is_combed_straight(state):
     return any(o.mode == "SCULPT_CURVES" and o.data == guides for o in bpy.data.objects)
 
 
-def make_again(hair, depsgraph):
+def regenerate(hair, depsgraph):
     """Bind hair to its guides again and compute all strands, after changes of settings, surface or guides."""
     if curves.follows_library(hair) and simulated_guides.is_shown(hair.vellus.guide_curves):
         _follow_linked(hair, depsgraph)
@@ -219,7 +219,7 @@ def is_ahead(hair):
         guide_curves, settings = pipeline.inputs_of(hair)
         styles = style_items.styles_of(hair.vellus)
     except HairError:
-        return False  # `make_again` handles it
+        return False  # `regenerate` handles it
     if bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
     return bound.styles.read.styles == styles
@@ -289,7 +289,7 @@ def follow_masks(surfaces, depsgraph):
         try:
             if bindings.of(hair) is None:
                 if not staleness.has_other_mask(hair, depsgraph):
-                    make_again(hair, depsgraph)
+                    regenerate(hair, depsgraph)
             elif _restyle(hair, depsgraph):
                 state.status = ""
         except HairError as error:

@@ -157,7 +157,7 @@ def _points_at(guides, time, checked_in=None):
     baked = frame_folders.frames_of(guides)
     if baked is not None and baked.manifest is not None and baked.manifest.guide_count == len(guides.curves):
         points = _baked_points(guides, baked, time, checked_in)
-        for error in baked.take_complaints():
+        for error in baked.take_errors():
             print(f"Vellus: {error}", file=sys.stderr)
         if points is not None:
             return frame_folders.rooted(guides, points)

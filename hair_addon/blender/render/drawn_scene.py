@@ -145,8 +145,8 @@ def _are_made(hair):
 
 
 def _fit(maps, lamps, is_wide):
-    is_as_wide = maps is not None and maps.is_wide == is_wide
-    return is_as_wide and maps.layer_count == max(1, int(lamps.record["count"]))
+    preserves_widths = maps is not None and maps.is_wide == is_wide
+    return preserves_widths and maps.layer_count == max(1, int(lamps.record["count"]))
 
 
 def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):

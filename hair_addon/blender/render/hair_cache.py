@@ -40,7 +40,7 @@ class _CachedStrands:
     wetness: np.ndarray | None  # (S,) float32, None if strands do not differ
     places: tuple | None  # roots from `stored_roots.places`, or None
     rooted_on: tuple  # (session_uid of the surface, its topology)
-    may_float: bool  # whether strands may begin off the surface
+    may_start_off_surface: bool  # whether strands may begin off the surface
     note: HairError | None = None  # strands of the datablock that are left out
     growing: Future | None = None  # of the points, if other threads compute them; None if they were read
     on_gpu: strand_textures.StrandsOnGPU | None = None  # deformed by `pose`
@@ -128,7 +128,7 @@ def _carried(cached, pose, chosen=slice(None)):
     """Points (M, P, 3) of chosen strands, deformed by a pose; at rest if the surface is not deformed."""
     if pose is None or not pose.is_deformed:
         return cached.points[chosen]
-    return pose.carry(cached.points, cached.rooted_on[1], cached.places, chosen, cached.may_float)
+    return pose.carry(cached.points, cached.rooted_on[1], cached.places, chosen, cached.may_start_off_surface)
 
 
 def _pose_of(surface_object):
@@ -300,7 +300,7 @@ def _read(datablock, bound, shown):
         places = None if datablock.surface is None else stored_roots.slid_places(datablock)
         if places is not None and read.is_sound is not None:
             places = tuple(values[read.is_sound] for values in places)
-        rooted = places, _rooted_on(datablock, datablock.vellus.topology), stored_roots.may_float(datablock)
+        rooted = places, _rooted_on(datablock, datablock.vellus.topology), stored_roots.may_start_off_surface(datablock)
         return _CachedStrands(*read.arrays, *rooted, read.note)
     if bound.is_written or bound.has_moved_only:
         randoms, wetness = curves.read_randoms(datablock), curves.read_wetness(datablock)

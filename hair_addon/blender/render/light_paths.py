@@ -64,7 +64,7 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     ]
     lights = drawn.lights.copy()
     lights["grid_corner"][:3] = grid.corner
-    lights["grid_scale"][:3] = 1.0 / (grid.voxel * texture_sides.beside_powers(grid.shape))
+    lights["grid_scale"][:3] = 1.0 / (grid.voxel * texture_sides.avoid_powers_of_two(grid.shape))
     return replace(drawn, lights=lights, hair_lights=None, hair_visibility=visibility)
 
 

@@ -137,7 +137,7 @@ class Making:
         if surface is None or not self.may_carry or (is_behind and self.due is None and _is_deformed(cached.pose)):
             return False
         vertices, weights, *slides = pose.rooted(
-            cached.rooted_on[1], cached.places, cached.points[:, 0], cached.may_float
+            cached.rooted_on[1], cached.places, cached.points[:, 0], cached.may_start_off_surface
         )
         drawn = cached.on_gpu
         if _is_deformed(cached.pose):

@@ -7,7 +7,7 @@ import bpy
 import gpu
 
 from ...core.errors import HairError
-from ...core.files.whole_file import whole_file
+from ...core.files.atomic_file import atomic_file
 from ...core.imaging import pixel_sampling
 from ...core.imaging.pixel_sampling import MOST_DRAWN
 from ...core.long_work import Stage, run_now
@@ -92,7 +92,7 @@ def write_picture(pixels, path, blender_scene):
         raise HairError(f"Pictures are saved as .png or .exr, not as {path.suffix or 'a file without an extension'}.")
     file_format, color_depth = formats[path.suffix.lower()]
     height, width, _rgba = pixels.shape
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         image = bpy.data.images.new("Vellus picture", width, height, alpha=True, float_buffer=True)
         try:
             image.alpha_mode = "PREMUL"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
         rod,
         root_motion,
         simulation,
-        stopped_colliders,
+        topology_changes,
     )
 else:
     __getattr__ = submodules(__name__)

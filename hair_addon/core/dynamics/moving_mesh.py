@@ -94,7 +94,7 @@ class _Surface:
 
     @cached_property
     def _turning(self):
-        """The `Turning` of the vertices around roots, for all poses."""
+        """The `VertexRotations` of the vertices around roots, for all poses."""
         require_finite(self._mesh.vertices)
         return vertex_turns.turning(self._mesh.vertices, self._faces, self._places[0])
 

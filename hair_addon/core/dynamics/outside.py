@@ -30,7 +30,7 @@ _PER_CELL = 16  # points for each cell of the grid of distances
 _NEAR = wp.constant(1e-6)  # tolerance of distances [m]
 
 
-def kept_outside(
+def moved_outside(
     points: np.ndarray, obstacles: Sequence[Obstacle], device: wp.DeviceLike = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Move strands (S, P, 3) [m] out of obstacles → (points (S, P, 3) float64, (S,) bool: which were moved).

@@ -20,7 +20,7 @@ from . import root_motion
 from .air import Air, ForceField
 from .collision.colliders import Collider, Colliders
 from .collision.contact import Contacts
-from .collision.contact_substep import TouchingStrands
+from .collision.contact_substep import CollidingStrands
 from .hair_volume import LEAST_CELL, HairVolume
 from .rod import detail, rotations, sag_free
 from .rod.material import material_of
@@ -90,7 +90,7 @@ class Simulation:
         do not match.
         """
         self.settings, self.pose, self.world = settings, pose, world
-        self.substeps = self.asked_substeps = 0  # of the last frame, and the number that its motion requires
+        self.substeps = self.required_substeps = 0  # of the last frame, and the number that its motion requires
         self._device = wp.get_device(device)
         self._start, self._origin = pose, np.round(pose.positions.mean(axis=0) / _GRID) * _GRID
         self._scale = pose.scale
@@ -107,7 +107,7 @@ class Simulation:
         self._colliders = Colliders(self._device)
         self._read_obstacles(world.obstacles)
         self._contacts = Contacts(self._rods.arrays.positions, self._colliders)
-        self._touching = TouchingStrands(self._rods, self._contacts)
+        self._touching = CollidingStrands(self._rods, self._contacts)
         self._air = Air(self._rods.arrays.slips.shape, self._device)
         self._volume, self._waters = self._new_volume(), self._new_waters()
         self._since_rubbed = 0.0  # [s]
@@ -211,8 +211,8 @@ class Simulation:
             self._renew()
         self._rods.move_roots(pose.positions - self._origin, pose.turns)
         self._read_obstacles(world.obstacles)
-        self.asked_substeps = self._substep_count(before, pose)
-        count = self.asked_substeps if self.settings.automatic_substeps else self.settings.substeps
+        self.required_substeps = self._substep_count(before, pose)
+        count = self.required_substeps if self.settings.automatic_substeps else self.settings.substeps
         step = step_of(self.settings, self._material, seconds, count, world.gravity)
         if self._is_free:
             self._rods.advance(step)

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from . import (
         array_file,
         array_grooms,
+        atomic_file,
         curve_file,
         curve_units,
         file_lock,
@@ -16,12 +17,11 @@ if TYPE_CHECKING:
         frame_manifest,
         groom_curves,
         library_settings,
-        plain_file,
         settings_file,
         style_presets,
         table_cache,
         table_exr,
-        whole_file,
+        untrusted_file,
     )
 else:
     __getattr__ = submodules(__name__)

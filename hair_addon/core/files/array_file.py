@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import HairError
-from . import plain_file
+from . import untrusted_file
 
 # Name → (type of NumPy, shape).
 Layout = Mapping[str, tuple[str, tuple[int, ...]]]
@@ -72,7 +72,7 @@ def write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
 def read(path: Path, layout: Layout) -> dict[str, np.ndarray]:
     """Return the arrays of a file, read-only. Raises `HairError` unless `write` produces this file for the layout."""
     require_layout(layout)
-    arrays = decoded(plain_file.read(path, size_of(layout)), layout)
+    arrays = decoded(untrusted_file.read(path, size_of(layout)), layout)
     if arrays is None:
         raise HairError("{path} cannot be read: {cause}.", path=path, cause="it is damaged, or of another simulation")
     return arrays

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import HairError
-from . import foreign_arrays
+from . import untrusted_arrays
 from .curve_file import TO_Z_UP, Convention, CurveFile, CurveSet
 
 _POINTS = {"guide_points": True, "strand_points": False}
@@ -24,12 +24,12 @@ _NAMES = {"guide_points": "Guides", "strand_points": "Hair"}
 
 def read(path: Path, axis: str = "Z") -> CurveFile:
     """Read the curves of a file of arrays; axis: the up axis of a file without one. Raises `HairError`."""
-    with foreign_arrays.opened(path) as archive:
+    with untrusted_arrays.opened(path) as archive:
         return _read(path, archive, axis)
 
 
 def _read(path, archive, axis):
-    there = {*foreign_arrays.names(archive)}
+    there = {*untrusted_arrays.names(archive)}
     names = [name for name in _POINTS if name in there]
     if not names:
         raise HairError(
@@ -37,7 +37,7 @@ def _read(path, archive, axis):
         )
     sets = []
     for name in names:
-        points, counts = foreign_arrays.array(archive, name), _counts(path, archive, there, name)
+        points, counts = untrusted_arrays.array(archive, name), _counts(path, archive, there, name)
         shape = points.shape
         is_fitting = len(shape) == 3 and shape[1] >= 2 if counts is None else len(shape) == 2
         if not is_fitting or shape[0] < 1 or shape[-1] != 3 or points.dtype.kind != "f":
@@ -51,7 +51,7 @@ def _read(path, archive, axis):
         width_name = name.replace("points", "widths")
         radii = None
         if width_name in there:
-            widths = foreign_arrays.array(archive, width_name)
+            widths = untrusted_arrays.array(archive, width_name)
             if widths.shape != shape[:-1] or widths.dtype.kind != "f":
                 sentence = "{path}: {name} has shape {shape}, but must be {wanted}, as the points."
                 raise HairError(sentence, path=path, name=width_name, shape=widths.shape, wanted=shape[:-1])
@@ -67,7 +67,7 @@ def _read(path, archive, axis):
             )
         )
     if "up" in there:
-        axis = str(foreign_arrays.array(archive, "up"))
+        axis = str(untrusted_arrays.array(archive, "up"))
         if axis not in TO_Z_UP:
             raise HairError("{path}: up is {axis}, but must be X, Y or Z.", path=path, axis=axis[:20])
     return CurveFile(sets, Convention(1.0, axis))
@@ -81,7 +81,7 @@ def _counts(path, archive, there, name):
     """Return (G,) int64 points of each curve; None if the file has no counts, and all curves have equally many."""
     if _counts_of(name) not in there:
         return None
-    counts = foreign_arrays.array(archive, _counts_of(name))
+    counts = untrusted_arrays.array(archive, _counts_of(name))
     if counts.ndim != 1 or not len(counts) or counts.dtype.kind not in "iu" or counts.max() >= 2**31:
         sentence = "{path}: {name} must have the number of points of each curve."
         raise HairError(sentence, path=path, name=_counts_of(name))

@@ -19,13 +19,13 @@ import numpy as np
 
 from ..errors import HairError, cause_of
 from ..geometry.affine import Affine
-from . import array_file, frame_manifest, plain_file
+from . import array_file, frame_manifest, untrusted_file
+from .atomic_file import atomic_file
 from .file_lock import claim, claim_of
 from .frame_manifest import Manifest
-from .whole_file import whole_file
 
 _NAME = re.compile(r"(state_)?([+-](?!0{8})[0-9]{8}|\+0{8})\.npz", re.ASCII)  # frame 0 has one name
-# Partial files of a killed process, as `whole_file` names them; eight digits in older versions.
+# Partial files of a killed process, as `atomic_file` names them; eight digits in older versions.
 _LEFT_OVER = re.compile(r"\.vellus_[0-9a-f]{8}(?:[0-9a-f]{8})?\.(npz|json)", re.ASCII)
 MARKER = ".vellus_cache"  # the file that marks a folder as ours
 _MARK = b"Baked frames of Vellus\n"
@@ -59,7 +59,7 @@ def folder_of(base: Path, identity: str) -> Path:
 
 
 class FrameCache:
-    """Reader of frames in a folder. Unreadable files are missing frames; `take_complaints` returns the reasons once."""
+    """Reader of frames in a folder. Unreadable files are missing frames; `take_errors` returns the reasons once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -144,7 +144,7 @@ class FrameCache:
         before, after, last = (None if other is None else other.points for other in others)
         return None if after is None else between(before, frame.points, after, last, time - number)
 
-    def take_complaints(self) -> list[HairError]:
+    def take_errors(self) -> list[HairError]:
         """Return the reasons why files could not be read, and clear them."""
         taken, self._complaints = self._complaints, []
         return taken
@@ -238,7 +238,7 @@ class Writer:
             raise HairError("{path} cannot be written: {cause}.", path=path, cause="its arrays are not the manifest's")
         if not (self.folder / frame_manifest.NAME).is_file():
             raise HairError("{path} cannot be written: {cause}.", path=path, cause="its folder has lost its manifest")
-        with whole_file(path, is_forced=is_forced) as partial:
+        with atomic_file(path, is_forced=is_forced) as partial:
             array_file.write(partial, arrays)
 
 
@@ -298,7 +298,7 @@ def remove(folder: Path, numbers: Iterable[int] | None = None) -> int:
 def is_marked(folder: Path) -> bool:
     """Return whether a folder has our marker: a plain file with the right content."""
     try:
-        return plain_file.read(folder / MARKER, len(_MARK)) == _MARK
+        return untrusted_file.read(folder / MARKER, len(_MARK)) == _MARK
     except HairError:
         return False
 
@@ -388,5 +388,5 @@ def _remove(folder, is_chosen):
     with os.scandir(folder) as entries:
         chosen = [entry.path for entry in entries if is_chosen(entry.name) and entry.is_file(follow_symlinks=False)]
     for path in chosen:
-        plain_file.tried(lambda path=path: os.unlink(path))
+        untrusted_file.tried(lambda path=path: os.unlink(path))
     return len(chosen)

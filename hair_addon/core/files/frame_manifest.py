@@ -15,8 +15,8 @@ import numpy as np
 from ..errors import HairError
 from ..geometry.affine import Affine
 from ..params import is_text
-from . import array_file, plain_file
-from .whole_file import whole_file
+from . import array_file, untrusted_file
+from .atomic_file import atomic_file
 
 NAME = "manifest.json"
 FORMAT = "Vellus hair cache"
@@ -158,14 +158,14 @@ def write(folder: Path, manifest: Manifest) -> None:
     """Write a folder's manifest atomically and flush it to disk. Raises `HairError`."""
     notes = [[part[:_MOST_LETTERS] for part in note] for note in manifest.notes[:_MOST_NOTES]]
     found = {"format": FORMAT, "version": VERSION} | dataclasses.asdict(manifest) | {"notes": notes}
-    with whole_file(folder / NAME) as partial:
+    with atomic_file(folder / NAME) as partial:
         partial.write_text(json.dumps(found, indent=1), encoding="utf-8")
 
 
 def read(folder: Path) -> Manifest:
     """Read a folder's manifest. Raises `HairError` for content that `write` does not produce."""
     path = folder / NAME
-    return parsed(plain_file.read(path, _LARGEST_FILE), path)
+    return parsed(untrusted_file.read(path, _LARGEST_FILE), path)
 
 
 def parsed(data: bytes, path: Path) -> Manifest:

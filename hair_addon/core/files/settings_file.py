@@ -19,7 +19,7 @@ from ..shading.appearance import TABLE_FIELDS, Appearance
 from ..shading.tables import lookup_tables
 from ..styling.base import StyleSettings
 from ..styling.kinds import KINDS, LABELS, MOST_STYLES, kind_of
-from .whole_file import whole_file
+from .atomic_file import atomic_file
 
 S = TypeVar("S", bound=Settings)
 
@@ -274,7 +274,7 @@ def _refuse_constant(name):
 
 def write_object(path: str | Path, values: dict[str, Any]) -> None:
     """Write {name: value} as JSON, atomically. Raises `HairError`."""
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         partial.write_text(text_of(values), encoding="utf-8")
 
 

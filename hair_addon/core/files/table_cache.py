@@ -17,7 +17,7 @@ from pathlib import Path
 from ..errors import HairError
 from ..shading.tables import lookup_tables
 from . import table_exr
-from .whole_file import whole_file
+from .atomic_file import atomic_file
 
 CAPACITY = 64  # sets of some 2 MB
 
@@ -57,7 +57,7 @@ def _name(settings, version):
 
 def _mark_used(place):
     """Update the time of last use in a set's `used` file; a read-only folder is left unchanged."""
-    with contextlib.suppress(HairError), whole_file(place / "used", is_forced=False) as partial:
+    with contextlib.suppress(HairError), atomic_file(place / "used", is_forced=False) as partial:
         partial.write_text(str(time.time_ns()))
 
 

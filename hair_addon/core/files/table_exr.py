@@ -22,7 +22,7 @@ from ..params import declared, like
 from ..shading.tables import table_axes
 from ..shading.tables.dual_scattering import DualTables
 from ..shading.tables.lookup_tables import MAX_SIZE, Settings, Tables, to_half
-from .whole_file import whole_files
+from .atomic_file import atomic_files
 
 FORMAT_VERSION = 2
 
@@ -72,7 +72,7 @@ def _write_set(folder, arrays, settings, version):
         half = to_half(array)
         channels = table_axes.channels(name, settings.mode)
         files[folder / f"{name}.exr"] = _encode(half, channels, _table_header(name, half, settings, version))
-    with whole_files(files) as partials:
+    with atomic_files(files) as partials:
         for partial, data in zip(partials, files.values(), strict=True):
             partial.write_bytes(data)
     return list(files)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         curvature,
         face_places,
         fingerprint,
+        flipped_faces,
         hash_grid,
         landmark_warp,
         mesh,
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
         strands,
         surface_deform,
         transform,
-        turned_faces,
         uv_maps,
         vertex_turns,
     )

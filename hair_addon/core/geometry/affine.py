@@ -76,7 +76,7 @@ class Affine:
         return bool(np.isfinite(self.matrix).all()) and abs(np.linalg.det(self.axes)) >= 1e-30
 
     @property
-    def keeps_axes(self) -> bool:
+    def is_uniform_scale(self) -> bool:
         """Whether the linear part is a uniform scale, of either sign, within rounding."""
         size = np.trace(self.axes) / 3.0
         return np.allclose(self.axes, size * np.eye(3), rtol=0.0, atol=_ROUNDING * abs(size))
@@ -87,7 +87,7 @@ class Affine:
         return np.allclose(self.matrix, np.eye(4), rtol=0.0, atol=_ROUNDING)
 
     @property
-    def is_as_wide(self) -> bool:
+    def preserves_widths(self) -> bool:
         """Whether widths are unchanged within rounding."""
         return abs(self.scale - 1.0) <= _ROUNDING
 
@@ -99,8 +99,8 @@ class Affine:
             return (np.asarray(points, np.float64) @ self.axes.T + self.matrix[:3, 3]).astype(np.float32)
 
     def widths(self, widths: np.ndarray) -> np.ndarray:
-        """Scale widths, radii or lengths, float32; bit-identical if `is_as_wide`."""
-        if self.is_as_wide:
+        """Scale widths, radii or lengths, float32; bit-identical if `preserves_widths`."""
+        if self.preserves_widths:
             return np.asarray(widths, np.float32)
         with np.errstate(invalid="ignore", over="ignore"):
             return (np.asarray(widths, np.float64) * self.scale).astype(np.float32)

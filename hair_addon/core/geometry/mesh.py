@@ -33,7 +33,7 @@ class SurfacePoints:
         """Return whether the points are bit-identical to others."""
         return np.array_equal(self.triangle, others.triangle) and np.array_equal(self.barycentric, others.barycentric)
 
-    def wound_otherwise(self) -> "SurfacePoints":
+    def with_flipped_winding(self) -> "SurfacePoints":
         """Return the same points for triangles whose last two corners are swapped."""
         return SurfacePoints(self.triangle, np.ascontiguousarray(self.barycentric[:, [0, 2, 1]]))
 

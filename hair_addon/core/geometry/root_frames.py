@@ -91,7 +91,7 @@ def identities(points: SurfacePoints, is_mirrored: bool = False) -> tuple[np.nda
     is_mirrored: whether triangles are wound opposite to the stored roots.
     Both depend only on the root, not on other strands; two IDs are equal with a probability of 2^-32.
     """
-    points = points.wound_otherwise() if is_mirrored else points
+    points = points.with_flipped_winding() if is_mirrored else points
     count = len(points)
     found, numbers = np.empty(count, np.int32), np.empty(count, np.float32)
     bits = np.ascontiguousarray(points.barycentric, np.float32).view(np.int32)

@@ -20,7 +20,7 @@ from ..kernels import kernel_cache
 from ..kernels.checks import require_count, require_indices
 from . import vertex_turns
 from .mesh import Faces, require_finite
-from .vertex_turns import Turning
+from .vertex_turns import VertexRotations
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -56,8 +56,8 @@ def motion(
     return turned(before, after, vertex_turns.turning(at_rest, faces, vertices))
 
 
-def turned(before: np.ndarray, after: np.ndarray, turning: Turning) -> SurfaceMotion:
-    """Return the `SurfaceMotion` by a `Turning`, which is reused for many poses; only its vertices get rotations."""
+def turned(before: np.ndarray, after: np.ndarray, turning: VertexRotations) -> SurfaceMotion:
+    """Return the `SurfaceMotion` by a `VertexRotations`, reused for many poses; only its vertices get rotations."""
     require_finite(after)
     require_count("vertices", len(after), len(before))
     found = turning.axes(after)

@@ -16,7 +16,7 @@ class Texture:
     values: np.ndarray
     corner_uvs: np.ndarray
 
-    def wound_otherwise(self) -> "Texture":
+    def with_flipped_winding(self) -> "Texture":
         """Return the same texture for triangles whose last two corners are swapped."""
         return Texture(self.values, np.ascontiguousarray(self.corner_uvs[:, [0, 2, 1]]))
 

@@ -27,7 +27,7 @@ UNTURNED = np.eye(3, dtype=np.float32)[:2]  # x and y axis of a vertex without r
 
 
 @dataclass(frozen=True)
-class Turning:
+class VertexRotations:
     """Rest data of M vertices of a mesh and the F faces around them; created by `turning`."""
 
     rest: np.ndarray  # (V, 3) float32, all vertices at rest
@@ -71,8 +71,8 @@ class Turning:
         return found
 
 
-def turning(rest: np.ndarray, faces: Faces, vertices: np.ndarray | None = None) -> Turning:
-    """Return the `Turning` of a mesh with finite rest vertices (V, 3) float32.
+def turning(rest: np.ndarray, faces: Faces, vertices: np.ndarray | None = None) -> VertexRotations:
+    """Return the `VertexRotations` of a mesh with finite rest vertices (V, 3) float32.
 
     vertices: indices, in any shape, of vertices that need a rotation, None for all. Raises `HairError` for invalid
     indices.
@@ -94,7 +94,7 @@ def turning(rest: np.ndarray, faces: Faces, vertices: np.ndarray | None = None) 
     inverses = wp.empty(len(corners), dtype=wp.mat33d, device="cpu")
     inputs = [Rows(_shared(corners, np.int32, wp.vec3i)), _shared(rest, np.float32, wp.vec3)]
     parallel.launch(_rest_inverses, len(corners), inputs, [inverses], "cpu", least_rows=_LEAST_FACES)
-    return Turning(rest, chosen, corners, inverses.numpy().reshape(-1, 3, 3), starts, around)
+    return VertexRotations(rest, chosen, corners, inverses.numpy().reshape(-1, 3, 3), starts, around)
 
 
 def _shared(array, scalar, kind):

@@ -14,7 +14,7 @@ from ..errors import HairError
 from ..geometry.landmark_warp import Warp
 from ..geometry.mesh import SurfacePoints, TriMesh, interpolate, positions
 from . import groom_transfer
-from .groom_transfer import Ground, Places
+from .groom_transfer import Places, TransferSurface
 
 METHODS = ("AUTO", "UV", "NEAREST")
 
@@ -37,7 +37,7 @@ class Passage:
     warp: Warp | None
 
 
-def passage(source: Ground, target: Ground, roots: SurfacePoints, method: str = "AUTO") -> Passage:
+def passage(source: TransferSurface, target: TransferSurface, roots: SurfacePoints, method: str = "AUTO") -> Passage:
     """Return the `Passage` of guides with roots (G) on the source; method: one of `METHODS`. Raises `HairError`.
 
     "AUTO" uses the first method that applies: a copy, UV maps that agree, the nearest surface.
@@ -89,7 +89,7 @@ def _by_agreeing_uv(source, target, roots):
 
 
 def carried_weights(
-    source: Ground, target: Ground, weights: np.ndarray, warp: Warp | None, reach: float = _REACH
+    source: TransferSurface, target: TransferSurface, weights: np.ndarray, warp: Warp | None, reach: float = _REACH
 ) -> np.ndarray:
     """Transfer masks (V, K) of the source's vertices to the target's W vertices: (W, K) float32 in [0, 1].
 

@@ -20,7 +20,7 @@ _OUTSIDE = 1e-3  # tolerance for coordinates outside all faces, relative to the 
 
 
 @dataclass(frozen=True)
-class Ground:
+class TransferSurface:
     """The source or target mesh of a transfer: `TriMesh` [m] and UV coordinates (F, 3, 2) of its corners, or None."""
 
     mesh: TriMesh
@@ -48,7 +48,7 @@ class Places:
         return self.far_count + self.other_side_count
 
 
-def places_by_uv(source: Ground, target: Ground, roots: SurfacePoints, scales: bool = True) -> Places:
+def places_by_uv(source: TransferSurface, target: TransferSurface, roots: SurfacePoints, scales: bool = True) -> Places:
     """Return `Places` with equal UV coordinates; roots: G `SurfacePoints` of the source.
 
     scales: whether lengths scale with the surface. Coordinates outside the target's layout have no place; of

@@ -47,7 +47,7 @@ def clump_trees(
     placed_on, its_texture = mesh if shape is None else shape, texture
     if is_mirrored:  # as stored roots, so that sites are the same on a mirrored surface
         placed_on = TriMesh(-placed_on.vertices, placed_on.triangles[:, [0, 2, 1]])
-        its_texture = None if texture is None else texture.wound_otherwise()
+        its_texture = None if texture is None else texture.with_flipped_winding()
 
     def place(count, seed, progress):
         found = placement.cvt.place(
@@ -60,7 +60,7 @@ def clump_trees(
             device=device,
             progress=lambda part: progress("Placing locks", part),
         )
-        return found.wound_otherwise() if is_mirrored else found
+        return found.with_flipped_winding() if is_mirrored else found
 
     return ClumpTrees(binder, place, groom_defaults.grown_area(mesh, density, texture))
 

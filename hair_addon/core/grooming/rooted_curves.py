@@ -33,7 +33,7 @@ class RootedCurves:
     roots: SurfacePoints
     distances: np.ndarray
     is_far: np.ndarray
-    left_out_count: int  # curves of zero length or with non-finite points
+    skipped_count: int  # curves of zero length or with non-finite points
 
     @property
     def reversed_count(self) -> int:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 
-def beside_powers(lengths: Sequence[int] | np.ndarray | int) -> np.ndarray:
+def avoid_powers_of_two(lengths: Sequence[int] | np.ndarray | int) -> np.ndarray:
     """Return the smallest lengths, at least the given positive integers, that are not powers of two."""
     found = np.array(lengths)
     while (is_power := found & (found - 1) == 0).any():

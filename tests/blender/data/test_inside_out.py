@@ -87,7 +87,7 @@ def test_flipping_lets_hair_grow_outward(blender_scene):
 
 
 def test_scripts_and_commands_are_told(blender_scene, tmp_path, capfd):
-    notices.said_cache.clear()
+    notices.printed_cache.clear()
     vertices, triangles = TETRAHEDRON
     for winding, is_told in ((1, False), (-1, True)):
         write_obj(tmp_path / "mesh.obj", vertices, triangles[:, ::winding])

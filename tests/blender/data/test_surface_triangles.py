@@ -21,7 +21,7 @@ def concave(scene):
     surface.shape_key_add(name="Basis")
     key = surface.shape_key_add(name="Concave")
     key.data[1].co = (-0.5, 0.5, 0.0)
-    curves_objects.keep_rest(surface)
+    curves_objects.store_rest_positions(surface)
     bpy.context.view_layer.update()
     at_rest = scenes.read_surface(surface, bpy.context.evaluated_depsgraph_get())
     key.value = 1.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import scene
-from hair_addon.core.geometry import turned_faces
+from hair_addon.core.geometry import flipped_faces
 from tests.support.exchange.imported import select
 
 
@@ -39,15 +39,15 @@ def test_subdivided_faces_are_as_before_their_cage_was_turned(blender, levels):
     bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
     turned_positions, turned = evaluated(body)
     assert not np.array_equal(faces.corner_vertices, turned.corner_vertices)
-    found = turned_faces.turned_cage(turned, corner_count)
+    found = flipped_faces.turned_cage(turned, corner_count)
     np.testing.assert_array_equal(found.before(turned.corner_vertices), faces.corner_vertices)
     np.testing.assert_allclose(turned_positions[found.vertices] * (-1, 1, 1), positions, atol=1e-5)
-    back = turned_faces.turned_cage(faces, corner_count)
+    back = flipped_faces.turned_cage(faces, corner_count)
     np.testing.assert_array_equal(back.corners[found.corners], np.arange(len(found.corners)))
 
 
 def test_other_quads_are_none_of_a_cage(blender):
     body = add_mesh(1)
     _positions, faces = evaluated(body)
-    assert turned_faces.turned_cage(faces, 0) is None
-    assert turned_faces.turned_cage(faces, len(faces.corner_vertices)) is None
+    assert flipped_faces.turned_cage(faces, 0) is None
+    assert flipped_faces.turned_cage(faces, len(faces.corner_vertices)) is None

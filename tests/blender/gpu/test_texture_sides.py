@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.gpu import light_grid, surface_textures
-from hair_addon.core.imaging.texture_sides import beside_powers
+from hair_addon.core.imaging.texture_sides import avoid_powers_of_two
 
 
 def is_power(lengths):
@@ -14,7 +14,7 @@ def is_power(lengths):
 
 def test_sides_are_the_least_that_are_not_powers_of_two():
     lengths = np.arange(1, 5000)
-    found = beside_powers(lengths)
+    found = avoid_powers_of_two(lengths)
     assert not is_power(found).any() and (found >= lengths).all()
     np.testing.assert_array_equal(found[~is_power(lengths)], lengths[~is_power(lengths)])
     np.testing.assert_array_equal(found - lengths, np.where(is_power(lengths), 1 + (lengths == 1), 0))

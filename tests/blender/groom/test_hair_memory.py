@@ -31,7 +31,7 @@ def free(monkeypatch):
     def leave(part):
         needed = cost.strand_bytes(10_000, 41, 4)
         monkeypatch.setattr(memory, "free_bytes", lambda: int(needed / part))
-        notices.said_cache.clear()
+        notices.printed_cache.clear()
 
     return leave
 

@@ -38,7 +38,7 @@ def test_no_folder_of_a_file_is_looked_up_there(hair, path, monkeypatch, tmp_pat
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     seen = []
     monkeypatch.setattr(paths.bpy.path, "abspath", lambda given, **_: seen.append(given) or str(tmp_path))
-    notices.said_cache.clear()
+    notices.printed_cache.clear()
     data = bpy.data.hair_curves["Hair"]
     data.vellus.table_folder = path
     bpy.ops.object.camera_add(location=(0.0, -4.0, 0.0), rotation=(1.57, 0.0, 0.0))

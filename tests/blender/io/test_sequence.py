@@ -18,8 +18,8 @@ import pytest
 from hair_addon.blender.io import frames, sequence
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import file_lock
+from hair_addon.core.files.atomic_file import atomic_file, partial_of
 from hair_addon.core.files.file_lock import claim, claim_of
-from hair_addon.core.files.whole_file import partial_of, whole_file
 from tests.support.commands import ROOT, command, largest_file, run, run_here
 
 COUNT = 5
@@ -278,7 +278,7 @@ def test_pictures_of_other_origin_are_kept(turning, tmp_path):
 def test_an_unwritten_file_does_not_replace_another(tmp_path):
     (tmp_path / "f.exr").write_text("before")
     for write in (lambda _path: None, Path.touch):
-        with pytest.raises(HairError, match="was not written"), whole_file(tmp_path / "f.exr") as partial:
+        with pytest.raises(HairError, match="was not written"), atomic_file(tmp_path / "f.exr") as partial:
             write(partial)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("f.exr", "before")]
 
@@ -292,7 +292,7 @@ def test_frames_are_not_written_through_links_that_others_have_prepared(tmp_path
         os.symlink(victim, pattern.with_name(name))
 
     def write(path, number):
-        with whole_file(path, partial_of(path)) as partial:
+        with atomic_file(path, partial_of(path)) as partial:
             partial.write_text(f"frame {number}")
 
     assert [number for number, _path in sequence.make(pattern, [1, 2], write)] == [1, 2]

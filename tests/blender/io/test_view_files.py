@@ -8,7 +8,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.io import frames, sequence
 from hair_addon.core.errors import HairError
-from hair_addon.core.files.whole_file import partial_of
+from hair_addon.core.files.atomic_file import partial_of
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
 SMALL = {"width": 16, "height": 12, "sample_count": 1}

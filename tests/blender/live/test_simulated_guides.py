@@ -86,5 +86,5 @@ def test_undo_shows_guides_as_combed(followed):
     invalidation.data_replaced()
     assert bindings.of(hair.data) is None
     show(guides, None)
-    live_hair.make_again(hair.data, bpy.context.evaluated_depsgraph_get())
+    live_hair.regenerate(hair.data, bpy.context.evaluated_depsgraph_get())
     assert np.array_equal(written(hair), before)

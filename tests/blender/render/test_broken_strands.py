@@ -25,7 +25,7 @@ def break_strands(hair, value, strands):
     hair.data.position_data.foreach_set("vector", points.ravel())
     hair.data.update_tag()
     bpy.context.view_layer.update()
-    notices.said_cache.clear()
+    notices.printed_cache.clear()
 
 
 def drawn_hair():

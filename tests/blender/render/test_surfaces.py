@@ -201,7 +201,7 @@ def test_each_face_has_the_color_of_its_slot(stage):
 
 
 def test_without_its_image_a_surface_has_its_color_and_says_so_once(stage, tmp_path, capsys):
-    notices.said_cache.clear()
+    notices.printed_cache.clear()
     principled = material_of(plane(), Base_Color=(0.2, 0.4, 0.6, 1.0), Specular_IOR_Level=0.0)
     missing = bpy.data.images.new("Lost", 1, 1)
     missing.source, missing.filepath = "FILE", str(tmp_path / "lost.png")

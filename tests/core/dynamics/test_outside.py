@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.dynamics.outside import kept_outside
+from hair_addon.core.dynamics.outside import moved_outside
 from hair_addon.core.dynamics.simulation import Obstacle
 from hair_addon.core.errors import HairError
 from tests.support.meshes import subdivided_sphere
@@ -38,7 +38,7 @@ def lengths(points):
 
 
 def test_no_point_is_inside_and_lengths_nearly_stay(ball, strands, device):
-    kept, is_moved = kept_outside(strands, [ball], device)
+    kept, is_moved = moved_outside(strands, [ball], device)
     a, b, c = np.moveaxis(ball.vertices[ball.triangles] - [0.0, 0.0, 0.1], 1, 0)
     normals = np.cross(b - a, c - a)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -51,21 +51,21 @@ def test_no_point_is_inside_and_lengths_nearly_stay(ball, strands, device):
 
 
 def test_strands_that_are_outside_stay_bit_by_bit(ball, strands, device):
-    kept, is_moved = kept_outside(strands, [ball], device)
+    kept, is_moved = moved_outside(strands, [ball], device)
     is_far = (from_middle(strands) > RADIUS + DISTANCE + 1e-5).all(axis=1)
     assert is_far.sum() > 100 and not is_moved[is_far].any()
     np.testing.assert_array_equal(kept[~is_moved], strands[~is_moved])
-    np.testing.assert_array_equal(kept_outside(kept, [ball], device)[0][~is_moved], strands[~is_moved])
+    np.testing.assert_array_equal(moved_outside(kept, [ball], device)[0][~is_moved], strands[~is_moved])
 
 
 def test_strands_do_not_depend_on_each_other(ball, strands, device):
-    kept, _ = kept_outside(strands, [ball], device)
+    kept, _ = moved_outside(strands, [ball], device)
     order = np.random.default_rng(1).permutation(len(strands))
-    np.testing.assert_allclose(kept_outside(strands[order], [ball], device)[0], kept[order], atol=1e-7)
+    np.testing.assert_allclose(moved_outside(strands[order], [ball], device)[0], kept[order], atol=1e-7)
 
 
 def test_without_colliders_nothing_moves(strands, device):
-    kept, is_moved = kept_outside(strands, [], device)
+    kept, is_moved = moved_outside(strands, [], device)
     assert kept is not None and not is_moved.any()
     np.testing.assert_array_equal(kept, strands)
 
@@ -73,4 +73,4 @@ def test_without_colliders_nothing_moves(strands, device):
 def test_points_that_are_not_finite_are_refused(ball, strands, device):
     strands[3, 4, 1] = np.nan
     with pytest.raises(HairError, match="finite"):
-        kept_outside(strands, [ball], device)
+        moved_outside(strands, [ball], device)

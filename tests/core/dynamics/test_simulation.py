@@ -303,7 +303,7 @@ def test_a_number_of_substeps_that_is_set_is_taken_and_more_are_asked_for(rng):
         moved = pose.moved(RigidMotion(rotations.IDENTITY, np.zeros(3), np.array([distance, 0.0, 0.0])))
         for simulation in (fixed, automatic):
             simulation.advance(moved, World(), FRAME)
-        assert fixed.substeps == 4 and fixed.asked_substeps == automatic.asked_substeps == automatic.substeps
+        assert fixed.substeps == 4 and fixed.required_substeps == automatic.required_substeps == automatic.substeps
     assert automatic.substeps > 8
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.files import frame_cache, frame_manifest, plain_file
+from hair_addon.core.files import frame_cache, frame_manifest, untrusted_file
 from hair_addon.core.files.frame_cache import FrameCache, baking, between, remove
 from tests.support import folder_digest
 from tests.support.cached_frames import (
@@ -242,7 +242,7 @@ def test_a_file_that_another_program_holds_is_tried_three_times(folder, monkeypa
         bake(folder, [1])
     assert len(tries) == 12
     with monkeypatch.context() as patch:
-        patch.setattr(plain_file.os, "open", held(os.open, 0))
+        patch.setattr(untrusted_file.os, "open", held(os.open, 0))
         assert cache.read_frame(1) is not None
     with monkeypatch.context() as patch:
         patch.setattr(os, "replace", held(os.replace, 4))

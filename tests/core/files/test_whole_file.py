@@ -6,7 +6,7 @@ import os
 import pytest
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.files.whole_file import require_place, whole_file, whole_files
+from hair_addon.core.files.atomic_file import atomic_file, atomic_files, require_writable_path
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def paths(tmp_path):
 
 
 def test_files_take_their_places_together(paths):
-    with whole_files(paths) as partials:
+    with atomic_files(paths) as partials:
         for partial in partials:
             partial.write_text("after")
         assert [path.read_text() for path in paths] == ["before", "before"]
@@ -28,7 +28,7 @@ def test_files_take_their_places_together(paths):
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), RuntimeError("Error: no exporter")])
 def test_after_an_error_all_is_as_before(paths, error):
     with pytest.raises(HairError, match=r"a cannot be written: (No space left on device|no exporter)\.$"):
-        with whole_files(paths) as partials:
+        with atomic_files(paths) as partials:
             partials[0].write_text("after")
             raise error
     assert [path.read_text() for path in paths] == ["before", "before"]
@@ -37,7 +37,7 @@ def test_after_an_error_all_is_as_before(paths, error):
 
 def test_a_file_that_nobody_wrote_or_that_is_empty_is_refused(paths):
     for content in (None, ""):
-        with pytest.raises(HairError, match="b was not written"), whole_files(paths) as partials:
+        with pytest.raises(HairError, match="b was not written"), atomic_files(paths) as partials:
             partials[0].write_text("after")
             if content is not None:
                 partials[1].write_text(content)
@@ -46,7 +46,7 @@ def test_a_file_that_nobody_wrote_or_that_is_empty_is_refused(paths):
 
 def test_the_file_is_named_as_its_format_demands(tmp_path):
     """Exporters go by the ending; paths inside a file may be relative to it."""
-    with whole_file(tmp_path / "new" / "hair.usdc") as partial:
+    with atomic_file(tmp_path / "new" / "hair.usdc") as partial:
         assert partial.suffix == ".usdc" and partial.parent == tmp_path / "new"
         partial.write_text("after")
     assert os.listdir(tmp_path / "new") == ["hair.usdc"]
@@ -57,7 +57,7 @@ def test_what_is_no_place_for_a_file_is_refused_before_anything_is_written(tmp_p
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").touch()
     os.mkfifo(tmp_path / "pipe")
-    for refuses in (require_place, lambda path: whole_file(path).__enter__()):
+    for refuses in (require_writable_path, lambda path: atomic_file(path).__enter__()):
         with pytest.raises(HairError):
             refuses(tmp_path / name)
     assert sorted(os.listdir(tmp_path)) == ["file", "folder", "pipe"]

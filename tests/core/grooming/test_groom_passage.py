@@ -10,7 +10,7 @@ from hair_addon.core.files.settings_file import GroomSettings
 from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh, positions
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.grooming.groom_passage import carried_weights, passage
-from hair_addon.core.grooming.groom_transfer import Ground
+from hair_addon.core.grooming.groom_transfer import TransferSurface
 from hair_addon.core.styling import clump, trim
 from tests.support.meshes import subdivided_sphere
 
@@ -35,7 +35,7 @@ def seen_from_above(mesh):
 def test_a_turned_and_scaled_copy_needs_no_uv_map(head):
     mesh, roots = head
     copy = TriMesh((mesh.vertices @ (2.5 * TURN).T + [3.0, 0.0, -1.0]).astype(np.float32), mesh.triangles)
-    found = passage(Ground(mesh), Ground(copy), roots)
+    found = passage(TransferSurface(mesh), TransferSurface(copy), roots)
     assert (found.method, found.places.lost_count) == ("COPY", 0)
     assert found.places.scale == pytest.approx(2.5, abs=1e-5)
     np.testing.assert_allclose(positions(copy, found.places.roots), positions(copy, roots), atol=2e-6)
@@ -52,19 +52,19 @@ def test_uv_maps_count_where_they_agree(head):
     bald = TriMesh(there.vertices, np.ascontiguousarray(cap))
     own = TriMesh(mesh.vertices, np.ascontiguousarray(mesh.triangles[upper]))
     rooted = SurfacePoints(np.searchsorted(upper, up.triangle).astype(np.int32), up.barycentric)
-    ground = Ground(own, seen_from_above(own))
-    found = passage(ground, Ground(bald, seen_from_above(bald)), rooted)
+    ground = TransferSurface(own, seen_from_above(own))
+    found = passage(ground, TransferSurface(bald, seen_from_above(bald)), rooted)
     assert found.method == "UV"
     moved = positions(bald, found.places.roots)
     np.testing.assert_allclose(moved[:, :2], positions(own, rooted)[found.places.kept][:, :2], atol=1e-3)
     shuffled = seen_from_above(bald)[np.random.default_rng(1).permutation(len(cap))]
-    assert passage(ground, Ground(bald, shuffled), rooted).method == "NEAREST"
+    assert passage(ground, TransferSurface(bald, shuffled), rooted).method == "NEAREST"
 
 
 def test_another_shape_takes_guides_to_its_nearest_surface(head):
     mesh, roots = head
     other = subdivided_sphere(4)
-    found = passage(Ground(mesh), Ground(other), roots)
+    found = passage(TransferSurface(mesh), TransferSurface(other), roots)
     assert found.method == "NEAREST"
     extent = np.ptp(other.vertices, axis=0) / np.ptp(mesh.vertices, axis=0)
     wanted = positions(mesh, roots)[found.places.kept] * extent
@@ -75,16 +75,16 @@ def test_masks_come_along(head):
     mesh, roots = head
     weights = np.clip(mesh.vertices[:, 2:], 0.0, 1.0)
     copy = TriMesh((mesh.vertices @ (0.1 * TURN).T).astype(np.float32), mesh.triangles)
-    for target in (Ground(mesh, seen_from_above(mesh)), Ground(copy, seen_from_above(mesh))):
-        found = passage(Ground(mesh, seen_from_above(mesh)), target, roots)
-        carried = carried_weights(Ground(mesh, seen_from_above(mesh)), target, weights, found.warp)
+    for target in (TransferSurface(mesh, seen_from_above(mesh)), TransferSurface(copy, seen_from_above(mesh))):
+        found = passage(TransferSurface(mesh, seen_from_above(mesh)), target, roots)
+        carried = carried_weights(TransferSurface(mesh, seen_from_above(mesh)), target, weights, found.warp)
         np.testing.assert_allclose(carried, weights, atol=2e-5)
 
 
 def test_an_unknown_method_is_refused(head):
     mesh, roots = head
     with pytest.raises(HairError, match="AUTO, UV, NEAREST"):
-        passage(Ground(mesh), Ground(mesh), roots, "MAGIC")
+        passage(TransferSurface(mesh), TransferSurface(mesh), roots, "MAGIC")
 
 
 def test_settings_follow_the_size_of_the_surface_and_forget_the_scene():

@@ -7,7 +7,7 @@ import pytest
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.landmark_warp import Warp, between_boxes, through_landmarks
 from hair_addon.core.geometry.mesh import TriMesh, positions
-from hair_addon.core.grooming.groom_transfer import Ground, carried, places_by_uv, places_by_warp
+from hair_addon.core.grooming.groom_transfer import TransferSurface, carried, places_by_uv, places_by_warp
 from tests.support.meshes import flat_grid, subdivided_sphere
 from tests.support.strands.combed import lengths, standing
 
@@ -21,11 +21,11 @@ COUNT, POINTS = 60, 13
 
 
 def hill(side_count, height=0.3):
-    """A `Ground` of a square hill of side_count² pairs of triangles; its UVs are the square."""
+    """A `TransferSurface` of a square hill of side_count² pairs of triangles; its UVs are the square."""
     flat = flat_grid(side_count)
     x, y, _ = flat.vertices.T
     vertices = np.stack([x, y, height * np.sin(np.pi * x) * np.sin(2.0 * y + 0.5)], axis=1)
-    return Ground(TriMesh(vertices.astype(np.float32), flat.triangles), flat.vertices[flat.triangles][..., :2])
+    return TransferSurface(TriMesh(vertices.astype(np.float32), flat.triangles), flat.vertices[flat.triangles][..., :2])
 
 
 def copy_of(mesh, linear, offset):
@@ -52,7 +52,7 @@ def test_a_turned_scaled_or_mirrored_copy_carries_the_same_groom(rng, method, si
     uvs = ground.corner_uvs if similarity == "turned" else ground.corner_uvs[:, [0, 2, 1]]
     points, roots = combed(ground.mesh, rng)
     if method == "UV":
-        places = places_by_uv(ground, Ground(mesh, uvs), roots)
+        places = places_by_uv(ground, TransferSurface(mesh, uvs), roots)
     else:
         marks = rng.normal(size=(6, 3))
         warp = Warp(linear, offset) if method == "AFFINE" else through_landmarks(marks, marks @ linear.T + offset)
@@ -108,7 +108,7 @@ def test_new_roots_are_nearest_by_brute_force(rng):
 def test_what_has_no_place_is_counted_and_the_others_stay_the_same(rng):
     ground = hill(12)
     x = ground.mesh.corners[:, :, 0].mean(axis=1)
-    half = Ground(TriMesh(ground.mesh.vertices, ground.mesh.triangles[x < 0.5]), ground.corner_uvs[x < 0.5])
+    half = TransferSurface(TriMesh(ground.mesh.vertices, ground.mesh.triangles[x < 0.5]), ground.corner_uvs[x < 0.5])
     points, roots = combed(ground.mesh, rng)
     is_there = positions(ground.mesh, roots)[:, 0] <= 0.5
     for places in (

@@ -60,7 +60,7 @@ def test_curves_without_a_length_or_with_bad_points_are_left_out_and_counted(rng
     lines = lines_of(points, starts)
     mixed = rooted_curves.polylines([*lines[:5], *bad, *lines[5:]])
     rooted = rooted_curves.root(GROUND, *mixed)
-    assert rooted.left_out_count == 4
+    assert rooted.skipped_count == 4
     np.testing.assert_array_equal(rooted.kept, [*range(5), *range(9, 14)])
     np.testing.assert_array_equal(mixed[0][rooted.point_order(mixed[1])], points)
     every_third = rooted_curves.root(GROUND, *mixed, every=3)

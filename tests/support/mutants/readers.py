@@ -148,7 +148,7 @@ def _are_the_arrays(found, whole):
 def _frame(path):
     cache = FrameCache(path.parent)
     frame = cache.read_frame(1)
-    complaints = cache.take_complaints()
+    complaints = cache.take_errors()
     if frame is None:
         assert complaints
         raise complaints[0]
@@ -290,7 +290,7 @@ def readers():
             "core/files/array_file.py", frame_bytes(), _frame, is_equal, path="+00000001.npz", others=frames
         ),
         "arrays": Reader("core/files/array_grooms.py", groom, array_grooms.read, _are_the_arrays),
-        "compressed arrays": Reader("core/files/foreign_arrays.py", packed, array_grooms.read, _are_the_arrays),
+        "compressed arrays": Reader("core/files/untrusted_arrays.py", packed, array_grooms.read, _are_the_arrays),
         "list of arrays": Reader("command_line/info.py", groom, info._arrays, anything),
         "Alembic": Reader("core/files/alembic/reader.py", abc, alembic.grooms.read, are_curves),
         "whole Alembic": Reader("core/files/alembic/reader.py", abc, alembic.reader.require_whole, anything),

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import invariant
 
 import hair_addon
-from hair_addon.blender.data.strands import curves as curves_door
+from hair_addon.blender.data.strands import curves as curve_data
 from hair_addon.blender.host import running
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.errors import HairError
@@ -59,7 +59,7 @@ class Everyone(Artist):
         seen = sorted({o.data.name for o in bpy.context.view_layer.objects if o.type == "CURVES"})
         if seen:
             curves = bpy.data.hair_curves[chosen(seen, number)]
-            points, firsts = curves_door.read_points(curves), curves_door.curve_offsets(curves)[:-1]
+            points, firsts = curve_data.read_points(curves), curve_data.curve_offsets(curves)[:-1]
             is_free = np.ones((len(points), 1), np.float32)
             is_free[firsts] = 0.0
             if len(points):
@@ -188,13 +188,13 @@ def state():
 
 
 def _state_of(datablock):
-    points = curves_door.read_points(datablock)
+    points = curve_data.read_points(datablock)
     roots = {a.name: _values(a) for a in datablock.attributes if a.name.startswith("root_")}
     values = {}
     for group in any_values.groups(datablock):
         for declared in any_values.settings(group):
             values[f"{group.path_from_id()}.{declared.identifier}"] = any_values.plain(group, declared)
-    counts = np.diff(curves_door.curve_offsets(datablock))
+    counts = np.diff(curve_data.curve_offsets(datablock))
     # Where a script removes the guides of hair, its status says so once the file is loaded, or something undone.
     is_said = datablock.vellus.kind != "HAIR" or datablock.vellus.guide_curves is not None
     return points, counts, roots, values, is_said and bool(datablock.vellus.status)

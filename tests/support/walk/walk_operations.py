@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, get_state_machine_test, invariant
 
 import hair_addon
-from hair_addon.blender.data.strands import curves as curves_door
+from hair_addon.blender.data.strands import curves as curve_data
 from hair_addon.blender.render import offscreen
 from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
@@ -107,7 +107,7 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
         seen = sorted({o.data.name for o in bpy.context.view_layer.objects if o.type == "CURVES"})
         if seen:
             guides = bpy.data.hair_curves[chosen(seen, number)]
-            points = curves_door.read_points(guides) + np.float32(amount)
+            points = curve_data.read_points(guides) + np.float32(amount)
             if len(points):
                 guides.attributes["position"].data.foreach_set("vector", points.ravel())
                 guides.update_tag()

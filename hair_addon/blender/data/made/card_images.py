@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ....core.cards import texels
-from ....core.files.whole_file import whole_files
+from ....core.files.atomic_file import atomic_files
 from ...host.notices import name_of
 
 
@@ -53,7 +53,7 @@ def _new_image(name, kind, values):
 
 
 def _save(images, paths):
-    with whole_files(paths) as partials:
+    with atomic_files(paths) as partials:
         for image, partial in zip(images, partials, strict=True):
             image.filepath_raw = str(partial)
             image.save()

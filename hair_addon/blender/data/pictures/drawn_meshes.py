@@ -216,7 +216,7 @@ def _normals(mesh, layout, has_vertex_normals):
 
 def _layout(mesh_object, mesh, is_moving):
     """The `_Layout` of an evaluated mesh; with `is_moving` the previous layout, if it fits."""
-    faces, slots = scene.faces_read_again(mesh_object.original, mesh), np.zeros(0, np.int32)
+    faces, slots = scene.cached_faces(mesh_object.original, mesh), np.zeros(0, np.int32)
     if len(mesh_object.material_slots) > 1:
         slots = np.zeros(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get("material_index", slots)

@@ -112,7 +112,7 @@ def write_roots(curves, surface, roots, normals=None, firsts=None):
         surface, roots = shown, geometry.closest_point.SurfaceQuery(shown.local_mesh).nearest(firsts)
     is_on_cage = surface.topology == cage.topology
     has_slides = on_cage is not None or stored_roots.slides(curves) is not None
-    if firsts is None or is_on_cage or not has_slides or stored_roots.may_float(curves):
+    if firsts is None or is_on_cage or not has_slides or stored_roots.may_start_off_surface(curves):
         stored_roots.write_slides(curves, None)
     else:
         stored_roots.write_slides(curves, mesh_math.interpolate(surface.rest, surface.mesh, roots) - firsts)
@@ -221,7 +221,7 @@ def read_radii(curves):
 def widen(curves, change):
     """Scale radii, or Blender's default radius if curves have none, as an `Affine` scales widths."""
     radii = attributes.read(curves, "radius", "FLOAT", "POINT")
-    if radii is None and change.is_as_wide:
+    if radii is None and change.preserves_widths:
         return
     radii = np.full(len(curves.points), attributes.RADIUS, np.float32) if radii is None else radii
     if len(radii):

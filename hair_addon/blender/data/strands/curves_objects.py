@@ -67,7 +67,7 @@ def objects_of(curves):
     return [user for user in bpy.data.objects if user.data == curves]
 
 
-def stand_on(curves_object, surface_object):
+def attach_to_surface(curves_object, surface_object):
     """Make an object a child of its surface without its own transform, so that they share local coordinates."""
     curves_object.parent, curves_object.parent_type = surface_object, "OBJECT"
     curves_object.matrix_parent_inverse.identity()
@@ -77,7 +77,7 @@ def stand_on(curves_object, surface_object):
     curves_object.matrix_basis.identity()  # last, as Blender removes the delta transforms when it is set
 
 
-def stands_apart(curves_object):
+def has_own_transform(curves_object):
     """Whether an object is not a child of its surface, or has its own transform."""
     if curves_object.parent != curves_object.data.surface or curves_object.parent_type != "OBJECT":
         return True
@@ -99,7 +99,7 @@ def is_elsewhere(curves_object, surface_object):
     return bool(abs(corners @ change[:3].T).max() > _APART * reach)
 
 
-def keep_rest(surface_object):
+def store_rest_positions(surface_object):
     """Let Blender store the rest positions of a surface's vertices, in which strands are rooted."""
     is_new = not surface_object.add_rest_position_attribute
     if is_new:

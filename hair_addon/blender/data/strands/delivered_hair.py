@@ -68,7 +68,7 @@ def take_off(hair_object):
     if following is not None:
         following.show_viewport = following.show_render = True
     if hair_object.parent is not None and hair_object.parent == hair_object.data.surface:
-        curves_objects.stand_on(hair_object, hair_object.parent)  # applied transforms had moved the object
+        curves_objects.attach_to_surface(hair_object, hair_object.parent)  # applied transforms had moved the object
     return True
 
 

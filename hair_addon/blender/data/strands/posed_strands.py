@@ -25,7 +25,7 @@ class Pose:
 
     @cached_property
     def _motions(self):
-        """{id of a `Turning`: (the `Turning`, its `SurfaceMotion`)}."""
+        """{id of a `VertexRotations`: (the `VertexRotations`, its `SurfaceMotion`)}."""
         return {}
 
     def motion_at(self, vertices):
@@ -41,17 +41,17 @@ class Pose:
             self._motions[id(turning)] = turning, moved
         return self._motions[id(turning)][1]
 
-    def carry(self, points, topology, places, chosen=slice(None), may_float=False):
+    def carry(self, points, topology, places, chosen=slice(None), may_start_off_surface=False):
         """Return (M, P, 3) float32: the chosen strands on the deformed surface; unchanged if it is not deformed.
 
         points: (S, P, 3) float32 of all strands at rest, in local coordinates; topology: of the surface that they were
         rooted on; places: their roots from `Surface.places` or `stored_roots.places`, or None. Strands are rooted at
-        the nearest point if the faces of the surface have changed or stored roots are damaged; may_float: whether
-        strands may begin off the surface.
+        the nearest point if the faces of the surface have changed or stored roots are damaged;
+        may_start_off_surface: whether strands may begin off the surface.
         """
         if not self.is_deformed:
             return points[chosen]
-        vertices, barycentric, *slides = self.rooted(topology, places, points[:, 0], may_float)
+        vertices, barycentric, *slides = self.rooted(topology, places, points[:, 0], may_start_off_surface)
         points = points[chosen] + slides[0][chosen][:, None] if slides else points[chosen]
         return carried(points, self.motion_at(vertices), (vertices[chosen], barycentric[chosen]))
 
@@ -67,7 +67,7 @@ class Pose:
             points = points + np.repeat(slides[0][chosen], counts, axis=0)
         return carried(points, self.motion_at(vertices), (vertices[chosen], barycentric[chosen]), counts)
 
-    def rooted(self, topology, places, firsts, may_float=False):
+    def rooted(self, topology, places, firsts, may_start_off_surface=False):
         """Roots on this surface for `carry_rooted`; firsts: (S, 3) local first points.
 
         A third array follows if strands were rooted on the cage or at another level of subdivision: (S, 3) offsets from
@@ -88,7 +88,7 @@ class Pose:
             for slide in slides:
                 slide[lost] = 0.0
             return vertices, barycentric, *slides
-        if may_float or cage_of(topology) != cage_of(surface.topology):
+        if may_start_off_surface or cage_of(topology) != cage_of(surface.topology):
             return vertices, barycentric
         at_rest = sum(barycentric[:, corner, None] * surface.rest[vertices[:, corner]] for corner in range(3))
         return vertices, barycentric, at_rest - firsts

@@ -128,7 +128,7 @@ def places(curves, vertex_count):
 def turn(curves, turned):
     """Flip the triangles of stored roots, as Blender flips faces when it applies a mirroring scale.
 
-    turned: the `TurnedFaces` of the surface.
+    turned: the `FlippedFaces` of the surface.
     """
     vertices, barycentric = _vertices(curves), attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
     if vertices is None or barycentric is None:
@@ -144,7 +144,7 @@ def turn(curves, turned):
         attributes.write(curves, name, "INT", "CURVE", vertices[:, column])
 
 
-def may_float(curves):
+def may_start_off_surface(curves):
     """Whether strands may begin off their surface, as imported curves do."""
     return attributes.has(curves, "root_distance", "FLOAT", "CURVE")
 

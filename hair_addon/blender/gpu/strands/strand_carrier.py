@@ -18,7 +18,7 @@ from . import vertex_turner
 from .strand_changes import StrandChanges, declare_written, new_changes, rows_texture
 
 if TYPE_CHECKING:
-    from ....core.geometry.vertex_turns import Turning
+    from ....core.geometry.vertex_turns import VertexRotations
 
 _GROUP_SIZE = 64
 
@@ -69,7 +69,7 @@ def new_carrier(
     point_count: int,
     places: tuple[np.ndarray, np.ndarray],
     vertices: np.ndarray,
-    turning: "Turning",
+    turning: "VertexRotations",
     slides: np.ndarray | None = None,
 ) -> StrandCarrier:
     """The `StrandCarrier` of S strands.

@@ -17,7 +17,7 @@ from ..strand_textures import MOST_GROUPS, TEXTURE_WIDTH
 from .strand_changes import empty_rows, rows_texture
 
 if TYPE_CHECKING:
-    from ....core.geometry.vertex_turns import Turning
+    from ....core.geometry.vertex_turns import VertexRotations
 
 _GROUP_SIZE = 64
 _VERTEX_TEXELS = 3
@@ -26,7 +26,7 @@ _LARGEST_INDEX = 1 << 24  # exact in single precision
 
 @dataclass(frozen=True)
 class VertexTurner:
-    """A `Turning` on the GPU; made by `new_turner`."""
+    """A `VertexRotations` on the GPU; made by `new_turner`."""
 
     turned: gpu.types.GPUTexture  # for each vertex its position and axes: shaders/strands/carry_strands.comp
     rings: gpu.types.GPUTexture  # for each vertex its index among uploaded vertices, and its range of `around`
@@ -67,11 +67,11 @@ class VertexTurner:
         return self.turned
 
 
-def new_turner(turning: "Turning", rest: np.ndarray) -> VertexTurner:
-    """The `VertexTurner` of a `Turning`; rest: (V, 3) float32, all vertices at rest.
+def new_turner(turning: "VertexRotations", rest: np.ndarray) -> VertexTurner:
+    """The `VertexTurner` of a `VertexRotations`; rest: (V, 3) float32, all vertices at rest.
 
-    `rest` differs from the vertices of the `Turning` for a smooth surface. Raises `HairError` if counts do not match,
-    the mesh is too large for a texture, or the driver does not support it.
+    `rest` differs from the vertices of the `VertexRotations` for a smooth surface. Raises `HairError` if counts do not
+    match, the mesh is too large for a texture, or the driver does not support it.
     """
     vertex_count = len(turning.rest)
     require_count("vertices", len(rest), vertex_count)

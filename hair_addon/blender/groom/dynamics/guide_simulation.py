@@ -81,10 +81,10 @@ class GuideSimulation:
         """
         if self.may_have_other_faces:
             self.may_have_other_faces = False
-            others = dynamics.stopped_colliders.divided(frame.world.obstacles, self.obstacles)
+            others = dynamics.topology_changes.divided(frame.world.obstacles, self.obstacles)
             self.obstacles |= others
             self.simulation.renew_obstacles(others)
-        obstacles, notes = dynamics.stopped_colliders.stopped(frame.world.obstacles, self.obstacles, frame.frame)
+        obstacles, notes = dynamics.topology_changes.stopped(frame.world.obstacles, self.obstacles, frame.frame)
         self.obstacles = {obstacle.name: obstacle for obstacle in obstacles}
         return replace(frame, world=replace(frame.world, obstacles=obstacles), errors=(*frame.errors, *notes))
 

@@ -49,7 +49,7 @@ class HandMade:
         far = float(self.rooted.distances.max()) * 1000.0
         said = (
             (
-                self.rooted.left_out_count,
+                self.rooted.skipped_count,
                 "{count} curves with zero length or non-finite points were removed.",
                 {},
             ),
@@ -139,7 +139,7 @@ def using_as_guides(
     every = grooming.rooted_curves.checked_every(every)
     applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
     require_usable(curves_object, surface_object)
-    curves_objects.keep_rest(surface_object)
+    curves_objects.store_rest_positions(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)
     seen = foreign_curves.read(curves_object, applies_modifiers)
     if len(seen.starts) < 2:
@@ -270,7 +270,7 @@ def write(
 
 def _put_on(curves_object, surface_object, is_rendered):
     """Parent an object to its surface, with the surface's coordinates and no other transforms."""
-    curves_objects.stand_on(curves_object, surface_object)
+    curves_objects.attach_to_surface(curves_object, surface_object)
     for constraint in curves_object.constraints:
         constraint.enabled = False
     curves_objects.render(curves_object, is_rendered=is_rendered)

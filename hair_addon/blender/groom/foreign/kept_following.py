@@ -158,7 +158,7 @@ def _bind(hair, present, depsgraph, followed):
         lines=parting.lines,
         drawn_on=surface.drawn_on,
         roots=roots,
-        is_mirrored=surface.names_otherwise,
+        is_mirrored=surface.has_flipped_winding,
     )
     rest = kept_shapes.read(hair)
     bound = KeptBinding(surface, binding, shape, present if rest is None else rest, starts, guides)

@@ -72,7 +72,7 @@ def using_as_hair(
     applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
     follows_guides = plain_value("Follow Guides", follows_guides, False, _SWITCH)
     hand_made_guides.require_usable(curves_object, surface_object)
-    curves_objects.keep_rest(surface_object)
+    curves_objects.store_rest_positions(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)
     seen = foreign_curves.read(curves_object, applies_modifiers)
     if len(seen.starts) < 2:
@@ -97,7 +97,7 @@ def using_as_hair(
                 placed.rooted.roots,
                 wanted,
                 strands.from_numpy(guides.even(surface), guides.rooted.roots),
-                is_mirrored=surface.names_otherwise,
+                is_mirrored=surface.has_flipped_winding,
                 progress=part_of(progress, 0.1, 1.0),
             )
             return placed, wanted, derived, guides
@@ -110,7 +110,7 @@ def using_as_hair(
             placed.rooted.roots,
             wanted,
             settings.guide_count,
-            is_mirrored=surface.names_otherwise,
+            is_mirrored=surface.has_flipped_winding,
             progress=part_of(progress, 0.1, 1.0),
         )
         return placed, wanted, derived, None

@@ -50,7 +50,7 @@ def as_curves(surface: Object) -> Iterator[Object]:
         made.name = made.data.name = name
         made.data.surface = surface
         # Its points are in the surface's coordinates, but Blender gives it a transform without the surface's shear.
-        curves_objects.stand_on(made, surface)
+        curves_objects.attach_to_surface(made, surface)
         bpy.context.view_layer.update()
         yield made
     modifier = surface.modifiers[modifier.name]

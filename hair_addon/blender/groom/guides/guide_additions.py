@@ -103,7 +103,7 @@ def _between(guides, count, mask, depsgraph):
         regions=parting.regions,
         lines=parting.lines,
         drawn_on=surface.drawn_on,
-        is_mirrored=surface.names_otherwise,
+        is_mirrored=surface.has_flipped_winding,
         device=device,
     )
     point_count = max(int(np.bincount(guides.counts).argmax()), 2)

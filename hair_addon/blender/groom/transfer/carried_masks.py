@@ -7,7 +7,7 @@ from bpy.types import Curves, Depsgraph, Object
 from ....core import grooming
 from ....core.geometry.landmark_warp import Warp
 from ....core.geometry.mesh import interpolate
-from ....core.grooming.groom_transfer import Ground
+from ....core.grooming.groom_transfer import TransferSurface
 from ...data import scene, usable_surfaces, vertex_groups
 from ...data.strands import curves
 from ...data.surfaces import Surface
@@ -32,7 +32,7 @@ def read(guides: Curves, hair: Curves | None, target: Object, depsgraph: Depsgra
 
 
 def carried(
-    masks: dict[str, np.ndarray], source: Ground, target: Ground, warp: Warp | None, reach: float
+    masks: dict[str, np.ndarray], source: TransferSurface, target: TransferSurface, warp: Warp | None, reach: float
 ) -> dict[str, np.ndarray]:
     """{name: (W,) weights} at the vertices of the target; arguments as of `groom_passage.carried_weights`."""
     if not masks:

@@ -17,7 +17,7 @@ from ....core.errors import HairError
 from ....core.geometry.landmark_warp import Warp
 from ....core.geometry.mesh import check_mesh, positions
 from ....core.grooming.groom import HairSettings
-from ....core.grooming.groom_transfer import Ground, Places
+from ....core.grooming.groom_transfer import Places, TransferSurface
 from ....core.grooming.transfer_settings import TransferSettings
 from ....core.long_work import Work
 from ...data import landmarks, scene, surface_space, usable_surfaces, whole_changes
@@ -90,11 +90,11 @@ def transferring(
         pipeline.inputs_of(hair)
     curves.require_overridable(guides)
     source = guide_tools.open_guides(guides, depsgraph)
-    curves_objects.keep_rest(target)
+    curves_objects.store_rest_positions(target)
     surface = scene.read_surface(target, scene.present_depsgraph())
     check_mesh(surface.mesh)
     warp = _warp(guides.surface, source.surface, target, surface, settings, depsgraph)
-    own_ground, ground = (Ground(one.mesh, one.corner_uvs) for one in (source.surface, surface))
+    own_ground, ground = (TransferSurface(one.mesh, one.corner_uvs) for one in (source.surface, surface))
     masks = carried_masks.read(guides, hair, target, depsgraph)
     remembered = tuple(map(Remembered, (guides, hair, target)))
 
@@ -142,7 +142,7 @@ def _warp(its_object, its_surface: Surface, target, surface: Surface, settings, 
     return Warp(np.eye(3), apart)
 
 
-def _places(source: Ground, target: Ground, roots, warp, settings):
+def _places(source: TransferSurface, target: TransferSurface, roots, warp, settings):
     """The `Places` of guides. Raises `HairError`."""
     transfer, scales = grooming.groom_transfer, settings.scale_lengths
     if warp is None:

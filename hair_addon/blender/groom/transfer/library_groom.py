@@ -28,7 +28,7 @@ from ..foreign.hand_made_guides import HandMade
 from . import carried_masks, groom_settings
 
 if TYPE_CHECKING:
-    from ....core.grooming.groom_transfer import Ground
+    from ....core.grooming.groom_transfer import TransferSurface
 
 _GUIDE_RADIUS = 1.0 / 300.0  # of guides in viewports, by their length
 _UNEQUAL = 1e-4  # weights that differ by less are of the same mask
@@ -44,7 +44,7 @@ class LibraryGroom:
     """
 
     name: str
-    ground: "Ground"
+    ground: "TransferSurface"
     roots: SurfacePoints
     points: np.ndarray
     counts: np.ndarray
@@ -88,7 +88,7 @@ def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:
     if attributes.are_smooth(guides).any():
         points, counts = read.numpy().reshape(-1, 3), np.full(len(counts), read.point_count)
     rotation = _rotation(surface)
-    ground = grooming.groom_transfer.Ground(_turned_mesh(surface.mesh, rotation.T), surface.corner_uvs)
+    ground = grooming.groom_transfer.TransferSurface(_turned_mesh(surface.mesh, rotation.T), surface.corner_uvs)
     masks, regions = {}, {}
     for mask in library_settings.masks_of(settings):
         if mask in surface_object.vertex_groups:
@@ -158,7 +158,7 @@ def adding_groom(
     surface = scene.read_surface(surface_object, depsgraph)
     check_mesh(surface.posed_mesh)
     rotation = _rotation(surface)
-    target = grooming.groom_transfer.Ground(_turned_mesh(surface.posed_mesh, rotation.T), surface.corner_uvs)
+    target = grooming.groom_transfer.TransferSurface(_turned_mesh(surface.posed_mesh, rotation.T), surface.corner_uvs)
     found = grooming.groom_passage.passage(groom.ground, target, groom.roots, method)
     places = found.places
     points = grooming.groom_transfer.carried(

@@ -16,7 +16,7 @@ from ...kernels import kernel_cache, parallel
 from ...kernels.checks import require_count
 from . import contact_queries
 from .colliders import Colliders
-from .contact_queries import PLANE, WIDTH, Asking, Samples
+from .contact_queries import PLANE, WIDTH, QueryOptions, Samples
 from .distance_grid import distance_grid
 from .nearest_surface import Surface
 from .surface_motions import SurfaceMotions
@@ -97,11 +97,13 @@ class Contacts:
             require_count("lanes", moved.shape[2], self._shape[2])
         self.note_motion()
         self.send_motions()
-        asking = asking_of(0.0 if is_final else duration, is_final, is_again, is_skipping)
+        asking = query_options(0.0 if is_final else duration, is_final, is_again, is_skipping)
         return self.look(self.surface(), asking, positions, last_positions, moved)
 
-    def look(self, surface: Surface, asking: Asking, positions: Any, last_positions: Any, moved: Any = None) -> Any:
-        """Launch the kernels of `find` for validated arrays, a surface and an `Asking`."""
+    def look(
+        self, surface: Surface, asking: QueryOptions, positions: Any, last_positions: Any, moved: Any = None
+    ) -> Any:
+        """Launch the kernels of `find` for validated arrays, a surface and an `QueryOptions`."""
         is_final = asking.is_final != 0
         *either, middle_planes = self.planes
         planes = either[int(is_final)]
@@ -246,9 +248,11 @@ class Contacts:
         parallel.launch_shares(kernel, thread_count, [*inputs, *at_once], [outputs] * shares, device)
 
 
-def asking_of(duration: float, is_final: bool = False, is_again: bool = False, is_skipping: bool = True) -> Asking:
-    """Return the `Asking` of a substep of a duration [s], zero for no rise; other arguments as in `Contacts.find`."""
-    asking = Asking()
+def query_options(
+    duration: float, is_final: bool = False, is_again: bool = False, is_skipping: bool = True
+) -> QueryOptions:
+    """Return the `QueryOptions` of a substep of a duration [s], zero for no rise; the others as in `Contacts.find`."""
+    asking = QueryOptions()
     asking.is_final, asking.is_again, asking.is_skipping = int(is_final), int(is_again), int(is_skipping)
     asking.rise = RISE * duration
     return asking

@@ -8,7 +8,7 @@
 //
 //   int group, int sample, int first_lane    the samples
 //   int is_middle                            1: midpoint of segment `sample`; 0: the vertex after it
-//   Asking asking                            is_final: after the solve; is_again: samples that have not moved since
+//   QueryOptions asking                      is_final: after the solve; is_again: samples that have not moved since
 //                                            their last query keep their planes; is_skipping, 0: every sample queries;
 //                                            rise: of samples that are inside in the groom [m]
 //   Surface surface                          see nearest_surface.py

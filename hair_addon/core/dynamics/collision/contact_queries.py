@@ -35,7 +35,7 @@ class Samples:
 
 
 @wp.struct
-class Asking:
+class QueryOptions:
     """Query options: see `Contacts.find`."""
 
     is_final: int
@@ -124,7 +124,7 @@ def _put_needs(
     sample: int,
     first_lane: int,
     is_middle: int,
-    asking: Asking,
+    asking: QueryOptions,
     surface: Surface,
     positions: wp.array3d[float],
     last_positions: wp.array3d[float],
@@ -252,7 +252,7 @@ def _look_in(
 @wp.func
 def find_in(
     surface: Surface,
-    asking: Asking,
+    asking: QueryOptions,
     positions: wp.array3d[float],
     last_positions: wp.array3d[float],
     middle_planes: wp.array3d[float],
@@ -312,7 +312,7 @@ def any_moved(moved: wp.array3d[float], group: int, first_lane: int, lanes_at_on
 @wp.kernel
 def find_planes(
     surface: Surface,
-    asking: Asking,
+    asking: QueryOptions,
     positions: wp.array3d[float],
     last_positions: wp.array3d[float],
     middle_planes: wp.array3d[float],

@@ -27,8 +27,8 @@ from ..rod.rod_solver import (
     advance_block,
 )
 from ..rod.rods import Rods
-from .contact import Contacts, asking_of
-from .contact_queries import WIDTH, Asking, Samples, any_moved, find_in
+from .contact import Contacts, query_options
+from .contact_queries import WIDTH, QueryOptions, Samples, any_moved, find_in
 from .nearest_surface import Surface
 
 # No gradients are needed. The solver fuses multiply-adds explicitly (`fused` of lanes.h).
@@ -40,7 +40,7 @@ _FINISH, _AGAIN = wp.constant(FINISH), wp.constant(AGAIN)
 _WIDTH = wp.constant(WIDTH)
 
 
-class TouchingStrands:
+class CollidingStrands:
     """Strands with their contacts, and memory for the planes of the groups in progress."""
 
     takes_groups = True  # on a CPU: all stages group by group; False: stage by stage, as on a GPU
@@ -134,8 +134,8 @@ class TouchingStrands:
 
 
 def _ways_of_asking(step):
-    """Return the `Asking` before the solve, after it, and after AGAIN."""
-    return asking_of(step.size), asking_of(0.0, is_final=True), asking_of(0.0, is_final=True, is_again=True)
+    """Return the `QueryOptions` before the solve, after it, and after AGAIN."""
+    return query_options(step.size), query_options(0.0, is_final=True), query_options(0.0, is_final=True, is_again=True)
 
 
 def _for_each(array, group_count):
@@ -153,9 +153,9 @@ def _advance_groups(
     strands: RodArrays,
     scratches: wp.array3d[float],
     surface: Surface,
-    first_asking: Asking,
-    final_asking: Asking,
-    again_asking: Asking,
+    first_asking: QueryOptions,
+    final_asking: QueryOptions,
+    again_asking: QueryOptions,
     vertices: Samples,
     middles: Samples,
     first: int,
@@ -192,7 +192,7 @@ def _advance_groups(
 @wp.func
 def find_group(
     surface: Surface,
-    asking: Asking,
+    asking: QueryOptions,
     strands: RodArrays,
     middle_planes: wp.array3d[float],
     is_middle: int,

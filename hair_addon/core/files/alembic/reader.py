@@ -185,10 +185,10 @@ class Archive:
         elements = np.frombuffer(content, target.kind)
         return elements if target.extent == 1 else elements.reshape(-1, target.extent)
 
-    def require_there(self, properties: Mapping[str, Property]) -> None:
+    def require_complete(self, properties: Mapping[str, Property]) -> None:
         """Raise `Damaged` unless all samples of properties and of their children are within the file."""
         for one in properties.values():
-            self.require_there(one.children)
+            self.require_complete(one.children)
             for address in one.addresses:
                 self._size_of(address)
 
@@ -305,7 +305,7 @@ def require_whole(path: Path) -> None:
             while pending:
                 one = pending.pop()
                 pending += one.children()
-                archive.require_there(one.properties)
+                archive.require_complete(one.properties)
     except (Damaged, OSError) as error:
         raise HairError("{path} is a damaged Alembic file.", path=path) from error
 

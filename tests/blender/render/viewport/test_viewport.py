@@ -308,7 +308,7 @@ def test_a_shader_that_does_not_compile_is_reported_once_with_file_and_line(file
     line = next(number for number, words in enumerate(text.splitlines(), 1) if "int row =" in words)
     broken.write_text(text.replace("int row =", "int row = nonsense; int other =", 1))
     monkeypatch.setattr(shaders, "FOLDER", tmp_path / "shaders")
-    monkeypatch.setattr(shaders, "complaint_cache", Cache())
+    monkeypatch.setattr(shaders, "error_cache", Cache())
     compilations = []
     real = gpu.shader.create_from_info
     monkeypatch.setattr(gpu.shader, "create_from_info", lambda info: (compilations.append(1), real(info))[1])
@@ -335,7 +335,7 @@ def test_undrawable_hair_is_reported_once(monkeypatch, capsys):
 
     space = SimpleNamespace(shading=SimpleNamespace(type="SOLID"), overlay=SimpleNamespace(show_overlays=False))
     monkeypatch.setattr(viewport, "_draw_hair", refuse)
-    notices.said_cache.clear()
+    notices.printed_cache.clear()
     monkeypatch.setattr(viewport, "bpy", SimpleNamespace(context=SimpleNamespace(space_data=space)))
     viewport.draw()
     viewport.draw()

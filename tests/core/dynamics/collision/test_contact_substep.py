@@ -8,7 +8,7 @@ import pytest
 import warp as wp
 from scipy.spatial.transform import Rotation
 
-from hair_addon.core.dynamics.collision.contact_substep import TouchingStrands
+from hair_addon.core.dynamics.collision.contact_substep import CollidingStrands
 from hair_addon.core.dynamics.rod import rotations
 from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.dynamics.root_motion import RigidMotion, RootPose
@@ -62,7 +62,7 @@ def assert_equal(state, other):
 def test_a_group_at_once_moves_as_stage_by_stage(monkeypatch):
     state, touching = shaken()
     assert touching > 20
-    monkeypatch.setattr(TouchingStrands, "takes_groups", False)
+    monkeypatch.setattr(CollidingStrands, "takes_groups", False)
     assert_equal(state, shaken()[0])
 
 
@@ -115,7 +115,7 @@ def test_what_is_recorded_moves_strands_in_all_later_frames(monkeypatch, changes
     state, _ = shaken(10, 6, **changes)
     if wp.get_device(DEVICE).is_cpu:
         monkeypatch.setattr(os, "process_cpu_count", lambda: 1)
-        monkeypatch.setattr(TouchingStrands, "takes_groups", False)
+        monkeypatch.setattr(CollidingStrands, "takes_groups", False)
         recorder = Recorder(monkeypatch)
         monkeypatch.setattr(replays.Replays, "is_recording", True)
         assert_equal(state, shaken(10, 6, **changes)[0])

@@ -16,7 +16,7 @@ _SIDES = np.array([(0, 1), (1, 2), (2, 3), (3, 0)])
 
 
 @dataclass(frozen=True)
-class TurnedFaces:
+class FlippedFaces:
     """The permutation of corners and vertices by a flip, which is its own inverse.
 
     corners: (C,) int, the present corner of each original one; vertices: (V,) int32, the present number of each
@@ -32,16 +32,16 @@ class TurnedFaces:
         return permuted if self.vertices is None else self.vertices[permuted]
 
 
-def turned(faces: Faces) -> TurnedFaces:
-    """Return the `TurnedFaces` of faces without subdivision."""
+def turned(faces: Faces) -> FlippedFaces:
+    """Return the `FlippedFaces` of faces without subdivision."""
     starts, sizes = faces.starts[:-1], np.diff(faces.starts)
     first, size = np.repeat(starts, sizes), np.repeat(sizes, sizes)
     corner = np.arange(len(first)) - first
-    return TurnedFaces(first + (size - corner) % np.maximum(size, 1), None)
+    return FlippedFaces(first + (size - corner) % np.maximum(size, 1), None)
 
 
-def turned_cage(faces: Faces, corner_count: int) -> TurnedFaces | None:
-    """Return the `TurnedFaces` of faces whose cage was flipped; None if the quads of the cage's faces are unknown.
+def turned_cage(faces: Faces, corner_count: int) -> FlippedFaces | None:
+    """Return the `FlippedFaces` of faces whose cage was flipped; None if the quads of the cage's faces are unknown.
 
     corner_count: see `cage_vertices`.
     """
@@ -63,7 +63,7 @@ def turned_cage(faces: Faces, corner_count: int) -> TurnedFaces | None:
         present = 4 * firsts[:, None] + its_corners
         corners[original] = present
         vertices[faces.corner_vertices[original[:, is_inside]]] = faces.corner_vertices[present[:, is_inside]]
-    return TurnedFaces(corners, vertices)
+    return FlippedFaces(corners, vertices)
 
 
 def _image(quads, cage_size):

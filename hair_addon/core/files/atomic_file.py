@@ -9,20 +9,20 @@ from collections.abc import Generator, Iterable
 from pathlib import Path
 
 from ..errors import HairError, cause_of
-from . import plain_file
+from . import untrusted_file
 
 _PARTIAL = re.compile(r"\.vellus_[0-9a-f]{16}_(.+)", re.ASCII | re.DOTALL)
 
 
 @contextlib.contextmanager
-def whole_file(path: str | Path, partial: Path | None = None, is_forced: bool = True) -> Generator[Path]:
-    """`whole_files` for one file; partial: the temporary path, None for a new one."""
-    with whole_files([path], None if partial is None else [partial], is_forced) as (there,):
+def atomic_file(path: str | Path, partial: Path | None = None, is_forced: bool = True) -> Generator[Path]:
+    """`atomic_files` for one file; partial: the temporary path, None for a new one."""
+    with atomic_files([path], None if partial is None else [partial], is_forced) as (there,):
         yield there
 
 
 @contextlib.contextmanager
-def whole_files(
+def atomic_files(
     paths: Iterable[str | Path], partials: list[Path] | None = None, is_forced: bool = True
 ) -> Generator[list[Path]]:
     """Yield temporary paths to write to; on success they replace `paths`, after an error none does.
@@ -45,7 +45,7 @@ def whole_files(
         if is_forced:
             require_room(partial, 65_536)
         for path, partial in zip(places, partials, strict=True):
-            plain_file.tried(lambda partial=partial, path=path: os.replace(partial, path))
+            untrusted_file.tried(lambda partial=partial, path=path: os.replace(partial, path))
     except (OSError, RuntimeError) as error:
         raise HairError("{path} cannot be written: {cause}.", path=places[0], cause=cause_of(error)) from error
     finally:
@@ -88,7 +88,7 @@ def require_room(path: Path, byte_count: int) -> None:
             file.truncate(size)
 
 
-def require_place(path: str | Path) -> None:
+def require_writable_path(path: str | Path) -> None:
     """Raise `HairError` unless a file can be written at `path`; for use before long work."""
     path = Path(path)
     _require_file(path)
