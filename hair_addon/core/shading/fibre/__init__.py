@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         fresnel,
         kajiya_kay,
         longitudinal,
+        longitudinal_kernel,
         marschner,
         paths,
         pigment,

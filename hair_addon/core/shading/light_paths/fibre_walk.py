@@ -5,6 +5,8 @@ sampling, for one offset h of the ray in the fibre's width. The mean over h is t
 
 import warp as wp
 
+from ..fibre.longitudinal_kernel import d_eon_lobe
+
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 PI = wp.constant(wp.pi)
@@ -88,29 +90,13 @@ def exit_angle(path: int, h: float, sin_o: float, cos_o: float, eta: float):
 
 
 @wp.func
-def i0e(x: float):
-    """exp(-x) I0(x) for x >= 0 [Abramowitz64, 9.8.1-2]."""
-    t = x / 3.75
-    if t <= 1.0:
-        s = t * t
-        series = 0.2659732 + s * (0.0360768 + s * 0.0045813)
-        return wp.exp(-x) * (1.0 + s * (3.5156229 + s * (3.0899424 + s * (1.2067492 + s * series))))
-    r = 1.0 / t
-    series = 0.00916281 + r * (-0.02057706 + r * (0.02635537 + r * (-0.01647633 + r * 0.00392377)))
-    return (0.39894228 + r * (0.01328592 + r * (0.00225319 + r * (-0.00157565 + r * series)))) / wp.sqrt(x)
-
-
-@wp.func
 def longitudinal(sin_i: float, sin_o: float, shift: float, v: float):
     """`longitudinal.d_eon_lobe`, the view's inclination shifted back."""
     cos_i = wp.sqrt(1.0 - sin_i * sin_i)
     cos_o = wp.sqrt(1.0 - sin_o * sin_o)
     sin_turned = sin_o * wp.cos(shift) - cos_o * wp.sin(shift)
     cos_turned = wp.abs(cos_o * wp.cos(shift) + sin_o * wp.sin(shift))
-    along = sin_i + sin_turned
-    across = cos_i - cos_turned
-    beside_cone = -0.5 * (along * along + across * across)
-    return i0e(cos_i * cos_turned / v) * wp.exp(beside_cone / v) / (v * (1.0 - wp.exp(-2.0 / v)))
+    return d_eon_lobe(sin_i, cos_i, sin_turned, cos_turned, v)
 
 
 @wp.func

@@ -10,7 +10,7 @@ import warp as wp
 
 from ...kernels import kernel_cache
 from ..fibre import energy_conserving
-from ..fibre.longitudinal import BESSEL_FAR, BESSEL_NEAR
+from ..fibre.longitudinal_kernel import d_eon_lobe
 from ..fibre.marschner import Caustic, longitudinal_lobes
 from .cell_means import NODES, WEIGHTS, Absorptions
 from .lookup_tables import Settings
@@ -23,8 +23,6 @@ _PI = wp.constant(wp.float64(np.pi))
 _HALF_PI = wp.constant(wp.float64(0.5 * np.pi))
 _NODES = wp.constant(wp.types.vector(4, wp.float64)(*NODES))
 _WEIGHTS = wp.constant(wp.types.vector(4, wp.float64)(*WEIGHTS))
-_NEAR = wp.constant(wp.types.vector(7, wp.float64)(*BESSEL_NEAR))
-_FAR = wp.constant(wp.types.vector(9, wp.float64)(*BESSEL_FAR))
 _BISECTIONS = wp.constant(50)
 
 
@@ -189,19 +187,6 @@ def _spread_texels(
     out_n[row, column, channel] = total
 
 
-@wp.func
-def _i0e(x: F):
-    t = x / F(3.75)
-    total = F(0.0)
-    if t <= F(1.0):
-        for power in range(7):
-            total = total * t * t + _NEAR[6 - power]
-        return total * wp.exp(-x)
-    for power in range(9):
-        total = total / t + _FAR[8 - power]
-    return total / wp.sqrt(x)
-
-
 @wp.kernel
 def _d_eon_texels(
     theta: wp.array[F],
@@ -212,12 +197,9 @@ def _d_eon_texels(
     row, column, lobe = wp.tid()
     v = lobes[lobe, 1]
     theta_o = theta[row] - lobes[lobe, 0]
+    sin_i = wp.sin(theta[column])
     cos_i = wp.cos(theta[column])
-    cos_o = wp.abs(wp.cos(theta_o))
-    along = wp.sin(theta[column]) + wp.sin(theta_o)
-    across = cos_i - cos_o
-    beside_cone = F(-0.5) * (along * along + across * across)
-    value = _i0e(cos_i * cos_o / v) * wp.exp(beside_cone / v) / (v * (F(1.0) - wp.exp(F(-2.0) / v)))
+    value = d_eon_lobe(sin_i, cos_i, wp.sin(theta_o), wp.abs(wp.cos(theta_o)), v)
     out_m[row, column, lobe] = float(value)
 
 
