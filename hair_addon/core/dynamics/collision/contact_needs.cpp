@@ -7,6 +7,9 @@
 // The body of `_put_needs` in contact_queries.py. Parameters, of arrays (groups, rows, lanes):
 //
 //   int group, int sample, int first_lane    the samples
+//
+// and those of `Query`, of which the names below are fields:
+//
 //   int is_middle                            1: midpoint of segment `sample`; 0: the vertex after it
 //   QueryOptions asking                      is_final: after the solve; is_again: samples that have not moved since
 //                                            their last query keep their planes; is_skipping, 0: every sample queries;
@@ -27,6 +30,14 @@
 {
 #include "lanes.h"
 
+const auto& surface = query.surface;
+const auto& asking = query.asking;
+const auto& positions = query.positions;
+const auto& last_positions = query.last_positions;
+const auto& middle_planes = query.middle_planes;
+const auto& samples = query.samples;
+const auto& out_planes = query.planes;
+const int is_middle = query.is_middle;
 const size_t stride = positions.shape[2];
 const auto row_of = [&](const auto& array, int row) {
   return array.data + size_t(group) * (array.strides[0] / sizeof(float)) + row * stride + first_lane;

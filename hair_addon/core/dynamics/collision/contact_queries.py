@@ -44,6 +44,20 @@ class QueryOptions:
     rise: float  # motion in this substep of samples that are inside in the groom [m]
 
 
+@wp.struct
+class Query:
+    """Which samples look for a plane, how, and the arrays that they are in."""
+
+    surface: Surface
+    asking: QueryOptions
+    positions: wp.array3d[float]  # 3 rows per vertex [m]
+    last_positions: wp.array3d[float]  # at the start of the substep
+    middle_planes: wp.array3d[float]  # of segments, `PLANE` rows each
+    is_middle: int  # 1: middles of segments; 0: vertices
+    samples: Samples
+    planes: wp.array3d[float]  # of these samples, to be written
+
+
 @wp.func
 def _index(row: int, per_vector: int, component: int):
     """Return the row of a vector's component."""
@@ -119,72 +133,49 @@ def _gap(planes: wp.array3d[float], group: int, row: int, lane: int, point: wp.v
         STAYED=1e-7,
     )
 )
-def _put_needs(
-    group: int,
-    sample: int,
-    first_lane: int,
-    is_middle: int,
-    asking: QueryOptions,
-    surface: Surface,
-    positions: wp.array3d[float],
-    last_positions: wp.array3d[float],
-    middle_planes: wp.array3d[float],
-    samples: Samples,
-    out_planes: wp.array3d[float],
-) -> int: ...
+def _put_needs(query: Query, group: int, sample: int, first_lane: int) -> int: ...
 
 
 @wp.func
-def _look(
-    surface: Surface,
-    positions: wp.array3d[float],
-    last_positions: wp.array3d[float],
-    is_middle: int,
-    group: int,
-    sample: int,
-    lane: int,
-    needed: float,
-    samples: Samples,
-    out_planes: wp.array3d[float],
-):
+def _look(query: Query, group: int, sample: int, lane: int, needed: float):
     """Write the plane of a sample if there is a surface within `needed`."""
-    row = sample + 1 - is_middle
-    point = _sample(positions, group, sample, lane, is_middle)
-    last = _sample(last_positions, group, sample, lane, is_middle)
-    at_rest = samples.rest[group, sample, lane]
-    now = surface.motions[surface.substep]
-    out_planes[group, _index(row, PLANE, 3), lane] = 0.0
-    largest = wp.min(surface.largest_distance, at_rest)
+    row = sample + 1 - query.is_middle
+    point = _sample(query.positions, group, sample, lane, query.is_middle)
+    last = _sample(query.last_positions, group, sample, lane, query.is_middle)
+    at_rest = query.samples.rest[group, sample, lane]
+    now = query.surface.motions[query.surface.substep]
+    query.planes[group, _index(row, PLANE, 3), lane] = 0.0
+    largest = wp.min(query.surface.largest_distance, at_rest)
     entry = Hit()
     entry.collider = -1
     radius = needed + wp.min(0.5 * needed, _AHEAD)
-    hit = nearest(surface, point, last, radius, samples.sides[group, sample, lane])
+    hit = nearest(query.surface, point, last, radius, query.samples.sides[group, sample, lane])
     if now.deformation <= BACK and at_rest >= 0.0:
         start = now.carry * last + now.carry_shift
         way = wp.length(point - start)
         # The point cannot have crossed a surface that is farther away than its motion.
         if hit.gap <= way + 2.0 * BACK:
-            entry = crossed(surface, point, start, largest)
+            entry = crossed(query.surface, point, start, largest)
             if entry.collider >= 0:
                 needed = wp.max(needed, wp.abs(largest) + wp.min(way, MOST_MOTION) + MARGIN)
                 if needed > radius and hit.collider < 0:
-                    hit = nearest(surface, point, last, needed, samples.sides[group, sample, lane])
+                    hit = nearest(query.surface, point, last, needed, query.samples.sides[group, sample, lane])
     if now.deformation > BACK and at_rest >= 0.0 and hit.collider >= 0:
-        entry = crossed(surface, point, last + hit.displacement, largest)
-    samples.sides[group, sample, lane] = 0
-    _put_vector(samples.asked, group, sample, lane, now.to_rest * (point - now.moved))
-    samples.clear[group, sample, lane] = hit.gap
+        entry = crossed(query.surface, point, last + hit.displacement, largest)
+    query.samples.sides[group, sample, lane] = 0
+    _put_vector(query.samples.asked, group, sample, lane, now.to_rest * (point - now.moved))
+    query.samples.clear[group, sample, lane] = hit.gap
     is_near = hit.collider >= 0 and hit.gap <= needed
     if entry.collider >= 0 and not (is_near and hit.distance <= 0.0 and wp.dot(hit.normal, entry.normal) > 0.0):
         hit = entry  # the nearest surface is not the front of the crossed one
     elif not is_near:
         return
-    samples.clear[group, sample, lane] = wp.min(samples.clear[group, sample, lane], hit.distance)
-    samples.sides[group, sample, lane] = hit.side
-    settings = surface.settings[hit.collider]
+    query.samples.clear[group, sample, lane] = wp.min(query.samples.clear[group, sample, lane], hit.distance)
+    query.samples.sides[group, sample, lane] = hit.side
+    settings = query.surface.settings[hit.collider]
     offset = wp.dot(hit.normal, hit.place) + wp.min(settings[1], at_rest)
     if wp.dot(hit.normal, hit.normal) > 0.5:  # zero for faces of zero area
-        _put_plane(out_planes, group, row, lane, hit.normal, offset, hit.displacement, settings[0])
+        _put_plane(query.planes, group, row, lane, hit.normal, offset, hit.displacement, settings[0])
 
 
 @wp.func
@@ -220,84 +211,58 @@ def _choose(
 
 
 @wp.func
-def _look_in(
-    surface: Surface,
-    positions: wp.array3d[float],
-    last_positions: wp.array3d[float],
-    middle_planes: wp.array3d[float],
-    sample_count: int,
-    lanes_at_once: int,
-    is_middle: int,
-    group: int,
-    sample: int,
-    first_lane: int,
-    samples: Samples,
-    out_planes: wp.array3d[float],
-):
-    """Query the surface for the lanes that `_put_needs` has selected."""
-    row = sample + 1 - is_middle
+def _look_in(query: Query, group: int, sample: int, first_lane: int, lanes_at_once: int):
+    """Query the surface in the lanes marked by `_put_needs`."""
+    row = sample + 1 - query.is_middle
+    planes = query.planes
     for lane in range(first_lane, first_lane + lanes_at_once):
-        if wp.length_sq(_normal(out_planes, group, row, lane)) > 0.0:
-            continue  # the plane is kept
-        needed = out_planes[group, _index(row, PLANE, 3), lane]
-        is_beside = out_planes[group, _index(row, PLANE, 7), lane] > 0.0
+        if wp.length_sq(_normal(planes, group, row, lane)) > 0.0:
+            continue  # it keeps its plane
+        needed = planes[group, _index(row, PLANE, 3), lane]
+        is_beside = planes[group, _index(row, PLANE, 7), lane] > 0.0
         if is_beside:
-            out_planes[group, _index(row, PLANE, 7), lane] = 0.0
+            planes[group, _index(row, PLANE, 7), lane] = 0.0
         if needed > 0.0:
-            _look(surface, positions, last_positions, is_middle, group, sample, lane, needed, samples, out_planes)
+            _look(query, group, sample, lane, needed)
         if is_beside:
-            _choose(positions, middle_planes, sample_count, group, row, lane, out_planes)
+            _choose(query.positions, query.middle_planes, query.samples.rest.shape[1], group, row, lane, planes)
 
 
 @wp.func
 def find_in(
+    query: Query, group: int, first_sample: int, samples_at_once: int, first_lane: int, lanes_at_once: int
+) -> int:
+    """Write the planes of some samples of some lanes; return whether any of them queried the surface."""
+    is_near = int(0)
+    for sample in range(first_sample, first_sample + samples_at_once):
+        if _put_needs(query, group, sample, first_lane) != 0:
+            is_near = 1
+            _look_in(query, group, sample, first_lane, lanes_at_once)
+    return is_near
+
+
+@wp.func
+def query_of(
     surface: Surface,
     asking: QueryOptions,
     positions: wp.array3d[float],
     last_positions: wp.array3d[float],
     middle_planes: wp.array3d[float],
     is_middle: int,
-    group: int,
-    first_sample: int,
-    samples_at_once: int,
-    first_lane: int,
-    lanes_at_once: int,
     samples: Samples,
-    out_planes: wp.array3d[float],
-) -> int:
-    """Write the planes of some samples of some lanes; returns whether any of them queried the surface."""
-    is_near = int(0)
-    for sample in range(first_sample, first_sample + samples_at_once):
-        is_any = _put_needs(
-            group,
-            sample,
-            first_lane,
-            is_middle,
-            asking,
-            surface,
-            positions,
-            last_positions,
-            middle_planes,
-            samples,
-            out_planes,
-        )
-        if is_any != 0:
-            is_near = 1
-            _look_in(
-                surface,
-                positions,
-                last_positions,
-                middle_planes,
-                samples.rest.shape[1],
-                lanes_at_once,
-                is_middle,
-                group,
-                sample,
-                first_lane,
-                samples,
-                out_planes,
-            )
-    return is_near
+    planes: wp.array3d[float],
+):
+    """Return the `Query` of these arguments."""
+    query = Query()
+    query.surface = surface
+    query.asking = asking
+    query.positions = positions
+    query.last_positions = last_positions
+    query.middle_planes = middle_planes
+    query.is_middle = is_middle
+    query.samples = samples
+    query.planes = planes
+    return query
 
 
 @wp.func
@@ -334,21 +299,8 @@ def find_planes(
     if asking.is_again != 0:
         if any_moved(moved, group, first_lane, lanes_at_once) == 0:
             return
-    find_in(
-        surface,
-        asking,
-        positions,
-        last_positions,
-        middle_planes,
-        is_middle,
-        group,
-        first_sample,
-        samples_at_once,
-        first_lane,
-        lanes_at_once,
-        samples,
-        out_planes,
-    )
+    query = query_of(surface, asking, positions, last_positions, middle_planes, is_middle, samples, out_planes)
+    find_in(query, group, first_sample, samples_at_once, first_lane, lanes_at_once)
 
 
 @wp.kernel

@@ -28,7 +28,7 @@ from ..rod.rod_solver import (
 )
 from ..rod.rods import Rods
 from .contact import Contacts, query_options
-from .contact_queries import WIDTH, QueryOptions, Samples, any_moved, find_in
+from .contact_queries import WIDTH, QueryOptions, Samples, any_moved, find_in, query_of
 from .nearest_surface import Surface
 
 # No gradients are needed. The solver fuses multiply-adds explicitly (`fused` of lanes.h).
@@ -200,19 +200,6 @@ def find_group(
     samples: Samples,
     planes: wp.array3d[float],
 ) -> int:
-    count = samples.rest.shape[1]
-    return find_in(
-        surface,
-        asking,
-        strands.positions,
-        strands.positions_before,
-        middle_planes,
-        is_middle,
-        group,
-        0,
-        count,
-        0,
-        _WIDTH,
-        samples,
-        planes,
-    )
+    before = strands.positions_before
+    query = query_of(surface, asking, strands.positions, before, middle_planes, is_middle, samples, planes)
+    return find_in(query, group, 0, samples.rest.shape[1], 0, _WIDTH)
