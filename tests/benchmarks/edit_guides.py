@@ -27,7 +27,7 @@ import hair_addon
 from blend_samples.heads import head
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu.shadows import ShadowMaps
-from hair_addon.blender.gpu.strands import maker_choice, strand_maker
+from hair_addon.blender.gpu.strands import device_choice, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair
@@ -223,7 +223,7 @@ def main():
             *options.size, options.guides, gpu.platform.renderer_get(), gpu.platform.backend_type_get()
         )
     )
-    makes, uploads = maker_choice.times()
+    makes, uploads = device_choice.times()
     print(f"measured once: made in {1e3 * makes:.2f} ms, uploaded in {1e3 * uploads:.2f} ms")
     for strand_count in options.strands:
         for device in options.devices:

@@ -20,7 +20,7 @@ from ..gpu import (
 from ..gpu import lights as blender_lights
 from ..gpu.shadows import ShadowMaps
 from ..host.notices import can_be_drawn
-from . import hair_cache, hair_places, made_strands, read_strands
+from . import gpu_strands, hair_cache, hair_places, read_strands
 
 # The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke.
 _SHADOW_STEPS = drawing.Steps(strand_count=50_000)
@@ -111,7 +111,7 @@ def read(
     # Without a GPU, frames of playback are drawn like still frames. Hair that is only moved by its object is handled
     # like hair made on the GPU, also once it is at rest.
     has_played = former is not None or (before is not None and before.renewal is not None)
-    are_made = _are_made(hair) or (has_played and bool(hair) and made_strands.are_wanted())
+    are_made = _are_made(hair) or (has_played and bool(hair) and gpu_strands.are_wanted())
     last = before or (former if are_made else None)
     is_draft = is_draft or (former is not None and are_made)
     if before is None and last is not None and _fit(last.shadow_maps, lamps, is_shaded):

@@ -23,7 +23,7 @@ from ..groom import bindings
 from ..host import notices, paths
 from ..host.caches import Cache
 from ..settings import preferences, properties, shared_wetness
-from . import made_strands, read_strands, refused_strands
+from . import gpu_strands, read_strands, refused_strands
 from .refused_strands import Refused
 
 # Number of cached tables: those of one groom, and of the last few positions of a slider.
@@ -46,7 +46,7 @@ class _CachedStrands:
     on_gpu: strand_textures.StrandsOnGPU | None = None  # deformed by `pose`
     pose: posed_strands.Pose | None = None  # None without a surface
     moved: list = field(default_factory=list)  # [(M,) indices of strands] that have moved since the upload
-    making: made_strands.Making = field(default_factory=made_strands.Making)
+    generator: gpu_strands.StrandGenerator = field(default_factory=gpu_strands.StrandGenerator)
 
     def __post_init__(self):
         require_count("radii", len(self.radii), len(self.points))
@@ -95,16 +95,16 @@ def strands_on_gpu(datablock):
         cached = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
     pose = _pose_of(datablock.surface)
     is_elsewhere = cached.on_gpu is None or cached.pose is not pose
-    is_due = cached.making.due is not None
+    is_due = cached.generator.due is not None
     if is_due or is_elsewhere:
         is_behind = _is_behind(datablock)
-        if cached.on_gpu is not None and cached.making.bring(cached, pose, is_behind):
+        if cached.on_gpu is not None and cached.generator.bring(cached, pose, is_behind):
             return cached.on_gpu
         if is_due or is_behind:
             cached = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
     moved, cached.moved = cached.moved, []
     if moved or is_elsewhere:
-        cached.making.carrier = None  # its strands at rest are outdated
+        cached.generator.carrier = None  # its strands at rest are outdated
     if cached.on_gpu is None or is_elsewhere or (moved and not cached.on_gpu.has_points):
         points = _carried(cached, pose)
         cached.on_gpu = strand_textures.upload_strands(points, cached.radii, cached.randoms, cached.wetness)
@@ -113,7 +113,7 @@ def strands_on_gpu(datablock):
         chosen = np.unique(np.concatenate(moved))
         require_indices("strands", chosen, len(cached.points))
         cached.on_gpu = strand_textures.move_strands(cached.on_gpu, chosen, _carried(cached, pose, chosen))
-    elif not cached.on_gpu.has_points and cached.making.carrier is None and not _is_behind(datablock):
+    elif not cached.on_gpu.has_points and cached.generator.carrier is None and not _is_behind(datablock):
         cached.on_gpu = replace(cached.on_gpu, points=cached.points, has_points=True)  # computed meanwhile
     return cached.on_gpu
 
@@ -144,7 +144,7 @@ def drawn_bytes(datablock):
     cached = _strands_of(datablock.session_uid)
     if cached is None or cached.on_gpu is None:
         return None
-    textures = [*cached.on_gpu.textures, *cached.making.textures]
+    textures = [*cached.on_gpu.textures, *cached.generator.textures]
     return strand_textures.bytes_of(textures) + strand_textures.seen_bytes(cached.on_gpu)
 
 
@@ -174,13 +174,13 @@ def follow_where_drawn(session_uid, bound):
     """Note that guides of `BoundHair` or their weights have changed: the GPU makes all strands with the next redraw."""
     cached = _strands_of(session_uid)
     if cached is not None:
-        cached.making.due = bound
+        cached.generator.due = bound
 
 
 def may_make(session_uid):
     """Whether the GPU makes the strands in viewports while guides are combed, as decided by `choose_makers`."""
     cached = _strands_of(session_uid)
-    return cached is not None and cached.making.is_chosen and not cached.moved
+    return cached is not None and cached.generator.is_chosen and not cached.moved
 
 
 def may_restyle(session_uid, bound, styles):
@@ -188,26 +188,26 @@ def may_restyle(session_uid, bound, styles):
     cached = _strands_of(session_uid)
     if not may_make(session_uid) or bound.straight is not None:
         return False
-    return cached.making.can_style(styles) and cached.making.is_prepared(bound, styles)
+    return cached.generator.can_style(styles) and cached.generator.is_prepared(bound, styles)
 
 
 def prepare_makers():
     """Compile one of the programs for edits of hair in viewports; returns whether one was missing."""
     for datablock in bpy.data.hair_curves:
         cached, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
-        if cached is not None and bound is not None and cached.making.prepare(bound.shown):
+        if cached is not None and bound is not None and cached.generator.prepare(bound.shown):
             return True
     return False
 
 
 def choose_makers():
     """Decide for which hair in viewports the GPU makes or carries strands."""
-    is_wanted = made_strands.are_wanted()
+    is_wanted = gpu_strands.are_wanted()
     for datablock in bpy.data.hair_curves:
         cached, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
         if cached is not None and cached.on_gpu is not None:
             is_bound = bound is not None and bound.free is None and cached.points is bound.shown.points
-            cached.making.choose(is_wanted, bound.shown if is_bound else None)
+            cached.generator.choose(is_wanted, bound.shown if is_bound else None)
 
 
 def _strands_of(session_uid):
@@ -262,7 +262,7 @@ def _is_same(datablock, cached, bound):
         (cached.points is bound.shown.points if bound is not None else _are_points(datablock, cached.points))
         and np.array_equal(cached.radii.ravel(), curves.read_radii(datablock))
         and np.array_equal(cached.randoms, curves.read_randoms(datablock))
-        and made_strands.are_equal(cached.wetness, curves.read_wetness(datablock))
+        and gpu_strands.are_equal(cached.wetness, curves.read_wetness(datablock))
         and cached.rooted_on == _rooted_on(datablock, datablock.vellus.topology)
         and (bound is not None or _are_places(cached.places, stored_roots.slid_places(datablock)))
     )

@@ -8,7 +8,7 @@ import pytest
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import posed_strands, stored_roots
 from hair_addon.blender.gpu import ambient_visibility, strand_textures
-from hair_addon.blender.gpu.strands import maker_choice, vertex_turner
+from hair_addon.blender.gpu.strands import device_choice, vertex_turner
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene
@@ -18,7 +18,7 @@ from hair_addon.core.geometry import vertex_turns
 from hair_addon.core.imaging import ambient_cube
 from hair_addon.core.styling import curl, lean
 from tests.support.counting import counts_of
-from tests.support.made_strands import CLOSE, comb, drawn, grown
+from tests.support.gpu_strands import CLOSE, comb, drawn, grown
 from tests.support.reading import points
 
 
@@ -66,7 +66,7 @@ def test_hair_that_was_opened_on_a_bent_surface_is_carried_from_its_second_pose(
         shown = drawn(hair)
         assert calls["uploads"] == 0
         np.testing.assert_allclose(shown, carried(hair), rtol=0.0, atol=CLOSE)
-    monkeypatch.setattr(maker_choice, "times", lambda: (1.0, 0.0))
+    monkeypatch.setattr(device_choice, "times", lambda: (1.0, 0.0))
     drawn(hair)
     bend(surface, 0.6)
     np.testing.assert_allclose(drawn(hair), carried(hair), rtol=0.0, atol=CLOSE)

@@ -14,7 +14,7 @@ from hair_addon.core.grooming import following
 from hair_addon.core.styling import bend, clump, curl, frizz, lean, wet
 from tests.support import drawn_strands
 from tests.support.counting import counts_of
-from tests.support.made_strands import CLOSE, comb, drawn, grown, prepare
+from tests.support.gpu_strands import CLOSE, comb, drawn, grown, prepare
 from tests.support.reading import points
 from tests.support.scenes import even_guides
 

@@ -11,7 +11,7 @@ from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import handlers, live_hair, moving_surfaces
 from tests.blender.live.test_carried_strands import bend
 from tests.support.counting import Traffic, counts_of
-from tests.support.made_strands import CLOSE, drawn
+from tests.support.gpu_strands import CLOSE, drawn
 from tests.support.reading import evaluated_points, points
 
 

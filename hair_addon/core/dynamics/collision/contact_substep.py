@@ -20,9 +20,9 @@ from ..rod.rod_solver import (
     PREDICT,
     SOLVE,
     Around,
+    FrameSubsteps,
     Numbers,
     RodArrays,
-    Step,
     Surroundings,
     advance_block,
 )
@@ -50,7 +50,7 @@ class CollidingStrands:
         self._replays = Replays(rods.device)
         self._planes: list[tuple[Any, Any, Any]] = []  # of each share of the strands
 
-    def advance(self, step: Step, first: int, end: int, surroundings: Surroundings) -> None:
+    def advance(self, step: FrameSubsteps, first: int, end: int, surroundings: Surroundings) -> None:
         """Advance by substeps first … end - 1, and pose the colliders. Raises `HairError` if counts do not match."""
         colliders = self._contacts.colliders
         self._contacts.expect(step.count)

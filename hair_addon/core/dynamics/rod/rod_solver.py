@@ -137,7 +137,7 @@ class Surroundings:
 
 
 EMPTY = Surroundings()
-_SHARED = (  # fields of both `Step` and `Numbers`
+_SHARED = (  # fields of both `FrameSubsteps` and `Numbers`
     "count",
     "pinned",
     "carried",
@@ -160,7 +160,7 @@ def plane_row(point: int, field: int) -> int:
 
 
 @dataclass(frozen=True)
-class Step:
+class FrameSubsteps:
     """Parameters of a frame's substeps that all strands share."""
 
     size: float  # h [s]
@@ -177,7 +177,7 @@ class Step:
 
 @wp.struct
 class Numbers:
-    """A `Step` with a range of substeps, for kernels."""
+    """A `FrameSubsteps` with a range of substeps, for kernels."""
 
     first: int
     end: int
@@ -252,7 +252,7 @@ def scratch(segment_count: int, group_count: int, device: wp.DeviceLike) -> wp.a
 
 def advance(
     arrays: RodArrays,
-    step: Step,
+    step: FrameSubsteps,
     scratch: wp.array,
     first: int = 0,
     end: int | None = None,
@@ -278,13 +278,13 @@ def advance(
         kernel_cache.launch(_advance_blocks, group_count * GPU_LANES, inputs, device=device, block_dim=block_dim)
 
 
-def stages_of(arrays: RodArrays, step: Step, stages: int) -> int:
+def stages_of(arrays: RodArrays, step: FrameSubsteps, stages: int) -> int:
     """Return the stages to run: without SOLVE and AGAIN if all segments are pinned."""
     return stages & ~(SOLVE | AGAIN) if step.pinned == arrays.lengths.shape[1] else stages
 
 
 def kernel_inputs(
-    arrays: RodArrays, step: Step, scratch: wp.array, first: int, end: int | None, surroundings: Surroundings
+    arrays: RodArrays, step: FrameSubsteps, scratch: wp.array, first: int, end: int | None, surroundings: Surroundings
 ) -> tuple[Numbers, Around]:
     """Return step and surroundings for kernels. Raises `HairError` if counts do not match."""
     end = step.count if end is None else end

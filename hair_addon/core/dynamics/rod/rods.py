@@ -16,7 +16,7 @@ from ...kernels import kernel_cache
 from ...kernels.checks import require_count
 from . import rod_solver, rotations
 from .material import Material
-from .rod_solver import RodArrays, Step, Surroundings
+from .rod_solver import FrameSubsteps, RodArrays, Surroundings
 from .settings import DynamicsSettings
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
@@ -60,9 +60,9 @@ def half_rotations(frames: np.ndarray) -> np.ndarray:
 
 def step_of(
     settings: DynamicsSettings, material: Material, seconds: float, count: int, gravity: tuple[float, float, float]
-) -> Step:
-    """Return the `Step` of a frame with a duration [s] and a number of substeps; gravity: of the scene [m/s²]."""
-    return Step(
+) -> FrameSubsteps:
+    """Return the `FrameSubsteps` of a frame of a duration [s] in a number of substeps; gravity: of the scene [m/s²]."""
+    return FrameSubsteps(
         seconds / count,
         count,
         (settings.gravity * gravity[0], settings.gravity * gravity[1], settings.gravity * gravity[2]),
@@ -237,7 +237,7 @@ class Rods:
 
     def advance(
         self,
-        step: Step,
+        step: FrameSubsteps,
         first: int = 0,
         end: int | None = None,
         stages: int = rod_solver.WHOLE,
@@ -250,7 +250,7 @@ class Rods:
         if stages & rod_solver.FINISH:
             self.step_size = step.size
 
-    def begun(self, step: Step) -> Step:
+    def begun(self, step: FrameSubsteps) -> FrameSubsteps:
         """Return a step that continues the last one."""
         if self.step_size == 0.0:  # the first step starts with the rest shape's multipliers of equilibrium
             self._put("multipliers", self._held * (step.size**2 / self._mass_unit))

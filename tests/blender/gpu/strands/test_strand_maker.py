@@ -10,7 +10,7 @@ import pytest
 import warp as wp
 
 from hair_addon.blender.gpu import shaders, strand_textures
-from hair_addon.blender.gpu.strands import maker_choice, strand_bounds, strand_changes, strand_maker
+from hair_addon.blender.gpu.strands import device_choice, strand_bounds, strand_changes, strand_maker
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import strands
 from hair_addon.core.geometry.mesh import SurfacePoints
@@ -183,11 +183,11 @@ def test_other_guides_or_strands_are_refused(blender, rng):
     ("times", "is_faster", "can_make"), [((1.0, 3.0), 1, 1), ((2.0, 3.0), 0, 1), ((np.inf, 0.0), 0, 0)]
 )
 def test_the_faster_way_is_chosen(monkeypatch, times, is_faster, can_make):
-    monkeypatch.setattr(maker_choice, "times", lambda: times)
-    assert (maker_choice.is_faster(), maker_choice.can_make()) == (is_faster, can_make)
+    monkeypatch.setattr(device_choice, "times", lambda: times)
+    assert (device_choice.is_faster(), device_choice.can_make()) == (is_faster, can_make)
 
 
 def test_times_are_measured_once(blender):
-    first = maker_choice.times()
+    first = device_choice.times()
     assert min(first) > 0.0
-    assert maker_choice.times() is first
+    assert device_choice.times() is first

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu.strands import maker_choice
+from hair_addon.blender.gpu.strands import device_choice
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
@@ -20,7 +20,7 @@ CLOSE = 1e-5  # [m] of strands of half a metre on a ball of one
 def window(monkeypatch):
     """Act as in a window on a graphics card, where hair is written when an interaction is over."""
     monkeypatch.setattr(running, "has_window", lambda: True)
-    monkeypatch.setattr(maker_choice, "times", lambda: (0.0, 1.0))
+    monkeypatch.setattr(device_choice, "times", lambda: (0.0, 1.0))
     yield
     live_hair.cancel_writing()
     invalidation.data_replaced()

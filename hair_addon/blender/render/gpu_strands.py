@@ -13,7 +13,7 @@ import numpy as np
 from ...core.errors import HairError
 from ..data.strands.posed_strands import Pose
 from ..gpu import shaders, strand_textures
-from ..gpu.strands import maker_choice, strand_carrier, strand_maker, style_maker
+from ..gpu.strands import device_choice, strand_carrier, strand_maker, style_maker
 from ..groom.bindings import BoundHair
 from ..groom.styled_hair import StyledHair
 from ..host import running
@@ -28,11 +28,11 @@ def are_wanted() -> bool:
     chosen = preferences.stroke_device()
     if chosen == "COMPUTE" or not running.has_window():
         return False
-    return maker_choice.can_make() if chosen == "GPU" else maker_choice.is_faster()
+    return device_choice.can_make() if chosen == "GPU" else device_choice.is_faster()
 
 
 @dataclass
-class Making:
+class StrandGenerator:
     """The state of making the strands of one hair on the GPU, and of deforming them with their surface."""
 
     maker: strand_maker.StrandMaker | style_maker.StyleMaker | None = None

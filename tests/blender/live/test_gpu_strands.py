@@ -11,11 +11,11 @@ import pytest
 
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, shaders, strand_textures, surface_textures
-from hair_addon.blender.gpu.strands import maker_choice, strand_maker
+from hair_addon.blender.gpu.strands import device_choice, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair
-from hair_addon.blender.render import drawn_scene, hair_cache, made_strands
+from hair_addon.blender.render import drawn_scene, gpu_strands, hair_cache
 from hair_addon.blender.render.viewport import viewport
 from hair_addon.blender.settings import preferences
 from hair_addon.core.errors import HairError
@@ -23,7 +23,7 @@ from hair_addon.core.grooming import following
 from tests.blender.render.test_hair_places import view3d
 from tests.support import drawn_strands
 from tests.support.counting import counts_of
-from tests.support.made_strands import CLOSE, comb, drawn, grown, prepare
+from tests.support.gpu_strands import CLOSE, comb, drawn, grown, prepare
 from tests.support.reading import points
 
 
@@ -171,15 +171,15 @@ def test_one_edit_may_go_either_way(watched, monkeypatch):
     ],
 )
 def test_the_user_may_choose(monkeypatch, choice, times, is_wanted):
-    monkeypatch.setattr(maker_choice, "times", lambda: times)
+    monkeypatch.setattr(device_choice, "times", lambda: times)
     monkeypatch.setattr(running, "has_window", lambda: True)
     monkeypatch.setattr(preferences, "stroke_device", lambda: choice)
-    assert made_strands.are_wanted() == is_wanted
+    assert gpu_strands.are_wanted() == is_wanted
 
 
 def test_nothing_is_measured_without_a_window(monkeypatch):
-    monkeypatch.setattr(maker_choice, "times", None)
-    assert not made_strands.are_wanted()
+    monkeypatch.setattr(device_choice, "times", None)
+    assert not gpu_strands.are_wanted()
 
 
 @pytest.mark.usefixtures("made_anew")
@@ -187,7 +187,7 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkey
     """It is measured when hair is drawn first; every edit of bound hair is then made there."""
     viewport.view_cache.clear()
     calls, asked = counts_of(monkeypatch), []
-    monkeypatch.setattr(maker_choice, "times", lambda: asked.append(1) or (0.0, 1.0))
+    monkeypatch.setattr(device_choice, "times", lambda: asked.append(1) or (0.0, 1.0))
 
     def view():
         context = bpy.context
