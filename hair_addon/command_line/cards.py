@@ -31,7 +31,7 @@ def run(given, console):
 
 
 def _cards(given, console, hair, settings):
-    """([object], counts of the finest level, notes)."""
+    """Make the cards; returns ([object], {name: count} of the finest level, notes)."""
     folder = given.textures
     if folder is None and not blender.io.mesh_export.has_textures(given.out):
         folder = given.out.parent

@@ -41,7 +41,7 @@ def add_curves(parser):
 
 
 def checked(given):
-    """Path of the curve file, or None. Raises `HairError` for conflicting options."""
+    """Return the path of the curve file, or None. Raises `HairError` for conflicting options."""
     came_from = given.guides_from or given.hair_from
     if given.guides_from and given.hair_from:
         raise HairError("--guides-from and --hair-from exclude each other.")
@@ -61,8 +61,8 @@ def checked(given):
 
 
 def wanted(kind, given, file_axes):
-    """What is wanted of a file of curves; file_axes: Blender's axes → those of the mesh's file."""
-    # What the mesh's file is asked, that of curves need not be.
+    """Return the `Wanted` of the options; file_axes: (3, 3), Blender's axes → the mesh file's."""
+    # --up belongs to the mesh file if that has no up axis, otherwise to the curve file.
     is_said = given.up and not blender.io.mesh_files.asks_for_axis(given.input)
     said = Convention(parsed_unit(given.unit) if given.unit else None, given.up if is_said else None)
     axis = blender.io.mesh_files.axis_of(file_axes)

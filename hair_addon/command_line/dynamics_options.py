@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Options of dynamics: --dynamics bend_stiffness=20,hold=5 and --dynamics-preset WET.
 
-One option for all settings: some have the names of others, such as gravity and size, and forty more would bury the rest
-of the help.
+All settings share one option: some names, such as gravity and size, are taken by other settings, and forty more options
+would bury the rest of the help.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def dynamics(text):
 
 
 def changed(options, settings):
-    """`DynamicsSettings` with the preset, and then the settings, that options give."""
+    """Return `DynamicsSettings` with the preset of the options applied, then their settings."""
     if options.dynamics_preset:
         settings = applied(settings, options.dynamics_preset)
     for changes in options.dynamics:

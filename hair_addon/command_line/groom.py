@@ -21,7 +21,7 @@ _SHARED = {name for name, *_ in declared(GuideSettings)} & {name for name, *_ in
 # Settings of guides only.
 _OF_GUIDES = [setting for setting in declared(GuideSettings) if setting[0] not in _SHARED]
 
-# Settings of hair that grows: hair that is kept as it came has a look, and as many guides as are derived.
+# Settings of growing hair. Imported hair has only a look and a number of derived guides.
 _OF_GROWTH = [s for s in (*declared(GuideSettings), *declared(HairSettings)) if s[0] != "guide_count"]
 
 
@@ -83,7 +83,7 @@ def run(given, console):
 
 
 def _styled(given, settings, surface):
-    """`GroomSettings` with the styles that options give, for a mesh object."""
+    """Return `GroomSettings` with the styles of the options, fitted to a mesh object."""
 
     def fit():
         return blender.groom.styles.hair_styles.fit_of(surface, settings.guides, settings.hair)
@@ -136,9 +136,9 @@ def _follow_curves(given, surface, settings, file_axes, console):
 
 
 def _keep_curves(given, surface, settings, file_axes, console):
-    """Return (guides, hair): the curves in another file, or in the open one, as hair, and guides.
+    """Return (guides, hair) with the curves in another file, or in the open one, as hair.
 
-    The guides that the file has for this hair, or guides derived from it.
+    Guides are those of the hair in that file, or are derived from the hair.
     """
     useless = options.options_given(given, _OF_GROWTH) + (["--style"] if given.styles else [])
     useless += ["--style-preset"] if given.style_preset else []
@@ -183,7 +183,7 @@ def _warn_of_useless(names, reason, console):
 
 @contextmanager
 def _curves_of(kind, given, surface, file_axes, console):
-    """What is found in a file, which may be the open one; said to people."""
+    """Context with the `Found` of a curve file, which may be the open one; prints its notes."""
     path = given.guides_from or given.hair_from
     wanted = curve_options.wanted(kind, given, file_axes)
     is_open = path.resolve() == given.input.resolve()

@@ -17,9 +17,9 @@ _PATIENCE = 30.0  # [s] to wait for a terminated process to exit
 
 
 class Failed:
-    """A process that failed: its exit status, below 0 where a signal ended it, and what it complained of.
+    """A failed process: its exit status, negative if a signal ended it, and its last error message.
 
-    is_late: whether it was ended because it took too long.
+    is_late: whether it was terminated at the time limit.
     """
 
     def __init__(self, status, complaint="", is_late=False):
@@ -41,8 +41,8 @@ class Failed:
 def run(commands, console, hear, step="", seconds=math.inf):
     """Run commands in parallel until all have ended; returns a `Failed` for each that failed.
 
-    commands: argument lists of processes that print lines of JSON; hear(values): called with each; step: what they do;
-    seconds: after which they are ended.
+    commands: argument lists of processes that print lines of JSON; hear(values): called with each line; step: name for
+    progress; seconds: time limit, after which the processes are killed.
     """
     heard = queue.Queue()
     helpers = []
@@ -104,7 +104,7 @@ class _Helper:
         return self._complaints[-1] if self._complaints else ""
 
     def stop(self, patience):
-        """Terminate the process: at its next step, or at once if that takes longer [s]."""
+        """Terminate the process; kill it if it still runs after `patience` [s]."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
             try:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files whose readers are native code, which ends, or never ends, on damaged files: a process of its own reads them.
+"""Reading of files in a separate process: native importers can crash or hang on damaged files.
 
-`import`, the command of that process, makes a .blend of a mesh file, or tries to read the curves of one. It is for
-commands that read such files, not for people, and not listed.
+The process runs the command `import`, which converts a mesh file to a .blend, or tries to read its curves. The command
+is for internal use and not listed.
 """
 
 import tempfile
@@ -16,7 +16,7 @@ from . import helpers
 
 blender = lazy.Package("..blender", __package__)
 
-# [s] for a file, and for each byte of it: several times what the slowest reader takes on a slow machine.
+# Time limit per file [s] and per byte of it [s]: several times what the slowest importer takes on a slow machine.
 _PATIENCE, _PATIENCE_A_BYTE = 120.0, 5e-6
 
 

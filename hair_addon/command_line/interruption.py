@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ctrl-C and SIGTERM: the command stops at its next step, a second signal stops it at once.
+"""Ctrl-C and SIGTERM: the command stops at its next step; a second signal stops it at once.
 
 Python's own KeyboardInterrupt can be raised anywhere, and would be lost in Blender's callbacks.
 """

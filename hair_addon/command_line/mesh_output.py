@@ -22,7 +22,7 @@ def add(parser):
 def make(given, console, made_of):
     """Open the input, make meshes of each hair and write them.
 
-    made_of(hair): ([object], {what is counted: count}, what is left out).
+    made_of(hair): returns ([object], {name: count}, notes).
     """
     blender.io.mesh_files.require_blend(given.input)
     blender.io.mesh_export.require_writable(given.out)

@@ -10,7 +10,7 @@ blender = lazy.Package("..blender", __package__)
 def open_file(given, console, has_curves=False):
     """Open `given.input`; returns (3, 3), Blender's axes → the file's. Raises `HairError`.
 
-    has_curves: whether its curves are read afterwards.
+    has_curves: whether the caller will read curves of the file.
     """
     blender.require_registered()
     blender.io.mesh_files.require_readable(given.input)

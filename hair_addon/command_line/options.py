@@ -42,7 +42,7 @@ class Parser(argparse.ArgumentParser):
         file.flush()
 
     def error(self, message):
-        """End with status 2."""
+        """Print the message and exit with status 2."""
         self.exit(2, f"{PROGRAM}: {message.rstrip('.')}: see {self.prog} --help.\n")
 
 
@@ -82,7 +82,7 @@ def add_groom_settings(parser):
 
 
 def option_of(name):
-    """The option that sets a field of settings."""
+    """Return the option that sets a field of settings."""
     return _OPTIONS.get(name, "--" + name.replace("_", "-"))
 
 
@@ -119,7 +119,7 @@ def changed(settings, options, declarations):
 
 
 def _given(options, declarations):
-    """{field: value} of the options that were given, within their ranges."""
+    """Return {field: value} of the given options. Raises `HairError` for values out of range."""
     return {
         name: plain_value(option_of(name), getattr(options, name), default, details)
         for name, default, details in declarations
@@ -142,7 +142,7 @@ def changed_groom(settings, options):
 
 
 def frame_range(text):
-    """Parse A-B, or A, as a range of frames; "all" stands for the scene's."""
+    """Parse A-B, or A, as a range of frames; returns "all" unchanged, for the scene's range."""
     if text == "all":
         return text
     match = re.fullmatch(r"(-?\d{1,7})(?:-(-?\d{1,7}))?", text)
@@ -157,7 +157,7 @@ def frame_range(text):
 
 
 def count(text):
-    """A whole number from 1 to 256."""
+    """Parse a whole number from 1 to 256."""
     if re.fullmatch(r"\d{1,3}", text) is None or not 1 <= int(text) <= 256:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 256")
     return int(text)

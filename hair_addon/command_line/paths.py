@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths of a command: a leading // is the folder of the .blend file, as everywhere in Blender."""
+"""Paths of a command: a leading // stands for the folder of the .blend file, as in Blender."""
 
 import os
 from pathlib import Path

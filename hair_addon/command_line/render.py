@@ -59,7 +59,6 @@ def add(verbs):
 
 def run(given, console):
     """Open the file and render its frames, in this process or in several."""
-
     blender.io.mesh_files.require_blend(given.input)
     known_count = len(given.frames) if isinstance(given.frames, range) else 1
     blender.io.frames.require_pattern(given.out, known_count, given.passes)
@@ -103,7 +102,7 @@ def _make_sequence(given, console, numbers, settings):
 
 
 def _run_jobs(given, console, numbers, settings):
-    """Render by several processes. Where one fails the others render its frames: only missing ones are an error."""
+    """Render in several processes. If one fails, the others render its frames; only missing frames are an error."""
     words = [*blender.host.cli_command.words(), *_words(given, numbers, settings)]
     failed = helpers.run([words] * given.jobs, console, lambda values: console.result(values, _sentence(values)))
     missing = blender.io.sequence.missing_frames(given.out, numbers)

@@ -9,7 +9,7 @@ _FLAGS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no"
 
 
 def parsed(text, settings_class, owner):
-    """Parse name=value,name=value as {name: value}; owner: what errors call the settings' owner."""
+    """Parse name=value,name=value as {name: value}; owner: name for errors."""
     declarations = {name: (default, details) for name, default, details in declared(settings_class)}
     changes = {}
     for pair in text.split(",") if text else ():

@@ -12,7 +12,7 @@ from . import setting_pairs
 
 
 def add_styles(parser, has_surface):
-    """Add the options; has_surface: whether the command knows what to fit a preset to."""
+    """Add the options; has_surface: whether the command has a surface to fit presets to."""
     offers, presets = ", ".join(map(str.lower, OFFERS)), ", ".join(style_presets.PRESETS)
     said = "; lengths that are not given are fitted to the surface" if has_surface else ""
     parser.add_argument(
@@ -48,9 +48,9 @@ def style(text):
 
 
 def styled(options, settings, fit=None):
-    """`GroomSettings` with the preset, and then with the styles, that options give. Raises `HairError`.
+    """Return `GroomSettings` with the preset of the options applied, then their styles. Raises `HairError`.
 
-    fit: function of no arguments that returns (factor of lengths, mean distance of strands [m]), None for a head's.
+    fit(): returns (factor of lengths, mean distance of strands [m]); None keeps the lengths for a head.
     """
     size = fit() if fit is not None and (options.style_preset or options.styles) else None
     if options.style_preset:

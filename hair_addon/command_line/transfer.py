@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""transfer: hair of a .blend → another mesh of it."""
+"""transfer: hair of a .blend → another mesh in that file."""
 
 import time
 

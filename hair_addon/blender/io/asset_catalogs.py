@@ -13,7 +13,10 @@ _HEAD = "# This is an Asset Catalog Definition file for Blender.\n#\n# Other lin
 
 @dataclass(frozen=True)
 class Catalog:
-    """UUID of a catalog; text: the library's list with the catalog added, None if the list has it already."""
+    """UUID of a catalog and path of the library's list.
+
+    text: the list with the catalog added; None if the list already has it.
+    """
 
     identifier: str
     path: Path
@@ -21,7 +24,7 @@ class Catalog:
 
 
 def read(folder: Path, catalog: str) -> Catalog:
-    """A catalog such as "Hair/Short" in a library's folder. Raises `HairError`."""
+    """Return a `Catalog` such as "Hair/Short" of a library's folder. Raises `HairError`."""
     catalog = "/".join(part.strip() for part in catalog.replace(":", "-").split("/") if part.strip())
     if not catalog or any(ord(character) < 32 for character in catalog):
         raise HairError("The catalog has no name: type one, or clear the field.")

@@ -33,10 +33,10 @@ _OTHER = {"GUIDES": "HAIR", "HAIR": "GUIDES"}
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is wanted of a file: kind "GUIDES" or "HAIR", of the objects or groups of a name, of all for "".
+    """A request for curves: kind "GUIDES" or "HAIR"; name: of objects or groups, "" for all.
 
-    said: the unit and the axis of its coordinates, where people say them; axis: of arrays that do not say; plays:
-    whether curves that move are to, where they can.
+    said: unit and up axis given by the user; axis: up axis of arrays that do not store one; plays: whether to keep the
+    motion of curves, if possible.
     """
 
     kind: str
@@ -48,9 +48,9 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Found:
-    """An object of the wanted curves, one of the guides that the file has for them, and what to tell people.
+    """Objects of the requested curves and of their guides in the file, with notes for the user.
 
-    motion: of the curves in metres with Z up, where they are to play; starts: (C+1,) of the curves among its points.
+    motion: of curves that play, in metres with Z up; starts: (C+1,) offsets of the curves in its points.
     """
 
     curves: bpy.types.Object
@@ -71,7 +71,7 @@ def require_readable(path):
 
 
 def read(path, axis="Z"):
-    """The `CurveFile` of a file that is no .blend; axis: of arrays that do not say. Raises `HairError`."""
+    """Read a file other than .blend as a `CurveFile`; axis: up axis of arrays that store none. Raises `HairError`."""
     path = Path(path)
     require_readable(path)
     reader = _READERS[path.suffix.lower()]
@@ -79,19 +79,19 @@ def read(path, axis="Z"):
 
 
 def read_all(path):
-    """Like `read`, with the points of each time, loaded lazily. Raises `HairError`."""
+    """Like `read`, but load the points of all time samples too. Raises `HairError`."""
     for one in read(path).sets:
         for index in range(0 if one.motion is None else len(one.motion.times)):
             one.motion.points_at(index)
 
 
 def is_read_natively(path):
-    """Whether a file is read by native code, which can crash on damaged files."""
+    """Whether native code reads the file, which can crash on damaged files."""
     return Path(path).suffix.lower() in _USD
 
 
 def summary(path):
-    """[{name: value}] of the objects of curves in a file that is no .blend. Raises `HairError`."""
+    """Return [{name: value}] of the curves objects in a file other than .blend. Raises `HairError`."""
     kinds = {True: "guides", False: "strands", None: "curves"}
     return [
         {
@@ -109,9 +109,9 @@ def summary(path):
 
 @contextmanager
 def curves_of(path, wanted, surface_object, is_open=False):
-    """What is `Found` in a file, in the open scene; all else that came with it goes again.
+    """Context with the `Found` of a file, in the open scene; removes all other data appended with it.
 
-    is_open: whether the file is what is open. Raises `HairError`.
+    is_open: whether this file is open. Raises `HairError`.
     """
     path = Path(path)
     require_readable(path)
@@ -161,7 +161,7 @@ def reading(path):
 
 
 def made_of(path, file, wanted, surface_object):
-    """What is `Found` in a `CurveFile`, made in the open scene. Raises `HairError`."""
+    """Create the `Found` of a `CurveFile` in the open scene. Raises `HairError`."""
     path = Path(path)
     chosen, guides = _chosen_sets(path, file.sets, wanted)
     reading = curve_units.choose(file, [*chosen, *guides], wanted.said, _mesh(surface_object), str(path))
@@ -190,7 +190,7 @@ def _name(path, chosen):
 
 
 def _now(curves):
-    """Moving curves at the scene's time, or at the nearest time in the file."""
+    """Return the curves at the time sample nearest to the scene's time."""
     if curves.motion is None:
         return curves
     return replace(curves, points=curves.motion.points_at(_present_index(curves.motion)))
@@ -209,7 +209,7 @@ def _note_on_motion(path, motion):
 
 
 def _chosen_sets(path, sets, wanted):
-    """([sets that are wanted], [those of the guides of these])."""
+    """Return ([requested sets], [sets of their guides]). Raises `HairError`."""
     every = [one for one in sets if len(one)]
     if not every:
         raise HairError("{path} has no curves.", path=path)
@@ -219,7 +219,7 @@ def _chosen_sets(path, sets, wanted):
         sentence = '{path} has no curves "{name}", but {names}.'
         raise HairError(sentence, path=path, name=wanted.name, names=names)
     is_guide = wanted.kind == "GUIDES"
-    # What the file says to be of the kind; else what it says nothing of; else the rest.
+    # Prefer sets that the file marks as this kind, then unmarked sets, then the rest.
     chosen = next(
         found
         for found in ([one for one in named if one.is_guide is kind] for kind in (is_guide, None, not is_guide))
@@ -287,7 +287,7 @@ def _chosen_objects(path, came, wanted, is_open):
 
 
 def _guides_of(chosen, came):
-    """Objects of the guides that the hair follows, in the order of the hair."""
+    """Return the objects of the guides that the hair follows, in the order of the hair."""
     followed = dict.fromkeys(one.data.vellus.guide_curves for one in chosen if one.type == "CURVES")
     shown = {one.data: one for one in came if one.type == "CURVES"}
     return [shown[guides] for guides in followed if guides in shown]

@@ -10,9 +10,9 @@ from . import strand_arrays
 
 
 def new_object(name, placed, surface_object, guide_ids=None):
-    """A new object of a `CurveSet` in metres with Z up; it is in the scene, with the coordinates of a surface.
+    """Add an object for a `CurveSet` in metres with Z up to the scene, with the transform of a surface.
 
-    guide_ids: (G,) identities of the guides that it follows; their places among these are kept, with weights.
+    guide_ids: (G,) IDs of the guides that the curves follow; their indices are stored with the weights.
     """
     to_world = np.array(surface_object.matrix_world, np.float64) * strand_arrays.metres_per_unit(bpy.context.scene)
     to_world[3, 3] = 1.0
@@ -39,7 +39,7 @@ def new_object(name, placed, surface_object, guide_ids=None):
 
 
 def _guide_map(known, ids, weights):
-    """(S, k) int32 places among known identities, -1 for none, and (S, k) float32 weights."""
+    """Return (S, k) int32 indices in the known IDs, -1 for none, and (S, k) float32 weights."""
     order = np.argsort(known, kind="stable")
     places = np.minimum(np.searchsorted(known, ids, sorter=order), len(known) - 1)
     indices = order[places]
@@ -48,7 +48,7 @@ def _guide_map(known, ids, weights):
 
 
 def make_plain(curves_object):
-    """Make guides, hair or any other curves of a file curves as they are seen, which are of no surface."""
+    """Convert guides, hair or other curves to plain curves with their visible shape and without a surface."""
     datablock = foreign_curves.take(curves_object, True)
     datablock.vellus.kind, datablock.vellus.guide_curves, datablock.surface = "NONE", None, None
     matrix = curves_object.matrix_world.copy()
@@ -58,13 +58,13 @@ def make_plain(curves_object):
 
 
 def joined(objects):
-    """One object of the curves of several as they are seen now: the first of them, into which the others go."""
+    """Join objects, with the visible shape of their curves, into the first one; returns it."""
     first, *others = objects
     if not others:
         return first
     for one in objects:
         datablock = foreign_curves.take(one, True)
-        curves.write_guide_map(datablock, None)  # of other guides than those that they have in the end
+        curves.write_guide_map(datablock, None)  # indices would refer to the guides before joining
     with bpy.context.temp_override(
         active_object=first, object=first, selected_objects=objects, selected_editable_objects=objects
     ):

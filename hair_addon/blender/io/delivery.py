@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Delivery: hair of baked guides as frames of a USD file, which Blender plays without the add-on."""
+"""Delivery: hair of baked guides → frames in a USD file, which Blender plays without the add-on."""
 
 import contextlib
 from dataclasses import dataclass
@@ -45,9 +45,9 @@ class _Task:
 
 
 def path_of(guides, blend_path=None):
-    """The file that hair of some guides is delivered to: beside a .blend, the open one for None. Raises `HairError`.
+    """Return the file for delivered hair of some guides, beside a .blend (None: the open one). Raises `HairError`.
 
-    No hair of other guides plays it.
+    Hair of other guides does not play this file.
     """
     if blend_path is None:
         if not bpy.data.filepath:
@@ -64,10 +64,10 @@ def path_of(guides, blend_path=None):
 
 @whole_changes.whole
 def delivering(guides, path, blender_scene):
-    """Write the hair of baked guides to a file and let it play that, as work in steps: a computation a sample.
+    """Write the hair of baked guides to a file and let the hair play it, as work in steps, one per sample.
 
-    Frames are those of the scene and the one after; where motion blur is on, also the times between them that Cycles
-    samples. The scene is at the time where it was, on every way out. Raises `HairError`.
+    Samples are the frames of the scene and the next one; with motion blur, also the times between frames that Cycles
+    samples. The scene's time is always restored. Raises `HairError`.
     """
     frames = scene_time.scene_frames()
     frame_folders.require_frames(guides, range(frames.start, frames.stop + 1))
@@ -90,13 +90,15 @@ def delivering(guides, path, blender_scene):
                     go_to(blender_scene, time)
                     require_shown(its_guides.find(), time)
                     read = [_read(task, time) for task in tasks]
-                    in_file = time * scene_time.remapping(blender_scene)  # Blender reads it at the animation's time
+                    in_file = time * scene_time.remapping(
+                        blender_scene
+                    )  # Blender looks samples up by the animation's time
                     yield _writing(file, tasks, read, in_file, (f"Frame {time:g}", index / len(times)))
             byte_count = partial.stat().st_size
             delivered_hair.close_files(path)
     cache_file = delivered_hair.open_file(path)
     baked = frame_folders.frames_of(its_guides.find())
-    # No samples are needed if guides start to move after the last frame.
+    # There are no baked frames if the guides start to move after the last frame.
     key = "" if baked is None or baked.manifest is None else baked.manifest.key
     for task in tasks:
         hair = task.hair.find()
@@ -107,7 +109,7 @@ def delivering(guides, path, blender_scene):
 
 
 def take_off(guides):
-    """Let delivered hair follow its guides again; returns the number of hair that was changed. The file stays."""
+    """Let delivered hair follow its guides again; returns the number of changed hair Curves. Keeps the file."""
     delivered = [hair for hair in curves.followers(guides) if delivered_hair.is_delivered(hair)]
     if not delivered:
         raise HairError('No hair of the guides "{name}" plays delivered frames.', name=name_of(guides))
@@ -133,7 +135,7 @@ def _deliverable(guides):
 
 
 def _times(blender_scene, frames, chosen):
-    """Sample times, in order, including the exposure of the first and the last frame."""
+    """Return the sample times, sorted, including the exposure of the first and the last frame."""
     steps = [_motion_steps(user) for hair in chosen for user in delivered_hair.objects_of(hair)]
     between = scene_time.exposure_times(blender_scene, max(steps))
     sampled = {frame + offset for frame in frames for offset in between}
@@ -164,7 +166,7 @@ def _go_back(its_scene, time):
 
 
 def go_to(blender_scene, time):
-    """Set the time and update hair as outside a long operation."""
+    """Set the time and update hair as if no long operation were running."""
     with running.set_aside():
         scene_time.go_to_time(blender_scene, time)
         live_hair.write_all()
@@ -182,7 +184,7 @@ def require_shown(guides, time):
 
 
 def _read(task, time):
-    """(points, radii, matrix) of hair where its surface carries it now. Raises `HairError`."""
+    """Return (points, radii, matrix) of evaluated hair at the present time. Raises `HairError`."""
     evaluated = task.probe.find().evaluated_get(scene.present_depsgraph())
     if not np.array_equal(curves.point_counts(evaluated.data), task.counts):
         name, frame = name_of(task.hair.find()), f"{time:g}"
@@ -197,7 +199,7 @@ def _read(task, time):
 
 
 def _writing(file, tasks, read, time, told):
-    """A function of (progress) that writes the samples of one time in the file; told: what progress is called with."""
+    """Return a function of (progress) that writes the samples of one time; told: arguments of progress."""
 
     def write(progress):
         progress(*told)

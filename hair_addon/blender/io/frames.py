@@ -38,7 +38,7 @@ def scene_size():
 
 
 def path_of(pattern, frame):
-    """The file of a frame: the last row of # in a pattern's name becomes the number, padded with zeros."""
+    """Return the file of a frame: its number, padded with zeros, replaces the last run of # in the pattern's name."""
     pattern = Path(pattern)
     width = _number_width(pattern)
     if not width:
@@ -85,7 +85,7 @@ def require_view_layer():
 
 
 def bind_simulated():
-    """Bind simulated hair in its start frame: its bits are the same whichever frame a process renders first.
+    """Bind simulated hair in its start frame, so that its bits do not depend on the frame rendered first.
 
     Strands are bound in world axes, where a rotating surface differs by rounding in each frame.
     """
@@ -104,7 +104,7 @@ def _number_width(pattern):
 
 
 def missing_files(numbers, allows_missing=False):
-    """Sentence listing files that the open scene lacks in the given frames; "" if none are missing.
+    """Return a sentence listing the files that are missing in the given frames; "" if there are none.
 
     Raises `HairError` with that sentence unless `allows_missing`.
     """
@@ -116,12 +116,12 @@ def missing_files(numbers, allows_missing=False):
 
 
 def write_frame(path, frame, engine, settings, partial=None, progress=no_progress, allows_missing=False):
-    """Render a frame of the open scene and write it; its files appear whole or not at all. Raises `HairError`.
+    """Render a frame of the open scene and write its files atomically. Raises `HairError`.
 
-    path: of `view_files.files_of`; engine: of `ENGINES`; settings: `PictureSettings`, but `DRAWING_FIELDS`; partial:
-    where it is written first, None for a new path; progress(step, part): told how far it is, and may raise to stop it:
-    Vellus after any pass, others before the file is written. allows_missing: render also where files are missing that
-    the scene needs.
+    path: as in `view_files.files_of`; engine: a key of `ENGINES`; settings: `PictureSettings`, ignoring
+    `DRAWING_FIELDS`; partial: temporary path, None for a new one; progress(step, part): may raise to stop the render,
+    for Vellus after any pass, for other engines before the file is written; allows_missing: render even if files that
+    the scene needs are missing.
     """
     blender_scene = bpy.context.scene
     if not FIRST_FRAME <= frame <= LAST_FRAME:

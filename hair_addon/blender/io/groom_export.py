@@ -21,7 +21,7 @@ from . import delivery, groom_sources, hair_file, strand_arrays, usd_groom
 
 @dataclass(frozen=True)
 class Exported:
-    """A file that was written: its groups, guides, strands, frames and bytes, and what importers will do with it."""
+    """A written file: numbers of its groups, guides, strands, frames and bytes, and notes on importers."""
 
     path: Path
     groups: int
@@ -49,8 +49,7 @@ def require_writable(path):
 def exporting(path, chosen, settings, blender_scene):
     """Write hair Curves and their guides to a file, as work in steps; returns an `Exported`.
 
-    settings: `ExportSettings`. The file appears whole or not at all; the scene is at the time where it was, on every
-    way out. Raises `HairError`.
+    settings: `ExportSettings`. The file is written atomically; the scene's time is always restored. Raises `HairError`.
     """
     require_writable(path)
     if not chosen:
@@ -98,7 +97,7 @@ def _go_to(blender_scene, time):
 
 
 def _opened(partial, path, chosen, first_frame, blender_scene):
-    """The context of a writer; first_frame: None where nothing moves."""
+    """Return the context of a writer; first_frame: None without animation."""
     told = f"Vellus {paths.addon_version()}", _properties(chosen)
     rate = scene_time.frame_rate(blender_scene)
     if _is_usd(path):
@@ -107,7 +106,7 @@ def _opened(partial, path, chosen, first_frame, blender_scene):
 
 
 def _simulated(chosen, frames):
-    """Simulated guides of the hair, in exports of several frames. Raises `HairError` unless baked."""
+    """Return the simulated guides of the hair, none for a single frame. Raises `HairError` unless baked."""
     guides = {hair.vellus.guide_curves for hair in chosen} - {None}
     simulated = [one for one in guides if frame_folders.is_simulated(one)]
     if frames == [None]:
@@ -121,7 +120,7 @@ def _simulated(chosen, frames):
 
 
 def _read(sources, numbers, per_metre, is_first):
-    """[(number, points)] of what is written at this time."""
+    """Return [(number, points)] of the curves to write at this time."""
     read = []
     for source, number in zip(sources, numbers, strict=True):
         if is_first or source.moves:
@@ -130,7 +129,7 @@ def _read(sources, numbers, per_metre, is_first):
 
 
 def _adding(writer, sources, path):
-    """A function of (progress) that writes all but points, and returns the numbers of the curves."""
+    """Return a function of (progress) that writes all data except points, and returns the curves' numbers."""
 
     def write(progress):
         numbers = []
@@ -144,7 +143,7 @@ def _adding(writer, sources, path):
 
 
 def _writing(writer, read, path, frame, part):
-    """A function of (progress) that writes the points of one time, which can be stopped between parts of them."""
+    """Return a function of (progress) that writes the points of one time and can be stopped between blocks."""
     step = "Exporting" if frame is None else f"Frame {frame}"
 
     def watched(points, progress):
@@ -164,7 +163,7 @@ def _writing(writer, read, path, frame, part):
 
 @contextlib.contextmanager
 def _told(path):
-    """Raise `HairError` for a disk that is full: a computation runs outside of what tells of other errors."""
+    """Convert OSError, such as of a full disk, to `HairError`: computations run outside other error handling."""
     try:
         yield
     except OSError as error:
@@ -172,7 +171,7 @@ def _told(path):
 
 
 def _properties(chosen):
-    """Settings of each hair with guides, as JSON."""
+    """Return the settings of each hair with guides, as JSON."""
     with_guides = [hair for hair in chosen if hair.vellus.guide_curves is not None]
     settings = {name_of(hair): settings_file.to_object(groom_settings.settings_of(hair)) for hair in with_guides}
     return json.dumps(settings, ensure_ascii=True, separators=(",", ":"))

@@ -38,10 +38,9 @@ def require_writable(path):
 
 
 def write(path, guides, hair, file_axes):
-    """Write guide and hair Curves; a .blend holds all of the open file, the others these and their surface.
+    """Write guide and hair Curves: a .blend has all of the open file, other formats the Curves and their surface.
 
-    file_axes: (3, 3), Blender's axes → those that arrays are to be in. The file appears whole or not at all.
-    Raises `HairError`.
+    file_axes: (3, 3), Blender's axes → those of arrays in an .npz. The file is written atomically. Raises `HairError`.
     """
     ending = path.suffix.lower()
     if ending == ".blend":
@@ -62,7 +61,7 @@ def save_copy(path):
 
 
 def arrays(guides, hair, file_axes):
-    """{name: array} as `array_grooms` has them, unequal numbers of points too; file_axes: as of `write`."""
+    """Return {name: array} in the format of `array_grooms`; file_axes: as in `write`."""
     made = {}
     for name, curves in (("guide", guides), ("strand", hair)):
         counts = strand_arrays.counts_of(curves)
@@ -79,7 +78,7 @@ def arrays(guides, hair, file_axes):
 
 
 def _objects(guides, hair):
-    """Objects of guides, hair and their surface."""
+    """Return the objects of guides, hair and their surface."""
     layer = bpy.context.view_layer
     layer.update()
     found = (object_of(guides, layer), object_of(hair, layer), guides.surface)
@@ -88,9 +87,7 @@ def _objects(guides, hair):
 
 @contextlib.contextmanager
 def _kinds_told(guides, hair):
-    """Let Blender's exporters write which curves are guides: USD takes attributes of curves, Alembic properties of
-    objects.
-    """
+    """Mark guides and strands for Blender's exporters: USD writes attributes of curves, Alembic object properties."""
     told = [(guides, True), (hair, False)]
     objects = [(object_of(datablock, bpy.context.view_layer), is_guide) for datablock, is_guide in told]
     objects = [(one, is_guide) for one, is_guide in objects if one is not None and _KIND not in one]
@@ -125,7 +122,7 @@ def _export(partial, ending, guides, hair):
 
 
 def _say_unit(path, scale):
-    """Set metersPerUnit of a USD file: Blender writes and reads one metre for any scene."""
+    """Set metersPerUnit of a USD file: Blender always writes one metre."""
     if path.suffix.lower() == ".usdz":
         raise HairError("Blender cannot store this scene's unit in a .usdz file: write a .usdc file.")
     bpy.utils.expose_bundled_modules()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms as assets in .blend files: an object of the guides' Curves on its own copy of the surface, with the settings.
+"""Grooms as assets in .blend files: guide Curves on their own copy of the surface, with the settings.
 
-The object is marked as an asset with a picture. Its Curves name the surface; masks are vertex groups of that; settings
-are text in the form of a settings file, so that files of older versions are read by what reads those.
+The Curves object is marked as an asset with a preview picture. Masks are vertex groups of the surface. Settings are
+stored as the text of a settings file, so the same code reads older versions.
 """
 
 import json
@@ -35,7 +35,7 @@ _BLEND = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # first bytes of .blend
 
 
 def path_of(folder: Path, name: str) -> Path:
-    """The file of a groom in an asset library: its own, or a new one. Raises `HairError`."""
+    """Return the file of a groom in an asset library: its present file, or an unused name. Raises `HairError`."""
     name = name.strip()
     if not file_names.stem_of(name).strip("_. "):
         raise HairError("The name is empty: type one.")
@@ -47,7 +47,7 @@ def path_of(folder: Path, name: str) -> Path:
 
 
 def _is_of_others(path, name):
-    """Whether the file exists and holds more than this groom."""
+    """Whether the file exists and has other contents than this groom."""
     if not path.exists():
         return False
     try:
@@ -81,8 +81,8 @@ def saving(
 ) -> Work[Path]:
     """Save a hair Curves datablock as an asset, as work in steps; returns the file.
 
-    path: the folder of a library, or a .blend file; name: of the groom, the hair's for none; picture: as in `write`,
-    drawn for None where the machine can. Raises `HairError`.
+    path: the folder of a library, or a .blend file; name: of the groom, by default the hair's; picture: as in `write`,
+    None draws it if the machine can. Raises `HairError`.
     """
     name = name.strip() or name_of(hair)
     if len(name.encode()) > _MOST_NAME:
@@ -101,7 +101,7 @@ def saving(
 
 
 def _drawn(hair, view_layer):
-    """The picture of hair; None on a machine that cannot draw, or for hair that the view layer does not show."""
+    """Draw the picture of hair; None if the machine cannot draw or the view layer does not show the hair."""
     shown = selection.object_of(hair, view_layer)
     if shown is None or not len(hair.points):
         return None
@@ -113,10 +113,10 @@ def _drawn(hair, view_layer):
 
 
 def write(path: Path, grooms: Iterable[tuple[LibraryGroom, np.ndarray | None]], catalog: str = "") -> None:
-    """Write grooms with their pictures (height, width, 4) float32, sRGB, the first row at the bottom, None for none.
+    """Write grooms with their pictures: (height, width, 4) float32, sRGB, bottom row first, or None.
 
-    catalog: "Hair/Short" for instance, which the library's list of catalogs gets; empty for none. The file appears
-    whole or not at all. Raises `HairError`.
+    catalog: added to the library's list of catalogs, for example "Hair/Short"; empty for none. The file is written
+    atomically. Raises `HairError`.
     """
     listed = asset_catalogs.read(path.parent, catalog) if catalog else None
     made: list[bpy.types.Object] = []
@@ -148,7 +148,7 @@ def _make_way(name):
 
 
 def _asset(groom, picture, catalog):
-    """A new object, in no scene, of a `LibraryGroom`; catalog: the UUID of its catalog, empty for none."""
+    """Create the object of a `LibraryGroom`, outside all scenes; catalog: UUID, empty for none."""
     datablock = bpy.data.hair_curves.new(groom.name)
     datablock.add_curves([int(count) for count in groom.counts])
     datablock.set_types(type="POLY")
@@ -189,7 +189,7 @@ def _remove(asset):
 
 
 def path_and_name(text: str) -> tuple[Path, str]:
-    """FILE or FILE:NAME → (the file, the name of a groom in it, empty for none)."""
+    """FILE or FILE:NAME → (file, name of a groom in it or "")."""
     file, separator, name = text.rpartition(":")
     if not separator or not file.lower().endswith(".blend"):
         return Path(text), ""
@@ -217,7 +217,7 @@ def _require_blend(path):
 
 
 def read(path: Path, name: str = "") -> LibraryGroom:
-    """Groom with a name in a .blend file, or the only one if the name is empty; adds nothing. Raises `HairError`."""
+    """Read a groom by name, or the only one for an empty name; the open file stays unchanged. Raises `HairError`."""
     names = names_in(path)
     if name and name not in names:
         raise HairError('{path} has no groom "{name}".', path=path, name=name)
@@ -273,7 +273,7 @@ def _groom(asset, name, path):
 
 
 def _roots(datablock, mesh, first_points):
-    """`SurfacePoints` as stored; the nearest to the first points where these do not fit the mesh."""
+    """Return the stored `SurfacePoints`; those nearest to the first points if they do not fit the mesh."""
     triangle = attributes.read(datablock, "root_triangle", "INT", "CURVE")
     barycentric = attributes.read(datablock, "root_barycentric", "FLOAT_VECTOR", "CURVE")
     if triangle is not None and barycentric is not None:

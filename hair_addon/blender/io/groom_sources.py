@@ -27,8 +27,8 @@ _RESERVED = ("groom", "materials")  # names of other objects in files
 class Source:
     """Guides or strands to export.
 
-    is_modified: whether they are as an artist's modifiers make them; matrix: (4, 4), from where they are [m] to where
-    another object shows them; None for where they are.
+    is_modified: whether the artist's modifiers are applied; matrix: (4, 4), world space [m] → place of another object
+    that shows them; None for their own object.
     """
 
     datablock: Remembered
@@ -39,7 +39,7 @@ class Source:
 
 
 def hair_on(active):
-    """Hair exported for an active object: all hair on its surface with objects in the view layer."""
+    """Return the hair to export for an active object: all hair on its surface with objects in the view layer."""
     layer = bpy.context.view_layer
     layer.update()  # the view layer may lack new objects
     systems = hair_systems.systems_of(selection.surface_of(active), layer)
@@ -48,7 +48,7 @@ def hair_on(active):
 
 
 def all_hair():
-    """All hair with objects in the view layer, oldest first."""
+    """Return all hair with objects in the view layer, oldest first."""
     layer = bpy.context.view_layer
     layer.update()
     found = {o.data for o in layer.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"}
@@ -56,7 +56,7 @@ def all_hair():
 
 
 def sources_of(chosen, settings, per_metre):
-    """A `Source` for the guides and strands of each hair; identities are unique in the file."""
+    """Return the `Source`s of the guides and strands of each hair; IDs are unique in the file."""
     names, sources, first_id = group_names(chosen), [], 0
     for group, (hair, name) in enumerate(zip(chosen, names, strict=True)):
         guides = hair.vellus.guide_curves
@@ -72,7 +72,7 @@ def sources_of(chosen, settings, per_metre):
 
 
 def group_names(chosen):
-    """Names of the groups of some hair in a file."""
+    """Return the group names of some hair in a file."""
     return groom_curves.group_names([name_of(hair) for hair in chosen], _RESERVED)
 
 
@@ -92,7 +92,7 @@ def _guide_curves(guides, group, name, first_id, per_metre):
 
 def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
     counts = strand_arrays.counts_of(hair)
-    widths = _widths(hair, shown, counts, per_metre)  # first: what follows may evaluate again
+    widths = _widths(hair, shown, counts, per_metre)  # first: later calls may evaluate again
     guides = hair.vellus.guide_curves
     guide_count = 0 if guides is None else len(guides.curves)
     # Strands name guides only if the file has guides.
@@ -118,23 +118,23 @@ def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
 
 
 def _widths(datablock, shown, counts, per_metre):
-    """Diameters of some strands, in the file's units; shown: the Curves that have the radii."""
+    """Return a function of a slice of curves that gives diameters in the file's units; shown: Curves with radii."""
     if np.array_equal(counts, exported_curves.counts_kept(shown)):
         radii = exported_curves.radii_kept(shown)
-    else:  # guides that simulate, which have as many points each
+    else:  # simulated guides, which are resampled to equal point counts
         radii = exported_curves.read_radii(shown, int(counts[0]))(slice(None)).ravel()
     factor = np.float32(2.0 * strand_arrays.world_scale(datablock) * per_metre)
     return lambda some: radii[_points_of(counts, some)] * factor
 
 
 def _points_of(counts, some):
-    """The slice of points of a slice of curves."""
+    """Convert a slice of curves to a slice of their points."""
     first = int(counts[: some.start].sum(dtype=np.int64))
     return slice(first, first + int(counts[some].sum(dtype=np.int64)))
 
 
 def _shading_of(look, randoms, counts, shown):
-    """(colors, roughness) of the points of a slice of curves."""
+    """Return (colors, roughness): functions of a slice of curves that give values per point."""
     if (counts == counts[0]).all():
         count = int(counts[0])
         return (
@@ -153,7 +153,7 @@ def _shading_of(look, randoms, counts, shown):
 
 
 def _guides_at_rest(guides):
-    """(G, P, 3) float32 in local coordinates of guides that simulate, in each frame as many; None of others."""
+    """Return (G, P, 3) float32 local points of simulated guides, with a constant P; None for others."""
     shown = simulated_guides.point_cache.get(guides.session_uid)
     if shown is not None or not frame_folders.is_simulated(guides):
         return shown
@@ -162,7 +162,7 @@ def _guides_at_rest(guides):
 
 
 def points_of(source, per_metre):
-    """The points of a `Source` now, as `strand_arrays.shown_rows` gives them. Raises `HairError`."""
+    """Return the present points of a `Source`, as `Rows` (see `strand_arrays.shown_rows`). Raises `HairError`."""
     datablock, exported = source.datablock.find(), source.curves
     if source.is_modified and modified_strands.curves_of(datablock) is None:
         raise HairError('The number of strands of "{name}" changes: remove its keys.', name=name_of(datablock))
@@ -179,13 +179,13 @@ def points_of(source, per_metre):
 
 
 def instances_of(chosen):
-    """[(group, (4, 4) matrix)] of hair that other objects show too, as `strand_arrays.other_places` gives them."""
+    """Return [(group name, (4, 4) matrix)] of other objects that show the hair (see `strand_arrays.other_places`)."""
     pairs = zip(chosen, group_names(chosen), strict=True)
     return [(name, matrix) for hair, name in pairs for matrix in strand_arrays.other_places(hair)]
 
 
 def copies_of(sources, instances):
-    """A `Source` for each of an instance's group, for files in which hair is written for each object that shows it."""
+    """Return copies of the `Source`s for each instance, for formats without instances."""
     groups = {source.curves.group_id: source.curves.group_name for source in sources}
     instances = [(name, matrix) for name, matrix in instances if name in groups.values()]
     wanted = [*groups.values(), *(f"{name}_instance" for name, _matrix in instances)]
@@ -244,7 +244,7 @@ def notes_of(chosen, sources, settings):
 
 
 def _notes_of_guides(guides):
-    """What is said of guides that do not have their own numbers of points in a file."""
+    """Notes on guides that are written with other point counts than their own."""
     local = _guides_at_rest(guides)
     if local is not None and (curves.point_counts(guides) != local.shape[1]).any():
         sentence = '"{name}" is written with {count} points a guide, as it is simulated.'

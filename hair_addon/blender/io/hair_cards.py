@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair → cards: ribbons, textures drawn of the strands, and materials with them, for each level of detail."""
+"""Hair → cards: ribbons, textures drawn from the strands, and materials, for each level of detail."""
 
 from dataclasses import dataclass
 
@@ -21,9 +21,9 @@ from . import hair_meshes
 
 @dataclass(frozen=True)
 class CardLevel:
-    """A level of detail that was made: its object, {map: image}, number of cards, pictures and triangles.
+    """A finished level of detail: its object, {map: image}, and numbers of cards, pictures and triangles.
 
-    notes: which parts of the hair are omitted.
+    notes: on omitted parts of the hair.
     """
 
     mesh_object: object
@@ -48,12 +48,12 @@ class _Drawn:
 def making_cards(hair, settings, folder=None):
     """Make cards of hair Curves, as work in steps; returns [`CardLevel`], the finest first. Raises `HairError`.
 
-    settings: `CardSettings`; folder: of the textures' files, None packs them into the .blend. Nothing is added to the
-    scene before all levels are computed and drawn.
+    settings: `CardSettings`; folder: for the texture files, None packs them into the .blend. Nothing is added to the
+    scene until all levels are drawn.
     """
     settings.require_size(hair_meshes.strand_count(hair))
     if folder is not None:
-        folder = folder.absolute()  # Blender takes other paths of images from the folder of the .blend file
+        folder = folder.absolute()  # Blender resolves relative image paths from the .blend file
         require_writable_path(folder / "texture.png")
     yield Stage("Reading strands", 0.0)
     read = hair_meshes.read_hair(hair)
@@ -67,7 +67,7 @@ def making_cards(hair, settings, folder=None):
 
 
 def _drawing(read, level, picture_count, parts):
-    """Draw a level, as work in steps that covers an interval of the total progress."""
+    """Draw a level, as work in steps; parts: (first, last) of the total progress."""
     first, last = parts
     told = first, first + 0.1 * (last - first)
     flat = yield lambda progress: _flat_cards(read, level, picture_count, part_of(progress, *told))
@@ -90,7 +90,7 @@ def _adding(sums, segments, placed, shift, rows):
 
 
 def _flat_cards(read, level, picture_count, progress):
-    """(mesh in local coordinates, `PlacedStrands`, number of pictures)."""
+    """Compute the cards; returns (mesh in local coordinates, `PlacedStrands`, number of pictures)."""
     count = level.card_count
     labels = clusters.clusters(clusters.strand_features(read.points), count, progress)
     progress("Making cards", 1.0)

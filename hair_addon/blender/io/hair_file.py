@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A USD file of hair that moves, written sample by sample: it grows on the disk, not in memory."""
+"""A USD file of moving hair, written sample by sample to the disk, without keeping samples in memory."""
 
 import re
 from pathlib import Path
@@ -16,10 +16,7 @@ _PROGRAM = "Vellus delivered hair"
 
 
 def require_ours(path):
-    """Raise `HairError` unless a file could be written to `path`, where there is none, or one of this kind.
-
-    Also where this build of Blender lacks USD.
-    """
+    """Raise `HairError` if another file than delivered hair is at `path`, or if this build of Blender lacks USD."""
     require_usd()
     if not path.exists():
         return
@@ -36,7 +33,7 @@ def require_ours(path):
 
 
 def require_usd():
-    """Raise `HairError` where this build of Blender has no USD."""
+    """Raise `HairError` if this build of Blender lacks USD."""
     if not paths.has_operator("wm.usd_export"):
         raise HairError("Hair cannot be written: this build of Blender lacks USD.")
     bpy.utils.expose_bundled_modules()
@@ -51,7 +48,7 @@ def failed(path, error):
 
 
 def define_curves(stage, path, counts):
-    """New polylines of (S,) points each: a `UsdGeom.BasisCurves` whose widths are per point."""
+    """Define polylines with counts (S,) of points; returns a `UsdGeom.BasisCurves` with widths per point."""
     from pxr import UsdGeom, Vt
 
     curves = UsdGeom.BasisCurves.Define(stage, path)
@@ -63,7 +60,7 @@ def define_curves(stage, path, counts):
 
 
 def extent(points, reach):
-    """The box around points (N, 3) with a radius, as USD has it."""
+    """Return the bounding box of points (N, 3), enlarged by a radius, as a USD extent."""
     from pxr import Vt
 
     return Vt.Vec3fArray.FromNumpy(np.float32([points.min(axis=0) - reach, points.max(axis=0) + reach]))
@@ -72,7 +69,8 @@ def extent(points, reach):
 class HairFile:
     """Strands of several hair objects at several times, in Blender's axes and a scene's units.
 
-    A context: the file is whole after it. Methods raise `HairError` where the disk is full; final_path: that it names.
+    A context manager: the file is complete after it. final_path: for errors. Methods raise `HairError` if the disk is
+    full.
     """
 
     def __init__(self, path: Path, final_path: Path, frame_rate: float, metres_per_unit: float) -> None:
@@ -115,7 +113,7 @@ class HairFile:
         self._hair[path].write(time, points, radii, matrix)
 
     def save(self, time):
-        """Write what was added to the disk; time: of the samples, in frames."""
+        """Write the added samples to the disk; time: of the samples, in frames."""
         from pxr import Tf
 
         self._times.append(time)
@@ -138,7 +136,7 @@ class _Hair:
             curves.CreateWidthsAttr(),
         )
         self._transform = curves.AddTransformOp()
-        self._last = None  # (time, widths) of the sample before
+        self._last = None  # (time, widths) of the previous sample
 
     def write(self, time, points, radii, matrix):
         from pxr import Gf, Vt
@@ -150,7 +148,7 @@ class _Hair:
         self._write_widths(time, 2.0 * radii)
 
     def _write_widths(self, time, widths):
-        """Only where they change: between samples readers interpolate."""
+        """Write widths only if they change: readers interpolate between samples."""
         from pxr import Vt
 
         before, self._last = self._last, (time, widths)

@@ -27,8 +27,8 @@ from . import modified_strands, strand_arrays
 class HairBeside:
     """Strands of length above zero in world axes around their surface's origin, in the scene's unit.
 
-    points (S, P, 3), radii (S, P), randoms (S,); surface: the posed mesh there; to_local (3, 3): to its coordinates;
-    notes: what is left out.
+    points (S, P, 3), radii (S, P), randoms (S,); surface: the posed mesh in this space; to_local (3, 3): this space →
+    the surface's local coordinates; notes: on omitted parts.
     """
 
     name: str
@@ -46,12 +46,12 @@ class HairBeside:
         return strand_colors.colors(self.look, self.randoms, self.points.shape[1])
 
     def local(self, made: PolygonMesh) -> PolygonMesh:
-        """A mesh in the surface's local coordinates."""
+        """Transform a mesh to the surface's local coordinates."""
         return made.transformed(self.to_local)
 
 
 def read_hair(hair):
-    """`HairBeside` of hair Curves, where they are now. Raises `HairError`."""
+    """Return the `HairBeside` of hair Curves at the present time. Raises `HairError`."""
     surface_object = hair.surface
     if surface_object is None:
         raise HairError('"{name}" has no surface: attach it to a mesh.', name=name_of(hair))

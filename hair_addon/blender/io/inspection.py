@@ -20,7 +20,7 @@ from . import strand_arrays
 
 
 def open_file():
-    """{name: value} of the open file's surfaces, guides and hair, and of other curves."""
+    """Return {name: value} of the surfaces, guides, hair and other curves in the open file."""
     shown = bpy.context.scene.objects
     return {
         "metres_per_unit": strand_arrays.metres_per_unit(bpy.context.scene),
@@ -74,7 +74,7 @@ def _baked(guides):
 
 
 def _changed_parts(guides, manifest):
-    """What frames follow from that has changed since they were baked: settings, guides, surface and others."""
+    """Return the names of inputs that have changed since baking, such as settings, guides or surface."""
     if manifest.guide_count != len(guides.curves):
         return ["guides"]
     try:

@@ -37,7 +37,7 @@ def require_stl(path):
 def require_alembic(path):
     """Raise `HairError` for a truncated or damaged Alembic file, on which Blender's importer crashes.
 
-    An Ogawa file names the place of its root group, which is written last: a count, and as many places.
+    An Ogawa file stores the offset of its root group, which is written last: a count followed by that many offsets.
     """
     size = path.stat().st_size
     with open(path, "rb") as file:
@@ -74,7 +74,7 @@ def require_usd(path):
 
 
 def require_imported(path):
-    """Raise `HairError` where an importer has made a mesh whose faces name vertices or corners that it lacks."""
+    """Raise `HairError` if an imported mesh has faces with invalid vertex or corner indices."""
     for mesh in bpy.data.meshes:
         if not usable_surfaces.is_whole(mesh):
             raise HairError(f"{path} is damaged: the faces of its mesh {mesh.name} do not match its points.")
@@ -110,7 +110,7 @@ def require_ply(path):
 
 
 def _ply_header(content):
-    """(byte order or "" for text, [(count, [struct formats of a row, of lists as pairs])], where rows begin)."""
+    """Return (byte order, "" for text; [(count, [struct formats of a row, pairs for lists])]; offset of the rows)."""
     mark = content.index(b"end_header")
     start = content.index(b"\n", mark) + 1
     byte_order, elements = None, []
@@ -131,7 +131,7 @@ def _ply_header(content):
 
 
 def _ply_end(content, byte_order, elements, place):
-    """End of the last row; beyond the end of a truncated file."""
+    """Return the offset of the end of the last row, beyond the end of a truncated file."""
     for count, row in elements:
         if not any(isinstance(part, tuple) for part in row):
             place += count * struct.calcsize(byte_order + "".join(row))
@@ -149,7 +149,7 @@ def _ply_end(content, byte_order, elements, place):
 
 
 def _ply_text_end(content, elements, start):
-    """The length of a text with all of its rows; raises ValueError or IndexError for another."""
+    """Return the length of a complete text, more if rows are missing; raises ValueError or IndexError for bad rows."""
     rows = content[start:].decode("ascii").splitlines()
     row_number = 0
     for count, row in elements:

@@ -34,7 +34,7 @@ def _obj(path):
     return bpy.ops.wm.obj_export(filepath=path, export_selected_objects=True, export_materials=False)
 
 
-# Ending → (export, operator that does it, whether the file has the textures in it).
+# Extension → (export function, its operator, whether the format embeds textures).
 _FORMATS = {
     ".blend": (_blend, "wm.save_as_mainfile", True),
     ".glb": (_gltf, "export_scene.gltf", True),
@@ -65,7 +65,7 @@ def has_textures(path):
 
 
 def write(path, objects):
-    """Write mesh objects of the view layer with the armatures that move them, and nothing else but in a .blend.
+    """Write mesh objects of the view layer with their armatures; a .blend has the whole scene.
 
     Raises `HairError`.
     """
@@ -74,4 +74,4 @@ def write(path, objects):
     rigs = [modifier.object for one in objects for modifier in armature_weights.armatures_of(one)]
     chosen = [*dict.fromkeys([*objects, *rigs])]
     with contextlib.nullcontext() if export is _blend else only_chosen(chosen), atomic_file(path) as partial:
-        export(str(partial.absolute()))  # exporters name textures from there
+        export(str(partial.absolute()))  # exporters derive texture paths from this path

@@ -30,10 +30,10 @@ def _import_stl(path, up):
 
 
 def _import_gltf(path, _up):
-    # It is written in Python, whose messages and tracebacks go where Blender's own do: an error is raised as well.
+    # The importer is written in Python: send its messages where Blender's own go. Errors are raised too.
     blenders = io.TextIOWrapper(io.FileIO(2, "w", closefd=False), errors="backslashreplace", write_through=True)
     with contextlib.redirect_stderr(blenders):
-        return bpy.ops.import_scene.gltf(filepath=path, disable_bone_shape=True)  # which would add a mesh
+        return bpy.ops.import_scene.gltf(filepath=path, disable_bone_shape=True)  # bone shapes would add a mesh
 
 
 def _import_usd(path, _up):
@@ -48,7 +48,7 @@ def _axes(up):
     return {"forward_axis": "Y", "up_axis": "Z"} if up == "Z" else {"forward_axis": "NEGATIVE_Z", "up_axis": "Y"}
 
 
-# Ending → (import, operator that does it, check for what the operator would not notice).
+# Extension → (import function, its operator, check for damage that the operator would miss).
 _FORMATS = {
     ".obj": (_import_obj, "wm.obj_import", mesh_checks.require_obj),
     ".ply": (_import_ply, "wm.ply_import", mesh_checks.require_ply),
@@ -77,7 +77,7 @@ def ends_blender(path):
 
 
 def axis_of(file_axes):
-    """The axis, Y or Z, that points up in a file; file_axes: as `open_file` returns."""
+    """Return the up axis of a file, "Y" or "Z"; file_axes: as `open_file` returns."""
     return next(name for name, axes in _UP.items() if np.array_equal(axes, file_axes))
 
 
@@ -106,8 +106,8 @@ def require_blend(path):
 def open_file(path, *, up="Z", runs_scripts=False):
     """Load a .blend, or a mesh file into an empty scene; the open file is closed.
 
-    up: the axis, Y or Z, that points up in files that do not say; runs_scripts: whether a .blend may run scripts and
-    drivers of its own. Returns (3, 3): Blender's axes → the file's. Raises `HairError`.
+    up: up axis, Y or Z, of files that do not store one; runs_scripts: whether a .blend may run its scripts and
+    drivers. Returns (3, 3): Blender's axes → the file's. Raises `HairError`.
     """
     path = Path(path)
     require_readable(path)
@@ -138,7 +138,7 @@ def save_scene(path):
 
 
 def load_scene(path):
-    """Open what `save_scene` has saved, as if it had been made here: it has no name. Raises `HairError`."""
+    """Open a file of `save_scene` as an unsaved file. Raises `HairError`."""
     try:
         bpy.ops.wm.read_homefile(filepath=str(path), load_ui=False)
     except RuntimeError as error:
@@ -153,7 +153,7 @@ def _open_blend(path, runs_scripts):
 
 
 def _is_y_up(path, ending):
-    """glTF is by specification, Alembic by convention; USD states it."""
+    """Whether Y points up: always in glTF by specification and in Alembic by convention; USD files store it."""
     if not ending.startswith(".usd"):
         return True
     bpy.utils.expose_bundled_modules()
@@ -168,7 +168,7 @@ def scripts_kept_from_running():
 
 
 def find_surface(name=""):
-    """The only mesh object of the view layer, or the one with a name. Raises `HairError`."""
+    """Return the mesh object with a name, or the only one of the view layer. Raises `HairError`."""
     meshes = [o for o in bpy.context.view_layer.objects if o.type == "MESH"]
     if name:
         meshes = [o for o in meshes if o.name == name]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands with the artist's modifiers applied: files and meshes match renders."""
+"""Strands with the artist's modifiers applied, so that files and meshes match renders."""
 
 import bpy
 import numpy as np
@@ -12,10 +12,10 @@ from ..host.notices import name_of
 
 
 def curves_of(datablock):
-    """Evaluated Curves of hair Curves with modifiers, until the next evaluation; the datablock itself without any.
+    """Return the evaluated Curves of hair with modifiers, valid until the next evaluation; without any, the datablock.
 
-    None where viewports do not evaluate what renders do, or strands have other points then: none of what is stored
-    for each would fit.
+    None if the object is hidden, if viewports and renders use different modifiers, or if modifiers change the points,
+    which stored attributes would not fit.
     """
     shown = selection.object_of(datablock, bpy.context.view_layer)
     if not _modifiers(shown):
@@ -32,7 +32,7 @@ def curves_of(datablock):
 
 
 def notes_of(datablock):
-    """Notes on hair Curves whose modifiers are ignored."""
+    """Yield a note if the modifiers of hair Curves are ignored."""
     if curves_of(datablock) is None:
         names = ", ".join(_modifiers(selection.object_of(datablock, bpy.context.view_layer)))
         sentence = 'Modifiers of "{name}" are left out, as they change its number of points or are hidden: {names}.'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kept hair that moves as the curves of its file do: frames in a USD file beside the .blend, which Blender plays."""
+"""Imported hair that plays the motion of its curves: frames in a USD file beside the .blend."""
 
 from pathlib import Path
 
@@ -15,14 +15,14 @@ from . import hair_file, strand_arrays
 
 
 def path_beside(blend_path, hair):
-    """Path of the file that the hair of a .blend plays."""
+    """Return the path of the file that the hair of a .blend plays."""
     return blend_path.with_name(f"{blend_path.stem}_{name_of(hair)}.usdc")
 
 
 def playing(hair, motion, order, path: Path):
-    """A function of (progress) that writes all samples of a `Motion` and lets hair play them; returns their number.
+    """Return a function of (progress) that writes a `Motion`, lets hair play it and returns the number of samples.
 
-    motion: in metres with Z up; order: (N,) of its points, those of the strands. Raises `HairError`.
+    motion: in metres with Z up; order: (N,) indices of its points in the order of the strands. Raises `HairError`.
     """
     hair_file.require_ours(path)
     blender_scene, shown = bpy.context.scene, selection.object_of(hair, bpy.context.view_layer)
@@ -38,13 +38,13 @@ def playing(hair, motion, order, path: Path):
                     progress(f"Frame {time * rate:g}", index / len(motion.times))
                     points = motion.points_at(index)[order].astype(np.float64) / scale
                     local = points @ back[:3, :3].T + back[:3, 3]
-                    # Rounded, as frames are the whole numbers that they are meant to be.
+                    # Rounded, so that frame numbers are whole.
                     in_file = round(float(time) * rate, 6)
                     file.write(in_file, place, local.astype(np.float32), radii, matrix)
                     file.save(in_file)
             delivered_hair.close_files(path)
         cache_file = delivered_hair.open_file(path)
-        if not bpy.data.filepath:  # a new .blend, which is written beside the file
+        if not bpy.data.filepath:  # a new .blend will be saved beside the file
             cache_file.filepath = f"//{path.name}"
         delivered_hair.deliver(hair, cache_file, place)
         return len(motion.times)

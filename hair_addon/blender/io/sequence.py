@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of a sequence, shared among all processes with the same command: none is rendered twice.
+"""Frames of a sequence, shared among all processes with the same command: no frame is rendered twice.
 
-A frame is done when its files, one or one for each view, exist and are complete: they are written atomically, but
-another program may have left an empty one with the same name. A file beside the frames identifies the sequence, with
-the files that the scene reads, so that another command, or one with another texture, does not continue it.
+A frame is done when its files (one per view) exist and are complete: they are written atomically, but another program
+may have left an empty file with the same name. A file beside the frames identifies the sequence and the files that the
+scene reads, so that another command, or one with another texture, does not continue it.
 """
 
 import contextlib
@@ -27,10 +27,11 @@ _PAUSE = 0.5  # [s] between checks for frames of other processes
 
 
 def description(input_path, engine, settings):
-    """Description of a sequence, equal for commands with the same result.
+    """Return the description of a sequence, equal for commands with the same result.
 
-    input_path: the .blend, which is open; engine: of `frames.ENGINES`; settings: {name: value}. Linked files and images
-    count by size and time of change: to digest gigabytes of textures would delay each process of a farm by minutes.
+    input_path: the open .blend; engine: a key of `frames.ENGINES`; settings: {name: value}. Linked files and images are
+    compared by size and modification time: digests of gigabytes of textures would delay each process of a farm by
+    minutes.
     """
     with open(input_path, "rb") as file:
         digest = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
@@ -41,10 +42,10 @@ def description(input_path, engine, settings):
 
 
 def begin(pattern, numbers, described, replaces=False):
-    """Get ready for frames of a sequence; raises `HairError` where there are others than those described.
+    """Prepare a sequence; raises `HairError` if the files belong to another one.
 
-    pattern: as `frames.path_of` takes it; numbers: of the frames; described: `description`; replaces: drop what is
-    there of these frames, and make them again.
+    pattern: as in `frames.path_of`; numbers: frame numbers; described: a `description`; replaces: delete existing files
+    of these frames.
     """
     record = record_of(pattern)
     require_writable_path(record)
@@ -61,7 +62,7 @@ def begin(pattern, numbers, described, replaces=False):
 
 @contextlib.contextmanager
 def _claimed(path):
-    """`claim`, with a sentence where the folder takes no further file. Raises `HairError`."""
+    """`claim`, with OSError converted to `HairError`."""
     try:
         with claim(path) as is_ours:
             yield is_ours
@@ -70,7 +71,7 @@ def _claimed(path):
 
 
 def record_of(pattern):
-    """The hidden file beside a sequence that identifies it."""
+    """Return the path of the hidden file that identifies a sequence."""
     pattern = Path(pattern)
     return pattern.with_name(f".{pattern.name}.json")
 
@@ -102,7 +103,7 @@ def _require_same(record, described):
 
 
 def _in_words(key, found, described):
-    """What of a sequence is other, and which of its files are, where only some are."""
+    """Describe a difference of sequences: its key, with the differing files for "files"."""
     if key != "files" or not isinstance(found, dict) or not isinstance(found.get(key), dict):
         return key
     before, now = found[key], described[key]
@@ -118,10 +119,9 @@ def _require_none(pattern, numbers):
 
 
 def make(pattern, numbers, write, told=no_progress):
-    """Render frames not yet rendered or claimed, and wait for claimed ones; yields (number, path) of each.
+    """Render frames not yet rendered or claimed, and wait for claimed ones; yields (number, path) of rendered frames.
 
-    write(path, number): makes one, whole or not at all; told(step, part): told how far the sequence is, may raise to
-    stop.
+    write(path, number): writes a frame atomically; told(step, part): progress callback, may raise to stop.
     """
     left = list(numbers)
     while left:

@@ -25,10 +25,10 @@ def metres_per_unit(blender_scene):
 
 
 def world_points(datablock):
-    """(S, P, 3) float32 [m]: a Curves datablock's points in Blender's axes, where its surface carries them now.
+    """Return (S, P, 3) float32 points [m] of a Curves datablock in Blender's axes, on the present pose of its surface.
 
-    Without other modifiers than ours. Curves of different point counts are resampled to the largest, and Catmull-Rom
-    splines to points on the curve, as many as strands have.
+    The artist's modifiers are not applied. Curves are resampled to the largest point count, and Catmull-Rom splines to
+    at least `POINT_COUNT` points on the curve.
     """
     bring_up_to_date()
     return _whole(world_rows(datablock, local=_at_rest(datablock)), shape_of(datablock))
@@ -51,7 +51,7 @@ def _whole(rows, shape):
 
 
 def counts_of(datablock):
-    """(S,) int32: points of each curve that `world_rows` and `shown_rows` give. Raises `HairError`."""
+    """Return (S,) int32 point counts of the curves of `world_rows` and `shown_rows`. Raises `HairError`."""
     shape_of(datablock)
     return exported_curves.counts_kept(datablock)
 
@@ -66,10 +66,10 @@ def shown_rows(datablock, per_metre=1.0) -> Rows:
 
 
 def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
-    """A function of a slice of curves that gives (N, 3) float32 points of them [m], times `per_metre`.
+    """Return a function of a slice of curves that gives their (N, 3) float32 points [m] times `per_metre`.
 
-    Where `world_points` has them, but each curve has as many points as `counts_of` says. local: (S, P, 3) float32 that
-    is taken for the points at rest, None for those of the datablock.
+    Like `world_points`, but without resampling: point counts are those of `counts_of`. local: (S, P, 3) float32 points
+    at rest, None for those of the datablock.
     """
     bring_up_to_date()
     if local is None:
@@ -89,7 +89,7 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
 
 
 def _placed(local, to_world) -> Rows:
-    """`Rows` of local ones where a (4, 4) matrix takes them."""
+    """Return local `Rows` transformed by a (4, 4) matrix and to metres."""
     to_file = to_world * metres_per_unit(bpy.context.scene)
 
     def rows(some):
@@ -99,14 +99,14 @@ def _placed(local, to_world) -> Rows:
 
 
 def _shown(datablock):
-    """Evaluated Curves that an artist's modifiers have made of a datablock; None where it has none, or others fit."""
+    """Return the evaluated Curves of a datablock with artist's modifiers; None without any, or if unusable."""
     bring_up_to_date()
     shown = modified_strands.curves_of(datablock)
     return None if shown == datablock else shown
 
 
 def other_places(datablock):
-    """[(4, 4) float64]: from where `world_points` are [m] to where other objects of a view layer show them.
+    """Return [(4, 4) float64]: `world_points` [m] → where other objects of the view layer show them.
 
     Raises `HairError`.
     """
@@ -132,7 +132,7 @@ def bring_up_to_date():
 
 
 def shape_of(datablock):
-    """(S, P, 3): the shape of `world_points`. Raises `HairError` for Curves without strands."""
+    """Return (S, P, 3), the shape of `world_points`. Raises `HairError` for Curves without strands."""
     counts = curves.point_counts(datablock)
     if not len(counts):
         raise HairError('"{name}" has no strands.', name=name_of(datablock))
@@ -143,13 +143,13 @@ def shape_of(datablock):
 
 
 def world_scale(datablock):
-    """Mean metres per unit of a Curves datablock's local coordinates. Raises `HairError`."""
+    """Return the mean number of metres per local unit of a Curves datablock. Raises `HairError`."""
     matrix = _to_world(datablock)[:3, :3]
     return float(abs(np.linalg.det(matrix))) ** (1.0 / 3.0) * metres_per_unit(bpy.context.scene)
 
 
 def _to_world(datablock):
-    """(4, 4) float64: local → world of the object that shows Curves; of their surface for guides that none shows."""
+    """Return (4, 4) float64, local → world, of the object that shows Curves; of the surface for guides without one."""
     shown = selection.object_of(datablock, bpy.context.view_layer)
     if shown is None and datablock.vellus.kind == "GUIDES":
         shown = datablock.surface  # new guides lie on it with no transform of their own

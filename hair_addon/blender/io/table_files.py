@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Marschner settings → the model's tables and dual scattering's, as files."""
+"""Marschner settings → files with the tables of the model and of dual scattering."""
 
 import imbuf
 

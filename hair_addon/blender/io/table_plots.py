@@ -45,14 +45,14 @@ def plot_tables(tables, dual):
 
 
 class _Panel:
-    """Pixels (H, W, 3) of one plot, its first line on top, with the text that belongs over it."""
+    """Pixels (H, W, 3) of one plot, top row first, and its labels."""
 
     def __init__(self, inside, title, x_axis, y_axis):
         height, width = _PANEL + _TOP + _BOTTOM, _PANEL + _LEFT + _RIGHT
         self.pixels = np.full((height, width, 3), _BACKGROUND, np.uint8)
         self.pixels[_TOP - 1 : _TOP + _PANEL + 1, _LEFT - 1 : _LEFT + _PANEL + 1] = _AXIS
         self.pixels[_TOP : _TOP + _PANEL, _LEFT : _LEFT + _PANEL] = inside
-        self.text = [(title, _LEFT, _TOP - 12)]  # (words, x, y of the base line), from the top left
+        self.text = [(title, _LEFT, _TOP - 12)]  # (text, x, y of the baseline), from the top left
         (x_label, x_ticks), (y_label, y_ticks) = x_axis, y_axis
         for part, tick in zip((0.0, 0.5, 1.0), x_ticks, strict=True):
             self.text.append((tick, _LEFT + part * _PANEL - 0.5 * _width(tick), _TOP + _PANEL + 18))
@@ -93,7 +93,7 @@ def _width(words):
 
 
 def _beside(panels, columns=5):
-    """Panels → one ImBuf, at most `columns` in a line."""
+    """Panels → one ImBuf, at most `columns` per row."""
     height, width = panels[0].pixels.shape[:2]
     lines = -(-len(panels) // columns)
     picture = imbuf.new((width * min(len(panels), columns), height * lines))
@@ -103,7 +103,7 @@ def _beside(panels, columns=5):
     for panel, (x, y) in zip(panels, corners, strict=True):
         canvas[y : y + height, x : x + width, :3] = panel.pixels
     with picture.with_buffer(write=True) as buffer:
-        np.asarray(buffer)[...] = canvas[::-1]  # an ImBuf begins at the bottom
+        np.asarray(buffer)[...] = canvas[::-1]  # an ImBuf stores the bottom row first
     blf.size(0, _TEXT_SIZE)
     blf.color(0, 1.0, 1.0, 1.0, 1.0)
     with blf.bind_imbuf(0, picture):

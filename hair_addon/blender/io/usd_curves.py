@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of USD files: BasisCurves, NurbsCurves and HermiteCurves as they are drawn, after [UsdCurves24].
+"""Curves of USD files: the drawn shape of BasisCurves, NurbsCurves and HermiteCurves, after [UsdCurves24].
 
-Polylines keep their points, and so do Catmull-Rom splines whose end points stand twice, which Blender draws alike.
-All others become polylines of points on their curves (`core.geometry.bezier_segments`).
+Polylines keep their points, as do Catmull-Rom splines with doubled end points, which Blender draws alike. All others
+become polylines (`core.geometry.bezier_segments`).
 """
 
 from collections.abc import Iterator
@@ -17,21 +17,21 @@ from ...core.files.curve_file import Convention, CurveFile, CurveSet, Motion
 from ...core.files.groom_curves import GUIDE_SLOTS
 from . import usd_shapes, usd_stage
 
-_USUAL = Convention(0.01, "Y")  # of USD
+_USUAL = Convention(0.01, "Y")  # USD's defaults
 
 
 @dataclass(frozen=True)
 class _Timing:
-    """The first and the last time of a file, None if it names none; rate: time codes in a second."""
+    """within: first and last time of a file, None if it states none; rate: time codes per second."""
 
     within: tuple[float, float] | None
     rate: float
 
 
 def read(path: Path) -> CurveFile:
-    """The curves of a USD file. Raises `HairError`.
+    """Read the curves of a USD file. Raises `HairError`.
 
-    Curves that move stand where they are at the first time that the file names, or has samples of.
+    Points of moving curves are those at the file's start time, or at their first sample.
     """
     stage = usd_stage.opened(path)
     with usd_stage.errors_named(path):
@@ -60,7 +60,7 @@ def _names(prims):
 
 
 def _sets_of(path, prim, name, timing, notes) -> Iterator[CurveSet]:
-    """The `CurveSet` of a prim; none where it has no curves. What people are to know is added to notes."""
+    """Yield the `CurveSet` of a prim unless it has no curves; appends messages for the user to notes."""
     times = usd_stage.times_of(prim, usd_shapes.moving_attributes(prim), timing.within)
     time = usd_stage.time_code(times[0] if times else None)
     drawn = usd_shapes.drawn(prim, time, keeps_splines=len(times) < 2)  # Blender plays polylines
@@ -110,7 +110,7 @@ def _placed(points, matrix):
 
 
 def _moved(path, prim, name, time, first):
-    """Points at another time than that of the first `Drawn`, divided as it is. Raises `HairError`."""
+    """Return the points at another time, divided like the first `Drawn`. Raises `HairError`."""
     with usd_stage.errors_named(path):
         drawn = usd_shapes.drawn(prim, time, first.lines, keeps_splines=False)
         if not np.array_equal(drawn.counts, first.counts):
@@ -120,7 +120,7 @@ def _moved(path, prim, name, time, first):
 
 
 def _of_grooms(prim, time, is_kept):
-    """{field: value} of a `CurveSet` that primvars of grooms say [UnrealGroom26]; others are left out."""
+    """Return {field: value} of a `CurveSet` from the primvars of grooms [UnrealGroom26]; others are omitted."""
     from pxr import UsdGeom
 
     def one(name):

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Grooms as USD: polylines with primvars, in metres with Z up, which Unreal, Houdini and Omniverse read.
 
-    /groom                     Xform with the API schema GroomAPI, by which Unreal knows a groom
+    /groom                     Xform with the API schema GroomAPI, which identifies grooms in Unreal
     /groom/<group>             Xform
     /groom/<group>/strands     BasisCurves
     /groom/<group>/guides      BasisCurves with the purpose guide
     /groom/<group>_instance    Xform, an instance of the group: where another object shows the same hair
     /groom/materials/<group>   Material: a preview surface, and the settings of the look as inputs
 
-Primvars with the prefix groom_ are those of [UnrealGroom26], whose width is that of the curves; st and displayColor are
-what other programs look for.
+Primvars with the prefix groom_ are those of [UnrealGroom26], except the width, which is the curves' own; st and
+displayColor are for other programs.
 """
 
 from contextlib import contextmanager
@@ -46,7 +46,7 @@ _HAIR_INPUTS = {
 
 
 class UsdGroomWriter:
-    """Writes a groom to a stage; `writing` makes it. Guides and strands are added, and then get their points."""
+    """Writer of a groom to a stage, made by `writing`: first add all guides and strands, then write their points."""
 
     def __init__(self, stage, path, tool, properties, first_frame):
         self._stage, self._path, self._first_frame = stage, path, first_frame
@@ -59,7 +59,7 @@ class UsdGroomWriter:
         _primvar(root, "groom_properties", "String", "constant", properties)
 
     def add(self, curves, moves=False):
-        """Write all of `GroomCurves` but points; returns their number. moves: whether points of each time come."""
+        """Write `GroomCurves` without points; returns their number. moves: whether the points are animated."""
         from pxr import UsdGeom
 
         group = UsdGeom.Xform.Define(self._stage, f"{_ROOT}/{curves.group_name}").GetPath()
@@ -76,7 +76,7 @@ class UsdGroomWriter:
         return len(self._added) - 1
 
     def write_points(self, number, points):
-        """Write the points (N, 3) [m] of added curves, at the next time. Raises `HairError` for non-finite ones."""
+        """Write points (N, 3) [m] of added curves at the next time. Raises `HairError` for non-finite values."""
         from pxr import Usd
 
         made, check, moves, reach, times = self._added[number]
@@ -91,7 +91,7 @@ class UsdGroomWriter:
             self._save()
 
     def _save(self):
-        """Write what was added to the disk, which frees its memory."""
+        """Write the added data to the disk, which frees its memory."""
         from pxr import Tf
 
         try:
@@ -100,7 +100,7 @@ class UsdGroomWriter:
             raise hair_file.failed(self._path, error) from error
 
     def add_instance(self, group_name, matrix):
-        """Show a group again; matrix: (4, 4), from where the group is [m]."""
+        """Add an instance of a group; matrix: (4, 4), transform of the instance relative to the group [m]."""
         from pxr import Gf, UsdGeom
 
         path, number = f"{_ROOT}/{group_name}_instance", 1
@@ -121,13 +121,13 @@ class UsdGroomWriter:
 def writing(path: Path, final_path: Path, tool, properties, rate=24.0, first_frame=0):
     """Write a groom to a path; the file is whole after the context.
 
-    final_path: that errors name; rate: frames a second; the rest as `unreal_groom.writing`. Raises `HairError` where
-    Blender lacks USD, or the disk is full.
+    final_path: for errors; rate: frames per second; the rest as in `unreal_groom.writing`. Raises `HairError` if
+    Blender lacks USD or the disk is full.
     """
     hair_file.require_usd()
     from pxr import Tf, Usd, UsdGeom
 
-    # USD writes a whole text file anew at each save, so that it would take a time as the square of its frames.
+    # USD rewrites a whole text file at each save: the time would grow with the square of the number of frames.
     is_text = path.suffix.lower() == ".usda"
     binary = new_partial_of(path.with_suffix(".usdc")) if is_text else path
     try:
@@ -170,7 +170,7 @@ def _write_primvars(prim, curves):
 
 
 def _bind_material(stage, prim, curves):
-    """Give strands a material: a surface that every program shades, and the settings of the look for those of hair."""
+    """Give strands a material: a preview surface for every program, and the look's settings for hair shaders."""
     from pxr import Sdf, UsdGeom, UsdShade
 
     path = f"{UsdGeom.Scope.Define(stage, f'{_ROOT}/{MATERIALS}').GetPath()}/{curves.group_name}"
@@ -197,7 +197,7 @@ def _primvar(prim, name, kind, scope, value):
 
 
 def _array(kind, values):
-    """A `Vt` array of a NumPy one."""
+    """Convert a NumPy array to a `Vt` array."""
     from pxr import Vt
 
     dtype = np.int32 if kind in {"IntArray", "Vec3iArray"} else np.float32

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shape of a prim of USD's curves at a time, as polylines or Catmull-Rom splines in its own coordinates."""
+"""Shape of a USD curves prim at a time: polylines or Catmull-Rom splines in local coordinates."""
 
 from dataclasses import dataclass, replace
 
@@ -10,16 +10,16 @@ from ...core.geometry import bezier_segments
 from ...core.geometry.bezier_segments import each
 from ...core.geometry.strands import curve_offsets
 
-_MOST_ORDER = 16  # of NURBS: what makes them is of 4, and of 8 at most
+_MOST_ORDER = 16  # of NURBS: programs write order 4, rarely up to 8
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """Points (N, 3) float64 of curves, counts (S,) of each, and diameters (N,), None without any.
+    """Points (N, 3) float64 of curves, their counts (S,), and diameters (N,), None without any.
 
-    is_kept: which of the file's curves these are; is_smooth: whether they are Catmull-Rom splines; has_odd_widths:
-    whether the file has diameters, of a number that fits nothing; lines: as of `bezier_segments.polylines`, None of
-    curves that keep their points; was_smooth: whether they could be Catmull-Rom splines, which were not to be kept.
+    is_kept: which of the file's curves are included; is_smooth: whether they are Catmull-Rom splines; has_odd_widths:
+    whether the number of the file's diameters is invalid; lines: as in `bezier_segments.polylines`, None for curves
+    that keep their points; was_smooth: whether Catmull-Rom splines were converted to polylines.
     """
 
     points: np.ndarray
@@ -34,9 +34,9 @@ class Drawn:
 
 @dataclass(frozen=True)
 class _Curves:
-    """A prim's curves as the file has them: points (N, 3), counts (S,), and is_kept (S,): which of them are valid.
+    """A prim's curves in the file: points (N, 3), counts (S,), and is_kept (S,), which of them are valid.
 
-    segments: (S,) how many each has, where it is valid.
+    segments: (S,) segment counts of valid curves.
     """
 
     points: np.ndarray
@@ -52,14 +52,16 @@ class _Curves:
 
     @property
     def kept_counts(self):
-        """(K,)."""
+        """Point counts (K,) of valid curves."""
         return self.counts[self.is_kept]
 
 
 @dataclass(frozen=True)
 class _Widths:
-    """Diameters of the curves that are kept: one for each of their points, or for each end of their segments, of which
-    each curve has one more than segments; is_odd: whether there are some that fit neither."""
+    """Diameters of valid curves: per point, or per segment end, of which a curve has one more than segments.
+
+    is_odd: whether the number of diameters fits neither.
+    """
 
     of_points: np.ndarray | None = None
     of_ends: np.ndarray | None = None
@@ -67,16 +69,16 @@ class _Widths:
 
 
 def moving_attributes(prim):
-    """The attributes of a prim that move its curves."""
+    """Return the attributes of a prim whose samples animate its curves."""
     names = ("points", "tangents", "pointWeights", "curveVertexCounts")
     return [prim.GetAttribute(name) for name in names if prim.HasAttribute(name)]
 
 
 def drawn(prim, time, lines=None, keeps_splines=True) -> Drawn:
-    """The `Drawn` of a prim at a time. Raises `HairError`.
+    """Return the `Drawn` of a prim at a time. Raises `HairError`.
 
-    lines: into how many to divide each segment, None for as many as it needs; keeps_splines: whether Catmull-Rom
-    splines may stay such.
+    lines: number of lines per segment, None to choose it by curvature; keeps_splines: whether to keep Catmull-Rom
+    splines.
     """
     from pxr import UsdGeom
 
@@ -96,7 +98,7 @@ def drawn(prim, time, lines=None, keeps_splines=True) -> Drawn:
 
 
 def _array(prim, name, time, kind, width=1):
-    """Values (N,) or (N, width) of an attribute, empty if it has none."""
+    """Return values (N,) or (N, width) of an attribute, empty if it has none. Raises `HairError`."""
     value = prim.GetAttribute(name).Get(time) if prim.HasAttribute(name) else None
     shape = (width,) if width > 1 else ()
     values = np.asarray([] if value is None else value)
@@ -107,13 +109,13 @@ def _array(prim, name, time, kind, width=1):
 
 
 def _require(prim, is_valid, name, other):
-    """Raise `HairError` for arrays that do not fit each other."""
+    """Raise `HairError` unless is_valid: the attribute `name` does not fit `other`."""
     if not is_valid:
         raise HairError(f"{prim.GetPath()} is damaged: its {name} do not fit its {other}.")
 
 
 def _linear(prim, time, points, counts, is_closed):
-    """Polylines: their own points; closed ones end where they begin."""
+    """Return polylines with their own points; closed ones repeat the first point."""
     curves = _Curves(points, counts, counts >= 2 + is_closed, counts - (not is_closed), is_closed)
     kept, starts = curves.kept_counts, curve_offsets(counts)[:-1][curves.is_kept]
     own, along = each(kept + is_closed)
@@ -186,7 +188,7 @@ def _ends_twice(curves):
 
 
 def _unchanged(curves, rows, counts, widths, is_smooth=False):
-    """`Drawn` of curves that keep their points, or some of them, one for each end of a segment."""
+    """Return the `Drawn` of curves that keep their points, or those at segment ends."""
     kept = np.full(len(curves.points), -1)
     kept[curves.rows] = np.arange(len(curves.rows))
     values = widths.of_ends if widths.of_points is None else widths.of_points[kept[rows]]
@@ -198,7 +200,7 @@ def _with_widths(points, widths):
 
 
 def _divided(curves, segments, widths, lines):
-    """`Drawn` of Bézier segments, whose fourth value is a diameter where there is one for each point."""
+    """Return the `Drawn` of Bézier segments; the fourth coordinate, if any, is the diameter."""
     if lines is None or len(lines) != len(segments.controls):
         lines = bezier_segments.line_counts(segments)
     values, counts, places = bezier_segments.polylines(segments, lines)
@@ -211,7 +213,7 @@ def _divided(curves, segments, widths, lines):
 
 
 def _widths(prim, time, curves, short_ends=None):
-    """The `_Widths` of curves; short_ends: (S,) ends of segments by another count that files have."""
+    """Read the `_Widths` of curves; short_ends: (S,) an alternative number of segment ends that some files use."""
     from pxr import UsdGeom
 
     primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("widths")

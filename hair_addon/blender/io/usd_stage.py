@@ -17,7 +17,7 @@ _MOST_NAMED = 3  # files in a sentence
 
 @dataclass(frozen=True)
 class Found:
-    """Prims of curves that are drawn, and how many are not: invisible, proxies of others, scattered by instancers."""
+    """Drawn curves prims, and numbers of omitted ones: invisible, proxies, scattered by point instancers."""
 
     prims: list
     invisible: int
@@ -48,14 +48,14 @@ def errors_named(path: Path):
 
 
 def time_code(time: float | None):
-    """A `Usd.TimeCode`, the earliest for None."""
+    """Return a `Usd.TimeCode`, the earliest for None."""
     from pxr import Usd
 
     return Usd.TimeCode.EarliestTime() if time is None else Usd.TimeCode(time)
 
 
 def opened(path: Path):
-    """The `Usd.Stage` of a file as it is on the disk. Raises `HairError`, also where files that it names are not."""
+    """Open a file as a `Usd.Stage`, bypassing USD's cache. Raises `HairError`, also if referenced files are missing."""
     with errors_named(path):
         from pxr import Usd
 
@@ -69,7 +69,7 @@ def opened(path: Path):
 
 
 def _cause_of(error):
-    """First USD error, without its source location."""
+    """Return the first USD error, without its source location."""
     text = str(error)
     line = re.search(r":(\d+):\d+: parse error", text)
     if line is not None:
@@ -81,7 +81,7 @@ def _cause_of(error):
 
 
 def _missing(stage):
-    """Names of files, and of what is in them, that a stage is made of and that are not there."""
+    """Return the names of referenced files, and of prims in them, that are missing."""
     found = []
     for error in stage.GetCompositionErrors():
         named = re.search(r"@([^@]*)@(<[^>]*>)?", str(error))
@@ -92,7 +92,7 @@ def _missing(stage):
 
 
 def curves_of(stage, time) -> Found:
-    """The `Found` of a stage at a time, those of instances too."""
+    """Return the `Found` of a stage at a time, including instances."""
     from pxr import Usd, UsdGeom
 
     prims, invisible, proxies, instanced = [], 0, 0, 0
@@ -123,9 +123,10 @@ def _prototypes(stage):
 
 
 def times_of(prim, attributes, within: tuple[float, float] | None) -> list[float]:
-    """Times, in time codes, at which some attributes of a prim, or the transforms above it, have samples.
+    """Return sorted times, in time codes, of the samples of a prim's attributes and of all its transforms.
 
-    within: the file's first and last time, the first of which is among them where anything moves; None if it has none.
+    within: the file's first and last time, which limit the result; the first is included if anything moves. None if the
+    file states none.
     """
     from pxr import UsdGeom
 
@@ -144,14 +145,14 @@ def times_of(prim, attributes, within: tuple[float, float] | None) -> list[float
 
 
 def matrix_of(prim, time) -> np.ndarray:
-    """(4, 4) float64: a prim's coordinates → the stage's."""
+    """Return (4, 4) float64, local → stage coordinates."""
     from pxr import UsdGeom
 
     return np.array(UsdGeom.Imageable(prim).ComputeLocalToWorldTransform(time)).T  # USD's have rows of vectors
 
 
 def primvar(prim, name: str, time):
-    """Values of a primvar, expanded by its indices if it has any; None if it has no values."""
+    """Return the values of a primvar with its indices applied; None if it has no values."""
     from pxr import UsdGeom
 
     found = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)

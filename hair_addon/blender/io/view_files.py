@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files of a frame: one, or one for each view of a stereoscopic scene, named with the view's suffix."""
+"""The files of a frame: one, or one per view of a stereoscopic scene, named with the view's suffix."""
 
 from pathlib import Path
 
@@ -11,15 +11,15 @@ _OF_STEREO = {"left", "right"}  # names of the views that Blender renders for st
 
 
 def files_of(path):
-    """The files that the open scene's frame is saved as, for a path without a view's suffix. Raises `HairError`."""
+    """Return the files of a frame of the open scene; path: without view suffix. Raises `HairError`."""
     path = Path(path)
     return [path.with_name(f"{path.stem}{suffix}{path.suffix}") for suffix in _suffixes(path)]
 
 
 def views_format(path, has_passes):
-    """How the open scene's views are saved in a file's format, by Blender's name: as it is set, if the format can.
+    """Return Blender's views format for the open scene: the one set, if the file format supports it.
 
-    A file with passes as layers holds both views of a stereo picture as its parts.
+    A file with passes as layers stores both views of a stereo picture as parts.
     """
     if _are_apart(path):
         return "INDIVIDUAL"
@@ -43,7 +43,7 @@ def _are_apart(path):
 
 
 def _views():
-    """The views of the open scene that are rendered; none without Stereoscopy."""
+    """Return the rendered views of the open scene; none without Stereoscopy."""
     render = bpy.context.scene.render
     if not render.use_multiview:
         return []
