@@ -75,9 +75,9 @@ def unregister():
         _unregister()
     elif not bpy.app.timers.is_registered(_unregister_after_render):
         bpy.app.timers.register(_unregister_after_render, first_interval=_PATIENCE, persistent=True)
-        said = translations.interface_text("Blender renders: Vellus is disabled when the render has ended.")
-        print(f"Vellus: {said}", file=sys.stderr)
-        _show_in_status_bars(said)
+        sentence = translations.interface_text("Blender renders: Vellus is disabled when the render has ended.")
+        print(f"Vellus: {sentence}", file=sys.stderr)
+        _show_in_status_bars(sentence)
 
 
 def _unregister_after_render():

@@ -54,30 +54,30 @@ def parser(program):
     return made
 
 
-def run(given, said):
-    """Run a command with parsed options; returns the exit status. said: its `Console`."""
+def run(given, console):
+    """Run a command with parsed options; returns the exit status. console: its `Console`."""
     try:
         paths.resolve(given)
-        given.run(given, said)
+        given.run(given, console)
         return 0
     except (Stopped, KeyboardInterrupt):
         pass
     except HairError as error:
-        if not said.interruption.is_asked:  # otherwise a consequence of the interruption
-            said.fail(" ".join(str(error).split()))
+        if not console.interruption.is_asked:  # otherwise a consequence of the interruption
+            console.fail(" ".join(str(error).split()))
             return 1
     except ModuleNotFoundError as error:
         if error.name != "bpy":
             raise
-        said.fail(NO_BLENDER)
+        console.fail(NO_BLENDER)
         return 1
     except MemoryError:
-        said.fail("Not enough memory: use fewer strands or points, or a smaller picture.")
+        console.fail("Not enough memory: use fewer strands or points, or a smaller picture.")
         return 1
     except BrokenPipeError:  # the reader has closed the pipe
         return 1
     except OSError as error:  # a path that passed the checks may be too long, or removed in the meantime
-        said.fail(f"{error.filename}: {error.strerror}." if error.filename else f"{error.strerror or error}.")
+        console.fail(f"{error.filename}: {error.strerror}." if error.filename else f"{error.strerror or error}.")
         return 1
-    said.fail("stopped: unfinished results were not written.")
-    return said.interruption.status
+    console.fail("stopped: unfinished results were not written.")
+    return console.interruption.status

@@ -53,9 +53,9 @@ def checked(given):
         raise HairError("--unit has no effect on a .blend file, which has its own.")
     if given.unit:
         parsed_unit(given.unit)
-    if given.up and not blender.io.mesh_files.asks_for_axis(given.input) and (is_blend or not came_from):
+    if given.up and not blender.io.mesh_files.lacks_up_axis(given.input) and (is_blend or not came_from):
         raise HairError(f"--up has no effect: {given.input} has its own axes.")
-    if given.up == "X" and blender.io.mesh_files.asks_for_axis(given.input):
+    if given.up == "X" and blender.io.mesh_files.lacks_up_axis(given.input):
         raise HairError("--up X is not known for a mesh: Y or Z points up there.")
     return came_from
 
@@ -63,8 +63,8 @@ def checked(given):
 def wanted(kind, given, file_axes):
     """Return the `Wanted` of the options; file_axes: (3, 3), Blender's axes → the mesh file's."""
     # --up belongs to the mesh file if that has no up axis, otherwise to the curve file.
-    is_said = given.up and not blender.io.mesh_files.asks_for_axis(given.input)
-    said = Convention(parsed_unit(given.unit) if given.unit else None, given.up if is_said else None)
+    is_of_curves = given.up and not blender.io.mesh_files.lacks_up_axis(given.input)
+    convention = Convention(parsed_unit(given.unit) if given.unit else None, given.up if is_of_curves else None)
     axis = blender.io.mesh_files.axis_of(file_axes)
     plays = kind == "HAIR" and given.out.suffix.lower() == ".blend"
-    return blender.io.curve_files.Wanted(kind, given.object, said, axis, plays)
+    return blender.io.curve_files.Wanted(kind, given.object, convention, axis, plays)

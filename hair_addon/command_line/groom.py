@@ -96,9 +96,9 @@ def _styled(given, settings, surface):
 
 def _grow(surface, settings, console):
     """Return (guides, hair) that grow on a mesh object."""
-    said = blender.data.usable_surfaces.inside_out_warning(surface)
-    if said is not None:
-        console.warn(said[0].format(**said[1]))
+    warning = blender.data.usable_surfaces.inside_out_warning(surface)
+    if warning is not None:
+        console.warn(warning[0].format(**warning[1]))
     depsgraph = blender.data.scene.present_depsgraph()
     work = blender.groom.transfer.groom_settings.adding_hair(surface, settings, depsgraph)
     return run_now(work, console.progress)

@@ -38,27 +38,27 @@ class Failed:
         return f"A worker process ended with {self.cause} and without an error message."
 
 
-def run(commands, console, hear, step="", seconds=math.inf):
+def run(commands, console, receive, step="", seconds=math.inf):
     """Run commands in parallel until all have ended; returns a `Failed` for each that failed.
 
-    commands: argument lists of processes that print lines of JSON; hear(values): called with each line; step: name for
-    progress; seconds: time limit, after which the processes are killed.
+    commands: argument lists of processes that print lines of JSON; receive(values): called with each line; step: name
+    for progress; seconds: time limit, after which the processes are killed.
     """
-    heard = queue.Queue()
+    received = queue.Queue()
     helpers = []
     is_late, end = False, time.monotonic() + seconds
     try:
-        helpers += [_Helper(words, heard) for words in commands]
-        while any(helper.is_at_work for helper in helpers) or not heard.empty():
+        helpers += [_Helper(words, received) for words in commands]
+        while any(helper.is_running for helper in helpers) or not received.empty():
             console.progress(step or f"{len(helpers)} processes", 0.0)
             if time.monotonic() > end:
                 is_late = True
                 break
             try:
-                values = heard.get(timeout=_LOOK)
+                values = received.get(timeout=_LOOK)
             except queue.Empty:
                 continue
-            hear(values)
+            receive(values)
     finally:
         for helper in helpers:
             helper.stop(_PATIENCE if not is_late else 0.0)
@@ -68,28 +68,30 @@ def run(commands, console, hear, step="", seconds=math.inf):
 class _Helper:
     """A process, and the threads that read its output."""
 
-    def __init__(self, words, heard):
+    def __init__(self, words, received):
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
         self._process = subprocess.Popen(words, text=True, encoding="utf-8", errors="replace", **pipes)
-        self._heard, self._complaints = heard, []
-        self._threads = [threading.Thread(target=target, daemon=True) for target in (self._hear, self._hear_errors)]
+        self._received, self._complaints = received, []
+        self._threads = [
+            threading.Thread(target=target, daemon=True) for target in (self._read_output, self._read_errors)
+        ]
         for thread in self._threads:
             thread.start()
 
-    def _hear(self):
+    def _read_output(self):
         for line in self._process.stdout:
             # Blender prints messages before the command starts, and a process may be killed in the middle of a line.
             if line.startswith("{") and line.endswith("\n"):
                 with contextlib.suppress(ValueError):
-                    self._heard.put(json.loads(line))
+                    self._received.put(json.loads(line))
 
-    def _hear_errors(self):
+    def _read_errors(self):
         for line in self._process.stderr:
             if line.startswith(f"{PROGRAM}: ") and not line.startswith(f"{PROGRAM}: warning: "):
                 self._complaints.append(line.removeprefix(f"{PROGRAM}: ").strip())
 
     @property
-    def is_at_work(self):
+    def is_running(self):
         """Whether the process runs or has unread output."""
         return self._process.poll() is None or any(thread.is_alive() for thread in self._threads)
 

@@ -47,13 +47,13 @@ def open_apart(path, up, console, has_curves=False):
 
     has_curves: whether this process will read curves of the file; the separate process tries them first.
     """
-    heard = []
+    received = []
     with tempfile.TemporaryDirectory(prefix="vellus_", ignore_cleanup_errors=True) as folder:
         made = Path(folder) / "made.blend"
         options = [f"--out={made}", "--up", up, *(["--curves"] if has_curves else [])]
-        _run(path, options, console, heard.append)
+        _run(path, options, console, received.append)
         blender.io.mesh_files.load_scene(made)
-    return np.array(heard[-1]["file_axes"])
+    return np.array(received[-1]["file_axes"])
 
 
 def try_curves(path, console):
@@ -62,14 +62,13 @@ def try_curves(path, console):
         _run(path, ["--curves"], console, lambda _values: None)
 
 
-def _run(path, options, console, hear):
+def _run(path, options, console, receive):
     words = [*blender.host.cli_command.words(), "import", str(path.absolute()), *options]
     seconds = _PATIENCE + _PATIENCE_A_BYTE * path.stat().st_size
-    for failed in helpers.run([words], console, hear, "Reading", seconds):
+    for failed in helpers.run([words], console, receive, "Reading", seconds):
         if failed.is_late:
-            raise HairError(f"{path} cannot be read: its reader came to no end, as it does where a file is damaged.")
+            raise HairError(f"{path} cannot be read: reading takes too long, so the file may be damaged.")
         raise HairError(
             failed.complaint
-            or f"{path} cannot be read: its reader ended without a word ({failed.cause}), "
-            "as it does where a file is damaged."
+            or f"{path} cannot be read: its importer crashed ({failed.cause}), so the file may be damaged."
         )

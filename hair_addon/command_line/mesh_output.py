@@ -27,15 +27,17 @@ def make(given, console, made_of):
     blender.io.mesh_files.require_blend(given.input)
     blender.io.mesh_export.require_writable(given.out)
     opening.open_file(given, console)
-    started, objects, told = time.perf_counter(), [], []
+    started, objects, summaries = time.perf_counter(), [], []
     for hair in export.chosen_hair(given):
         made, counts, notes = made_of(hair)
         for note in notes:
             console.warn(str(note))
         objects += made
-        told.append({"hair": blender.host.notices.name_of(hair), **counts})
+        summaries.append({"hair": blender.host.notices.name_of(hair), **counts})
     blender.io.mesh_export.write(given.out, objects)
     seconds = time.perf_counter() - started
     values = {"verb": given.run.__module__.rpartition(".")[2], "input": str(given.input), "out": str(given.out)}
-    said = f"{len(objects)} meshes in {seconds:.2f} s: {given.out}"
-    console.result(values | {"made": told, "bytes": given.out.stat().st_size, "seconds": round(seconds, 3)}, said)
+    sentence = f"{len(objects)} meshes in {seconds:.2f} s: {given.out}"
+    console.result(
+        values | {"made": summaries, "bytes": given.out.stat().st_size, "seconds": round(seconds, 3)}, sentence
+    )

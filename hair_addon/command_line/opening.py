@@ -14,12 +14,12 @@ def open_file(given, console, has_curves=False):
     """
     blender.require_registered()
     blender.io.mesh_files.require_readable(given.input)
-    asks = blender.io.mesh_files.asks_for_axis(given.input)
-    up = (asks and getattr(given, "up", None)) or "Z"
-    if blender.io.mesh_files.ends_blender(given.input):
+    lacks_axis = blender.io.mesh_files.lacks_up_axis(given.input)
+    up = (lacks_axis and getattr(given, "up", None)) or "Z"
+    if blender.io.mesh_files.may_crash_blender(given.input):
         return import_mesh.open_apart(given.input, up, console, has_curves)
     file_axes = blender.io.mesh_files.open_file(given.input, up=up, runs_scripts=given.enable_scripts)
-    kept = blender.io.mesh_files.scripts_kept_from_running()
-    if kept:
-        console.warn(f"{given.input} has scripts or drivers that were not run ({kept}): --enable-scripts runs them.")
+    blocked = blender.io.mesh_files.scripts_kept_from_running()
+    if blocked:
+        console.warn(f"{given.input} has scripts or drivers that were not run ({blocked}): --enable-scripts runs them.")
     return file_axes

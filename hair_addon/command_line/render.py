@@ -79,7 +79,7 @@ def run(given, console):
         started = time.perf_counter()
         write = blender.io.frames.write_frame
         write(given.out, numbers[0], given.engine, settings, None, console.progress, given.allow_missing)
-        _tell(given, console, numbers[0], given.out, started)
+        _report(given, console, numbers[0], given.out, started)
 
 
 def _make_sequence(given, console, numbers, settings):
@@ -97,7 +97,7 @@ def _make_sequence(given, console, numbers, settings):
 
     started = time.perf_counter()
     for number, path in blender.io.sequence.make(given.out, numbers, write, console.progress):
-        _tell(given, console, number, path, started)
+        _report(given, console, number, path, started)
         started = time.perf_counter()
 
 
@@ -123,7 +123,7 @@ def _words(given, numbers, settings):
     return words + [f"--{name}" for name, is_given in flags.items() if is_given]
 
 
-def _tell(given, console, frame, path, started):
+def _report(given, console, frame, path, started):
     seconds = time.perf_counter() - started
     values = {"verb": "render", "input": str(given.input), "frame": frame, "engine": given.engine}
     values |= {"out": str(path), "seconds": round(seconds, 3)}

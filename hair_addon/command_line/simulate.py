@@ -67,14 +67,14 @@ def run(given, console):
         raise HairError(f"{given.input} has no guides that simulate: switch Dynamics on, or name them by --guides.")
     _warn_of_memory(guides, console)
 
-    def tell(baked):
+    def report(baked):
         values = {"verb": "simulate", "input": str(given.input), "guides": baked.guides, "frame": baked.frame}
         values |= {"seconds": round(baked.seconds, 3), "substeps": baked.substeps, "broken": baked.broken}
         values |= {"out": str(baked.folder)}
         console.result(values, f"{baked.guides}: frame {baked.frame} in {baked.seconds:.2f} s")
 
     scene = blender.host.scene_time.present_scene()
-    baking = blender.groom.dynamics.guide_baking.baking(guides, last, scene, given.overwrite, tell)
+    baking = blender.groom.dynamics.guide_baking.baking(guides, last, scene, given.overwrite, report)
     for one, made in zip(guides, run_now(baking, console.progress), strict=True):
         if made.worst.count:
             console.warn(str(made.worst.said_of(one)))

@@ -14,7 +14,7 @@ from . import setting_pairs
 def add_styles(parser, has_surface):
     """Add the options; has_surface: whether the command has a surface to fit presets to."""
     offers, presets = ", ".join(map(str.lower, OFFERS)), ", ".join(style_presets.PRESETS)
-    said = "; lengths that are not given are fitted to the surface" if has_surface else ""
+    fitting = "; lengths that are not given are fitted to the surface" if has_surface else ""
     parser.add_argument(
         "--style",
         dest="styles",
@@ -22,7 +22,7 @@ def add_styles(parser, has_surface):
         type=style,
         action="append",
         default=[],
-        help=f"a style with settings, as in curl:radius=0.004,pitch=0.01; again for more, in order: {offers}{said}",
+        help=f"a style with settings, as in curl:radius=0.004,pitch=0.01; again for more, in order: {offers}{fitting}",
     )
     lengths = ", fitted to the surface" if has_surface else ", with lengths for a head"
     parser.add_argument(

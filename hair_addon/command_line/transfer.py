@@ -51,8 +51,8 @@ def run(given, console):
     counts = {"guides": len(made.guides.curves), "lost": made.places.lost_count, "strands": len(made.hair.curves)}
     values = {"verb": "transfer", "input": str(given.input), "surface": target.name, "out": str(given.out), **counts}
     values |= {"scale": made.places.scale, "seconds": round(seconds, 3)}
-    told = f"{counts['guides']} guides, {counts['strands']} strands on {target.name}"
-    console.result(values, f"{told} in {seconds:.2f} s: {given.out}")
+    sentence = f"{counts['guides']} guides, {counts['strands']} strands on {target.name}"
+    console.result(values, f"{sentence} in {seconds:.2f} s: {given.out}")
 
 
 def _hair(given):

@@ -71,8 +71,7 @@ def test_an_importer_that_ends_its_process_is_one_sentence(files, tmp_path, monk
     )
     assert (ended.status, ended.out) == (1, "") and set(tmp_path.iterdir()) == before
     assert ended.errors == (
-        f"vellus: {files[ending]} cannot be read: its reader ended without a word (signal 11), as it does "
-        "where a file is damaged.\n"
+        f"vellus: {files[ending]} cannot be read: its importer crashed (signal 11), so the file may be damaged.\n"
     )
 
 
@@ -84,7 +83,7 @@ def test_curves_are_tried_apart(files, tmp_path, monkeypatch):
     ended = run_here("groom", HEAD, "--guides-from", files[".usdc"], "--out", tmp_path / "out.npz", reads_apart=True)
     assert (ended.status, ended.out) == (1, "")
     assert ended.errors == (
-        f"vellus: {files['.usdc']} cannot be read: its reader came to no end, as it does where a file is damaged.\n"
+        f"vellus: {files['.usdc']} cannot be read: reading takes too long, so the file may be damaged.\n"
     )
 
 

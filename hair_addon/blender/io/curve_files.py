@@ -35,13 +35,13 @@ _OTHER = {"GUIDES": "HAIR", "HAIR": "GUIDES"}
 class Wanted:
     """A request for curves: kind "GUIDES" or "HAIR"; name: of objects or groups, "" for all.
 
-    said: unit and up axis given by the user; axis: up axis of arrays that do not store one; plays: whether to keep the
-    motion of curves, if possible.
+    convention: unit and up axis given by the user; axis: up axis of arrays that do not store one; plays: whether to
+    keep the motion of curves, if possible.
     """
 
     kind: str
     name: str = ""
-    said: Convention = field(default_factory=Convention)
+    convention: Convention = field(default_factory=Convention)
     axis: str = "Z"
     plays: bool = False
 
@@ -118,7 +118,7 @@ def curves_of(path, wanted, surface_object, is_open=False):
     if path.suffix.lower() != ".blend":
         yield made_of(path, read(path, wanted.axis), wanted, surface_object)
         return
-    if wanted.said != Convention():
+    if wanted.convention != Convention():
         raise HairError("{path} has its own unit and axes: leave out those that were given.", path=path)
     before = set(bpy.data.objects)
     if not is_open:
@@ -164,7 +164,7 @@ def made_of(path, file, wanted, surface_object):
     """Create the `Found` of a `CurveFile` in the open scene. Raises `HairError`."""
     path = Path(path)
     chosen, guides = _chosen_sets(path, file.sets, wanted)
-    reading = curve_units.choose(file, [*chosen, *guides], wanted.said, _mesh(surface_object), str(path))
+    reading = curve_units.choose(file, [*chosen, *guides], wanted.convention, _mesh(surface_object), str(path))
     notes = [*file.notes, *reading.notes, *_notes_on_groups(path, chosen)]
     curves, its_guides = ([_now(one.placed(reading.metres, reading.up)) for one in sets] for sets in (chosen, guides))
     joined, made_guides, guide_ids = curve_file.join(curves), None, None

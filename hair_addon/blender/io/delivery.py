@@ -198,11 +198,11 @@ def _read(task, time):
     return points, curves.read_radii(evaluated.data), np.array(evaluated.matrix_world)
 
 
-def _writing(file, tasks, read, time, told):
-    """Return a function of (progress) that writes the samples of one time; told: arguments of progress."""
+def _writing(file, tasks, read, time, step):
+    """Return a function of (progress) that writes the samples of one time; step: arguments of progress."""
 
     def write(progress):
-        progress(*told)
+        progress(*step)
         for task, sample in zip(tasks, read, strict=True):
             file.write(time, task.path, *sample)
         file.save(time)

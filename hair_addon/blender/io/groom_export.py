@@ -98,11 +98,11 @@ def _go_to(blender_scene, time):
 
 def _opened(partial, path, chosen, first_frame, blender_scene):
     """Return the context of a writer; first_frame: None without animation."""
-    told = f"Vellus {paths.addon_version()}", _properties(chosen)
+    header = f"Vellus {paths.addon_version()}", _properties(chosen)
     rate = scene_time.frame_rate(blender_scene)
     if _is_usd(path):
-        return usd_groom.writing(partial, path, *told, rate, first_frame or 0)
-    return unreal_groom.writing(partial, *told, None if first_frame is None else rate, first_frame or 0)
+        return usd_groom.writing(partial, path, *header, rate, first_frame or 0)
+    return unreal_groom.writing(partial, *header, None if first_frame is None else rate, first_frame or 0)
 
 
 def _simulated(chosen, frames):
@@ -135,7 +135,7 @@ def _adding(writer, sources, path):
         numbers = []
         for source in sources:
             progress("Exporting", 0.0)
-            with _told(path):
+            with _disk_errors(path):
                 numbers.append(writer.add(source.curves, source.moves))
         return numbers
 
@@ -155,14 +155,14 @@ def _writing(writer, read, path, frame, part):
 
     def write(progress):
         for number, points in read:
-            with _told(path):
+            with _disk_errors(path):
                 writer.write_points(number, watched(points, progress))
 
     return write
 
 
 @contextlib.contextmanager
-def _told(path):
+def _disk_errors(path):
     """Convert OSError, such as of a full disk, to `HairError`: computations run outside other error handling."""
     try:
         yield

@@ -50,7 +50,7 @@ def write(path, guides, hair, file_axes):
         if ending == ".npz":
             np.savez(partial, **arrays(guides, hair, file_axes))
         else:
-            with only_chosen(_objects(guides, hair)), _kinds_told(guides, hair):
+            with only_chosen(_objects(guides, hair)), _kinds_marked(guides, hair):
                 _export(partial.absolute(), ending, guides, hair)
 
 
@@ -86,12 +86,12 @@ def _objects(guides, hair):
 
 
 @contextlib.contextmanager
-def _kinds_told(guides, hair):
+def _kinds_marked(guides, hair):
     """Mark guides and strands for Blender's exporters: USD writes attributes of curves, Alembic object properties."""
-    told = [(guides, True), (hair, False)]
-    objects = [(object_of(datablock, bpy.context.view_layer), is_guide) for datablock, is_guide in told]
+    kinds = [(guides, True), (hair, False)]
+    objects = [(object_of(datablock, bpy.context.view_layer), is_guide) for datablock, is_guide in kinds]
     objects = [(one, is_guide) for one, is_guide in objects if one is not None and _KIND not in one]
-    for datablock, is_guide in told:
+    for datablock, is_guide in kinds:
         attributes.write(datablock, _KIND, "INT", "CURVE", np.full(len(datablock.curves), is_guide, np.int32))
     for one, is_guide in objects:
         one[_KIND] = int(is_guide)
@@ -100,7 +100,7 @@ def _kinds_told(guides, hair):
     finally:
         for one, _is_guide in objects:
             del one[_KIND]
-        for datablock, _is_guide in told:
+        for datablock, _is_guide in kinds:
             datablock.attributes.remove(datablock.attributes[_KIND])
 
 
@@ -118,10 +118,10 @@ def _export(partial, ending, guides, hair):
             filepath=str(partial), selected_objects_only=True, export_hair=True, export_textures_mode="KEEP"
         )
         if scale != 1.0:
-            _say_unit(partial, scale)
+            _set_unit(partial, scale)
 
 
-def _say_unit(path, scale):
+def _set_unit(path, scale):
     """Set metersPerUnit of a USD file: Blender always writes one metre."""
     if path.suffix.lower() == ".usdz":
         raise HairError("Blender cannot store this scene's unit in a .usdz file: write a .usdc file.")

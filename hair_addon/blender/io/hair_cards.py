@@ -69,10 +69,10 @@ def making_cards(hair, settings, folder=None):
 def _drawing(read, level, picture_count, parts):
     """Draw a level, as work in steps; parts: (first, last) of the total progress."""
     first, last = parts
-    told = first, first + 0.1 * (last - first)
-    flat = yield lambda progress: _flat_cards(read, level, picture_count, part_of(progress, *told))
+    interval = first, first + 0.1 * (last - first)
+    flat = yield lambda progress: _flat_cards(read, level, picture_count, part_of(progress, *interval))
     mesh, placed, drawn_count = flat
-    yield Stage("Drawing cards", told[1])
+    yield Stage("Drawing cards", interval[1])
     picture = card_pictures.CardPicture(placed, level.texture_size)
     sums = texels.TexelSums(level.texture_size)
     for turn in range(card_pictures.PASSES):

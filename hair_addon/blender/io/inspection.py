@@ -117,5 +117,5 @@ def _settings(read):
 def _warnings(datablock):
     """Warnings shown in the panel."""
     state = datablock.vellus
-    said = [warning.text for warning in diagnostics.warnings_of(datablock.surface, [datablock])]
-    return said + [status for status in (state.status, state.shading_status, state.uv_status) if status]
+    texts = [warning.text for warning in diagnostics.warnings_of(datablock.surface, [datablock])]
+    return texts + [status for status in (state.status, state.shading_status, state.uv_status) if status]

@@ -60,20 +60,20 @@ _FORMATS = {
 }
 
 # Formats whose importers can crash Blender on damaged files despite all checks.
-_END_BLENDER = {".ply", ".usd", ".usdc", ".usda", ".usdz", ".abc"}
+_MAY_CRASH_BLENDER = {".ply", ".usd", ".usdc", ".usda", ".usdz", ".abc"}
 
 # Files without axes and units: read in metres.
-_UP_IS_ASKED = {".obj", ".ply", ".stl"}
+_WITHOUT_UP_AXIS = {".obj", ".ply", ".stl"}
 
 
-def asks_for_axis(path):
+def lacks_up_axis(path):
     """Whether the format does not state its up axis."""
-    return Path(path).suffix.lower() in _UP_IS_ASKED
+    return Path(path).suffix.lower() in _WITHOUT_UP_AXIS
 
 
-def ends_blender(path):
+def may_crash_blender(path):
     """Whether a damaged file of this format can crash the process that reads it."""
-    return Path(path).suffix.lower() in _END_BLENDER
+    return Path(path).suffix.lower() in _MAY_CRASH_BLENDER
 
 
 def axis_of(file_axes):
@@ -126,7 +126,7 @@ def open_file(path, *, up="Z", runs_scripts=False):
         mesh_checks.require_imported(path)
     except (OSError, RuntimeError) as error:
         raise HairError(f"{path} cannot be read: {cause_of(error)}.") from error
-    if ending in _UP_IS_ASKED:
+    if ending in _WITHOUT_UP_AXIS:
         return _UP[up]
     return _Y_UP if _is_y_up(path, ending) else np.eye(3)
 

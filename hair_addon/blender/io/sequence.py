@@ -118,16 +118,16 @@ def _require_none(pattern, numbers):
         raise HairError(f"{there} belongs to no known sequence: choose another name, or use --overwrite.")
 
 
-def make(pattern, numbers, write, told=no_progress):
+def make(pattern, numbers, write, progress=no_progress):
     """Render frames not yet rendered or claimed, and wait for claimed ones; yields (number, path) of rendered frames.
 
-    write(path, number): writes a frame atomically; told(step, part): progress callback, may raise to stop.
+    write(path, number): writes a frame atomically; progress(step, part): progress callback, may raise to stop.
     """
     left = list(numbers)
     while left:
         is_idle = True
         for number in list(left):
-            told(f"Frame {number}", 1.0 - len(left) / len(numbers))
+            progress(f"Frame {number}", 1.0 - len(left) / len(numbers))
             path = frames.path_of(pattern, number)
             if not _is_done(path):
                 with _claimed(path) as is_ours:

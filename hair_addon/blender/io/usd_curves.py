@@ -139,7 +139,7 @@ def _of_grooms(prim, time, is_kept):
     if is_guide is None and UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide:
         is_guide = True
     ids, uvs = of_curves("groom_id", np.int32), of_curves("groom_root_uv", np.float32, 2)
-    said = {
+    fields = {
         "is_guide": None if is_guide is None else bool(is_guide),
         "group_id": one("groom_group_id"),
         "group_name": one("groom_group_name"),
@@ -148,4 +148,4 @@ def _of_grooms(prim, time, is_kept):
         "guide_ids": of_curves("groom_closest_guides", np.int32, GUIDE_SLOTS),
         "guide_weights": of_curves("groom_guide_weights", np.float32, GUIDE_SLOTS),
     }
-    return {name: value for name, value in said.items() if value is not None}
+    return {name: value for name, value in fields.items() if value is not None}

@@ -132,7 +132,7 @@ def _child(name, first, last):
 def faults(name, count, seed, share=(0, 1), seconds=math.inf):
     """(Counter of how mutants were read, [what went wrong]) of one reader."""
     end = time.monotonic() + seconds
-    may_end = name == CURVES or (name in MESHES and _ends_blender(name))
+    may_end = name == CURVES or (name in MESHES and _may_crash_blender(name))
     told, found = Counter(), []
     asked = numbers(count, seed, share)
     number, last = asked.start, asked.stop
@@ -187,10 +187,10 @@ def _watch(process, end):
     return seen
 
 
-def _ends_blender(ending):
+def _may_crash_blender(ending):
     from hair_addon.blender.io import mesh_files
 
-    return mesh_files.ends_blender(f"a{ending}")
+    return mesh_files.may_crash_blender(f"a{ending}")
 
 
 def main(words=None):

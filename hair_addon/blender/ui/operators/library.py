@@ -61,7 +61,7 @@ _METHODS = {"AUTO": "Automatic", "UV": "UV Map", "NEAREST": "Nearest Surface"}
 _TOOLTIPS = {
     "AUTO": "As saved on a copy of the surface; by UV maps if they agree; else by the nearest surface",
     "UV": "Each guide keeps its UV coordinates",
-    "NEAREST": "Each guide goes to the nearest surface when both meshes are laid over each other",
+    "NEAREST": "Each guide goes to the nearest surface after both meshes are aligned",
 }
 
 
