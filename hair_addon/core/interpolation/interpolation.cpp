@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A strand as the weighted sum of its guides (interpolation.py), SEGMENTS of its segments at once: on a processor the
-// lanes of a vector, on a GPU registers of a thread.
+// A strand as the weighted sum of its guides (interpolation.py), SEGMENTS of its segments at once: in the lanes of a
+// vector on a CPU, in neighboring threads on a GPU.
 //
 // The body of `_sum_guides` in interpolation.py. Parameters, for S strands of P points, K slots of guides a strand and
 // G guides:
@@ -27,58 +27,77 @@
 #include "lanes.h"
 #include "vectors.h"
 #include "guide_sum.strand"
-constexpr int PARTS = SEGMENTS / LANES;
 const int point_count = out_points.shape[1];
 const int slot_count = indices.shape[1];
 const int group_count = offsets.shape[1];
 
+// A guide of the strand: its offsets, its weight, and the cosine and sine of its turn times the weight.
+struct Guide {
+  const float* offsets;
+  float share, cosine, sine;
+};
+const auto guide_of = [&](int slot) ALWAYS_INLINE {
+  const size_t place = size_t(strand) * slot_count + slot;
+  Guide guide;
+  guide.share = weights.data[place];
+  guide.offsets = offsets.data + size_t(indices.data[place]) * group_count * (4 * SEGMENTS);
+  guide.cosine = guide.share * turns.data[place][0];
+  guide.sine = guide.share * turns.data[place][1];
+  return guide;
+};
+
 #if defined(__CUDA_ARCH__)
-  const auto read_segments = [](lanes* to, const float* from) ALWAYS_INLINE {
-    for (int k = 0; k < PARTS / 4; ++k) {
-      const float4 four = __ldg(reinterpret_cast<const float4*>(from) + k);
-      to[4 * k] = four.x;
-      to[4 * k + 1] = four.y;
-      to[4 * k + 2] = four.z;
-      to[4 * k + 3] = four.w;
+  const int lane = threadIdx.x % SEGMENTS;
+  // The threads of this strand, as bits of the warp.
+  const unsigned team = ((1u << SEGMENTS) - 1u) << (threadIdx.x % 32 / SEGMENTS * SEGMENTS);
+  const auto read_segments = [&](const float* from) { return __ldg(from + lane); };
+  // From segments to points: sums of all segments from `last` on, which becomes the last of them.
+  const auto add_up = [&](lanes& along, float& last) {
+    for (int step = 1; step < SEGMENTS; step *= 2) {
+      const float before = __shfl_up_sync(team, along, step, SEGMENTS);
+      along += lane >= step ? before : 0.0f;
+    }
+    along += last;
+    last = __shfl_sync(team, along, SEGMENTS - 1, SEGMENTS);
+  };
+  const auto write_points = [&](lanes x, lanes y, lanes z, float* to, int count) {
+    if (lane < count) {
+      to[3 * lane] = x;
+      to[3 * lane + 1] = y;
+      to[3 * lane + 2] = z;
     }
   };
-  // From segments to points: sums of all segments from `last` on, which becomes the last of them.
-  const auto add_up = [](lanes* along, float& last) ALWAYS_INLINE {
-    for (int part = 0; part < PARTS; ++part) along[part] = last += along[part];
-  };
-  const auto write_points = [](const lanes* x, const lanes* y, const lanes* z, float* to, int count) ALWAYS_INLINE {
-#pragma unroll
-    for (int part = 0; part < PARTS; ++part) {
-      if (part < count) {
-        to[3 * part] = x[part];
-        to[3 * part + 1] = y[part];
-        to[3 * part + 2] = z[part];
-      }
+  // Slots are read for each group: registers of an index known at run time would be memory.
+  const auto for_guides = [&](auto use) {
+    for (int slot = 0; slot < slot_count; ++slot) {
+      if (weights.data[size_t(strand) * slot_count + slot] > 0.0f) use(guide_of(slot));
     }
   };
 #else
-  const auto read_segments = [](lanes* to, const float* from) ALWAYS_INLINE {
-    __builtin_memcpy(to, from, sizeof(lanes));
+  const auto read_segments = [](const float* from) ALWAYS_INLINE {
+    lanes found;
+    __builtin_memcpy(&found, from, sizeof(lanes));
+    return found;
   };
   // The same by an inclusive scan over the lanes [Harris07]: vectors are moved up by some lanes, with zeros below.
-  const auto add_up = [](lanes* along, float& last) ALWAYS_INLINE {
+  const auto add_up = [](lanes& along, float& last) ALWAYS_INLINE {
     const lanes zeros = 0.0f;
     const auto up_by_1 = [&](lanes v) { return __builtin_shufflevector(zeros, v, 0, 8, 9, 10, 11, 12, 13, 14); };
     const auto up_by_2 = [&](lanes v) { return __builtin_shufflevector(zeros, v, 0, 0, 8, 9, 10, 11, 12, 13); };
     const auto up_by_4 = [&](lanes v) { return __builtin_shufflevector(zeros, v, 0, 0, 0, 0, 8, 9, 10, 11); };
-    along[0] += up_by_1(along[0]);
-    along[0] += up_by_2(along[0]);
-    along[0] += up_by_4(along[0]) + last;
-    last = along[0][LANES - 1];
+    along += up_by_1(along);
+    along += up_by_2(along);
+    along += up_by_4(along) + last;
+    last = along[LANES - 1];
   };
   // From three vectors to points as they lie in memory: x0 y0 z0 x1 y1 z1 …
-  const auto write_points = [](const lanes* x, const lanes* y, const lanes* z, float* to, int count) ALWAYS_INLINE {
-    const lanes xy_0 = __builtin_shufflevector(x[0], y[0], 0, 8, 0, 1, 9, 0, 2, 10);
-    const lanes xy_1 = __builtin_shufflevector(x[0], y[0], 0, 3, 11, 0, 4, 12, 0, 5);
-    const lanes xy_2 = __builtin_shufflevector(x[0], y[0], 13, 0, 6, 14, 0, 7, 15, 0);
-    const lanes part_0 = __builtin_shufflevector(xy_0, z[0], 0, 1, 8, 3, 4, 9, 6, 7);
-    const lanes part_1 = __builtin_shufflevector(xy_1, z[0], 10, 1, 2, 11, 4, 5, 12, 7);
-    const lanes part_2 = __builtin_shufflevector(xy_2, z[0], 0, 13, 2, 3, 14, 5, 6, 15);
+  const auto write_points = [](lanes x, lanes y, lanes z, float* to, int count) ALWAYS_INLINE {
+    const lanes xy_0 = __builtin_shufflevector(x, y, 0, 8, 0, 1, 9, 0, 2, 10);
+    const lanes xy_1 = __builtin_shufflevector(x, y, 0, 3, 11, 0, 4, 12, 0, 5);
+    const lanes xy_2 = __builtin_shufflevector(x, y, 13, 0, 6, 14, 0, 7, 15, 0);
+    const lanes part_0 = __builtin_shufflevector(xy_0, z, 0, 1, 8, 3, 4, 9, 6, 7);
+    const lanes part_1 = __builtin_shufflevector(xy_1, z, 10, 1, 2, 11, 4, 5, 12, 7);
+    const lanes part_2 = __builtin_shufflevector(xy_2, z, 0, 13, 2, 3, 14, 5, 6, 15);
     if (count >= LANES) {
       __builtin_memcpy(to, &part_0, sizeof(lanes));
       __builtin_memcpy(to + LANES, &part_1, sizeof(lanes));
@@ -90,23 +109,15 @@ const int group_count = offsets.shape[1];
       for (int number = 0; number < 3 * count; ++number) to[number] = numbers[number];
     }
   };
-#endif
-
-// The guides with a weight: where their offsets begin, and the factors of those.
-const float* guide[SLOT_LIMIT];
-float share[SLOT_LIMIT], cosine[SLOT_LIMIT], sine[SLOT_LIMIT];
-int guide_count = 0;
-for (int slot = 0; slot < slot_count; ++slot) {
-  const size_t place = size_t(strand) * slot_count + slot;
-  const float weight = weights.data[place];
-  if (weight > 0.0f) {
-    guide[guide_count] = offsets.data + size_t(indices.data[place]) * group_count * (4 * SEGMENTS);
-    share[guide_count] = weight;
-    cosine[guide_count] = weight * turns.data[place][0];
-    sine[guide_count] = weight * turns.data[place][1];
-    ++guide_count;
+  Guide guides[SLOT_LIMIT];
+  int guide_count = 0;
+  for (int slot = 0; slot < slot_count; ++slot) {
+    if (weights.data[size_t(strand) * slot_count + slot] > 0.0f) guides[guide_count++] = guide_of(slot);
   }
-}
+  const auto for_guides = [&](auto use) ALWAYS_INLINE {
+    for (int number = 0; number < guide_count; ++number) use(guides[number]);
+  };
+#endif
 
 float* row = reinterpret_cast<float*>(out_points.data) + size_t(strand) * point_count * 3;
 float last_x = root[0], last_y = root[1], last_z = root[2];
@@ -114,34 +125,30 @@ row[0] = last_x;
 row[1] = last_y;
 row[2] = last_z;
 for (int group = 0; group < group_count; ++group) {
-  lanes x[PARTS] = {}, y[PARTS] = {}, z[PARTS] = {}, size[PARTS] = {};
-  for (int g = 0; g < guide_count; ++g) {
-    const float* its_offsets = guide[g] + group * (4 * SEGMENTS);
-    lanes guide_x[PARTS], guide_y[PARTS], guide_z[PARTS], guide_size[PARTS];
-    read_segments(guide_x, its_offsets);
-    read_segments(guide_y, its_offsets + SEGMENTS);
-    read_segments(guide_z, its_offsets + 2 * SEGMENTS);
-    read_segments(guide_size, its_offsets + 3 * SEGMENTS);
-#pragma unroll
-    for (int k = 0; k < PARTS; ++k) {
-      add_guide(
-          x[k], y[k], z[k], size[k], share[g], cosine[g], sine[g], guide_x[k], guide_y[k], guide_z[k], guide_size[k]);
-    }
-  }
+  lanes x = 0.0f, y = 0.0f, z = 0.0f, size = 0.0f;
+  for_guides([&](const Guide& guide) ALWAYS_INLINE {
+    const float* its_offsets = guide.offsets + group * (4 * SEGMENTS);
+    add_guide(
+        x,
+        y,
+        z,
+        size,
+        guide.share,
+        guide.cosine,
+        guide.sine,
+        read_segments(its_offsets),
+        read_segments(its_offsets + SEGMENTS),
+        read_segments(its_offsets + 2 * SEGMENTS),
+        read_segments(its_offsets + 3 * SEGMENTS));
+  });
   // Out of the strand's frame.
-#pragma unroll
-  for (int k = 0; k < PARTS; ++k) {
-    const lanes stretch = stretch_of(x[k], y[k], z[k], size[k], keep_length);
-    const lanes along_x = stretch * (tangent[0] * x[k] + bitangent[0] * y[k] + normal[0] * z[k]);
-    const lanes along_y = stretch * (tangent[1] * x[k] + bitangent[1] * y[k] + normal[1] * z[k]);
-    const lanes along_z = stretch * (tangent[2] * x[k] + bitangent[2] * y[k] + normal[2] * z[k]);
-    x[k] = along_x;
-    y[k] = along_y;
-    z[k] = along_z;
-  }
-  add_up(x, last_x);
-  add_up(y, last_y);
-  add_up(z, last_z);
-  write_points(x, y, z, row + 3 + group * (3 * SEGMENTS), point_count - 1 - group * SEGMENTS);
+  const lanes stretch = stretch_of(x, y, z, size, keep_length);
+  lanes along_x = stretch * (tangent[0] * x + bitangent[0] * y + normal[0] * z);
+  lanes along_y = stretch * (tangent[1] * x + bitangent[1] * y + normal[1] * z);
+  lanes along_z = stretch * (tangent[2] * x + bitangent[2] * y + normal[2] * z);
+  add_up(along_x, last_x);
+  add_up(along_y, last_y);
+  add_up(along_z, last_z);
+  write_points(along_x, along_y, along_z, row + 3 + group * (3 * SEGMENTS), point_count - 1 - group * SEGMENTS);
 }
 }

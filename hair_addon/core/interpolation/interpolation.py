@@ -16,7 +16,7 @@ about the normal. So guides are transformed to their frames once, a neighbour co
 instead of nine, and the strand's frame is applied to the sum.
 
 interpolation.cpp makes eight segments of a strand at once, in vector registers of a processor (Clang's vectors, which
-Warp compiles for the processor that it runs on: AVX, NEON) or in a thread's registers of a GPU. Sums stay in registers
+Warp compiles for the processor that it runs on: AVX, NEON) or in neighboring threads of a GPU. Sums stay in registers
 over all guides, segments are added up to points, and a strand is written once. The equations stand in guide_sum.strand,
 which the shader that interpolates where strands are drawn includes too.
 """
@@ -74,6 +74,7 @@ def interpolate(
         device=roots.device,
         least_rows=1024,
     )
+    threads = 1 if wp.get_device(roots.device).is_cpu else SEGMENTS
     points = parallel.empty_vectors((len(roots), point_count), roots.device) if out is None else out
     parallel.launch(
         _put_strands,
@@ -86,10 +87,12 @@ def interpolate(
             Rows(guide_weights.weights),
             Rows(guide_weights.turns),
             keep_length,
+            threads,
         ],
         outputs=[points],
         device=roots.device,
         under_way=under_way,
+        threads_per_row=threads,
     )
     return points
 
@@ -119,10 +122,11 @@ def _put_strands(
     weights: wp.array2d[float],
     turns: wp.array2d[wp.vec2],
     keep_length: float,
+    threads: int,  # of a strand
     # outputs
     out_points: wp.array2d[wp.vec3],
 ):
-    strand = wp.tid()
+    strand = wp.tid() / threads
     normal = normals[strand]
     tangent, bitangent = frame(normal)
     _sum_guides(

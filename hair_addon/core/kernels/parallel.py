@@ -42,11 +42,13 @@ def launch(
     device: wp.DeviceLike,
     least_rows: int = LEAST_ROWS,
     under_way: Callable[[], None] | None = None,
+    threads_per_row: int = 1,
 ) -> None:
-    """Run a kernel, one thread per row. inputs: `Rows`, and arguments shared by all threads; outputs: arrays of rows.
+    """Run a kernel. inputs: `Rows`, and arguments shared by all threads; outputs: arrays of rows.
 
     least_rows: fewer are not worth a CPU thread; under_way: called when all threads are about to begin; from then on
-    they do not need the GIL until the end. Raises `HairError` if an array has another number of rows.
+    they do not need the GIL until the end; threads_per_row: consecutive threads of the kernel for each row. Raises
+    `HairError` if an array has another number of rows.
     """
     device = wp.get_device(device)
     values = [*inputs, *map(Rows, outputs)]
@@ -63,7 +65,7 @@ def launch(
     def arguments(_part, first, end):
         return [value.part(first, end) if isinstance(value, Rows) else value for value in values]
 
-    _launch_parts(kernel, arguments, row_count, max(1, part_count), device, under_way)
+    _launch_parts(kernel, arguments, row_count, max(1, part_count), device, under_way, threads_per_row)
 
 
 def share_count(row_count: int, device: wp.DeviceLike, least_rows: int = LEAST_ROWS) -> int:
@@ -97,24 +99,26 @@ def _core_count(device):
     return kernel_setup.processor_count() if device.is_cpu else 1
 
 
-def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=None):
+def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=None, threads_per_row=1):
     """Launch a kernel on parts of the rows, with a thread for each core; arguments(part, first, end): of a part."""
     if part_count == 1:
         if under_way is not None:
             under_way()
-        kernel_cache.launch(kernel, dim=row_count, inputs=arguments(0, 0, row_count), device=device)
+        kernel_cache.launch(kernel, dim=row_count * threads_per_row, inputs=arguments(0, 0, row_count), device=device)
         return
     bounds = np.linspace(0, row_count, part_count + 1).astype(int).tolist()
 
     def launch_part(part):
         first, end = bounds[part : part + 2]
-        kernel_cache.launch(kernel, dim=end - first, inputs=arguments(part, first, end), device=device)
+        kernel_cache.launch(
+            kernel, dim=(end - first) * threads_per_row, inputs=arguments(part, first, end), device=device
+        )
 
     kernel_cache.load(device, kernel.module)  # once, before the threads start
     if under_way is not None:
         parts = zip(range(part_count), bounds, bounds[1:], strict=False)
         prepared = [
-            kernel_cache.prepared(kernel, end - first, arguments(part, first, end), device)
+            kernel_cache.prepared(kernel, (end - first) * threads_per_row, arguments(part, first, end), device)
             for part, first, end in parts
         ]
         numbers = itertools.count(1)
