@@ -33,7 +33,7 @@ _PATIENCE = 0.5  # [s] between checks whether a render has ended
 
 
 def require_registered():
-    """Register the add-on in a checkout. Raises `HairError` where it is an extension that is disabled."""
+    """Register the add-on in a checkout. Raises `HairError` for a disabled extension."""
     if hasattr(bpy.types.Curves, "vellus"):
         return
     if __package__.startswith("bl_ext."):  # Blender would register it twice when it is enabled
@@ -43,9 +43,9 @@ def require_registered():
 
 def register():
     """Register classes, then handlers and drawing."""
-    if bpy.app.timers.is_registered(_unregister_after_render):  # disabled a moment ago, and enabled again
+    if bpy.app.timers.is_registered(_unregister_after_render):  # enabled again during the wait
         bpy.app.timers.unregister(_unregister_after_render)
-        bpy.app.timers.register(_show_usual_status_bars)  # Blender hides its data while it enables an add-on
+        bpy.app.timers.register(_show_usual_status_bars)  # bpy.data is restricted while an add-on is enabled
         return
     for cls in CLASSES:
         bpy.utils.register_class(cls)
@@ -61,15 +61,15 @@ def register():
     handlers.register()
     viewport.register()
     first_setup.register()
-    # Blender's own handler of its exit comes too late.
+    # Blender's own exit handler runs too late.
     atexit.unregister(invalidation.end)
     atexit.register(invalidation.end)
 
 
 def unregister():
-    """Undo `register` in reverse: at once, or when the render of a window has ended.
+    """Undo `register` in reverse: at once, or when a render in a window has ended.
 
-    Blender would wait for the thread of the render, and this for Python, which Blender holds meanwhile.
+    Otherwise there would be a deadlock: Blender waits for the render thread, which waits for Python's lock.
     """
     if not running.is_rendering():
         _unregister()
@@ -95,7 +95,7 @@ def _show_usual_status_bars():
 
 
 def _show_in_status_bars(text):
-    """Show a text in all windows; None: what Blender shows there."""
+    """Show a text in the status bars of all windows; None restores Blender's own."""
     for workspace in bpy.data.workspaces if running.has_window() else ():
         workspace.status_text_set(text)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The manual for F1 and *Online Manual*: a page per panel, a heading per setting or operator.
 
-The pages are files of the add-on: HTML in the installed extension, their Markdown in docs/manual of a checkout.
+The pages are local files: HTML in the installed extension, Markdown in docs/manual of a checkout.
 """
 
 import re
@@ -67,19 +67,19 @@ _OPERATORS = {
 
 
 def anchor(label):
-    """The anchor of a heading, as Markdown's readers make it: guide-count of Guide Count."""
+    """Return the Markdown anchor of a heading: guide-count for Guide Count."""
     return re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", label).strip().lower())
 
 
 def folder():
-    """(folder of the pages, their suffix)."""
+    """Return (folder of the pages, their suffix)."""
     root = Path(__file__).resolve().parents[2]
     installed = root / "manual"
     return (installed, ".html") if installed.is_dir() else (root / "docs" / "manual", ".md")
 
 
 def manual_map():
-    """(prefix, [(pattern, page and anchor)]), as `bpy.utils.register_manual_map` wants it."""
+    """Return (prefix, [(pattern, page and anchor)]) for `bpy.utils.register_manual_map`."""
     pages, suffix = folder()
     targets = [
         (pattern.lower(), f"{page}{suffix}#{anchor(label)}") for pattern, page, label in (*_properties(), *_operators())
@@ -97,7 +97,7 @@ def _properties():
 
 
 def _operators():
-    """Of an operator's properties too, which Blender looks up by their operator."""
+    """Yield entries of operators, which serve their properties too."""
     labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in operators.CLASSES}
     for page, names in _OPERATORS.items():
         for name in names:

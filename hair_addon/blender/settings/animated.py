@@ -27,18 +27,18 @@ _GROUPS = {
 
 _RADII = {diameter: radius for radius, diameter in setting_properties.diameters(HairSettings)}
 
-# session_uid of Curves → (values of all settings when they were looked at last, paths that were keyed or driven then)
+# session_uid of Curves → (last known values of all settings, paths that were keyed or driven at that time)
 value_cache = Cache()
 
 
 def are_keyed(datablock):
-    """Whether any property of Curves may be moved by a key or a driver."""
+    """Whether any property of Curves may be animated or driven."""
     animation = datablock.animation_data
     return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
 
 
 def remember(is_made_with=False):
-    """Store setting values before a frame change; is_made_with: whether strands were made with what keys give now."""
+    """Store setting values before a frame change; is_made_with: whether strands match the present animated values."""
     for datablock in _keyed():
         known = value_cache.get(datablock.session_uid)
         paths = style_keys.keyed_paths(datablock) if is_made_with else set() if known is None else known[1]
@@ -46,9 +46,9 @@ def remember(is_made_with=False):
 
 
 def follow(depsgraph):
-    """Mark Curves as stale whose settings were animated; returns whether any were. A render has its own values.
+    """Mark Curves as stale whose animated settings changed; returns whether any did. Renders use their own values.
 
-    Of a key or driver that is new nobody knows what strands were made with: its first value counts as a change.
+    The first value of a new key or driver counts as a change, as the value that strands were made with is unknown.
     """
     is_render = scene_time.is_rendered(depsgraph)
     is_outdated = False
@@ -86,15 +86,15 @@ def _groups(state):
 
 
 def _at(datablock, paths):
-    """[(property group, name)] of the settings at some data paths; of a diameter, its radius."""
+    """Return [(property group, name)] of the settings at some data paths; radii in place of diameters."""
     found = []
     for path in paths:
         owner, _, name = path.rpartition(".")
-        with contextlib.suppress(ValueError):  # of a path that leads nowhere, which Blender keeps
+        with contextlib.suppress(ValueError):  # Blender keeps invalid data paths
             found.append((datablock.path_resolve(owner), _RADII.get(name, name)))
     return found
 
 
 def _key(item):
-    """Of a style, wherever it is in the list."""
+    """Return the key of a style, independent of its index in the list."""
     return item.kind, text_of(item, "name")

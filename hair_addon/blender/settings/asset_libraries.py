@@ -8,12 +8,12 @@ import bpy
 from ...core.errors import HairError
 from .translations import CONTEXT
 
-# Of operators that Blender calls for an asset: its own numbers.
+# Blender's own numbers, used when it calls an operator for an asset.
 _KINDS = (("LOCAL", 1), ("ALL", 2), ("ESSENTIALS", 3), ("ONLINE_ESSENTIALS", 4), ("CUSTOM", 100))
 
 
 def library_name(name, description):
-    """The name of an asset library, offered by name."""
+    """Return a property for the name of an asset library, with search."""
     return bpy.props.StringProperty(
         name=name, description=description, translation_context=CONTEXT, search=_names, search_options=set()
     )
@@ -25,13 +25,13 @@ def _names(_owner, _context, typed):
 
 
 def first_name():
-    """The name of the first asset library, empty where there is none."""
+    """Return the name of the first asset library, empty if there is none."""
     libraries = bpy.context.preferences.filepaths.asset_libraries
     return libraries[0].name if len(libraries) else ""
 
 
 def folder_of(name):
-    """The folder of an asset library. Raises `HairError`."""
+    """Return the folder of an asset library. Raises `HairError`."""
     library = bpy.context.preferences.filepaths.asset_libraries.get(name)
     if not name:
         raise HairError("There is no asset library: add one in Preferences ▸ File Paths.")
@@ -44,7 +44,7 @@ def show_changes(name):
     """Reload a library's assets in all windows after its files have changed."""
     library = bpy.context.preferences.filepaths.asset_libraries.get(name)
     if library is not None:
-        # A shelf that is not shown yet may have read all libraries for another mode, without a context to refresh in.
+        # A hidden asset shelf may have cached the libraries, and there is no context to refresh it in.
         were_changed = bpy.context.preferences.is_dirty
         library.path = library.path
         bpy.context.preferences.is_dirty = were_changed
@@ -57,7 +57,7 @@ def show_changes(name):
 
 
 def reference():
-    """{name: property} by which Blender tells an operator of an asset."""
+    """Return {name: property} that Blender sets when it calls an operator for an asset."""
     hidden = {"options": {"HIDDEN", "SKIP_SAVE"}}
     kinds = [(kind, kind.title(), "", number) for kind, number in _KINDS]
     return {
@@ -68,7 +68,7 @@ def reference():
 
 
 def referenced(operator):
-    """(file, name) of the asset that an operator with `reference` was called for; None for none. Raises `HairError`."""
+    """Return (file, name) of the asset an operator with `reference` was called for, or None. Raises `HairError`."""
     relative = operator.relative_asset_identifier.replace("\\", "/")
     if not relative:
         return None

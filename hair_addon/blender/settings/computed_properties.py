@@ -5,21 +5,21 @@ import bpy
 
 from .translations import CONTEXT
 
-_NOT_KEYED = set()  # of properties that take no keys
+_NOT_KEYED = set()  # options of properties that cannot be keyed
 
 
 def computed_text(name, description, get, set):
-    """A line of text of a group that is stored elsewhere; get(group), set(group, text): as in bpy.props."""
+    """Return a string property; get(group), set(group, text): as in bpy.props."""
     return bpy.props.StringProperty(**_computed(name, description, get, set), options=_NOT_KEYED)
 
 
 def computed_flag(name, description, get, set):
-    """The same for a boolean, also if the group's datablock is linked."""
+    """Return a boolean property, editable also if the group's datablock is linked."""
     return bpy.props.BoolProperty(**_computed(name, description, get, set), options={"LIBRARY_EDITABLE"})
 
 
 def computed_index(name, description, get, set):
-    """The same for a list index, -1 for none."""
+    """Return a property of a list index, -1 for none."""
     return bpy.props.IntProperty(**_computed(name, description, get, set), options=_NOT_KEYED)
 
 

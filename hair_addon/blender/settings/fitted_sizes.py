@@ -2,8 +2,9 @@
 """Sizes that are fitted to the surface and its mask until they are set by hand: length, gravity, drape, thickness and
 influence distance.
 
-Groups of Curves have a flag beside each, `fits_length` for `length`: setting the size, by hand, by a script or by a
-key, clears it. Operators remember what they have shown, and take it for fitted while nobody changes it.
+Property groups of Curves have a flag for each size, such as `fits_length` for `length`: setting the size by hand, by a
+script or by a key clears it. Operators store the sizes they have shown; a size stays fitted while it
+equals the stored one.
 """
 
 import json
@@ -16,12 +17,12 @@ from . import style_keys
 from .translations import CONTEXT
 
 _PREFIX = "fits_"
-_FOUND = ("drape",)  # by what makes new guides, and not by settings that are left open
+_FOUND = ("drape",)  # computed when guides are made, not from settings left open
 SHOWN = "shown_sizes"  # property of operators: JSON {name: value}
 
 
 def fitted(settings_class):
-    """Names of the settings of a class that are fitted to the surface until they are set."""
+    """Return the names of the settings of a class that are fitted to the surface until they are set."""
     sizes = from_surface(settings_class)
     return tuple(name for name, *_ in declared(settings_class) if name in sizes or name in _FOUND)
 
@@ -32,7 +33,7 @@ def flag_of(name):
 
 
 def group_properties(names, update):
-    """{flag: bpy property} of a property group, for some sizes; update: as in bpy.props."""
+    """Return {flag: bpy property} for some sizes of a property group; update: as in bpy.props."""
 
     def refit(group, context):
         group.id_data.vellus.fit_key = ""
@@ -51,12 +52,12 @@ def group_properties(names, update):
 
 
 def operator_properties():
-    """{name: bpy property} that operators remember shown sizes in."""
+    """Return {name: bpy property} in which operators store shown sizes."""
     return {SHOWN: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})}
 
 
 def by_hand(name, update):
-    """An `update` of a size: it is no longer fitted."""
+    """Return an `update` for a size that clears its flag."""
 
     def changed(group, context):
         keep_flags(group, {name: False})
@@ -80,7 +81,7 @@ def keep_values(group, values):
 
 
 def names_in(group, settings_class):
-    """The sizes of a property group that are fitted; what keys or drivers move is not."""
+    """Return the fitted sizes of a property group; animated sizes are not fitted."""
     names = {name for name in fitted(settings_class) if getattr(group, flag_of(name))}
     if not names:
         return names
@@ -89,17 +90,17 @@ def names_in(group, settings_class):
 
 
 def opened(settings, names):
-    """`Settings` with some sizes left to be computed from the surface."""
+    """Return `Settings` with some sizes set to None, to be computed from the surface."""
     return replace(settings, **{name: None for name in from_surface(type(settings)) if name in names})
 
 
 def open_names(settings):
-    """The sizes of `Settings` that are left to be computed."""
+    """Return the sizes of `Settings` that are None, to be computed."""
     return {name for name in from_surface(type(settings)) if getattr(settings, name) is None}
 
 
 def is_open(operator, name):
-    """Whether an operator was not given a size: it is not set, or as the operator has shown it."""
+    """Whether a size of an operator was not given: it is not set, or equals the value shown."""
     if not operator.properties.is_property_set(name):
         return True
     shown = _shown(operator)
@@ -107,7 +108,7 @@ def is_open(operator, name):
 
 
 def show(operator, group, settings_class):
-    """Show the sizes of a group in an operator's redo panel, of which those that are fitted stay so."""
+    """Show the sizes of a group in an operator's redo panel; fitted sizes stay fitted."""
     for name in fitted(settings_class):
         setattr(operator, name, getattr(group, name))
     others = {name: value for name, value in _shown(operator).items() if name not in fitted(settings_class)}

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a length goes for each pixel that its field is dragged: a thousandth of the surface, within a factor of five.
+"""Drag steps of length fields: a thousandth of the surface per pixel, within a factor of five.
 
-Blender's steps belong to a property, not to its value, and follow the scene's unit. A length of a property group has
-two properties therefore: its own, in steps for scenes in meters, and one that shows it in coarser steps and beyond the
-end of the first one's slider, for scenes in centimeters and creatures of ten meters. Rows show the one that fits.
+Blender's steps belong to a property, not to its value, and follow the scene's unit. A length of a property group
+therefore has two properties: its own, with steps for scenes in meters, and one with coarser steps and a longer slider,
+for scenes in centimeters and creatures of ten meters. Rows show the property that fits.
 """
 
 import math
@@ -12,22 +12,22 @@ import bpy
 
 from . import style_keys
 
-FINE, COARSE = 0.03, 3.0  # of `bpy.props`: a hundredth of it is a pixel's, where the scene has no units
+FINE, COARSE = 0.03, 3.0  # `step` of `bpy.props`: a pixel is a hundredth of it if the scene has no units
 _SUFFIX = "_in_coarse_steps"
-_UNITS = {  # [m] that Blender has steps of
+_UNITS = {  # [m] units that Blender's steps use
     "METRIC": (1000.0, 1.0, 0.01, 0.001, 1e-6),
     "IMPERIAL": (1609.344, 0.3048, 0.0254, 2.54e-5),
 }
-_PIXELS = 1000.0  # that a length as large as the surface is dragged
+_PIXELS = 1000.0  # dragged for a length as large as the surface
 
 
 def coarse_name(name):
-    """The name of the property that shows a length in coarser steps."""
+    """Return the name of the property that shows a length in coarser steps."""
     return name + _SUFFIX
 
 
 def coarse_property(length, **details):
-    """A property that shows the length of a name in its group; details: as in bpy.props. Keys are for the length."""
+    """Return a property that shows `length` of its group; details: as in bpy.props. Only the length itself is keyed."""
 
     def read(group):
         return getattr(group, length)
@@ -39,7 +39,7 @@ def coarse_property(length, **details):
 
 
 def shown_name(owner, name):
-    """The property that a row shows a setting by: in steps that fit the surface of its hair, or its own."""
+    """Return the name of the property that a row shows for a setting: the one whose steps fit the hair's surface."""
     coarse = coarse_name(name)
     if coarse not in owner.bl_rna.properties:
         return name
@@ -50,11 +50,11 @@ def shown_name(owner, name):
     if fine_off <= coarse_off:
         return name
     is_keyed = f"{owner.path_from_id()}.{name}" in style_keys.keyed_paths(owner.id_data)
-    return name if is_keyed else coarse  # which would not show that it is
+    return name if is_keyed else coarse  # the coarse property would not show the key
 
 
 def per_pixel(step):
-    """Units of the scene that a length with a step of `bpy.props` goes for each pixel, as Blender finds it."""
+    """Return the scene units per dragged pixel for a `step` of `bpy.props`, as Blender computes it."""
     units = bpy.context.scene.unit_settings
     plain = 0.01 * step
     if units.system == "NONE":
@@ -65,11 +65,11 @@ def per_pixel(step):
 
 
 def _largest(units, length):
-    """The largest of units that a length is not shorter than, or the smallest of all."""
+    """Return the largest unit not longer than a length, or the smallest unit."""
     return next((unit for unit in units if unit <= length * (1.0 + 1e-6)), units[-1])
 
 
 def _size_of(datablock):
-    """The largest dimension of the surface of Curves, or of an object, in the world; 0 of others."""
+    """Return the largest world dimension of the surface of Curves, or of an object; 0 for others."""
     surface = datablock if isinstance(datablock, bpy.types.Object) else getattr(datablock, "surface", None)
     return 0.0 if surface is None else max(surface.dimensions)

@@ -5,13 +5,13 @@ import bpy
 
 
 def mark_geometry(group, _context):
-    """Regenerate guides or strands; an `update` of properties."""
+    """Mark guides or strands for regeneration; an `update` of properties."""
     group.id_data.vellus.is_stale = True
     group.id_data.update_tag()
 
 
 def mark_shading(group, _context):
-    """Update what shades them."""
+    """Mark the shading for update."""
     group.id_data.vellus.is_shading_stale = True
     group.id_data.update_tag()
 
@@ -22,13 +22,13 @@ def mark_shown(group, _context):
 
 
 def mark_dynamics(group, _context):
-    """Simulate from now on with other settings: frames that were simulated before are outdated. Guides stay combed."""
+    """Mark the simulation: simulated frames are outdated, combed guides stay."""
     group.id_data.vellus.is_dynamics_stale = True
     group.id_data.update_tag()
 
 
 def mark_water(group, context):
-    """Update what shades hair, and simulate its guides with another weight; group: of the hair."""
+    """Mark the shading of hair and the simulation of its guides, whose weight changes; group: of the hair."""
     mark_shading(group, context)
     guides = group.id_data.vellus.guide_curves
     if guides is not None and guides.vellus.simulates and guides.is_editable:
@@ -36,13 +36,13 @@ def mark_water(group, context):
 
 
 def mark_wet_style(group, context):
-    """Do it, and style the hair again."""
+    """Like `mark_water`, and regenerate the hair's styles."""
     mark_geometry(group, context)
     mark_water(group, context)
 
 
 def mark_water_of_guides(group, context):
-    """Simulate guides with another weight, and update what shades the hair that follows them."""
+    """Mark the simulation of guides, and the shading of the hair that follows them."""
     mark_dynamics(group, context)
     for curves in bpy.data.hair_curves:
         if curves.vellus.guide_curves == group.id_data and curves.is_editable:
@@ -50,7 +50,7 @@ def mark_water_of_guides(group, context):
 
 
 def mark_colliding(group, context):
-    """Do it for all guides that collide with an object; group: its settings as a collider."""
+    """Mark the simulation of all guides that collide with an object; group: its settings as a collider."""
     for curves in bpy.data.hair_curves:
         if curves.vellus.kind == "GUIDES" and _collides(curves, group.id_data):
             mark_dynamics(curves.vellus, context)

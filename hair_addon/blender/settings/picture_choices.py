@@ -5,14 +5,14 @@ import bpy
 
 from .translations import CONTEXT
 
-PRESENT = "PRESENT"  # identifier of the item that stands for what is there and is none of the others
+PRESENT = "PRESENT"  # identifier of the item for a present value that is none of the others
 
 
 def pictured(name, description, entries, present, choose):
-    """An enumeration property; entries(): [(identifier, label, icon)]; present(): identifier of what is there, or
+    """Return an enumeration property; entries(): [(identifier, label, icon)]; present(): the present identifier, or
     `PRESENT`; choose(identifier): called when a picture is clicked.
     """
-    texts = {}  # Blender reads those of dynamic items as long as it likes, while it asks for items anew
+    texts = {}  # Blender keeps pointers to the strings of dynamic items: keep them alive
 
     def kept(text):
         return texts.setdefault(text, text)

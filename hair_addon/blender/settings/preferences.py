@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Preferences: the compute device, and what makes the strands that viewports show."""
+"""Preferences: the compute device, and the device that makes strands in viewports."""
 
 import bpy
 
@@ -47,7 +47,7 @@ def is_extension():
 
 
 def device():
-    """Name of the Warp device that the user chose; the processor where there is no choice, or no such device."""
+    """Return the name of the chosen Warp device; "cpu" without a choice or without that device."""
     chosen = _chosen()
     if chosen is None or chosen.device == "cpu":
         return "cpu"
@@ -56,7 +56,7 @@ def device():
 
 
 def stroke_device():
-    """Whether the user chose "AUTOMATIC", "GPU" or "COMPUTE" for strands while guides are combed."""
+    """Return the choice for strands while combing: "AUTOMATIC", "GPU" or "COMPUTE"."""
     chosen = _chosen()
     return "AUTOMATIC" if chosen is None else chosen.stroke_device
 

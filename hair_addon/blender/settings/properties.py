@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings ↔ Blender's properties. Every default, range, unit and tooltip comes from the `Settings` classes.
 
-A change marks its Curves as stale and tags them; handlers.py is notified by the next depsgraph update. So a script
-that sets ten properties costs one evaluation, and hair in an undo step always matches its settings.
+A change marks its Curves as stale and tags them; the next depsgraph update notifies handlers.py. Thus a script that
+sets ten properties costs one evaluation, and hair in an undo step always matches its settings.
 """
 
 from dataclasses import replace
@@ -29,8 +29,8 @@ from .marks import (
 from .translations import CONTEXT
 
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"}  # paths may begin with //
-_NOT_KEYED = set()  # of properties that take no keys
-OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # what a shot may set of a linked character, and is stored in the shot
+_NOT_KEYED = set()  # options of properties that cannot be keyed
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # properties that a shot may override on a linked character
 
 MODELS = (
     ("KAJIYA_KAY", "Kajiya-Kay", "Opaque cylinder with a diffuse part and one highlight"),
@@ -41,49 +41,49 @@ MODELS = (
     ),
 )
 
-# Where these change, a simulation starts again.
+# A change of these restarts the simulation.
 _UNKEYED = ("vertex_count", "start_frame", "preroll", "size")
 
 
 def own_look_of(state):
-    """The `Appearance` of a hair as it is set; state: its `VellusCurves`. Raises `HairError`."""
+    """Return the `Appearance` set for a hair; state: its `VellusCurves`. Raises `HairError`."""
     return setting_properties.to_settings(state.appearance, Appearance)
 
 
 def look_of(state):
-    """The dry `Appearance` that a hair is shaded with, which is as wet as `shared_wetness.of_hair`."""
+    """Return the `Appearance` that a hair is shaded with: its own, with the largest shared wetness applied."""
     return appearance.wetted(own_look_of(state), shared_wetness.of_hair(state)[1])
 
 
 def dry_look_of(state):
-    """The same of strands that no style wets, where these have places."""
+    """Return the `Appearance` of strands that no masked Wet style reaches: with the least shared wetness applied."""
     return appearance.wetted(own_look_of(state), shared_wetness.of_hair(state)[0])
 
 
 def own_table_settings_of(state):
-    """The `lookup_tables.Settings` of a hair, those at their defaults that follow from its look. Raises `HairError`."""
+    """Return the `lookup_tables.Settings` of a hair, with defaults for those of its look. Raises `HairError`."""
     return setting_properties.to_settings(state.marschner, lookup_tables.Settings, skip=appearance.TABLE_FIELDS)
 
 
 def own_dynamics_of(state):
-    """The `DynamicsSettings` of guides as they are set; state: their `VellusCurves`. Raises `HairError`."""
+    """Return the `DynamicsSettings` set for guides; state: their `VellusCurves`. Raises `HairError`."""
     return setting_properties.to_settings(state.dynamics, DynamicsSettings)
 
 
 def dynamics_of(state):
-    """The `DynamicsSettings` that guides move by: as wet as their hair. Raises `HairError`."""
+    """Return the `DynamicsSettings` that guides are simulated with: as wet as their hair. Raises `HairError`."""
     return replace(own_dynamics_of(state), wetness=shared_wetness.of_guides(state))
 
 
 def keyed_dynamics_of(state):
-    """Names of the settings that `dynamics_of` gives that keys or drivers move."""
+    """Return the names of the animated or driven settings of `dynamics_of`."""
     paths = style_keys.keyed_paths(state.id_data)
     names = {name for name in setting_properties.names_of(DynamicsSettings) if f"vellus.dynamics.{name}" in paths}
     return names | ({"wetness"} if shared_wetness.is_keyed(state) else set())
 
 
 def table_settings_of(state, look=None):
-    """The `lookup_tables.Settings` that the Marschner model shades a hair with. Raises `HairError`.
+    """Return the `lookup_tables.Settings` that the Marschner model shades a hair with. Raises `HairError`.
 
     look: a dry `Appearance`; None for `look_of` the hair.
     """
@@ -325,21 +325,21 @@ def unregister():
 
 
 def folder(description):
-    """The `directory` property that a file browser fills."""
+    """Return the `directory` property, which a file browser sets."""
     return bpy.props.StringProperty(
         name="Folder", description=description, subtype="DIR_PATH", options=_RELATIVE, translation_context=CONTEXT
     )
 
 
 def file(description):
-    """The `filepath` property that a file browser fills."""
+    """Return the `filepath` property, which a file browser sets."""
     return bpy.props.StringProperty(
         name="File", description=description, subtype="FILE_PATH", options=_RELATIVE, translation_context=CONTEXT
     )
 
 
 def group_of(group_class):
-    """A group of properties."""
+    """Return a pointer property to a property group."""
     return bpy.props.PointerProperty(type=group_class)
 
 
@@ -349,7 +349,7 @@ def only_files(pattern):
 
 
 def text(name, description, is_remembered=False):
-    """A string of an operator that is not a setting. is_remembered: whether it is offered again when next called."""
+    """Return a string property that is not a setting; is_remembered: whether the operator keeps its last value."""
     options = set() if is_remembered else {"SKIP_SAVE"}
     return bpy.props.StringProperty(name=name, description=description, options=options, translation_context=CONTEXT)
 
@@ -361,7 +361,7 @@ def choice(name, description, labels, tooltips=None):
 
 
 def mesh_name(name, description):
-    """The name of a mesh object, offered by name, which an operator does not remember."""
+    """Return a property for the name of a mesh object, with search; operators do not keep its value."""
     return bpy.props.StringProperty(
         name=name,
         description=description,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""JSON files that users save under a name, for every .blend file, in a folder of the extension."""
+"""Named JSON files of the user, available in every .blend file, in a folder of the extension."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ class SavedFiles:
             return 0
 
     def path(self, name, create):
-        """The file of a name; create: its folder. Raises `HairError`."""
+        """Return the path of a file by name; create: whether to create its folder. Raises `HairError`."""
         folder = self.folder(create)
         if folder is None:
             raise HairError("Only the installed extension can save looks and styles: install it.")

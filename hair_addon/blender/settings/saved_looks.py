@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """User-saved looks, for every file: JSON in the add-on's folder.
 
-Blender's presets are Python scripts, which it runs; a look is numbers, so it is read as numbers.
+Unlike Blender's presets, which are Python scripts that it runs, a look contains only data.
 """
 
 from dataclasses import asdict

@@ -18,11 +18,11 @@ _SMALL_WORDS = {"in", "of", "per", "to", "with"}  # stay lower case in titles
 
 
 def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, override=frozenset()):
-    """{name: bpy property} for the fields of a `Settings` class but those of `skip`; `update` as in bpy.props.
+    """Return {name: bpy property} for the fields of a `Settings` class except `skip`; `update` as in bpy.props.
 
-    A radius has its diameter beside it, which is shown in its place. Operators have no `update`, and do not remember
-    text, which names data of one file. Structural settings, and those of `unkeyed`, take no keys. high: {name: largest
-    value} of fields whose range is shorter here.
+    A radius also gets a diameter property, which is shown in its place. Operators have no `update`, and do not keep
+    text, which names data of one file. Structural settings and those of `unkeyed` cannot be keyed. high: {name:
+    maximum} of fields with a shorter range here.
     """
     highs = high or {}
     made = {}
@@ -95,14 +95,14 @@ def _diameter_property(radius, name, description, details, update):
         def take(operator, _context):
             setattr(operator, radius, _radius_of(getattr(operator, name)))
 
-        # Stored, as a script may give it alone: Blender then calls no `set` of an operator.
+        # Stored, as a script may set only the diameter: Blender does not call `set` of an operator's arguments.
         return bpy.props.FloatProperty(update=take, **common)
 
     def read(group):
         return _millimeters_of(getattr(group, radius))
 
     def write(group, value):
-        # Not by its property, whose `update` tags the dependency graph: animation is evaluated while that is running.
+        # Bypass the property: its `update` tags the depsgraph, which may be evaluating animation now.
         wanted = min(max(_radius_of(value), _limits(details, False)["min"]), details.high)
         group.bl_system_properties_get(do_create=True)[radius] = wanted
 
@@ -137,7 +137,7 @@ def _limits(details, is_integer):
 
 
 def to_settings(owner, settings_class, skip=()):
-    """The `Settings` that an operator or property group holds, those of `skip` at their defaults.
+    """Return the `Settings` stored in an operator or property group, with defaults for those of `skip`.
 
     Raises `HairError` for values out of range.
     """
@@ -150,7 +150,7 @@ def to_settings(owner, settings_class, skip=()):
     return _settings_of(settings_class, tuple(skip), tuple(held))
 
 
-@lru_cache(maxsize=256)  # of settings that were read before: they are read with every step of a stroke
+@lru_cache(maxsize=256)  # settings are read with every step of a stroke
 def _settings_of(settings_class, skip, values):
     fields = [field for field in declared(settings_class) if field[0] not in skip]
     return settings_class(
@@ -159,9 +159,9 @@ def _settings_of(settings_class, skip, values):
 
 
 def plain(value, default, details):
-    """A property's value as it was meant: single precision gives 0.15 back as 0.15000000596."""
+    """Undo the rounding of a property's value to single precision: 0.15 is stored as 0.15000000596."""
     if isinstance(default, float):
-        # A default or a limit such as 15° in radians has no short decimal, and rounded up it would be out of range.
+        # Defaults and limits such as 15° in radians have no short decimal; rounded up they would be out of range.
         for meant in (default, details.low, details.high):
             if np.float32(meant) == np.float32(value):
                 return meant
@@ -173,7 +173,7 @@ def plain(value, default, details):
 
 @lru_cache(maxsize=64)
 def as_stored(settings):
-    """`Settings` as properties give them back: within Blender's limits, in single precision."""
+    """Return `Settings` as properties store them: within Blender's limits, in single precision."""
     values = {
         name: plain(_limited(getattr(settings, name), default, details), default, details)
         for name, default, details in declared(type(settings))
@@ -182,22 +182,22 @@ def as_stored(settings):
 
 
 def _limited(value, default, details):
-    """A number as Blender stores it: the least above zero that it knows, where single precision has zero."""
+    """Clamp a number to the property's minimum, which represents "above zero"."""
     if isinstance(default, tuple):
         return tuple(_limited(part, meant, details) for part, meant in zip(value, default, strict=True))
     return max(value, _limits(details, False).get("min", value)) if isinstance(default, float) else value
 
 
 def shortest(value):
-    """The shortest decimal that equals a value in single precision, as it was typed."""
+    """Return the shortest decimal that equals a value in single precision, as it was typed."""
     return float(str(np.float32(value)))
 
 
 def given_settings(operator, settings_class, skip=()):
-    """The `Settings` that an operator's properties give.
+    """Return the `Settings` given to an operator.
 
-    Those that follow from the surface are None unless the operator was called with them, or they were changed. skip and
-    errors as in `to_settings`.
+    Sizes fitted to the surface are None unless the operator was called with them or they were changed. skip and errors
+    as in `to_settings`.
     """
     is_given = operator.properties.is_property_set
     for radius, diameter in diameters(settings_class):
@@ -209,19 +209,19 @@ def given_settings(operator, settings_class, skip=()):
 
 
 def show(operator, group, settings_class):
-    """Show sizes in an operator's redo panel. Fitted ones are fitted again when another setting changes."""
+    """Show sizes in an operator's redo panel. Fitted sizes are computed again when another setting changes."""
     fitted_sizes.show(operator, group, settings_class)
     for radius, diameter in diameters(settings_class):
         setattr(operator, diameter, shortest(_millimeters_of(shortest(getattr(group, radius)))))
 
 
 def diameters(settings_class):
-    """[(name of a radius, name of the diameter that is shown in its place)] of a class."""
+    """Return [(name of a radius, name of its diameter)] of a class."""
     return [(name, details.diameter[0]) for name, _default, details in declared(settings_class) if details.diameter]
 
 
 def is_stored_as(settings, others, skip=()):
-    """Whether `Settings` of one class are the same once properties hold them, but for those of `skip`."""
+    """Whether `Settings` of one class are equal once stored in properties, ignoring those of `skip`."""
     first, second = as_stored(settings), as_stored(others)
     return all(getattr(first, name) == getattr(second, name) for name in names_of(type(first)) if name not in skip)
 
@@ -232,8 +232,7 @@ def names_of(settings_class):
 
 
 def assign(owner, settings, skip=(), fits=()):
-    """Write `Settings` into an operator's or group's properties, but for those of `skip`; fits: sizes that are fitted
-    to the surface."""
+    """Write `Settings` except `skip` to the properties of an operator or group; fits: names of fitted sizes."""
     for name, _default, _details in declared(type(settings)):
         if name not in skip:
             setattr(owner, name, getattr(settings, name))

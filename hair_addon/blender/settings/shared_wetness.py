@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wetness, one value of hair and of its guides: the largest that look, Wet styles and dynamics are set to.
+"""Wetness shared by hair and its guides: the largest of the values of look, Wet styles and dynamics.
 
-Materials, viewports and the simulation read it here, so any of these sliders changes what hair looks like and how it
-moves; the Wet style also gives it the shape of wet hair.
+Materials, viewports and the simulation use this value, so each of these sliders changes both appearance and motion; the
+Wet style also changes the shape.
 """
 
 import bpy
@@ -14,7 +14,7 @@ from . import setting_properties, style_items, style_keys
 
 
 def of_hair(state):
-    """(least, most) wetness of a hair, of strands that no style wets and of the wettest; state: its `VellusCurves`."""
+    """Return (least, most) wetness of a hair, without and with its Wet styles; state: its `VellusCurves`."""
     guides = state.guide_curves
     of_dynamics = 0.0 if guides is None else _value(guides.vellus.dynamics)
     least = max(_value(state.appearance), of_dynamics)
@@ -22,27 +22,27 @@ def of_hair(state):
 
 
 def of_guides(state):
-    """The wetness of the wettest guides: that of their wettest hair, or their own where that is more.
+    """Return the wetness of the wettest guides: the larger of their own and that of their wettest hair.
 
-    A guide has the mean wetness of the strands around it, as variation dries some. Raises `HairError`.
+    Styles count with the mean over strands, as variation dries some strands. Raises `HairError`.
     """
     return _wettest(state, _wet_styles(state))
 
 
 def evenly_of_guides(state):
-    """The wetness that all guides have at least: what masks do not keep from them. Raises `HairError`."""
+    """Return the wetness that all guides have at least, without masked styles. Raises `HairError`."""
     return _wettest(state, [style for style in _wet_styles(state) if mask_key(style) is None])
 
 
 def _wettest(state, styles):
-    """The largest wetness of dynamics, of the looks of hair, and of some styles."""
+    """Return the largest wetness of dynamics, of the looks of hair, and of some styles."""
     looks = [_value(hair.vellus.appearance) for hair in _followers(state)]
     amounts = [mean_amount(style) for style in styles if has_effect(style)]
     return setting_properties.shortest(max([_value(state.dynamics), *looks, *amounts]))
 
 
 def masked_styles(state):
-    """The settings of the Wet styles with a mask of the hair of some guides, disabled ones too. Raises `HairError`."""
+    """Return the settings of masked Wet styles of the guides' hair, including disabled ones. Raises `HairError`."""
     return [style for style in _wet_styles(state) if mask_key(style) is not None]
 
 
@@ -52,9 +52,9 @@ def _wet_styles(state):
 
 
 def slider_of(state):
-    """(property group, name) of the setting that wets the hair of some guides most; of dynamics where nothing does.
+    """Return (property group, name) of the setting with the largest wetness of some guides and their hair.
 
-    A Wet style comes first, also a dry one: it is what changes all that water does.
+    At equal values a Wet style comes first, as it also changes the shape, then dynamics.
     """
     found = [(_value(state.dynamics), 0, state.dynamics, "wetness")]
     for hair in _followers(state):
@@ -65,7 +65,7 @@ def slider_of(state):
 
 
 def _value(group):
-    """The wetness of a group; of one that a script has set to no number, none."""
+    """Return the wetness of a group, 0 for NaN and values out of range."""
     value = setting_properties.shortest(group.wetness)
     return value if 0.0 <= value <= 1.0 else 0.0
 
@@ -76,7 +76,7 @@ def _followers(state):
 
 
 def is_keyed(state):
-    """Whether the wetness that guides move with is moved by keys or drivers."""
+    """Whether the wetness of guides is animated or driven."""
     if "vellus.dynamics.wetness" in style_keys.keyed_paths(state.id_data):
         return True
     return any(_is_keyed_of_hair(hair) for hair in _followers(state))

@@ -20,7 +20,7 @@ _UNKEYED = ("seed",)  # strands would jump
 
 
 def _group_class(kind):
-    """A property group of the settings of a kind. Water is seen in shading and in motion too."""
+    """Return a property group class for the settings of a kind. Wetness also changes shading and motion."""
     update = mark_wet_style if kind == "WET" else mark_geometry
     annotations = setting_properties.annotations(KINDS[kind], update, unkeyed=_UNKEYED)
     contents = {"__doc__": DESCRIPTIONS[kind], "__annotations__": annotations, "__module__": __name__}
@@ -31,7 +31,7 @@ _GROUPS = {kind: _group_class(kind) for kind in KINDS}
 
 
 def _renamed(item, name, present, _is_set):
-    """Unique name for a style; keyframes by name follow."""
+    """Return a unique name for a style; data paths of keys with the old name are updated."""
     state = item.id_data.vellus
     others = [other for other in names_of(state) if other != present]
     name = unique_name(name.strip() or LABELS[item.kind], others)
@@ -80,7 +80,7 @@ def names_of(state):
 
 
 def make_names_readable(state):
-    """Replace the bytes of names that are not valid UTF-8, as in a damaged file: renaming such a style ends Blender."""
+    """Replace invalid UTF-8 bytes in names, as in a damaged file: renaming such a style crashes Blender."""
     for item in state.styles:
         if not text_of(item, "name"):
             stored = item.bl_system_properties_get()
@@ -89,7 +89,7 @@ def make_names_readable(state):
 
 
 def active_of(state):
-    """The item that is active in the list, None in an empty list."""
+    """Return the active item, None in an empty list."""
     return state.styles[state.active_style] if state.active_style < len(state.styles) else None
 
 
@@ -99,7 +99,7 @@ def wetness_of(state):
 
 
 def masks_of(item):
-    """(name of the group or attribute, name of the image) that mask a style; empty for none."""
+    """Return (name of the group or attribute, name of the image) that mask a style; empty for none."""
     group = group_of(item)
     return text_of(group, "mask"), text_of(group, "mask_image")
 
@@ -112,7 +112,7 @@ def objects_named(state):
 
 
 def unique_name(name, others):
-    """A name, numbered as Blender numbers if another has it: Curl, Curl.001."""
+    """Return a name, numbered as in Blender if it is taken: Curl, Curl.001."""
     if name not in others:
         return name
     stem, _, number = name.rpartition(".")
@@ -121,13 +121,13 @@ def unique_name(name, others):
 
 
 def new_seed(state):
-    """A seed that none of a hair's styles has."""
+    """Return a seed that none of a hair's styles uses."""
     taken = {group_of(item).seed for item in state.styles}
     return next(seed for seed in range(len(taken) + 1) if seed not in taken)
 
 
 def require_room(count):
-    """Raise `HairError` for more styles than a hair may have."""
+    """Raise `HairError` if a number of styles exceeds the limit."""
     if count > MOST_STYLES:
         raise HairError("Hair has at most {count} styles: remove one first.", count=MOST_STYLES)
 
@@ -170,9 +170,9 @@ def remove(state, place):
 
 
 def assign(state, styles, names=None):
-    """Replace all styles; names: of each, empty or None for those that styles of its kind have now, or new ones.
+    """Replace all styles; names: of each; empty, or None for all, reuses names of present styles of that kind.
 
-    A style that stays, by name and kind, keeps its keys. Nothing is marked where nothing changes. Raises `HairError`.
+    Styles with an unchanged name and kind keep their keys. Nothing is marked if nothing changes. Raises `HairError`.
     """
     require_room(len(styles))
     styles = [setting_properties.as_stored(settings) for settings in styles]
@@ -198,7 +198,7 @@ def _append(state, settings, name):
 
 
 def _named(state, styles, names):
-    """[(name, kind)] of styles, each name once; those without a name are, if they can be, styles that are there now."""
+    """Return unique [(name, kind)] of styles; unnamed styles take names of equal present styles, then of their kind."""
     present = dict(zip(names_of(state), styles_of(state), strict=True))
     taken = list(names or [""] * len(styles))
     for is_same in (lambda a, b: a == b, lambda a, b: type(a) is type(b)):
@@ -215,7 +215,7 @@ def _named(state, styles, names):
 
 
 def _follow(state, names, order):
-    """Bring keys up to date, and mark the hair; order: index before of each style in the list, None for a new one."""
+    """Update keys and mark the hair; order: previous index of each style in the list, None for a new style."""
     places = [order.index(index) if index in order else None for index in range(len(names))]
     style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, names_of(state)))
     mark_wet_style(state, None)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys and drivers that follow their style when styles are moved, removed or renamed.
+"""Update of keys and drivers when styles are moved, removed or renamed.
 
-Blender keys a style's setting by its place in the list, as vellus.styles[0].curl.radius, and leaves the key there.
+Blender keys a style's setting by its index, as vellus.styles[0].curl.radius, and does not update the index.
 """
 
 import re
@@ -12,7 +12,7 @@ _PATH = re.compile(r'vellus\.styles\[(?:(\d{1,6})|"((?:[^"\\]|\\.)*)")\](.*)', r
 
 
 class Rearrangement:
-    """Where the styles of a hair went: `names` before, their `places` after (None: removed), and `new_names` there."""
+    """A change of a hair's styles: old `names`, their new indices `places` (None: removed), and `new_names`."""
 
     def __init__(self, names, places, new_names):
         self._names, self._places, self._new_names = list(names), list(places), list(new_names)
@@ -24,7 +24,7 @@ class Rearrangement:
         return all(kept) and self._names == self._new_names[: len(self._names)]
 
     def path(self, path):
-        """A data path as it is now: unchanged if it is of no style, None if its style was removed."""
+        """Return the new data path: unchanged if it is not of a style, None if its style was removed."""
         match = _PATH.fullmatch(path)
         place = None if match is None else self._place_of(match)
         if place is None:
@@ -36,7 +36,7 @@ class Rearrangement:
         return f"vellus.styles[{key}]{match[3]}"
 
     def path_of_target(self, path):
-        """The same for what a driver reads: the path of a removed style leads nowhere, as Blender's own do."""
+        """Like `path` for a driver's target: the path of a removed style becomes invalid, as in Blender."""
         now = self.path(path)
         if now is not None:
             return now
@@ -44,7 +44,7 @@ class Rearrangement:
         return f'vellus.styles["{bpy.utils.escape_identifier(self._names[self._place_of(match)])}"]{match[3]}'
 
     def _place_of(self, match):
-        """Index before of the style that a path names, None if there was none."""
+        """Return the old index of the style in a matched path, None if there is none."""
         if match[1]:
             return int(match[1]) if int(match[1]) < len(self._names) else None
         name = bpy.utils.unescape_identifier(match[2])
@@ -52,7 +52,7 @@ class Rearrangement:
 
 
 def follow(curves, rearrangement):
-    """Bring the keys and drivers of Curves, and drivers that read their settings, up to date."""
+    """Update the keys and drivers of Curves, and drivers that read their settings."""
     if rearrangement.is_empty:
         return
     animation = curves.animation_data
@@ -76,7 +76,7 @@ def _follow_curves(fcurves, rearrangement):
 
 
 def _follow_actions(curves, animation, rearrangement):
-    """Of the action, of NLA strips, and of actions that wait to be assigned again."""
+    """Update the active action, NLA strips, and unassigned actions with slots of these Curves."""
     done, identifiers = {}, {animation.last_slot_identifier}
     for user in (animation, *_strips(animation)):
         action, slot = user.action, user.action_slot
@@ -96,7 +96,7 @@ def _follow_actions(curves, animation, rearrangement):
 
 
 def _follow_action(curves, action, slot, rearrangement):
-    """Returns the action with paths that are up to date: a copy where others use it, or a library has it."""
+    """Return the action with updated paths: a copy if other datablocks use it or it is linked."""
     handle = slot.handle
     paths = [curve.data_path for bag in _channelbags(action, handle) for curve in bag.fcurves]
     if all(rearrangement.path(path) == path for path in paths):
@@ -109,7 +109,7 @@ def _follow_action(curves, action, slot, rearrangement):
 
 
 def keyed_paths(curves):
-    """The data paths of Curves that keys, NLA strips or drivers move."""
+    """Return the data paths of Curves that are keyed, in NLA strips, or driven."""
     animation = curves.animation_data
     if animation is None:
         return set()
@@ -127,7 +127,7 @@ def _channelbags(action, handle):
 
 
 def _strips(animation):
-    """All NLA strips, those in meta strips too."""
+    """Yield all NLA strips, including those in meta strips."""
     waiting = [strip for track in animation.nla_tracks for strip in track.strips]
     while waiting:
         strip = waiting.pop()
@@ -136,7 +136,7 @@ def _strips(animation):
 
 
 def _all_animation():
-    """Animation data of all datablocks, node trees in others too."""
+    """Yield the animation data of all datablocks, including embedded node trees."""
     for block in bpy.data.all_ids:
         for owner in (block, getattr(block, "node_tree", None)):
             animation = getattr(owner, "animation_data", None)

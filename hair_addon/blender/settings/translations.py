@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Translation of the interface into Blender's language.
 
-Blender translates labels and tooltips of properties and classes by itself; sentences with values in them come from
-here. languages/ has a dictionary for each language, in gettext's format.
+Blender translates labels and tooltips of properties and classes itself; this module translates sentences with values.
+languages/ has a dictionary for each language, in gettext's format.
 """
 
 import json
@@ -17,10 +17,10 @@ from bpy.app.translations import pgettext_iface, pgettext_rpt
 from ...core.errors import HairError
 from ...core.params import is_text
 
-# A context of our own: in Blender "Guides" are drawing guides, and its dictionary is searched first.
+# Own context: in Blender's dictionary, which is searched first, "Guides" are drawing guides.
 CONTEXT = "Vellus"
 
-_NAME = __package__  # under which Blender keeps our dictionaries
+_NAME = __package__  # identifier of our dictionaries in Blender
 
 
 def interface_text(sentence, **values):
@@ -39,22 +39,22 @@ def error_text(error):
 
 
 def status_text(status):
-    """Translate a sentence that is stored in English with its values in it, as what is wrong with hair."""
+    """Translate a status that is stored in English with its values filled in."""
     sentence, values = _taken_apart(status)
     text = interface_text(sentence)
     return _Stored().format(text, **values) if values else text
 
 
 class _Stored(string.Formatter):
-    """Fills in values that are texts already."""
+    """A formatter for values that are strings already."""
 
     def format_field(self, value, _form):
         return value
 
 
-@lru_cache(maxsize=64)  # panels ask with every redraw
+@lru_cache(maxsize=64)  # panels call this with every redraw
 def _taken_apart(status):
-    """(sentence, {name: text}) of a status, of the sentence that has most words of its own; (status, {}) of none."""
+    """Split a status into (sentence, {name: text}) of the longest matching sentence; (status, {}) without a match."""
     if status in _sentences():
         return status, {}
     for sentence, words, names in _patterns():
@@ -65,10 +65,10 @@ def _taken_apart(status):
 
 
 def _values_between(words, names, status):
-    """{name: text} of a sentence with values that a status is; None where it is another.
+    """Return {name: text} of the values of a sentence in a status; None if the status does not match.
 
-    words: around its values, in turn; names: of these. Each value is as long as it may be, those before others first:
-    so words are looked for from the end, which takes a hostile status no longer than its length.
+    words: texts around the values, in order; names: of the values. Values match greedily from the left, so words are
+    searched from the end, in linear time even for a hostile status.
     """
     if not (status.startswith(words[0]) and status.endswith(words[-1])):
         return None
@@ -84,7 +84,7 @@ def _values_between(words, names, status):
     texts.append(status[first:end])
     values = {}
     for name, text in zip(names, reversed(texts), strict=True):
-        if values.setdefault(name, text) != text:  # it stands there twice
+        if values.setdefault(name, text) != text:  # a name may occur twice
             return None
     return values
 
@@ -96,7 +96,7 @@ def _sentences():
 
 @lru_cache(maxsize=1)
 def _patterns():
-    """[(sentence, words around its values, names of these)] of all with values, those with most words first."""
+    """Return [(sentence, texts around its values, names of the values)], sentences with the longest texts first."""
     found = []
     for sentence in _sentences():
         words, names = [""], []
@@ -115,7 +115,7 @@ def _filled(sentence, values):
 
 
 def read_po(path):
-    """{msgid: msgstr} of a .po file with one line for each; strings are written as in C, which JSON reads.
+    """Read {msgid: msgstr} of a .po file with one line each; its C strings are parsed as JSON.
 
     Raises `HairError`.
     """
@@ -140,7 +140,7 @@ def _text(quoted):
 
 
 def dictionaries():
-    """{locale: {msgid: msgstr}} of all languages whose files can be read; the others are told of on the console."""
+    """Return {locale: {msgid: msgstr}} of all readable languages; errors of others are printed to the console."""
     found = {}
     for path in (Path(__file__).parent / "languages").glob("*.po"):
         try:
@@ -151,7 +151,7 @@ def dictionaries():
 
 
 def register():
-    """Offer our translations to Blender: tooltips are looked up in no context, some buttons in that of operators."""
+    """Register translations; Blender looks up tooltips without a context, and some buttons in that of operators."""
     entries = {
         locale: {(context, msgid): text for msgid, text in texts.items() for context in ("*", "Operator", CONTEXT)}
         for locale, texts in dictionaries().items()
@@ -160,5 +160,5 @@ def register():
 
 
 def unregister():
-    """Take them away again."""
+    """Unregister the translations."""
     bpy.app.translations.unregister(_NAME)
