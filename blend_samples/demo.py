@@ -2,8 +2,8 @@
 """make demo: the report's pictures and its two results tables, made on this machine.
 
 Writes head.blend, kajiya_kay.png, marschner.png, dual_scattering.png, styled.png (the same hair, curly) and
-tables/{m,n,n_trt}.exr to a folder. --cycles adds cycles.png, the scene of dual_scattering.png by Cycles, which takes
-minutes; with --only-cycles there is nothing else. README's picture by Cycles has --cycles-samples 128.
+tables/{m,n,n_trt}.exr to a folder. --cycles adds cycles.png, the scene of dual_scattering.png in Cycles, which takes
+minutes; --only-cycles writes nothing else. README's picture by Cycles uses --cycles-samples 128.
 """
 
 import argparse
@@ -80,13 +80,13 @@ def main():
 
 
 def read():
-    """The scene as it is, on the GPU, with its shadows."""
+    """Upload the present scene to the GPU, with its shadows."""
     context = bpy.context
     return drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get())
 
 
 def with_look(drawn, hair):
-    """The scene with the look that the head's hair has now: light reaches it as before."""
+    """Return the scene with the present look of the head's hair; the light that reaches it is unchanged."""
     index = ambient_visibility.densest([strands for strands, *_ in drawn.hair])
     strands, _shading, *placed = drawn.hair[index]
     shaded = (strands, hair_cache.shading_of(hair), *placed)
@@ -134,7 +134,7 @@ def draw_by_cycles(hair, path, sample_count):
 
 
 def draw_styled(hair, path):
-    """Draw the same hair with a style preset, and leave it as it was."""
+    """Draw the same hair with a style preset, then restore it."""
     settings = hair.vellus.hair
     before = settings.point_count, settings.tip_taper
     api.apply_style_preset(hair, STYLE)
@@ -205,7 +205,7 @@ def _frames_per_second(drawn):
     draw(*_view_and_buffer(64, 36))  # compiles and fills caches
     frame = _view_and_buffer(1280, 720)
     seconds, frame_count = _seconds(lambda: draw(*frame)), 20
-    # Software drivers take seconds for a frame: one of them tells as much.
+    # Software drivers take seconds for a frame: a single frame is enough.
     return (
         1.0 / seconds if seconds > 0.5 else frame_count / _seconds(lambda: [draw(*frame) for _ in range(frame_count)])
     )

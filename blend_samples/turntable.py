@@ -25,11 +25,11 @@ from hair_addon.core.files.atomic_file import atomic_file
 
 COUNT = 24
 SIZE, LENS = 540, 120.0  # pixels of a side of a picture, [mm]: it holds the hair
-COLUMNS, SMALLER = 6, 3  # of the sheet: pictures in a row, pixels that become one
+COLUMNS, SMALLER = 6, 3  # of the sheet: pictures per row, reduction factor
 
 
 def main():
-    """Make everything; the exit status is that of the command that renders."""
+    """Make everything; returns the exit status of the render command."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("out/turntable"))
     parser.add_argument("--samples", type=int, default=16, help="samples per pixel")
@@ -38,7 +38,7 @@ def main():
     out = options.out.resolve()
     hair_addon.register()
     scene_file = out / "head.blend"
-    if not scene_file.exists():  # another file would be another sequence
+    if not scene_file.exists():  # a new file would start another sequence
         _build(scene_file)
     pattern = out / "frames" / "head_####.exr"
     words = ["render", str(scene_file), "--frames", f"1-{COUNT}", "--out", str(pattern), "--passes"]
@@ -56,12 +56,12 @@ def main():
 
 
 def _build(path):
-    """The head with its hair, which turns once about the vertical in front of a camera and lights that stay."""
+    """Build the head with its hair, turning once about the vertical before a fixed camera and fixed lights."""
     skull, _guides, hair = portrait.build(portrait.AHEAD)
     portrait.make_auburn(hair.data)
     head.light()
     scene = bpy.context.scene
-    # The last frame is followed by the first: it is a step short of a whole turn.
+    # The first frame follows the last, which is one step short of a whole turn.
     for frame, turn in ((1, 0.0), (COUNT + 1, 2.0 * math.pi)):
         skull.rotation_euler.z = turn
         skull.keyframe_insert("rotation_euler", index=2, frame=frame)
@@ -75,7 +75,7 @@ def _build(path):
 
 
 def _combined(path):
-    """(height, width, 4) float32 of an EXR, first row at the bottom."""
+    """Read (height, width, 4) float32 of an EXR, bottom row first."""
     with OpenEXR.File(str(path), separate_channels=True) as file:
         channels = file.channels()
         names = [next(name for name in channels if name.endswith(f"Combined.{letter}")) for letter in "RGBA"]
@@ -83,7 +83,7 @@ def _combined(path):
 
 
 def _small(pixels):
-    """Means of squares of pixels."""
+    """Return the means of squares of pixels."""
     height, width, channels = pixels.shape
     return pixels.reshape(height // SMALLER, SMALLER, width // SMALLER, SMALLER, channels).mean(axis=(1, 3))
 

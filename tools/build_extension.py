@@ -35,7 +35,7 @@ class BuildError(Exception):
 
 
 def manifest() -> dict:
-    """The parsed blender_manifest.toml."""
+    """Parse blender_manifest.toml."""
     return tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 
 
@@ -161,7 +161,7 @@ def stage(target: str, is_for_tests: bool = False) -> Path:
 
 def blender_ext(*arguments: str | Path) -> None:
     """Run Blender's extension tool."""
-    # Found, not imported: importing bpy starts Blender.
+    # Find bpy without importing it: the import starts Blender.
     bpy = Path(importlib.util.find_spec("bpy").origin).parent
     (tool,) = bpy.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")
     if subprocess.run([sys.executable, tool, *arguments]).returncode != 0:

@@ -5,8 +5,8 @@
     python tools/desktop_blender.py SCRIPT [ARGUMENT]  run a script in its window
 
 Blender comes from Debian's package, into a folder with a Debian of its own, so that the host's libraries do not matter:
-Debian or Ubuntu, root, about two minutes and 2 GB. VELLUS_DESKTOP_BLENDER names another folder, or the executable of a
-Blender that is there already; beside that one `xvfb-run` and `import` have to be on the PATH.
+Debian or Ubuntu, root, about two minutes and 2 GB. VELLUS_DESKTOP_BLENDER names another folder, or the executable of an
+installed Blender, which also needs `xvfb-run` and `import` on the PATH.
 """
 
 import os
@@ -43,7 +43,7 @@ class Unavailable(Exception):
 
 @dataclass(frozen=True)
 class DesktopBlender:
-    """A Blender executable, and the folder that is its whole file system where it does not live in the host's."""
+    """A Blender executable, and the folder of its root file system if it is not the host's."""
 
     executable: Path
     folder: Path | None = None
@@ -63,7 +63,7 @@ class DesktopBlender:
             *("xvfb-run", "--auto-servernum", "--server-args", f"-screen 0 {width}x{height}x24 -nolisten tcp"),
             *("timeout", "--kill-after=10", str(limit)),
             *(self.executable, "--gpu-backend", backend, "--window-geometry", "0", "0", str(width), str(height)),
-            # Events that a script makes stand for the artist's mouse and keys; the real ones are switched off by it.
+            # Events of a script replace those of mouse and keyboard, which this option disables.
             *("--enable-event-simulate", "--python-exit-code", "7"),
             *("--python", Path(script).resolve(), "--", *arguments),
         ]
@@ -89,12 +89,12 @@ class DesktopBlender:
 
 
 def _inherited():
-    """What this process was started with: bpy sets paths of its own files, which another Blender cannot read."""
+    """Return this process's original environment: bpy adds paths that another Blender cannot read."""
     return dict(os.environ)
 
 
 def _environment(profile):
-    """NAME=VALUE for a Blender whose user files and home are a folder."""
+    """Return NAME=VALUE for a Blender with its user files and home in a folder."""
     values = {"HOME": profile, "BLENDER_USER_RESOURCES": profile, "LC_ALL": "C.UTF-8"}
     # Software drivers take minutes to compile a window's shaders, which are the same in all profiles.
     values["MESA_SHADER_CACHE_DIR"] = _SHADERS

@@ -3,9 +3,9 @@
 
 Grows hair on the sample's head, opens it in a window of a desktop Blender with the built extension, and takes a picture
 of each panel in a sidebar of `SIDEBAR_WIDTH`. With the name `windows`, also build/manual/window_*.png of the whole
-window for each kind of active object, to look for labels that are cut. With the name `five_minutes`, README's pictures
-of its five minutes alone: docs/five_minutes/*.png, cut out of what `tests/desktop/manual/first_minutes.py` sees in
-a window; with `curly_hair` those of the page Curly Hair, of what `tests/desktop/manual/curly_hair.py` sees.
+window for each kind of active object, to look for labels that are cut. The name `five_minutes` writes only
+README's pictures, docs/five_minutes/*.png, cut from the windows of `tests/desktop/manual/first_minutes.py`;
+`curly_hair` writes those of the page Curly Hair, from `tests/desktop/manual/curly_hair.py`.
 """
 
 import shutil
@@ -101,7 +101,7 @@ def take_curly_hair(blender, extension, folder):
 
 
 def take_walk(blender, name, parts, extension, folder, *more):
-    """Run parts of a script of tests/desktop in a window as large as pictures need; returns what went wrong, or ""."""
+    """Run parts of a script of tests/desktop in a window of the pictures' size; returns an error message, or ""."""
     profile = folder / "profile"
     shutil.rmtree(folder, ignore_errors=True)
     profile.mkdir(parents=True)
@@ -115,7 +115,7 @@ def take_walk(blender, name, parts, extension, folder, *more):
 
 
 def read(path):
-    """(height, width, 4) float32 colors of a picture as they are seen, first row at the top."""
+    """Return (height, width, 4) float32 display colors of a picture, top row first."""
     import bpy
     import numpy as np
 
@@ -192,7 +192,7 @@ class Window:
             return operator(*arguments, **properties)
 
     def screen(self):
-        """(height, width, 4) colors of the screen as they are seen, first row at the top."""
+        """Return (height, width, 4) display colors of the screen, top row first."""
         self.run(self.bpy.ops.wm.redraw_timer, type="DRAW_WIN_SWAP", iterations=2)
         time.sleep(0.5)
         path = Path(self.bpy.app.tempdir) / "screen.png"
@@ -200,7 +200,7 @@ class Window:
         return read(path)
 
     def write(self, name, pixels):
-        """Colors as docs/manual/NAME.png."""
+        """Write colors as docs/manual/NAME.png."""
         write(MANUAL / f"{name}.png", pixels)
 
     def narrow(self):
@@ -214,7 +214,7 @@ class Window:
         raise RuntimeError(f"The sidebar has {self.sidebar.width} pixels.")
 
     def drag(self, x, y, end):
-        """The left mouse button, from a place to the same height at another."""
+        """Drag with the left mouse button, horizontally."""
         self.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
         yield
         self.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=x, y=y)
@@ -226,9 +226,9 @@ class Window:
         yield from pause(0.5)
 
     def show_panels(self, names):
-        """Show these panels of the tab and no others, all of them open; None: all that there are."""
+        """Show only these panels of the tab, opened; None: all panels."""
         pictured = {f"VELLUS_PT_{name}" for shown in PANELS.values() for name in shown}
-        # A panel whose parent is not there would stand at the top of the tab.
+        # A panel whose parent is missing would be at the top of the tab.
         panels = [p for p in self.blender.panels.CLASSES if {p.bl_idname, getattr(p, "bl_parent_id", "")} & pictured]
         for panel in reversed(panels):
             if panel.is_registered:
@@ -240,14 +240,14 @@ class Window:
 
 
 def pause(seconds):
-    """Leave Blender to itself for a while."""
+    """Let Blender run for some seconds."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         yield
 
 
 def panel_picture(screen, sidebar):
-    """The part of a screen's picture that the panels of a sidebar take, without the empty rest below them."""
+    """Return the part of a screen's picture with the panels of a sidebar, without the empty part below them."""
     top = len(screen) - sidebar.y - sidebar.height
     column = screen[top : top + sidebar.height, sidebar.x : sidebar.x + sidebar.width]
     is_panel = abs(column[:, 14, :3] - column[-40, 14, :3]).max(axis=1) > 0.02  # 14: left of all rows
@@ -261,7 +261,7 @@ def take(pictures):
     window = Window()
     bpy.context.preferences.view.show_splash = False
     space = window.area.spaces.active
-    bpy.context.preferences.system.use_region_overlap = False  # nothing shines through
+    bpy.context.preferences.system.use_region_overlap = False  # no transparent regions
     every = [name for names in PANELS.values() for name in names]
     window.show_panels(every)  # before any is drawn: whether a panel is open is decided then
     space.show_region_ui = True
@@ -326,7 +326,7 @@ def take_redo(window):
 
 
 def take_foreign(window):
-    """The Surface panel where curves that Vellus did not make are active."""
+    """The Surface panel while curves not made by Vellus are active."""
     import bpy
 
     window.run(bpy.ops.object.curves_random_add)
@@ -336,7 +336,7 @@ def take_foreign(window):
 
 
 def take_rendering(window):
-    """The Render properties where Vellus renders."""
+    """The Render properties with Vellus as the engine."""
     import bpy
 
     bpy.context.scene.render.engine = "VELLUS"

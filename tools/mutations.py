@@ -2,8 +2,8 @@
 """Mutate the dynamics solver and report which laws fail: `python tools/mutations.py [NAME ...]`.
 
 Each mutation is applied to a copy of the checkout, where the tests of its gates run (`pytest.mark.gate`). A mutation
-that no gate notices means that a law is missing, or too loose: then the exit status is 1. `--gates V5 V14` asks these
-instead of those that should notice, `--list` shows the mutations.
+that no gate notices means that a law is missing, or too loose: then the exit status is 1. `--gates V5 V14` runs these
+gates instead of those that should notice it; `--list` lists the mutations.
 """
 
 import argparse
@@ -26,7 +26,7 @@ PASSED, FAILED = 0, 1  # exit statuses of pytest
 
 @dataclass(frozen=True)
 class Mutation:
-    """A mistake: which gates should notice it, and its edits (file, text that stands there once, other text)."""
+    """A mistake: the gates that should notice it, and its edits (file, text that occurs once, replacement)."""
 
     name: str
     gates: tuple[str, ...]
@@ -153,7 +153,7 @@ MUTATIONS = (
 
 
 def copy_of_checkout(folder):
-    """Copy the files that git knows, as they are now, into a folder."""
+    """Copy the tracked files of the working tree into a folder."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True).stdout
     for name in filter(None, listed.split("\0")):
         if (ROOT / name).is_file():
@@ -175,7 +175,7 @@ def mutate(folder, mutation):
 
 
 def failures(folder, gates=()):
-    """Names of tests that fail in a copy: those of a gate, or of all for none; a sentence where pytest did not end."""
+    """Return names of failed tests in a copy, of a gate or of all gates; a sentence if pytest did not end."""
     chosen = " or ".join(f'gate(id="{gate}")' for gate in gates) or "gate"
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", chosen, TESTS]
     environment = os.environ | {"WARP_CACHE_PATH": str(KERNELS)}
