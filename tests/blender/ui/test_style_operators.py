@@ -22,6 +22,7 @@ from hair_addon.core.styling.base import ProfiledSettings, scaled
 from hair_addon.core.styling.kinds import KINDS, OFFERS, kind_of
 from tests.support.always import operate
 from tests.support.interface.layout import draw, draw_all
+from tests.support.pairs import share_of
 from tests.support.reading import points, write_points
 
 SPHERE_FACTOR = groom_defaults.FUR_LENGTH * math.sqrt(4.0 * math.pi) / 0.12  # of the sphere's default hair length
@@ -175,7 +176,7 @@ def test_styles_are_saved_appended_and_copied_with_their_hair(styled, tmp_path):
 # Presets.
 
 
-@pytest.mark.parametrize("preset", style_presets.PRESETS)
+@pytest.mark.parametrize("preset", share_of(style_presets.PRESETS))
 def test_presets_replace_styles_and_leave_the_rest(styled, preset):
     before = groom_settings.settings_of(styled.data)
     state().is_live = False  # locks for a head would be tens of thousands
