@@ -15,7 +15,8 @@ from hair_addon.core.params import Settings, declared
 from hair_addon.core.styling.kinds import KINDS, OFFERS
 from tests.support.reading import points
 
-FEW, MANY = 3, 6
+FEW, MANY = 3, 8
+HELD = 2  # arrays that a thread may hold that has just ended; they are freed with the next change
 LONG = 1000
 ROOM = 1.05  # between the memory after few changes, and after a thousand
 
@@ -115,7 +116,7 @@ def test_changes_of_a_style_keep_nothing_of_those_before(hair, offer):
             if step in (FEW, MANY - 1):
                 counts[step] = things_alive()
         assert len(shown) == MANY, begin.__name__
-        assert counts[MANY - 1] <= counts[FEW], begin.__name__
+        assert counts[MANY - 1] <= counts[FEW] + HELD < counts[FEW] + MANY - 1 - FEW, begin.__name__
     changing.assert_shown()
 
 
@@ -126,16 +127,13 @@ def resident():
 
 
 def grown(change):
-    """((things, memory) after a hundredth of `LONG` changes, (things, memory) after all); change(number): one.
-
-    Of the last three changes the fewest things: what is just being let go of is none.
-    """
+    """((things, memory) after a hundredth of `LONG` changes, (things, memory) after all); change(number): one."""
     seen = []
     for number in range(LONG):
         change(number)
-        if LONG // 100 - 3 <= number < LONG // 100 or number >= LONG - 3:
+        if number in (LONG // 100 - 1, LONG - 1):
             seen.append((things_alive(), resident()))
-    return [(min(things for things, _ in three), three[-1][1]) for three in (seen[:3], seen[3:])]
+    return seen
 
 
 @pytest.mark.long
@@ -146,5 +144,5 @@ def test_memory_stays_as_it_is_in_a_thousand_changes_and_frames(hair, offer):
     for begin in (changing.dragged, changing.keyed, changing.driven):
         (few_things, few), (things, memory) = grown(begin())
         print(f"{offer} {begin.__name__}: things {few_things} → {things}, MB {few / 1e6:.1f} → {memory / 1e6:.1f}")
-        assert things <= (1.0 + 1e-3) * few_things and memory <= ROOM * few
+        assert things <= few_things + HELD and memory <= ROOM * few
     changing.assert_shown()
