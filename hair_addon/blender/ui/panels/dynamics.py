@@ -73,7 +73,7 @@ def _draw_delivery(layout, context):
         return
     layout.operator("vellus.remove_delivery", icon="X")
     is_outdated = dynamics_notes.is_delivery_outdated(hair)
-    said = "Delivered hair is of other baked frames: deliver it again" if is_outdated else "Renders play delivered hair"
+    said = "Delivered hair is outdated: deliver again" if is_outdated else "Renders play delivered hair"
     write(layout, context, interface_text(said), "ERROR" if is_outdated else "INFO")
 
 
