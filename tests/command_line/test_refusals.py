@@ -38,6 +38,7 @@ def sentence(*words):
         ("faceVertexIndices = [0, 2, 1,", "faceVertexIndices = [0, 2, -1,"),
         ("faceVertexCounts = [3,", "faceVertexCounts = [1000000000,"),
         ("faceVertexCounts = [3, 3,", "faceVertexCounts = [-3, 9,"),
+        ("int[] faceVertexIndices = [", "int faceVertexIndices = 3\n        int[] others = ["),
         ("def Mesh", "def \xff\xfe"),
     ],
 )

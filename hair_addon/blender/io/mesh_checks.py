@@ -4,11 +4,11 @@
 import struct
 
 import bpy
-import numpy as np
 
 from ...core.errors import HairError
 from ...core.files import alembic
 from ..data import usable_surfaces
+from . import usd_shapes
 
 # The keyword of an .obj line, and the number of values that must follow.
 _OBJ_WORDS = {"v": 3, "vn": 3, "vt": 1, "f": 3}
@@ -67,10 +67,16 @@ def require_usd(path):
         raise HairError(f"{path} is not a valid USD file: it is damaged, or has another format.") from error
     for mesh in meshes:
         attributes = mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr(), mesh.GetPointsAttr()
-        counts, indices, points = (np.array(one.Get(Usd.TimeCode.EarliestTime()) or ()) for one in attributes)
-        is_whole = counts.sum() == len(indices) and counts.min(initial=0) >= 0
-        if not (is_whole and indices.min(initial=0) >= 0 and indices.max(initial=-1) < len(points)):
+        if not _fit(*(usd_shapes.values_at(one, Usd.TimeCode.EarliestTime()) for one in attributes)):
             raise HairError(f"{path} is damaged: the faces of its mesh {mesh.GetPath()} do not match its points.")
+
+
+def _fit(counts, indices, points):
+    """Whether faces with numbers of corners and vertices of corners match points; None: a value that is no array."""
+    if counts is None or indices is None or points is None:
+        return False
+    is_whole = counts.sum() == len(indices) and counts.min(initial=0) >= 0
+    return is_whole and indices.min(initial=0) >= 0 and indices.max(initial=-1) < len(points)
 
 
 def require_imported(path):

@@ -99,13 +99,23 @@ def drawn(prim, time, lines=None, keeps_splines=True) -> Drawn:
 
 def _array(prim, name, time, kind, width=1):
     """Return values (N,) or (N, width) of an attribute, empty if it has none. Raises `HairError`."""
-    value = prim.GetAttribute(name).Get(time) if prim.HasAttribute(name) else None
+    values = values_at(prim.GetAttribute(name), time) if prim.HasAttribute(name) else np.empty(0)
     shape = (width,) if width > 1 else ()
-    values = np.asarray([] if value is None else value)
+    _require(prim, values is not None, name, "type")
     if not values.size:
         return np.empty((0, *shape), kind)
     _require(prim, values.dtype.kind in "iuf" and values.shape[1:] == shape and values.ndim, name, "type")
     return values.astype(kind)
+
+
+def values_at(attribute, time):
+    """Return the array of an attribute, empty if it has no value; None if the value is no array or is damaged."""
+    value = attribute.Get(time)
+    try:
+        values = np.asarray([] if value is None else value)
+    except (ValueError, OverflowError):  # an array whose size is negative
+        return None
+    return values if values.ndim else None
 
 
 def _require(prim, is_valid, name, other):

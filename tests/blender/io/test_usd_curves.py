@@ -2,13 +2,14 @@
 """Curves of USD files that pxr makes, read as they are drawn."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
-from hair_addon.blender.io import usd_curves
+from hair_addon.blender.io import usd_curves, usd_shapes
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.strands import curve_offsets
 
@@ -383,3 +384,18 @@ def test_a_package_is_read(rng, tmp_path):
     assert UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(tmp_path / "a.usdc")), str(tmp_path / "a.usdz"))
     (tmp_path / "a.usdc").unlink()
     np.testing.assert_array_equal(usd_curves.read(tmp_path / "a.usdz").sets[0].points, points)
+
+
+def test_an_array_of_negative_size_is_damaged():
+    """As a damaged .usdz gives it: its conversion raises, its truth value too."""
+
+    class Values:
+        def __array__(self, *_options, **_names):
+            raise ValueError("negative dimensions are not allowed")
+
+        def __len__(self):
+            raise OverflowError("cannot fit 'int' into an index-sized integer")
+
+    for value in (Values(), 3.0):
+        assert usd_shapes.values_at(SimpleNamespace(Get=lambda _time, it=value: it), 0.0) is None
+    assert usd_shapes.values_at(SimpleNamespace(Get=lambda _time: None), 0.0).shape == (0,)
