@@ -28,7 +28,8 @@ def files(scene, tmp_path):
     bpy.ops.wm.usd_export(filepath=str(tmp_path / "a.usdc"))
     bpy.ops.wm.ply_export(filepath=str(tmp_path / "a.ply"), up_axis="Y", forward_axis="NEGATIVE_Z")
     bpy.ops.wm.alembic_export(filepath=str(tmp_path / "a.abc"), as_background_job=False)
-    return {ending: tmp_path / f"a{ending}" for ending in (".usdc", ".ply", ".abc")}
+    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "a.gltf"), export_format="GLTF_SEPARATE")
+    return {ending: tmp_path / f"a{ending}" for ending in (".usdc", ".ply", ".abc", ".gltf")}
 
 
 def seen():
@@ -43,7 +44,7 @@ def seen():
     return meshes, bpy.data.filepath, bpy.context.scene.unit_settings.scale_length
 
 
-@pytest.mark.parametrize("ending", [".usdc", ".ply"])  # .abc goes the way of these
+@pytest.mark.parametrize("ending", [".usdc", ".ply", ".gltf"])  # .abc goes the way of these
 def test_another_process_gives_the_same_scene(files, tmp_path, ending):
     up = "Y" if ending == ".ply" else "Z"
     file_axes = mesh_files.open_file(files[ending], up=up)

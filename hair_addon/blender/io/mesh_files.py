@@ -60,7 +60,7 @@ _FORMATS = {
 }
 
 # Formats whose importers can crash Blender on damaged files despite all checks.
-_MAY_CRASH_BLENDER = {".ply", ".usd", ".usdc", ".usda", ".usdz", ".abc"}
+_MAY_CRASH_BLENDER = {".ply", ".usd", ".usdc", ".usda", ".usdz", ".abc", ".glb", ".gltf"}
 
 # Files without axes and units: read in metres.
 _WITHOUT_UP_AXIS = {".obj", ".ply", ".stl"}
