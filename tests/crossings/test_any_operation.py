@@ -7,6 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.walk import walk_size
+
+RUN = 200  # steps from an empty file
+SECONDS = 1.2  # of a step, where other processes take most of the machine
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -29,7 +34,11 @@ def test_random_operations_raise_no_exception(counts, seed):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(1, 11))
+@pytest.mark.parametrize("seed", walk_size.seeds(1, 10))
 def test_all_operators_and_settings(seed):
-    """Ten times a thousand steps, with surfaces that move, and undo, redo, saving and loading that change nothing."""
-    check("walk_everything", 5, 200, seed, limit=1200)
+    """A thousand steps a seed, with surfaces that move, and undo, redo, saving and loading that change nothing.
+
+    How many of which seeds: `walk_size`.
+    """
+    count = walk_size.steps(1000)
+    check("walk_everything", max(count // RUN, 1), min(count, RUN), seed, limit=60 + SECONDS * count)

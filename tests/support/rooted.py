@@ -1,19 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far strands begin from the surface that they grow on, as Blender evaluates it; without the add-on's help."""
+"""How far strands begin from the surface that they grow on, as Blender evaluates it; without the add-on's help.
+
+Where a folded quad is bent further, Blender may cut it along its other diagonal. Roots stay on the triangle that they
+grow on at rest: else they would jump from frame to frame. So a surface is what either cut makes of it.
+"""
 
 import bpy
 from mathutils import Vector
+from mathutils.bvhtree import BVHTree
 
-NEAR = 2e-3  # of a surface's size: its faces are cut into triangles, which quads are not
+NEAR = 2e-3  # of a surface's size: a face of more than four corners has other cuts than the two of a quad
 
 
 def should_be_rooted(curves_object):
-    """Whether an object is hair that is up to date, without a complaint, on a surface that is not being edited."""
+    """Whether an object is hair that is up to date, without a complaint, on a surface that is not being edited.
+
+    Hair that follows guides of another surface grows on that one, and its panel says so.
+    """
     hair = curves_object.data
     guides, surface = hair.vellus.guide_curves, hair.surface
     if hair.vellus.kind != "HAIR" or not hair.vellus.is_live or not len(hair.curves):
         return False
     if guides is None or surface is None or any(one.vellus.status or one.vellus.is_stale for one in (hair, guides)):
+        return False
+    if guides.surface != surface:
         return False
     return bpy.context.view_layer.objects.get(surface.name) == surface and surface.mode == "OBJECT"
 
@@ -29,11 +39,24 @@ def far_root(curves_object, strands, depsgraph):
         return ""
     corners = [to_world @ Vector(corner) for corner in surface.bound_box]
     size = max((a - b).length for a in corners for b in corners)
-    most = 0.0
+    most, cuts = 0.0, None
     for root in strands[:: max(len(strands) // 5, 1), 0]:
         root = place @ Vector(map(float, root))
         found, nearest, _normal, _face = surface.closest_point_on_mesh(to_world.inverted() @ root)
-        most = max(most, (to_world @ nearest - root).length if found else 0.0)
+        away = (to_world @ nearest - root).length if found else 0.0
+        if away > NEAR * size:
+            cuts = cuts or _cut_both_ways(surface.data, to_world)
+            away = min(away, cuts.find_nearest(root)[3])
+        most = max(most, away)
     if most <= NEAR * size:
         return ""
     return f"a root of {curves_object.name} is {most:.3g} away from {surface.name}, which is {size:.3g} large"
+
+
+def _cut_both_ways(mesh, to_world):
+    """The tree of a mesh's triangles, with both cuts of each quad, in the world."""
+    mesh.calc_loop_triangles()
+    triangles = [tuple(triangle.vertices) for triangle in mesh.loop_triangles]
+    for a, b, c, d in (face.vertices for face in mesh.polygons if len(face.vertices) == 4):
+        triangles += [(a, b, c), (a, c, d), (a, b, d), (b, c, d)]
+    return BVHTree.FromPolygons([to_world @ vertex.co for vertex in mesh.vertices], triangles)

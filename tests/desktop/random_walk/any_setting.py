@@ -23,6 +23,7 @@ from tests.desktop.random_walk.any_exchange import Exchanges  # noqa: E402
 from tests.desktop.random_walk.any_operation import Operations  # noqa: E402
 from tests.desktop.steps import MORE, OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import MODULE, addon, in_viewport, install, refine_to, viewport, wait  # noqa: E402
+from tests.support import rooted  # noqa: E402
 
 _BLOCKS_AN_OBJECT, _MORE_BLOCKS = 8, 150  # curves, meshes, materials, images; workspaces, screens, node groups, text
 
@@ -128,6 +129,9 @@ class Artist(Operations, Exchanges):
             strand_count = len(datablock.curves) if bound is None else len(bound.points)
             assert kept is None or kept.strand_count == strand_count, datablock.name
             assert kept is None or np.isfinite(kept.points).all(), datablock.name
+            if kept is not None and rooted.should_be_rooted(curves_object):
+                away = rooted.far_root(curves_object, kept.points, bpy.context.evaluated_depsgraph_get())
+                assert not away, away
         self._nothing_grows()
 
     def _nothing_grows(self):

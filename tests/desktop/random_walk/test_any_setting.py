@@ -4,6 +4,7 @@
 import pytest
 
 from tests.desktop import walks
+from tests.support.walk import walk_size
 from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
@@ -39,6 +40,7 @@ def test_a_few_random_settings(desktop, extension, new_profile):
 
 @pytest.mark.long
 @pytest.mark.parametrize("backend", desktop_blender.BACKENDS)
-@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("seed", walk_size.seeds(1, 5))
 def test_many_random_settings(desktop, extension, new_profile, seed, backend):
-    check(desktop, extension, new_profile(), seed, step_count=300, limit=1200, backend=backend)
+    """How many steps of which seeds: `walk_size`."""
+    check(desktop, extension, new_profile(), seed, step_count=walk_size.steps(300), limit=1200, backend=backend)

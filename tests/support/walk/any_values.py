@@ -117,7 +117,7 @@ def _number(declared, source, odd):
 
 
 def _text(name, source, folder):
-    if name in {"filepath", "directory", "folder"}:
+    if name.endswith(("filepath", "directory", "folder")):
         endings = ["", ".png", ".json", ".abc", ".usdc", ".npz", ".asset.blend"]
         return str(folder / f"{source.choice('ab')}{source.choice(endings)}") if source.random() < 0.9 else ""
     there = ["", "missing", "half", "Painted", "Flow", *(o.name for o in bpy.data.objects)]

@@ -27,7 +27,7 @@ from hair_addon.core.params import Settings
 from tests.support import always, rooted
 from tests.support.always import activate, changed, chosen, objects, operate, ours
 from tests.support.scenes import shrink_shadows
-from tests.support.walk import any_values
+from tests.support.walk import any_values, walk_lengths
 from tests.support.walk.walk_operations import Artist, walk
 from tests.support.walk.walk_steps import needs_room, pick, step
 
@@ -40,6 +40,9 @@ class Everyone(Artist):
     """An artist who uses all that there is."""
 
     most_alive = None  # after the first run of the process: what Python held then
+
+    def law_of(self, name, values):
+        return walk_lengths.law_of(name, values)
 
     @step(is_grid=st.booleans())
     @needs_room

@@ -54,6 +54,10 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
     def teardown(self):
         self.folder.cleanup()
 
+    def law_of(self, name, values):
+        """What must hold of a step, beside the invariants, as a context in which it is taken."""
+        return contextlib.nullcontext()
+
     # ------------------------------------------------------------------------------------------------- making
 
     @step(kind=st.sampled_from(["ico", "grid", "no faces", "not a number", "flat"]))

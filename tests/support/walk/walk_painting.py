@@ -50,6 +50,7 @@ class PaintingSteps:
     def paint_image(self, number, of, brightness):
         image = bpy.data.images.get("Painted") or bpy.data.images.new("Painted", 4, 4)
         image.pixels.foreach_set(np.full(64, brightness, np.float32))
+        image.pack()  # else Blender brings it back black, where its first step is undone and redone
         image.update_tag()
         if ours():
             state = chosen(sorted(ours(), key=lambda c: c.name), number).vellus

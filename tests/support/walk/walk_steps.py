@@ -15,7 +15,10 @@ odd_numbers = st.sampled_from([math.nan, math.inf, -math.inf, 0.0, -1.0, 1e30, 0
 
 
 def step(**arguments):
-    """A `rule` that is said before it is taken: after a crash the last lines tell the way."""
+    """A `rule` that is said before it is taken: after a crash the last lines tell the way.
+
+    It is taken within the `law_of` the artist, a context that may compare before and after.
+    """
 
     def said(function):
         @functools.wraps(function)
@@ -23,7 +26,8 @@ def step(**arguments):
             print(
                 f"{function.__name__}({', '.join(f'{name}={value!r}' for name, value in values.items())})", flush=True
             )
-            function(self, **values)
+            with self.law_of(function.__name__, values):
+                function(self, **values)
 
         return rule(**arguments)(say_and_do)
 
