@@ -29,10 +29,14 @@ class Reading:
     has_rest: bool  # whether Blender stores rest positions
     is_turned: bool
     is_divided: bool  # whether modifiers subdivide the mesh, at the current level or at another
+    is_edited: bool = False  # whether it is divided and in Edit Mode, where the UV map before modifiers is not there
 
     def is_same(self, other):
         """Whether another reading results in the same `Surface`."""
-        named = [(read.name, read.uv_map, read.has_rest, read.is_turned, read.is_divided) for read in (self, other)]
+        named = [
+            (read.name, read.uv_map, read.has_rest, read.is_turned, read.is_divided, read.is_edited)
+            for read in (self, other)
+        ]
         if named[0] != named[1] or (self.loop_uvs is None) != (other.loop_uvs is None):
             return False
         own, others = (

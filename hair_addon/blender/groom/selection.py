@@ -170,8 +170,10 @@ def object_of(curves: Curves, view_layer: ViewLayer) -> Object | None:
     return next((o for o in _there(view_layer) if o.data == curves), None)
 
 
-def make_active(chosen: Object, view_layer: ViewLayer) -> None:
-    """Select only this object and make it active."""
+def make_active(chosen: Object | None, view_layer: ViewLayer) -> None:
+    """Select only this object and make it active; what is selected stays where the view layer does not have it."""
+    if chosen is None or view_layer.objects.get(chosen.name) != chosen:
+        return
     for other in _there(view_layer):
         other.select_set(other == chosen)
     view_layer.objects.active = chosen

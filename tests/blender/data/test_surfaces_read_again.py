@@ -8,6 +8,7 @@ import pytest
 
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.pictures import drawn_meshes
+from hair_addon.blender.render import hair_cache
 
 
 @pytest.fixture
@@ -145,3 +146,38 @@ def test_a_pose_cuts_no_polygons(ball, monkeypatch):
     assert second.is_deformed and not first.is_deformed
     drawn_meshes.read_drawn_meshes(depsgraph)  # at rest
     assert len(cut) == 1
+
+
+@pytest.mark.parametrize("is_divided", [True, False])
+def test_hair_of_a_file_that_was_saved_in_edit_mode_is_drawn(ball, is_divided, tmp_path):
+    """There the mesh before its modifiers does not list the attributes of its corners and vertices."""
+    if is_divided:
+        subdivide(ball)
+    bpy.ops.vellus.add_hair(guide_count=6, strand_count=20, relax_iterations=2)
+
+    def drawn():
+        made = next(c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR")
+        return hair_cache.strands_on_gpu(made).points
+
+    before = drawn()
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = ball
+    bpy.ops.object.mode_set(mode="EDIT")
+    path = str(tmp_path / "edited.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    opened = bpy.context.object
+    assert opened.mode == "EDIT"
+    np.testing.assert_allclose(drawn(), before, atol=1e-6)
+    own = scene.read_own_mesh(opened, np.eye(3))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    out = scene.read_own_mesh(opened, np.eye(3))
+    np.testing.assert_array_equal(own.vertices, out.vertices)
+    np.testing.assert_array_equal(own.triangles, out.triangles)
+    np.testing.assert_allclose(drawn(), before, atol=1e-6)
+    uvs = scene.read_surface(opened, bpy.context.evaluated_depsgraph_get()).sized_cage.corner_uvs
+    bpy.ops.wm.open_mainfile(filepath=path)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    again = scene.read_surface(bpy.context.object, bpy.context.evaluated_depsgraph_get()).sized_cage.corner_uvs
+    np.testing.assert_array_equal(again, uvs)

@@ -118,6 +118,19 @@ def test_deleting_a_row_leaves_the_others_alone(systems):
     assert listed() == (["Brows", "Long"], "Brows")
 
 
+def test_a_row_is_deleted_without_its_mesh_in_the_view_layer(systems):
+    """Its mesh, which is selected else, is in a collection that the view layer excludes."""
+    hidden = bpy.data.collections.new("Hidden")
+    bpy.context.scene.collection.children.link(hidden)
+    sphere = bpy.data.objects["Sphere"]
+    bpy.context.scene.collection.objects.unlink(sphere)
+    hidden.objects.link(sphere)
+    bpy.context.view_layer.layer_collection.children["Hidden"].exclude = True
+    activate("Brows")
+    bpy.ops.vellus.delete_system()
+    assert "Brows" not in bpy.data.objects
+
+
 def test_guides_that_other_hair_follows_survive_a_system(systems):
     guides = systems[1].data.vellus.guide_curves
     activate(bpy.data.objects["Brows Guides"].name)

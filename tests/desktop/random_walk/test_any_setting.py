@@ -43,4 +43,4 @@ def test_a_few_random_settings(desktop, extension, new_profile):
 @pytest.mark.parametrize("seed", walk_size.seeds(1, 5))
 def test_many_random_settings(desktop, extension, new_profile, seed, backend):
     """How many steps of which seeds: `walk_size`."""
-    check(desktop, extension, new_profile(), seed, step_count=walk_size.steps(300), limit=1200, backend=backend)
+    check(desktop, extension, new_profile(), seed, step_count=walk_size.steps(300), limit=3000, backend=backend)

@@ -349,8 +349,7 @@ class VELLUS_OT_delete_hair(HairOperator, bpy.types.Operator):
     def change(self, context):
         surface, parts = surface_of(context.object), parts_of(context.object)
         edits.delete(parts)
-        if surface is not None and surface.name in context.view_layer.objects:
-            make_active(surface, context.view_layer)
+        make_active(surface, context.view_layer)
         return "{count} objects deleted", {"count": len(parts)}
 
 
