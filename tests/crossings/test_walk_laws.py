@@ -75,6 +75,29 @@ def test_hair_that_follows_guides_of_another_surface_is_not_asked_for_but_told(h
     assert any("give it guides of its own" in text for text in told), told
 
 
+def test_curves_that_became_hair_begin_where_they_did(hair):
+    """Off the surface, as far as they store."""
+    strands = points(hair) + np.float32((0.0, 0.0, 0.3))
+    write_points(hair, strands)
+    hair.data.vellus.kind = "NONE"
+    bpy.ops.vellus.use_as_hair(guide_count=4)
+    assert hair.data.vellus.kind == "HAIR" and far(hair) and not rooted.should_be_rooted(hair)
+
+
+def test_roots_that_were_deleted_are_not_asked_for(hair):
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.curves.select_all(action="DESELECT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    chosen = np.zeros(len(hair.data.points), bool)
+    chosen[0] = True
+    hair.data.attributes[".selection"].data.foreach_set("value", chosen)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.curves.delete()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert len(hair.data.points) == len(chosen) - 1
+    assert not rooted.should_be_rooted(hair)
+
+
 def test_what_the_walk_paints_is_there_after_undo_and_redo(hair):
     """Blender brings the pixels of an image back, past its first step, only where they are in the file."""
     bpy.ops.ed.undo_push(message="before")

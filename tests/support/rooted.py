@@ -6,6 +6,7 @@ grow on at rest: else they would jump from frame to frame. So a surface is what 
 """
 
 import bpy
+import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
@@ -15,7 +16,8 @@ NEAR = 2e-3  # of a surface's size: a face of more than four corners has other c
 def should_be_rooted(curves_object):
     """Whether an object is hair that is up to date, without a complaint, on a surface that is not being edited.
 
-    Hair that follows guides of another surface grows on that one, and its panel says so.
+    Hair that follows guides of another surface grows on that one, and its panel says so. Curves that became hair begin as
+    far from the surface as they did, which they store. Where points were deleted in Edit Mode, roots may be among them.
     """
     hair = curves_object.data
     guides, surface = hair.vellus.guide_curves, hair.surface
@@ -23,9 +25,16 @@ def should_be_rooted(curves_object):
         return False
     if guides is None or surface is None or any(one.vellus.status or one.vellus.is_stale for one in (hair, guides)):
         return False
-    if guides.surface != surface:
+    if guides.surface != surface or "root_distance" in hair.attributes or not _are_equal(hair):
         return False
     return bpy.context.view_layer.objects.get(surface.name) == surface and surface.mode == "OBJECT"
+
+
+def _are_equal(curves):
+    """Whether all curves have the same number of points."""
+    offsets = np.empty(len(curves.curve_offset_data), np.int32)
+    curves.curve_offset_data.foreach_get("value", offsets)
+    return not np.ptp(np.diff(offsets))
 
 
 def far_root(curves_object, strands, depsgraph):
