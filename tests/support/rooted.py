@@ -16,8 +16,8 @@ NEAR = 2e-3  # of a surface's size: a face of more than four corners has other c
 def should_be_rooted(curves_object):
     """Whether an object is hair that is up to date, without a complaint, on a surface that is not being edited.
 
-    Hair that follows guides of another surface grows on that one, and its panel says so. Curves that became hair begin as
-    far from the surface as they did, which they store. Where points were deleted in Edit Mode, roots may be among them.
+    Hair that follows guides of another surface grows on that one, and its panel says so. Curves that became hair begin
+    as far from the surface as they did, which they store. Of points that were deleted in Edit Mode some may be roots.
     """
     hair = curves_object.data
     guides, surface = hair.vellus.guide_curves, hair.surface
