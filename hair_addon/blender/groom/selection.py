@@ -171,10 +171,11 @@ def object_of(curves: Curves, view_layer: ViewLayer) -> Object | None:
 
 
 def make_active(chosen: Object | None, view_layer: ViewLayer) -> None:
-    """Select only this object and make it active; what is selected stays where the view layer does not have it."""
-    if chosen is None or view_layer.objects.get(chosen.name) != chosen:
+    """Select only this object and make it active; without effect if the view layer does not have it."""
+    there = _there(view_layer)
+    if chosen not in there:
         return
-    for other in _there(view_layer):
+    for other in there:
         other.select_set(other == chosen)
     view_layer.objects.active = chosen
 
