@@ -8,7 +8,7 @@ import bpy
 from ...core.errors import HairError
 from ...core.files import alembic
 from ..data import usable_surfaces
-from . import usd_shapes
+from . import usd_stage
 
 # The keyword of an .obj line, and the number of values that must follow.
 _OBJ_WORDS = {"v": 3, "vn": 3, "vt": 1, "f": 3}
@@ -67,7 +67,7 @@ def require_usd(path):
         raise HairError(f"{path} is not a valid USD file: it is damaged, or has another format.") from error
     for mesh in meshes:
         attributes = mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr(), mesh.GetPointsAttr()
-        if not _fit(*(usd_shapes.values_at(one, Usd.TimeCode.EarliestTime()) for one in attributes)):
+        if not _fit(*(usd_stage.values_at(one, Usd.TimeCode.EarliestTime()) for one in attributes)):
             raise HairError(f"{path} is damaged: the faces of its mesh {mesh.GetPath()} do not match its points.")
 
 

@@ -123,26 +123,27 @@ def _of_grooms(prim, time, is_kept):
     """Return {field: value} of a `CurveSet` from the primvars of grooms [UnrealGroom26]; others are omitted."""
     from pxr import UsdGeom
 
-    def one(name):
+    def one(name, kind):
         value = usd_stage.primvar(prim, name, time)
-        return value[0] if value is not None and not isinstance(value, str) and np.ndim(value) else value
+        values = usd_stage.array_of(value)
+        value = values.ravel()[0].item() if values is not None and values.size else value
+        return value if isinstance(value, kind) else None
 
     def of_curves(name, kind, width=1):
-        value = usd_stage.primvar(prim, name, time)
+        value = usd_stage.array_of(usd_stage.primvar(prim, name, time))
         shape = (len(is_kept),) if width == 1 else (len(is_kept), width)
-        value = None if value is None or isinstance(value, str) else np.asarray(value)
         if value is None or value.shape != shape or value.dtype.kind not in "iuf":
             return None
         return value.astype(kind)[is_kept]
 
-    is_guide = one("groom_guide")
+    is_guide = one("groom_guide", int)
     if is_guide is None and UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide:
         is_guide = True
     ids, uvs = of_curves("groom_id", np.int32), of_curves("groom_root_uv", np.float32, 2)
     fields = {
         "is_guide": None if is_guide is None else bool(is_guide),
-        "group_id": one("groom_group_id"),
-        "group_name": one("groom_group_name"),
+        "group_id": one("groom_group_id", int),
+        "group_name": one("groom_group_name", str),
         "ids": of_curves("id", np.int32) if ids is None else ids,
         "root_uvs": of_curves("st", np.float32, 2) if uvs is None else uvs,
         "guide_ids": of_curves("groom_closest_guides", np.int32, GUIDE_SLOTS),

@@ -9,6 +9,7 @@ from ...core.errors import HairError
 from ...core.geometry import bezier_segments
 from ...core.geometry.bezier_segments import each
 from ...core.geometry.strands import curve_offsets
+from . import usd_stage
 
 _MOST_ORDER = 16  # of NURBS: programs write order 4, rarely up to 8
 
@@ -99,23 +100,13 @@ def drawn(prim, time, lines=None, keeps_splines=True) -> Drawn:
 
 def _array(prim, name, time, kind, width=1):
     """Return values (N,) or (N, width) of an attribute, empty if it has none. Raises `HairError`."""
-    values = values_at(prim.GetAttribute(name), time) if prim.HasAttribute(name) else np.empty(0)
+    values = usd_stage.values_at(prim.GetAttribute(name), time) if prim.HasAttribute(name) else np.empty(0)
     shape = (width,) if width > 1 else ()
     _require(prim, values is not None, name, "type")
     if not values.size:
         return np.empty((0, *shape), kind)
     _require(prim, values.dtype.kind in "iuf" and values.shape[1:] == shape and values.ndim, name, "type")
     return values.astype(kind)
-
-
-def values_at(attribute, time):
-    """Return the array of an attribute, empty if it has no value; None if the value is no array or is damaged."""
-    value = attribute.Get(time)
-    try:
-        values = np.asarray([] if value is None else value)
-    except (ValueError, OverflowError):  # an array whose size is negative
-        return None
-    return values if values.ndim else None
 
 
 def _require(prim, is_valid, name, other):
@@ -232,12 +223,12 @@ def _widths(prim, time, curves, short_ends=None):
     else:
         shape = UsdGeom.Curves(prim)
         scope, values = str(shape.GetWidthsInterpolation()), shape.GetWidthsAttr().Get(time)
-    if values is None or not len(values):
+    values, counts, kept = usd_stage.array_of(values), curves.counts, curves.is_kept
+    if values is not None and not values.size:
         return _Widths()
-    values, counts, kept = np.asarray(values).ravel(), curves.counts, curves.is_kept
-    if values.dtype.kind not in "iuf":
+    if values is None or values.dtype.kind not in "iuf":
         return _Widths(is_odd=True)
-    values = values.astype(np.float64)
+    values = values.ravel().astype(np.float64)
     ends = np.maximum(curves.segments, 1) + (not curves.is_closed)
     sizes = {"constant": 1, "vertex": counts.sum(), "varying": ends.sum(), "uniform": len(counts)}
     if short_ends is not None:

@@ -151,6 +151,20 @@ def matrix_of(prim, time) -> np.ndarray:
     return np.array(UsdGeom.Imageable(prim).ComputeLocalToWorldTransform(time)).T  # USD's have rows of vectors
 
 
+def array_of(value) -> np.ndarray | None:
+    """Return a USD value as an array, empty if it is None; None if it is not an array or is damaged."""
+    try:
+        values = np.asarray([] if value is None else value)
+    except (ValueError, OverflowError):  # an array whose size is negative
+        return None
+    return values if values.ndim else None
+
+
+def values_at(attribute, time) -> np.ndarray | None:
+    """Return an attribute's value at a time as `array_of` does."""
+    return array_of(attribute.Get(time))
+
+
 def primvar(prim, name: str, time):
     """Return the values of a primvar with its indices applied; None if it has no values."""
     from pxr import UsdGeom

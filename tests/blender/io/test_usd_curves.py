@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
-from hair_addon.blender.io import usd_curves, usd_shapes
+from hair_addon.blender.io import usd_curves, usd_stage
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.strands import curve_offsets
 
@@ -386,6 +386,31 @@ def test_a_package_is_read(rng, tmp_path):
     np.testing.assert_array_equal(usd_curves.read(tmp_path / "a.usdz").sets[0].points, points)
 
 
+@pytest.mark.parametrize(
+    ("line", "is_left_out"),
+    [
+        ("float widths = 0.1", True),
+        ("float primvars:widths = 0.1", True),
+        ('string[] primvars:widths = ["a"]', True),
+        ("float[] widths = []", False),
+        ('string primvars:groom_group_id = "abc"', False),
+        ("matrix4d primvars:groom_group_id = ((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1))", False),
+        ("int[] primvars:groom_group_name = [1]", False),
+        ('string[] primvars:groom_guide = ["a"]', False),
+        ("int primvars:groom_id = 3", False),
+    ],
+)
+def test_values_of_another_type_are_left_out(tmp_path, line, is_left_out):
+    path = tmp_path / "a.usda"
+    kind, points = 'uniform token type = "linear"', "point3f[] points = [(0, 0, 0), (0, 0, 1)]"
+    lines = "int[] curveVertexCounts = [2]", points, kind, line
+    path.write_text("\n".join(("#usda 1.0", 'def BasisCurves "hair"', "{", *lines, "}", "")))
+    read = usd_curves.read(path)
+    (one,) = read.sets
+    assert (one.radii, one.is_guide, one.group_id, one.group_name, one.ids) == (None, None, 0, "", None)
+    assert ["widths" in str(note) for note in read.notes] == [True] * is_left_out
+
+
 def test_an_array_of_negative_size_is_damaged():
     """As a damaged .usdz gives it: its conversion raises, its truth value too."""
 
@@ -397,5 +422,5 @@ def test_an_array_of_negative_size_is_damaged():
             raise OverflowError("cannot fit 'int' into an index-sized integer")
 
     for value in (Values(), 3.0):
-        assert usd_shapes.values_at(SimpleNamespace(Get=lambda _time, it=value: it), 0.0) is None
-    assert usd_shapes.values_at(SimpleNamespace(Get=lambda _time: None), 0.0).shape == (0,)
+        assert usd_stage.values_at(SimpleNamespace(Get=lambda _time, it=value: it), 0.0) is None
+    assert usd_stage.values_at(SimpleNamespace(Get=lambda _time: None), 0.0).shape == (0,)
