@@ -10,7 +10,8 @@
 //   vec3 root                               its root [m]
 //   vec3 tangent, bitangent, normal         its frame
 //   array_t<float> offsets                  (G, groups, 4 * SEGMENTS) segments of guides in the frames of their roots
-//                                           [m]: of each group all x, then all y, all z, all lengths; 0 past the tip
+//                                           [m], 0 past the tip: of each group all x, then all y, all z, all lengths
+//                                           on a CPU; x, y, z and length of one segment after the other on a GPU
 //   array_t<int> indices                    (S, K) guides of each strand
 //   array_t<float> weights                  (S, K) their weights, zero in unused slots
 //   array_t<vec2> turns                     (S, K) cosine and sine of the turn from a guide's frame to the strand's
@@ -36,6 +37,10 @@ struct Guide {
   const float* offsets;
   float share, cosine, sine;
 };
+// A group of its segments.
+struct Segments {
+  lanes x, y, z, size;
+};
 const auto guide_of = [&](int slot) ALWAYS_INLINE {
   const size_t place = size_t(strand) * slot_count + slot;
   Guide guide;
@@ -50,7 +55,10 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
   const int lane = threadIdx.x % SEGMENTS;
   // The threads of this strand, as bits of the warp.
   const unsigned team = ((1u << SEGMENTS) - 1u) << (threadIdx.x % 32 / SEGMENTS * SEGMENTS);
-  const auto read_segments = [&](const float* from) { return __ldg(from + lane); };
+  const auto read_segments = [&](const float* from) {
+    const float4 found = __ldg(reinterpret_cast<const float4*>(from) + lane);
+    return Segments{found.x, found.y, found.z, found.w};
+  };
   // From segments to points: sums of all segments from `last` on, which becomes the last of them.
   const auto add_up = [&](lanes& along, float& last) {
     for (int step = 1; step < SEGMENTS; step *= 2) {
@@ -75,8 +83,8 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
   };
 #else
   const auto read_segments = [](const float* from) ALWAYS_INLINE {
-    lanes found;
-    __builtin_memcpy(&found, from, sizeof(lanes));
+    Segments found;
+    __builtin_memcpy(&found, from, sizeof(Segments));
     return found;
   };
   // The same by an inclusive scan over the lanes [Harris07]: vectors are moved up by some lanes, with zeros below.
@@ -127,19 +135,8 @@ row[2] = last_z;
 for (int group = 0; group < group_count; ++group) {
   lanes x = 0.0f, y = 0.0f, z = 0.0f, size = 0.0f;
   for_guides([&](const Guide& guide) ALWAYS_INLINE {
-    const float* its_offsets = guide.offsets + group * (4 * SEGMENTS);
-    add_guide(
-        x,
-        y,
-        z,
-        size,
-        guide.share,
-        guide.cosine,
-        guide.sine,
-        read_segments(its_offsets),
-        read_segments(its_offsets + SEGMENTS),
-        read_segments(its_offsets + 2 * SEGMENTS),
-        read_segments(its_offsets + 3 * SEGMENTS));
+    const Segments its = read_segments(guide.offsets + group * (4 * SEGMENTS));
+    add_guide(x, y, z, size, guide.share, guide.cosine, guide.sine, its.x, its.y, its.z, its.size);
   });
   // Out of the strand's frame.
   const lanes stretch = stretch_of(x, y, z, size, keep_length);

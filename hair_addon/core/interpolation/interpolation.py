@@ -65,16 +65,17 @@ def interpolate(
         require_count("points to fill", out.shape[1], guide_points.shape[1])
     guide_count, point_count = guide_points.shape
     group_count = -(-(point_count - 1) // SEGMENTS)
+    on_cpu = wp.get_device(roots.device).is_cpu
     offsets = wp.empty((guide_count, group_count, 4 * SEGMENTS), dtype=float, device=roots.device)
     parallel.launch(
         _put_offsets,
         guide_count,
-        inputs=[Rows(guide_points), Rows(guide_normals)],
+        inputs=[Rows(guide_points), Rows(guide_normals), *((1, SEGMENTS) if on_cpu else (4, 1))],
         outputs=[offsets],
         device=roots.device,
         least_rows=1024,
     )
-    threads = 1 if wp.get_device(roots.device).is_cpu else SEGMENTS
+    threads = 1 if on_cpu else SEGMENTS
     points = parallel.empty_vectors((len(roots), point_count), roots.device) if out is None else out
     parallel.launch(
         _put_strands,
@@ -158,6 +159,8 @@ def _framed_offset(guide_points: wp.array2d[wp.vec3], guide: int, point: int, no
 def _put_offsets(
     guide_points: wp.array2d[wp.vec3],
     guide_normals: wp.array[wp.vec3],
+    segment_stride: int,
+    part_stride: int,
     # outputs
     out_offsets: wp.array3d[float],
 ):
@@ -166,4 +169,4 @@ def _put_offsets(
         for lane in range(wp.static(SEGMENTS)):
             offset = _framed_offset(guide_points, guide, 1 + wp.static(SEGMENTS) * group + lane, guide_normals[guide])
             for part in range(4):
-                out_offsets[guide, group, wp.static(SEGMENTS) * part + lane] = offset[part]
+                out_offsets[guide, group, segment_stride * lane + part_stride * part] = offset[part]
