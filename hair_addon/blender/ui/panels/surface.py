@@ -10,6 +10,7 @@ from ...groom.guides import line_drawing
 from ...groom.selection import active_of_kind, guides_of, hair_of, parts_of, surface_of
 from ...host.notices import name_of, text_of
 from ...settings.translations import interface_text
+from ..operators.systems import is_combing
 from ..setting_rows import row
 from .tab import HairTab, draw_combing, split, write
 
@@ -50,7 +51,7 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
             layout.operator("vellus.convert_particles", icon="PARTICLES")
         if parts:
             _draw_tools(layout, context)
-            _draw_combing(layout, context)
+            _draw_comb_styled(layout, context)
 
 
 def _draw_foreign(layout, context):
@@ -72,15 +73,16 @@ def _draw_foreign(layout, context):
 
 def _draw_tools(layout, context):
     column = layout.column(align=True)
-    draw_combing(column, context)
+    if not is_combing(context) or surface_of(context.object) is None:  # the Hair Systems panel has Stop Combing
+        draw_combing(column, context)
     column.operator("vellus.select_guides", text="Select Guides", icon="RESTRICT_SELECT_OFF")
     column.operator("vellus.select_hair", text="Select Hair", icon="RESTRICT_SELECT_OFF")
     column.operator("vellus.transfer_groom", icon="DUPLICATE")
     column.operator("vellus.delete_hair", icon="TRASH")
 
 
-def _draw_combing(layout, context):
-    """What hair with styles shows while its guides are combed."""
+def _draw_comb_styled(layout, context):
+    """Draw the setting that shows styles while guides are combed."""
     hair, guides = hair_of(context.object), guides_of(context.object)
     if hair is not None and guides is not None and len(hair.vellus.styles):
         row(layout, guides.vellus, "shows_styles_while_combing")
