@@ -14,11 +14,11 @@ if TYPE_CHECKING:
         fresnel,
         kajiya_kay,
         longitudinal,
-        longitudinal_kernel,
         marschner,
         paths,
         pigment,
         principled,
+        scattering_kernel,
         strand_variation,
     )
 else:

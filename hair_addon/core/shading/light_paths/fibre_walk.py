@@ -5,7 +5,8 @@ sampling, for one offset h of the ray in the fibre's width. The mean over h is t
 
 import warp as wp
 
-from ..fibre.longitudinal_kernel import d_eon_lobe
+from ..fibre.scattering_kernel import attenuation as attenuation_of
+from ..fibre.scattering_kernel import crossing_length, exit_angle, reflectance, shifted_lobe
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -36,37 +37,20 @@ def variance_of(roughness: float):
 
 
 @wp.func
-def reflectance(cosine: float, eta: float):
-    """`fresnel.dielectric_reflectance`, from outside."""
-    c = wp.clamp(cosine, 0.0, 1.0)
-    inside = wp.sqrt(wp.max(0.0, 1.0 - (1.0 - c * c) / (eta * eta)))
-    parallel = (eta * c - inside) / (eta * c + inside)
-    perpendicular = (c - eta * inside) / (c + eta * inside)
-    return 0.5 * (parallel * parallel + perpendicular * perpendicular)
-
-
-@wp.func
 def transmittance(h: float, sin_o: float, cos_o: float, eta: float, sigma_a: wp.vec3):
     """Light left after one crossing of the fibre."""
-    root = wp.sqrt(eta * eta - sin_o * sin_o)
-    offset = h * cos_o / root
-    length = 2.0 * wp.sqrt(wp.max(0.0, 1.0 - offset * offset)) * eta / root
+    length = crossing_length(h, sin_o, cos_o, eta)
     return wp.vec3(wp.exp(-sigma_a[0] * length), wp.exp(-sigma_a[1] * length), wp.exp(-sigma_a[2] * length))
 
 
 @wp.func
 def attenuation(path: int, fresnel: float, crossing: wp.vec3):
-    """Light of R, TT, TRT or all longer paths: `paths.path_attenuation`."""
-    if path == 0:
-        return wp.vec3(fresnel, fresnel, fresnel)
-    left = (1.0 - fresnel) * (1.0 - fresnel) * crossing
-    if path == 1:
-        return left
-    left = fresnel * wp.cw_mul(left, crossing)
-    if path == 2:
-        return left
-    once = fresnel * crossing
-    return wp.cw_div(wp.cw_mul(left, once), wp.vec3(1.0, 1.0, 1.0) - once)
+    """Light of R, TT, TRT or all longer paths."""
+    return wp.vec3(
+        attenuation_of(path, fresnel, crossing[0]),
+        attenuation_of(path, fresnel, crossing[1]),
+        attenuation_of(path, fresnel, crossing[2]),
+    )
 
 
 @wp.func
@@ -83,20 +67,11 @@ def lobe(path: int, fibre: Fibre):
 
 
 @wp.func
-def exit_angle(path: int, h: float, sin_o: float, cos_o: float, eta: float):
-    """Azimuth in which a path leaves."""
-    inside = wp.asin(wp.clamp(h * cos_o / wp.sqrt(eta * eta - sin_o * sin_o), -1.0, 1.0))
-    return float(path) * (2.0 * inside + PI) - 2.0 * wp.asin(h)
-
-
-@wp.func
 def longitudinal(sin_i: float, sin_o: float, shift: float, v: float):
-    """`longitudinal.d_eon_lobe`, the view's inclination shifted back."""
+    """`shifted_lobe` of sines alone."""
     cos_i = wp.sqrt(1.0 - sin_i * sin_i)
     cos_o = wp.sqrt(1.0 - sin_o * sin_o)
-    sin_turned = sin_o * wp.cos(shift) - cos_o * wp.sin(shift)
-    cos_turned = wp.abs(cos_o * wp.cos(shift) + sin_o * wp.sin(shift))
-    return d_eon_lobe(sin_i, cos_i, sin_turned, cos_turned, v)
+    return shifted_lobe(sin_i, cos_i, sin_o, cos_o, shift, v)
 
 
 @wp.func
@@ -125,7 +100,7 @@ def value(fibre: Fibre, viewer: wp.vec3, light: wp.vec3, h: float, weight: wp.ve
         if path == _RESIDUAL:
             part = part / (2.0 * PI)
         else:
-            turned = phi - exit_angle(path, h, sin_o, cos_o, fibre.eta)
+            turned = phi - exit_angle(path, h, wp.asin(h), sin_o, cos_o, fibre.eta)
             turned = turned - 2.0 * PI * wp.floor(turned / (2.0 * PI) + 0.5)
             e = wp.exp(-wp.abs(turned) / fibre.scale)
             part = part * e / (fibre.scale * (1.0 + e) * (1.0 + e) * (1.0 - 2.0 * logistic_part(fibre.scale)))
@@ -190,7 +165,7 @@ def turn(fibre: Fibre, viewer: wp.vec3, weight: wp.vec3, h: float, random: wp.ui
     if path != _RESIDUAL:
         low = logistic_part(fibre.scale)
         q = wp.clamp(low + wp.randf(state) * (1.0 - 2.0 * low), 1e-7, 1.0 - 1e-7)
-        phi = exit_angle(path, h, sin_o, cos_o, fibre.eta) - fibre.scale * wp.log(1.0 / q - 1.0)
+        phi = exit_angle(path, h, wp.asin(h), sin_o, cos_o, fibre.eta) - fibre.scale * wp.log(1.0 / q - 1.0)
     x = wp.normalize(viewer - sin_o * fibre.tangent)
     y = wp.cross(fibre.tangent, x)
     direction = sin_i * fibre.tangent + cos_i * (wp.cos(phi) * x + wp.sin(phi) * y)

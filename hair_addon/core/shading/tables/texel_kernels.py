@@ -10,8 +10,9 @@ import warp as wp
 
 from ...kernels import kernel_cache
 from ..fibre import energy_conserving
-from ..fibre.longitudinal_kernel import d_eon_lobe
 from ..fibre.marschner import Caustic, longitudinal_lobes
+from ..fibre.paths import TRT, TT, R
+from ..fibre.scattering_kernel import attenuation, crossing_length, exit_angle, reflectance, shifted_lobe
 from .cell_means import NODES, WEIGHTS, Absorptions
 from .lookup_tables import Settings
 
@@ -24,6 +25,17 @@ _HALF_PI = wp.constant(wp.float64(0.5 * np.pi))
 _NODES = wp.constant(wp.types.vector(4, wp.float64)(*NODES))
 _WEIGHTS = wp.constant(wp.types.vector(4, wp.float64)(*WEIGHTS))
 _BISECTIONS = wp.constant(50)
+_R, _TT, _TRT = (wp.constant(path) for path in (R, TT, TRT))
+
+
+@wp.struct
+class _Inclination:
+    """What a row of a table tells of the fibre: sine and cosine of theta_d or theta_o, eta, and eta'."""
+
+    sine: F
+    cosine: F
+    eta: F
+    eta_prime: F
 
 
 @wp.func
@@ -38,22 +50,23 @@ def _tt_gamma(phi: F, eta_prime: F):
 
 
 @wp.func
-def _trt_exit(gamma: F, eta_prime: F):
-    return F(4.0) * wp.asin(wp.sin(gamma) / eta_prime) - F(2.0) * gamma
+def _trt_exit(gamma: F, row: _Inclination):
+    """Azimuth in (-pi, pi) in which TRT leaves."""
+    return exit_angle(_TRT, wp.sin(gamma), gamma, row.sine, row.cosine, row.eta) - F(2.0) * _PI
 
 
 @wp.func
-def _trt_gamma(phi: F, low: F, high: F, slope_sign: F, eta_prime: F):
+def _trt_gamma(phi: F, low: F, high: F, slope_sign: F, row: _Inclination):
     """gamma of the ray that leaves at phi, within one monotone segment; its nearer end where none does."""
-    if slope_sign * (phi - _trt_exit(low, eta_prime)) <= F(0.0):
+    if slope_sign * (phi - _trt_exit(low, row)) <= F(0.0):
         return low
-    if slope_sign * (phi - _trt_exit(high, eta_prime)) >= F(0.0):
+    if slope_sign * (phi - _trt_exit(high, row)) >= F(0.0):
         return high
     below = low
     above = high
     for _step in range(_BISECTIONS):
         middle = F(0.5) * (below + above)
-        if slope_sign * (_trt_exit(middle, eta_prime) - phi) < F(0.0):
+        if slope_sign * (_trt_exit(middle, row) - phi) < F(0.0):
             below = middle
         else:
             above = middle
@@ -70,12 +83,11 @@ def _kept(phi: F, phi_c: F, fade: F, width: F):
 
 @wp.func
 def _send(
-    crossings: int,
+    path: int,
     low: F,
     high: F,
     cell_width: F,
-    cosine: F,
-    eta: F,
+    inclination: _Inclination,
     sigma_a: wp.array[F],
     caustic: wp.vec3d,
     row: int,
@@ -85,30 +97,17 @@ def _send(
 ):
     """Send the light A dh of the rays between two gamma into a cell, for each channel."""
     half_width = F(0.5) * (high - low)
-    root = wp.sqrt(eta * eta - F(1.0) + cosine * cosine)
-    eta_prime = root / cosine
-    eta_double_prime = eta * eta * cosine / root
     for node in range(4):
         gamma = low + half_width * (F(1.0) + _NODES[node])
-        sin_t = wp.sin(gamma) / eta_prime
-        cos_t = wp.sqrt(F(1.0) - sin_t * sin_t)
-        cos_i = wp.cos(gamma)
-        perpendicular = (cos_i - eta_prime * cos_t) / (cos_i + eta_prime * cos_t)
-        parallel = (eta_double_prime * cos_i - cos_t) / (eta_double_prime * cos_i + cos_t)
-        fresnel = F(0.5) * (perpendicular * perpendicular + parallel * parallel)
-        light = F(0.5) * cos_i * wp.abs(half_width) * _WEIGHTS[node] / cell_width
-        if crossings == 0:
-            out_n[row, column, 0] = out_n[row, column, 0] + float(light * fresnel)
-        else:
-            light = light * (F(1.0) - fresnel) * (F(1.0) - fresnel)
-            if crossings == 2:
-                light = light * fresnel
-                if caustic[2] > F(0.0):
-                    light = light * _kept(_trt_exit(gamma, eta_prime), caustic[0], caustic[1], caustic[2])
-            length = F(crossings) * F(2.0) * cos_t * eta / root
-            for channel in range(sigma_a.shape[0]):
-                left = float(light * wp.exp(-sigma_a[channel] * length))
-                out_n[row, column, channel] = out_n[row, column, channel] + left
+        h = wp.sin(gamma)
+        fresnel = reflectance(inclination.cosine * wp.cos(gamma), inclination.eta)
+        length = crossing_length(h, inclination.sine, inclination.cosine, inclination.eta)
+        light = F(0.5) * wp.cos(gamma) * wp.abs(half_width) * _WEIGHTS[node] / cell_width
+        if path == _TRT and caustic[2] > F(0.0):
+            light = light * _kept(_trt_exit(gamma, inclination), caustic[0], caustic[1], caustic[2])
+        for channel in range(out_n.shape[2]):
+            left = attenuation(path, fresnel, wp.exp(-sigma_a[channel] * length))
+            out_n[row, column, channel] = out_n[row, column, channel] + float(light * left)
 
 
 @wp.kernel
@@ -131,14 +130,19 @@ def _smooth_texels(
     first = edges[column]
     last = edges[column + 1]
     width = wp.abs(last - first)
-    eta_prime = wp.sqrt(eta * eta - F(1.0) + cosine * cosine) / cosine
+    inclination = _Inclination()
+    inclination.sine = wp.sqrt((F(1.0) - cosine) * (F(1.0) + cosine))
+    inclination.cosine = cosine
+    inclination.eta = eta
+    inclination.eta_prime = wp.sqrt(eta * eta - F(1.0) + cosine * cosine) / cosine
+    eta_prime = inclination.eta_prime
     caustic = wp.vec3d(phi_c[row], fade[row], glint_width)
 
-    _send(0, F(-0.5) * first, F(-0.5) * last, width, cosine, eta, sigma_a, caustic, row, column, out_n_r)
+    _send(_R, F(-0.5) * first, F(-0.5) * last, width, inclination, sigma_a, caustic, row, column, out_n_r)
     low = _tt_gamma(first, eta_prime)
     high = _tt_gamma(last, eta_prime)
     if low != high:
-        _send(1, low, high, width, cosine, eta, sigma_a, caustic, row, column, out_n_tt)
+        _send(_TT, low, high, width, inclination, sigma_a, caustic, row, column, out_n_tt)
 
     sin_squared = (F(4.0) - eta_prime * eta_prime) / F(3.0)
     gamma_c = _HALF_PI
@@ -157,10 +161,10 @@ def _smooth_texels(
         if segment == 2:
             start = gamma_c
             end = _HALF_PI
-        low = _trt_gamma(first, start, end, slope_sign, eta_prime)
-        high = _trt_gamma(last, start, end, slope_sign, eta_prime)
+        low = _trt_gamma(first, start, end, slope_sign, inclination)
+        high = _trt_gamma(last, start, end, slope_sign, inclination)
         if low != high:
-            _send(2, low, high, width, cosine, eta, sigma_a, caustic, row, column, out_n_trt)
+            _send(_TRT, low, high, width, inclination, sigma_a, caustic, row, column, out_n_trt)
 
     if glint_width > F(0.0):
         glint = F(0.0)
@@ -196,10 +200,10 @@ def _d_eon_texels(
 ):
     row, column, lobe = wp.tid()
     v = lobes[lobe, 1]
-    theta_o = theta[row] - lobes[lobe, 0]
-    sin_i = wp.sin(theta[column])
-    cos_i = wp.cos(theta[column])
-    value = d_eon_lobe(sin_i, cos_i, wp.sin(theta_o), wp.abs(wp.cos(theta_o)), v)
+    theta_i = theta[column]
+    theta_o = theta[row]
+    shift = lobes[lobe, 0]
+    value = shifted_lobe(wp.sin(theta_i), wp.cos(theta_i), wp.sin(theta_o), wp.cos(theta_o), shift, v)
     out_m[row, column, lobe] = float(value)
 
 
