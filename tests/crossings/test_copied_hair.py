@@ -144,6 +144,29 @@ def test_hair_that_is_duplicated_with_its_surface_alone_says_so_until_it_has_gui
     np.testing.assert_allclose(points(copy)[:, 0], 1.5 * points(hair)[:, 0], atol=1e-5)
 
 
+def test_a_linked_duplicate_of_a_surface_with_its_hair_may_be_moved_without_a_warning(hair):
+    select("Sphere", "Guides", "Hair")
+    bpy.ops.object.duplicate(linked=True)
+    sphere, copy = bpy.data.objects["Sphere.001"], bpy.data.objects["Hair.001"]
+    assert copy.parent == sphere and copy.data == hair.data
+    sphere.location.x = 4.0
+    bpy.context.view_layer.update()
+    assert draw(bpy.types.VELLUS_PT_surface).drawn["vellus.attach_to_surface"] == 0
+
+
+def test_own_guides_on_a_surface_of_another_shape_give_strands_new_roots(hair):
+    """Hair that followed guides of another surface is rooted on that one."""
+    bpy.ops.mesh.primitive_cube_add(size=3.0)
+    cube = bpy.context.object
+    hair.data.surface, hair.parent = cube, cube
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.vellus.make_own_guides()
+    bpy.context.view_layer.update()
+    assert hair.data.vellus.guide_curves.surface == cube and hair.data.vellus.status == ""
+    np.testing.assert_allclose(abs(points(hair)[:, 0]).max(axis=-1), 1.5, atol=1e-5)
+
+
 def test_hair_that_is_duplicated_alone_follows_the_same_guides_and_says_which(hair):
     assert draw(bpy.types.VELLUS_PT_interpolation).drawn["vellus.make_own_guides"] == 0
     select("Hair")

@@ -17,7 +17,8 @@ def should_be_rooted(curves_object):
     """Whether an object is hair that is up to date, without a complaint, on a surface that is not being edited.
 
     Hair that follows guides of another surface grows on that one, and its panel says so. Curves that became hair begin
-    as far from the surface as they did, which they store. Of points that were deleted in Edit Mode some may be roots.
+    as far from the surface as they did, which they store. A linked duplicate stands on that of the surface. Of points
+    that were deleted in Edit Mode some may be roots.
     """
     hair = curves_object.data
     guides, surface = hair.vellus.guide_curves, hair.surface
@@ -26,6 +27,12 @@ def should_be_rooted(curves_object):
     if guides is None or surface is None or any(one.vellus.status or one.vellus.is_stale for one in (hair, guides)):
         return False
     if guides.surface != surface or "root_distance" in hair.attributes or not _are_equal(hair):
+        return False
+    if (
+        curves_object.parent is not None
+        and curves_object.parent != surface
+        and curves_object.parent.data == surface.data
+    ):
         return False
     return bpy.context.view_layer.objects.get(surface.name) == surface and surface.mode == "OBJECT"
 

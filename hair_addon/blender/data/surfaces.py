@@ -157,10 +157,13 @@ class Surface:
 
     def is_same_cage(self, other):
         """Whether another surface is the same surface at rest, at any level of subdivision."""
+        return self.is_same_shape(other) and np.array_equal(self.to_world_axes, other.to_world_axes)
+
+    def is_same_shape(self, other):
+        """Whether another surface has the same cage at rest in local coordinates."""
         if cage_of(self.topology) != cage_of(other.topology) or self.cage_corners != other.cage_corners:
             return False
-        own, others = ((s.of_cage(s.rest), s.to_world_axes) for s in (self, other))
-        return all(map(np.array_equal, own, others))
+        return np.array_equal(self.of_cage(self.rest), other.of_cage(other.rest))
 
     def is_same(self, other):
         """Whether another surface equals this one, so that cached results are valid."""

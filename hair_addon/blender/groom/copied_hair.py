@@ -130,10 +130,21 @@ def make_own_guides(hair_list: Sequence[Curves], depsgraph: Depsgraph) -> list[C
     made: dict[tuple[Curves, Object], Curves] = {}
     for hair in hair_list:
         key = hair.vellus.guide_curves, hair.surface
+        is_same = not are_elsewhere(hair) or _is_same_shape(key[0].surface, surfaces[hair.surface], depsgraph)
         if key not in made:
             made[key] = _copied(*key, surfaces[hair.surface])
-        _let_follow(hair, made[key])
+        if is_same:
+            _let_follow(hair, made[key])
+        else:  # strands are rooted where the other surface was
+            hair.vellus.guide_curves = made[key]
     return list(made.values())
+
+
+def _is_same_shape(surface_object, surface, depsgraph):
+    try:
+        return scene.read_surface(surface_object, depsgraph).is_same_shape(surface)
+    except HairError:  # one that cannot be read is another
+        return False
 
 
 def _copied(guides, surface_object, surface):

@@ -105,6 +105,8 @@ def _of_places(surface, parts):
     for user in shown:
         if user.data not in parts or user.library is not None or delivered_hair.modifier_of(user) is not None:
             continue
+        if user.parent not in (surface, None) and user.parent.data == surface.data:
+            continue  # on a linked duplicate of the surface, wherever that stands
         names = {"hair": name_of(user), "name": name_of(surface)}
         if curves_objects.is_elsewhere(user, surface):
             text = '"{hair}" was moved away from "{name}": attach it, and it stands there again.'
