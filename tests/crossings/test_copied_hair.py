@@ -151,7 +151,9 @@ def test_a_linked_duplicate_of_a_surface_with_its_hair_may_be_moved_without_a_wa
     assert copy.parent == sphere and copy.data == hair.data
     sphere.location.x = 4.0
     bpy.context.view_layer.update()
-    assert draw(bpy.types.VELLUS_PT_surface).drawn["vellus.attach_to_surface"] == 0
+    for active in (bpy.data.objects["Sphere"], copy):
+        bpy.context.view_layer.objects.active = active
+        assert draw(bpy.types.VELLUS_PT_surface).drawn["vellus.attach_to_surface"] == 0
 
 
 def test_own_guides_on_a_surface_of_another_shape_give_strands_new_roots(hair):
