@@ -104,7 +104,7 @@ def test_guides_that_break_are_said_in_the_terminal_and_the_panel(shot, monkeypa
         return np.arange(counts.get(bpy.context.scene.frame_current, 0))
 
     monkeypatch.setattr(dynamics.simulation.Simulation, "broken", property(broken))
-    said = 'of 60 guides of "Guides" broke in frame {} and were put back: increase Substeps.'
+    said = 'of 60 guides of "Guides" broke in frame {} and were reset: increase Substeps.'
     first = run_here("simulate", shot, "--frames", "1-3", "--json")
     assert first.errors == f"vellus: warning: 2 {said.format(3)}\n"
     assert [line["broken"] for line in first.results] == [0, 2, 0]

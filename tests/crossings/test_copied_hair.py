@@ -179,7 +179,7 @@ def test_hair_that_is_duplicated_alone_follows_the_same_guides_and_says_which(ha
         bpy.context.view_layer.objects.active = active
         shown = draw(bpy.types.VELLUS_PT_interpolation)
         assert shown.drawn["vellus.make_own_guides"] == 1
-        assert f"The same guides are followed by: {other}" in " ".join(shown.texts)
+        assert f"Other hair follows the same guides: {other}" in " ".join(shown.texts)
     bpy.ops.vellus.make_own_guides()
     before = points(copy)
     comb(bpy.data.objects["Guides"])

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transforms that were applied to a surface: its local coordinates changed, and nothing moved in the world.
+"""Transforms applied to a surface: its local coordinates change, and nothing moves in the world.
 
-*Apply*, *Set Origin* and their like do so, of the surface, of its parents, or of both. What has become of the local
-coordinates follows from where the surface was, which three know: this session, the Curves themselves (as of the last
-save), and the Curves' objects, as Blender keeps the children of what it applies where they are.
+*Apply*, *Set Origin* and similar operators do this to the surface, to its parents, or to both. The change of local
+coordinates follows from the former transform of the surface. It is stored in this session, in the Curves (as of the
+last save), and in the transforms of the Curves' objects, as Blender keeps children in place when it applies transforms.
 """
 
 import bpy
@@ -26,15 +26,15 @@ from ..data.strands import (
 from ..data.surfaces import Surface, cage_of
 from . import bindings, pipeline, seen_shapes, staleness
 
-_CLOSE = 1e-5  # parts of the surface's size
-_ROUNDING = 1e-6  # parts of coordinates: they may be far from the origin
-_ROOTED = 0.9  # of the strands: others may have slid since they were rooted
+_CLOSE = 1e-5  # fraction of the surface's size
+_ROUNDING = 1e-6  # fraction of coordinates: they may be far from the origin
+_ROOTED = 0.9  # fraction of the strands: others may have slid since they were rooted
 
 
 def find(strands: Curves, surface: Surface, to_world_before: Affine | None) -> Affine | None:
-    """The `Affine` from the local coordinates that strands were rooted in to those of now; None where none was applied.
+    """Return the `Affine` from the local coordinates in which strands were rooted to the present ones; None if none.
 
-    to_world_before: where the surface's object was before, if that is known.
+    to_world_before: the former transform of the surface's object, if it is known.
     """
     rest_before = _rest_before(strands, surface)
     for change in _candidates(strands, to_world_before):
@@ -47,39 +47,39 @@ def find(strands: Curves, surface: Surface, to_world_before: Affine | None) -> A
 
 
 def _fitted(strands, surface, rest_before):
-    """The `Affine` from vertices before to those of now, where Blender shows that it applied something; else None.
+    """Return the `Affine` fitted to vertices before and now, if `is_due` shows an applied transform; else None.
 
-    Of parents that are turned and unevenly scaled it loses the shear, and the surface moves when it is applied.
+    Blender loses the shear of rotated and unevenly scaled parents, so such a surface moves when they are applied.
     """
     if rest_before is None or rest_before.shape != surface.rest.shape or not is_due(strands):
         return None
     before = np.hstack([rest_before.astype(np.float64), np.ones((len(rest_before), 1))])
     found, _residuals, rank, _sizes = np.linalg.lstsq(before, surface.rest.astype(np.float64), rcond=1e-6)
     change = Affine(np.vstack([found.T, [0.0, 0.0, 0.0, 1.0]]))
-    # A flat mesh says nothing of the direction across it.
+    # A flat mesh does not determine the direction across it.
     is_found = rank == 4 and change.is_valid and _is_close(change.points(rest_before), surface.rest, surface)
     return change if is_found else None
 
 
 def shift_of(rest_before: np.ndarray, surface: Surface) -> Affine | None:
-    """The `Affine` by which all (V, 3) vertices of a surface were moved alike, as *Geometry to Origin* does; else None.
+    """Return the common shift of all (V, 3) vertices of a surface, as by *Geometry to Origin*; None if there is none.
 
-    What follows places on the surface, as noise that neighboring strands share, goes along.
+    Noise that neighboring strands share, and all else that depends on places on the surface, is shifted along.
     """
     shift = Affine.shift((surface.rest.astype(np.float64) - rest_before).mean(axis=0))
     return shift if _is_close(shift.points(rest_before), surface.rest, surface) else None
 
 
 def note(strands: list[Curves], surface: Surface, change: Affine) -> None:
-    """Note that a transform was applied to what strands are rooted on, before any of them follows.
+    """Record a transform applied to the surface of strands, before any of them follows.
 
-    Of a scale that mirrors: Blender has turned the faces, and a `Surface` that is read afterwards knows it.
+    If it mirrors, Blender has flipped the faces; a `Surface` that is read afterwards has the flipped topology too.
     """
     rest_before, vertices = _rest_before(strands[0], surface), _vertices_before(strands[0], surface)
     for one in strands:
         if change.is_mirroring and one.vellus.topology == surface.turned_topology:
             stored_roots.turn(one, surface.turned)
-            # As baked frames know them, by the faces of the cage: `guide_baking.key_of`.
+            # Baked frames are keyed by the faces of the cage: `guide_baking.key_of`.
             before, now = (frame_manifest.digest(cage_of(key)) for key in (one.vellus.topology, surface.topology))
             surface_space.note_same(one, before, now)
             one.vellus.topology = surface.topology
@@ -89,20 +89,20 @@ def note(strands: list[Curves], surface: Surface, change: Affine) -> None:
 
 
 def _rest_before(strands, surface):
-    """(V, 3) vertices of the surface as strands know it, in their present order; None if they do not."""
+    """Return the (V, 3) vertices of the surface stored with strands, in their present order; None if not stored."""
     before, vertices = surface_space.rest_before(strands), _vertices_before(strands, surface)
     return before if before is None or vertices is None or len(before) != len(vertices) else before[vertices]
 
 
 def _vertices_before(strands, surface):
-    """The vertices of `FlippedFaces` if strands are rooted on the faces before a flip that renumbered others."""
+    """Return the vertices of `FlippedFaces` if strands are rooted on the faces before a flip; else None."""
     return surface.turned.vertices if strands.vellus.topology == surface.turned_topology else None
 
 
 def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgraph) -> None:
-    """Keep strands where they are in the world: their points, widths and what else is stored in local units.
+    """Keep strands in place in the world: transform points, widths and everything else stored in local units.
 
-    Guides before their hair, and all when `note` has noted it.
+    Call it after `note`, for guides before their hair.
     """
     firsts, followed = curves.first_points(strands), staleness.guides_digest(strands)
     left, baked_as = _left(strands, surface, change, firsts), _baked_as(strands)
@@ -115,10 +115,10 @@ def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgra
         simulated_guides.show(strands, rooted_as(change.points(shown), shown, firsts, curves.first_points(strands)))
     for user in curves_objects.objects_of(strands):
         if delivered_hair.modifier_of(user) is not None:
-            continue  # its frames stay in the coordinates of before
+            continue  # its frames stay in the former coordinates
         if user.parent == strands.surface:
             curves_objects.attach_to_surface(user, strands.surface)
-        else:  # its place in the world is the artist's
+        else:  # an artist placed it
             user.matrix_world = user.matrix_world @ left.inverse.as_blender()
     bindings.invalidate(strands)
     stored = stored_roots.points(strands, surface)
@@ -129,7 +129,7 @@ def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgra
 
 
 def keep_seen(strands: Curves, surface: Surface, change: Affine) -> None:
-    """Keep strands as they are seen where they turn with their surface by other angles now; when all have followed."""
+    """Keep the posed shape of strands whose rotation with the surface has changed; call it after `follow`."""
     stay = seen_shapes.kept_by(strands, surface, change)
     if stay is None:
         return
@@ -143,7 +143,7 @@ def keep_seen(strands: Curves, surface: Surface, change: Affine) -> None:
 
 
 def _note_moved(strands, baked_as, followed):
-    """Note that strands have moved with what was made of them.
+    """Record that strands have moved together with their baked frames and their hair.
 
     baked_as: `_baked_as` before; followed: their `guides_digest` before.
     """
@@ -155,9 +155,9 @@ def _note_moved(strands, baked_as, followed):
 
 
 def is_due(strands: Curves) -> bool:
-    """Whether an object of strands stands apart from their surface, as Blender leaves it when it applies transforms.
+    """Whether an object of strands has a transform of its own, as Blender leaves it when it applies transforms.
 
-    Asked in every frame: no geometry is read.
+    Called in every frame: reads no geometry.
     """
     surface_object = strands.surface
     if surface_object is None or strands.vellus.kind == "NONE" or strands.library is not None:
@@ -166,7 +166,7 @@ def is_due(strands: Curves) -> bool:
 
 
 def rooted_as(moved: np.ndarray, points: np.ndarray, roots: np.ndarray, moved_roots: np.ndarray) -> np.ndarray:
-    """Moved (G, P, 3) points of guides, whose roots are to the last bit those of the moved guides where they were so.
+    """Set the roots of moved (G, P, 3) points to `moved_roots`, bit for bit, where they were equal to `roots`.
 
     points: before; roots, moved_roots: (G, 3) of the guides, before and now.
     """
@@ -177,7 +177,7 @@ def rooted_as(moved: np.ndarray, points: np.ndarray, roots: np.ndarray, moved_ro
 
 
 def _candidates(strands, to_world_before):
-    """Changes of local coordinates that the places of objects tell of, the most exact ones first."""
+    """Yield possible changes of local coordinates from the transforms of objects, the most exact first."""
     now = surface_space.to_world(strands.surface)
     if not now.is_valid:
         return
@@ -191,7 +191,7 @@ def _candidates(strands, to_world_before):
 
 
 def _left(strands, surface, change, firsts):
-    """The part of a change that strands still have to make: Blender has applied it to those that were selected, too."""
+    """Return the remaining part of a change: Blender has already applied it to selected strands."""
     places = _root_places(strands, surface)
     objects = curves_objects.objects_of(strands)
     if places is None or not objects:
@@ -210,14 +210,14 @@ def _left(strands, surface, change, firsts):
 
 
 def _baked_as(strands):
-    """Digests by which baked frames know guides: of their points, which `follow` moves."""
+    """Return the digests of guides that key baked frames: of their points, which `follow` moves."""
     if strands.vellus.kind != "GUIDES" or not len(strands.curves):
         return []
     return [frame_manifest.digest(curves.even_local_points(strands))]
 
 
 def _is_as_made(hair, surface, left, depsgraph):
-    """Whether nobody but Blender, which applied a transform to it too, has moved hair: it is as its guides make it."""
+    """Whether hair equals the strands interpolated from its guides, apart from a transform that Blender applied."""
     if hair.vellus.kind != "HAIR" or curves.is_hand_made(hair):
         return False
     try:
@@ -229,7 +229,7 @@ def _is_as_made(hair, surface, left, depsgraph):
 
 
 def _are_rooted(strands, surface, change):
-    """Whether most strands begin at their stored roots after a change."""
+    """Whether most strands start at their stored roots after a change."""
     places = _root_places(strands, surface)
     if places is None:
         return False
@@ -239,7 +239,7 @@ def _are_rooted(strands, surface, change):
 
 
 def _root_places(strands, surface):
-    """((S,) bool: which strands have stored roots, (S, 3) local places of these at rest); None where none has."""
+    """Return (mask (S,) of strands with stored roots, (S, 3) local positions of these at rest); None if none has."""
     places = stored_roots.places(strands, len(surface.rest))
     if places is None or len(places[0]) != len(strands.curves):
         return None
@@ -259,7 +259,7 @@ def _tolerance(surface):
 
 
 def _widen(strands, change):
-    """Multiply what strands store of widths and distances in local units."""
+    """Scale the widths and distances that strands store in local units."""
     curves.widen(strands, change)
     apart = attributes.read(strands, "root_distance", "FLOAT", "CURVE")
     if apart is not None:
@@ -267,14 +267,14 @@ def _widen(strands, change):
 
 
 def followed_by(strands: Curves) -> list[Curves]:
-    """The hair that goes with guides to other coordinates: not hair that finds out by itself, as kept hair does."""
+    """Return the hair that is transformed with its guides; hand-made hair is excluded, as it follows by itself."""
     return [
         hair for hair in curves.followers(strands) if hair.surface == strands.surface and not curves.is_hand_made(hair)
     ]
 
 
 def left_alone(surface_object: bpy.types.Object) -> list[Curves]:
-    """Hair on a mesh object that no guides on it carry: their Curves are gone, or on another object."""
+    """Return hair on a mesh object without guides on the same object: they are deleted or elsewhere."""
 
     def is_alone(hair):
         guides = hair.vellus.guide_curves

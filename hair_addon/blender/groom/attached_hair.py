@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides and hair that are attached to another mesh object: in its coordinates, and where they are in the world."""
+"""Attachment of guides and hair to another mesh object, without moving them in the world."""
 
 from collections.abc import Callable, Iterable
 
@@ -22,10 +22,10 @@ def attach(
     depsgraph: Depsgraph,
     place_before: Callable[[Curves], Affine | None] = lambda _part: None,
 ) -> None:
-    """Attach guides and hair to a mesh object: as its children, in its coordinates.
+    """Attach guides and hair to a mesh object, as its children and in its coordinates.
 
-    What was combed or kept stays where it is in the world, as it is shown, and is rooted at the nearest points; the
-    rest grows again. place_before: where a surface was that is gone. Raises `HairError` before anything changes.
+    Combed and kept strands keep their posed positions in the world and are rooted at the nearest points; others are
+    regenerated. place_before: transform of a surface that is deleted. Raises `HairError` before anything changes.
     """
     parts = sorted(parts, key=lambda part: part.vellus.kind)  # guides before hair
     for part in parts:
@@ -61,12 +61,12 @@ def attach(
 
 
 def _stays(part):
-    """Whether Curves are to stay as they are: combed or kept ones, and those that do not grow again by themselves."""
+    """Whether Curves keep their positions: combed and kept ones, and those without automatic updates."""
     return curves.is_combed(part) or not part.vellus.is_live
 
 
 def _place(part, place_before):
-    """The `Affine` of local coordinates in the world, also of a surface that is gone."""
+    """Return the `Affine` from local to world coordinates, also of a surface that is deleted."""
     users, surface_object = curves_objects.objects_of(part), _surface_before(part)
     if surface_object is not None:
         return surface_space.to_world(surface_object)
@@ -77,13 +77,13 @@ def _place(part, place_before):
 
 
 def _surface_before(part):
-    """The mesh object that strands stand on; None where it is gone."""
+    """Return the mesh object that strands grow on; None if it is deleted."""
     found = surface_space.surface_before(part)
     return None if found is None or usable_surfaces.is_deleted(found) else found
 
 
 class _Carried:
-    """Strands as they are to be on another surface, computed before anything changes."""
+    """Strands on another surface, computed before anything changes."""
 
     def __init__(self, part: Curves, change: Affine, surface: Surface, depsgraph: Depsgraph) -> None:
         self._part, self._change = part, change
@@ -97,12 +97,12 @@ class _Carried:
         self._roots = curves.nearest_roots(surface, surface.from_local(firsts), seen_mesh)
         apart = np.linalg.norm(surface.from_local(firsts) - positions(seen_mesh, self._roots), axis=1)
         if apart.max() > np.ptp(seen_mesh.vertices, axis=0).max():
-            sentence = '"{name}" is farther from "{mesh}" than it is large: move the mesh to the hair, or transfer it.'
+            sentence = '"{name}" is too far from "{mesh}": move the mesh to the hair, or transfer the groom.'
             raise HairError(sentence, name=name_of(part), mesh=surface.name)
         self._places = surface.places(self._roots)
         at_rest = self._to_rest(firsts, np.ones(len(firsts), np.int32))
         on_surface = np.einsum("nc,ncx->nx", self._places[1], surface.rest[self._places[0]])
-        # Hand-made strands may begin off their surface; all others are rooted on it.
+        # Hand-made strands may start off their surface; all others are rooted on it.
         self._apart = np.linalg.norm(surface.from_local(at_rest - on_surface), axis=1)
         self._slide = np.zeros_like(at_rest) if curves.is_hand_made(part) else on_surface - at_rest
 
@@ -116,7 +116,7 @@ class _Carried:
         surface_space.keep_surface(self._part, surface)
 
     def _seen(self, points):
-        """(N, 3) points where they are seen, in the new surface's coordinates."""
+        """Return the posed positions of (N, 3) points, in the new surface's coordinates."""
         if self._motion_before is not None:
             motion, (*places, slides) = self._motion_before
             points = points + np.repeat(slides, self._counts, axis=0)
@@ -135,9 +135,9 @@ class _Carried:
 
 
 def _motion_of(part, depsgraph):
-    """(`SurfaceMotion` of the surface that strands are on, their places and slides there as of `Pose.rooted`).
+    """Return (`SurfaceMotion` of the strands' surface, their places and slides as from `Pose.rooted`).
 
-    None at rest, and where the surface is gone.
+    None at rest, and if the surface is deleted.
     """
     surface_object = _surface_before(part)
     if surface_object is None:

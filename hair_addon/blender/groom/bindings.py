@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cache of hair bindings during combing, by session UID of the hair, without references to Blender's data.
 
-Everything here is derived from the surface, the guides, the settings and the roots stored in the hair's Curves, and can
-be dropped at any time: the next change of a guide then searches again.
+Bindings are derived from the surface, the guides, the settings and the roots stored in the hair's Curves, and can be
+dropped at any time: the next change of a guide then searches again.
 """
 
 from concurrent.futures import Future
@@ -54,8 +54,8 @@ class BoundHair:
     is_map_written: bool = False  # whether the datablock holds this guide map
     written_radii: np.ndarray | None = None  # (P,) in the datablock, None if they may have changed
     is_report_due: bool = False  # whether Blender has yet to report our write, which is ignored
-    straight: "BoundHair | None" = None  # the same without styles while viewports show that: alone it follows strokes
-    is_behind: bool = False  # whether points have to grow again: what viewports show followed `guides` without them
+    straight: "BoundHair | None" = None  # the same without styles while viewports show it: only it follows strokes
+    is_behind: bool = False  # whether points are older than `guides`, which only the display has followed
 
     @property
     def points(self) -> np.ndarray:
@@ -81,9 +81,9 @@ class BoundHair:
         return interpolation.guide_weights.reach(self.binding.guide_weights, len(self.guides))
 
     def follow(self, guides: Strands) -> np.ndarray | None:
-        """Bring strands up to guides as they are combed now; indices (M,) of those that moved.
+        """Update strands for combed guides; returns the indices (M,) of moved strands.
 
-        None where that is not enough: guides came, went or slid over the surface, and the hair has to be bound again.
+        None if the hair has to be bound again, as guides were added, removed or slid over the surface.
         """
         combed = following.combed(guides, self.guides)
         if combed is None:
@@ -105,9 +105,9 @@ class BoundHair:
         return moved
 
     def follow_drawn(self, guides: Strands) -> np.ndarray | None:
-        """Note guides as they are combed now, where the GPU makes the strands that are shown; (M,) guides that moved.
+        """Store combed guides while the GPU generates the shown strands; returns the indices (M,) of moved guides.
 
-        Points grow in `catch_up`. None as from `follow`.
+        Points are computed in `catch_up`. None as from `follow`.
         """
         combed = following.combed(guides, self.guides)
         if combed is None:
@@ -139,13 +139,13 @@ class BoundHair:
         self.is_written = False
 
     def _reached(self, combed):
-        """Indices (M,) of the strands that move with some guides, and of those whose clumps do."""
+        """Return the indices (M,) of strands that follow some guides or whose clumps do."""
         moved, styling = self.reach.of(combed), self.styles.styling
         return moved if styling is None or not len(combed) else styling.reached(combed, moved)
 
     @memory_as_sentence()
     def grow(self, chosen: np.ndarray | None = None) -> None:
-        """Compute strands for `guides`, in other threads or, where they are (M,) indices of some, at once."""
+        """Compute strands for `guides` in other threads; if indices (M,) are given, compute only these, immediately."""
         self.let_go()
         binding, styling, axes = self.binding, self.styles.styling, self.surface.to_local_axes
         guides = self.guides if styling is None else styling.guides(self.guides)
@@ -161,9 +161,9 @@ class BoundHair:
             self._take_shares(shares, chosen)
 
     def restyle(self, styles: StyledHair, is_drawn: bool = False) -> None:
-        """Apply other styles to the same strands: nothing is searched.
+        """Apply other styles to the same strands, without a search.
 
-        is_drawn: whether the GPU makes the strands that are shown; then points grow in `catch_up`.
+        is_drawn: whether the GPU generates the shown strands; points are then computed in `catch_up`.
         """
         styles.continue_from(self.styles)
         self.styles = styles
@@ -179,7 +179,7 @@ class BoundHair:
         return self if self.straight is None else self.straight
 
     def show_styles(self, is_styled: bool) -> None:
-        """Let viewports show strands with styles, or without."""
+        """Show strands in viewports with or without styles."""
         if is_styled:
             self.catch_up()
             self.straight = None
@@ -188,7 +188,7 @@ class BoundHair:
             self.straight.grow()
 
     def catch_up(self) -> None:
-        """Grow the points for guides that only the viewport display has followed."""
+        """Compute the points for guides that only the viewport display has followed."""
         if self.is_behind:
             self.grow()
 
@@ -196,7 +196,7 @@ class BoundHair:
         return styled_hair.unstyled(self.styles, self.binding, self.guides, self.settings, self.surface)
 
     def _take_shares(self, shares, moved=slice(None)):
-        """Bring the guide map up to guides that were combed: the weights of strands, or of (M,) indices of them."""
+        """Store the weights of all strands, or of those with indices (M,), in the guide map."""
         if self.shares is None:
             self.shares = shares
             return
@@ -205,7 +205,7 @@ class BoundHair:
 
 
 def _grown(value: T | None) -> T:
-    """What strands have once they grow: `pipeline` sees to that before it hands on a `BoundHair`."""
+    """Return a value that exists once `grow` was called, as `pipeline` does for every `BoundHair`."""
     if value is None:
         raise ValueError("These strands have not begun to grow.")
     return value
@@ -224,10 +224,9 @@ def keep(datablock: Curves, bound: BoundHair) -> None:
 
 
 def grow_in_place_of(datablock: Curves | None, bound: BoundHair) -> None:
-    """Begin to grow strands that a hair Curves datablock is about to be bound to, None for a new one.
+    """Start computing strands for a hair Curves datablock, None for a new one, and drop its present binding.
 
-    What it was bound to is dropped: strands take the memory of its points where they are as many, of which a new one
-    would have to be cleared by the system first.
+    The memory of the present points is reused if their number is the same: the system would have to clear new memory.
     """
     if datablock is not None and (before := of(datablock)) is not None:
         binding_cache.invalidate(datablock.session_uid)
@@ -240,12 +239,12 @@ def grow_in_place_of(datablock: Curves | None, bound: BoundHair) -> None:
 
 
 def of(datablock: Curves) -> BoundHair | None:
-    """The `BoundHair` of a hair Curves datablock, or None."""
+    """Return the `BoundHair` of a hair Curves datablock, or None."""
     return binding_cache.get(datablock.session_uid)
 
 
 def can_read_masks(bound: BoundHair, target: Curves, depsgraph: Depsgraph) -> bool:
-    """Whether masks of styles are not to be read at another level of subdivision than hair is bound at."""
+    """Whether the surface has the level of subdivision that hair is bound at, or no masks of styles depend on it."""
     if target.surface is None or target.surface.type != "MESH":
         return False
     if not any(any(style_items.masks_of(item)) for item in target.vellus.styles):
@@ -255,7 +254,7 @@ def can_read_masks(bound: BoundHair, target: Curves, depsgraph: Depsgraph) -> bo
 
 
 def invalidate(datablock: Curves) -> None:
-    """Drop the cache of a datablock that was changed otherwise."""
+    """Drop the bindings of a datablock that was changed by other code."""
     binding_cache.invalidate(datablock.session_uid)
     kept_cache.invalidate(datablock.session_uid)
 

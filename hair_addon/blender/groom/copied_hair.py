@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copies of hair: what a copy grows on and follows, and guides that several hairs share.
+"""Copies of hair: their surface and guides, and guides that several hair objects share.
 
-Where objects are duplicated together Blender lets each copy point to the others. Make Single User copies data alone:
-copies then point to the originals, though their objects are on a surface of their own and beside guides of their own.
+If objects are duplicated together, Blender makes their copies refer to each other. Make Single User copies only data:
+the copies refer to the original surface and guides, although their objects are on another surface with other guides.
 """
 
 from collections.abc import Sequence
@@ -18,18 +18,18 @@ from ..host.notices import name_of
 from . import staleness
 from .selection import followers_shown
 
-known_cache = Cache()  # "Curves" → session UIDs of the guides and hair that were looked at last
+known_cache = Cache()  # "Curves" → session UIDs of guides and hair at the last check
 
 
 def remember() -> None:
-    """Take the Curves that there are now as they are: those of a file, of a library, or of an undo step."""
+    """Accept the present Curves as they are, as after opening a file, appending or undo."""
     known_cache.clear()
     if uids := frozenset(datablock.session_uid for datablock in _ours()):
         known_cache.keep("Curves", uids)
 
 
 def follow() -> None:
-    """Let Curves that were copied since grow on the surface that their objects are on, and follow its guides."""
+    """Attach Curves that were copied since the last call to the surface of their objects, and to its guides."""
     known, ours = known_cache.get("Curves"), _ours()
     if (known or frozenset()) == frozenset(datablock.session_uid for datablock in ours):
         return
@@ -67,7 +67,7 @@ def _users() -> dict[Curves, list[Object]]:
 
 
 def _surface_beside(datablock, users):
-    """The mesh object that all objects of Curves are on, where it is a copy of their surface; else None."""
+    """Return the parent of all objects of Curves if it is a copy of their surface; else None."""
     parents, surface = {user.parent for user in users}, datablock.surface
     if len(parents) != 1 or surface is None or surface in parents or surface.type != "MESH":
         return None
@@ -79,7 +79,7 @@ def _surface_beside(datablock, users):
 
 
 def _guides_beside(hair, new, users):
-    """Guides on the surface of hair that are a copy of those it follows, which are not there or not its own."""
+    """Return a copy of the followed guides on the hair's surface, if hair follows guides elsewhere or was copied."""
     followed = hair.vellus.guide_curves
     if hair not in new and followed.surface == hair.surface:
         return None
@@ -97,7 +97,7 @@ def _guides_beside(hair, new, users):
 
 
 def _let_follow(hair, guides):
-    """Let hair follow guides that are where those were that it was made with: nothing is to be made again."""
+    """Let hair follow identical guides, without marking it stale."""
     was_stale = hair.vellus.is_stale
     hair.vellus.guide_curves = guides
     hair.vellus.is_stale = was_stale
@@ -116,7 +116,7 @@ def are_elsewhere(hair: Curves) -> bool:
 
 
 def make_own_guides(hair_list: Sequence[Curves], depsgraph: Depsgraph) -> list[Curves]:
-    """Copy the guides of hair to its surface, and let it follow the copies; returns these. Raises `HairError`.
+    """Copy the guides of hair to its surface, let it follow the copies, and return them. Raises `HairError`.
 
     Hair that shared guides on another surface shares their copy.
     """
@@ -135,7 +135,7 @@ def make_own_guides(hair_list: Sequence[Curves], depsgraph: Depsgraph) -> list[C
             made[key] = _copied(*key, surfaces[hair.surface])
         if is_same:
             _let_follow(hair, made[key])
-        else:  # strands are rooted where the other surface was
+        else:  # marks the hair stale: its strands are rooted on the other surface
             hair.vellus.guide_curves = made[key]
     return list(made.values())
 
@@ -143,7 +143,7 @@ def make_own_guides(hair_list: Sequence[Curves], depsgraph: Depsgraph) -> list[C
 def _is_same_shape(surface_object, surface, depsgraph):
     try:
         return scene.read_surface(surface_object, depsgraph).is_same_shape(surface)
-    except HairError:  # one that cannot be read is another
+    except HairError:  # unreadable surfaces count as different
         return False
 
 

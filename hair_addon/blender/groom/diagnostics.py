@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Problems with a surface or its hair, each with the operator that fixes it.
 
-Panels call this on every redraw: it reads geometry only once after a mesh is edited.
+Panels call these functions on every redraw: geometry is read only once after a mesh is edited.
 """
 
 from collections.abc import Iterable
@@ -27,13 +27,13 @@ class Warning:
 
 
 def warnings_of(surface: Object | None, parts: Iterable[Curves]) -> list[Warning]:
-    """[Warning] about a mesh object, or None where it is missing, and the guide and hair Curves that grow on it."""
+    """Return [Warning] about a mesh object, None if it is missing, and the guide and hair Curves on it."""
     partings = [warning for part in parts if part.vellus.kind == "HAIR" for warning in parting_warnings(part)]
     there = None if surface is None or usable_surfaces.is_deleted(surface) else surface
     places = () if there is None else _of_places(there, parts)
     first = [*_of_library(surface, parts), *_of_surface(there, parts), *places, *_of_uv_map(there, parts)]
     if there is not None and any(map(frame_faces.are_others, parts)):
-        text = '"{name}" has other faces in this frame: hair stays on those of the frame that it was made in.'
+        text = '"{name}" has other faces in this frame: hair stays on the faces of the frame in which it was generated.'
         first.append(Warning(interface_text(text, name=name_of(there))))
     flows = [warning for part in parts if part.vellus.kind == "GUIDES" for warning in flow_warnings(part)]
     return [*first, *_of_guides(parts), *dict.fromkeys([*partings, *flows])]
@@ -60,7 +60,7 @@ def flow_warnings(guides: Curves) -> list[Warning]:
 
 
 def modifier_notes(hair_object: Object | None) -> list[str]:
-    """Translated sentences about modifiers of a hair object, or None, that Vellus does not draw in viewports."""
+    """Return translated sentences about modifiers of a hair object (or None) that take effect only in renders."""
     if hair_object is None or not hair_object.data.vellus.is_drawn:
         return []
     found = follow_nodes.modifiers_of_artist(hair_object)
@@ -92,24 +92,24 @@ def _of_surface(surface, parts):
         text = '"{name}" copies faces that are deformed already: move it up, or apply it.'
         yield Warning(interface_text(text, name=name_of(lost)))
     elif parts and rest_sources.lacks(surface, bpy.context.view_layer.depsgraph):
-        text = 'Modifiers of "{name}" make faces without rest positions: hair does not follow where they deform.'
+        text = 'Modifiers of "{name}" create faces without rest positions: hair does not follow their deformation.'
         yield Warning(interface_text(text, name=name_of(surface)))
     if surface.mode != "OBJECT" and any(part.vellus.is_stale for part in parts):
         yield Warning(interface_text("Hair updates when you leave this mode."))
 
 
 def _of_places(surface, parts):
-    """About the first object of hair that stands elsewhere than its surface, or will when that moves."""
+    """Yield a warning about the first hair object that is apart from its surface, or will be when the surface moves."""
     view_layer = bpy.context.view_layer
     shown = [] if view_layer is None else [o for o in view_layer.objects if o is not None and o.type == "CURVES"]
     for user in shown:
         if user.data not in parts or user.library is not None or delivered_hair.modifier_of(user) is not None:
             continue
         if user.parent not in (surface, None) and user.parent.data == surface.data:
-            continue  # on a linked duplicate of the surface, wherever that stands
+            continue  # on a linked duplicate of the surface, wherever it is
         names = {"hair": name_of(user), "name": name_of(surface)}
         if curves_objects.is_elsewhere(user, surface):
-            text = '"{hair}" was moved away from "{name}": attach it, and it stands there again.'
+            text = '"{hair}" was moved away from "{name}": attach it to move it back.'
         elif user.parent is None and not user.constraints and user.animation_data is None:
             text = '"{hair}" has lost its parent and stays behind when "{name}" moves: attach it.'
         else:
@@ -147,6 +147,6 @@ def _of_guides(parts):
 
 
 def sharing_note(hair: Curves) -> str:
-    """Translated sentence naming other hair that follows the same guides; empty if there is none."""
+    """Return a translated sentence that names other hair with the same guides; empty if there is none."""
     names = ", ".join(name_of(other) for other in copied_hair.sharing(hair))
-    return interface_text("The same guides are followed by: {names}", names=names) if names else ""
+    return interface_text("Other hair follows the same guides: {names}", names=names) if names else ""

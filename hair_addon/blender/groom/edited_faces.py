@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Roots on a surface whose faces have changed: those whose own face is still there keep their place in it.
+"""Roots on a surface with changed faces: roots keep their place in faces that still exist.
 
-An edit of other faces, *Join*, *Separate* or *Extrude*, gives vertices and faces other numbers. Vertices are known by
-where they were when strands were rooted. Roots whose face is gone move to the nearest points.
+Edits of other faces, such as *Join*, *Separate* or *Extrude*, renumber vertices and faces. Vertices are matched by
+their positions when strands were rooted. Roots of deleted faces move to the nearest points.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from ..data.surfaces import Surface, cage_of, faces_of
 from ..host.caches import Cache
 from . import bindings, staleness
 
-# (`Surface.topology`, fingerprint of where strands begin) → (triangles, barycentric coordinates) that were stored.
+# (`Surface.topology`, fingerprint of the first points of strands) → stored (triangles, barycentric coordinates).
 left_cache = Cache(capacity=32)
 
 
@@ -27,15 +27,15 @@ class _Edit:
     """Mapping of the vertices that strands were rooted between."""
 
     surface: Surface  # current state
-    matching: np.ndarray  # (V,) int32: each vertex of before now, -1 where it is gone
-    before: np.ndarray  # (W, 3) float32: where those of now were; those that are new, where they are
+    matching: np.ndarray  # (V,) int32: present index of each former vertex, -1 if deleted
+    before: np.ndarray  # (W, 3) float32: former positions of the present vertices; present ones of new vertices
 
 
 def root_again(strands: Curves, surface: Surface, depsgraph: Depsgraph) -> tuple[int, int]:
     """Root guides or kept hair, and the hair between guides, on a surface with other faces.
 
-    Strands are carried with vertices that were moved in the same edit. Returns how many guides, or kept strands, and
-    how many strands between guides had a face that is gone. Raises `HairError` as `check_mesh`.
+    Strands follow vertices that were moved in the same edit. Returns the numbers of guides (or kept strands) and of
+    strands between guides whose face was deleted. Raises `HairError` as `check_mesh`.
     """
     check_mesh(surface.mesh)
     edit = _edit(surface_space.rest_before(strands), surface)
@@ -55,14 +55,14 @@ def root_again(strands: Curves, surface: Surface, depsgraph: Depsgraph) -> tuple
 
 
 def follow_moved(strands: Curves, surface: Surface, before: np.ndarray) -> None:
-    """Carry guides or kept hair, and strands between guides that an artist has edited, with vertices that were moved.
+    """Move guides or kept hair, and combed strands between guides, with moved vertices.
 
-    before: (V, 3) where they were.
+    before: (V, 3) former positions of the vertices.
     """
     root_on_present_level(strands, surface, before)
     for target in (strands, *filter(_is_edited, _between(strands))):
         on_cage = None if surface.divided_of is None else stored_roots.cage_points(target, surface.cage)
-        if on_cage is not None:  # so that it does not matter how the cage is subdivided now
+        if on_cage is not None:  # independent of the present level of subdivision
             cage = surface.cage
             _carry(target, cage, before[: len(cage.rest)], cage.places(on_cage), on_cage)
             curves.write_roots(target, cage, on_cage)
@@ -80,16 +80,16 @@ def _between(strands):
 
 
 def _is_edited(hair):
-    """Whether an artist has edited strands between guides, which do not grow again then."""
+    """Whether an artist has combed strands between guides; these are not regenerated."""
     bound = bindings.of(hair)
     return (bound is None or bound.is_written) and curves.is_combed(hair)
 
 
 def change_level(strands: Curves, surface: Surface) -> None:
-    """Root guides or kept hair on a surface that is subdivided otherwise now, at the nearest points.
+    """Root guides or kept hair on a surface with another level of subdivision, at the nearest points.
 
-    No strand changes, and none between guides is rooted again: renders have their own levels. At a level that was
-    left before, roots are those that they were, to the bit, as long as strands begin where they did.
+    No strand moves, and strands between guides keep their roots, as renders have their own levels. Back at a former
+    level, roots get their former values, bit for bit, if the strands still start at the same points.
     """
     state, digest = strands.vellus, geometry.fingerprint.fingerprint(curves.first_points(strands))
     triangle, barycentric = stored_roots.raw(strands)
@@ -107,9 +107,9 @@ def change_level(strands: Curves, surface: Surface) -> None:
 
 
 def root_on_present_level(strands: Curves, surface: Surface, before: np.ndarray) -> None:
-    """Root hair between guides that is rooted at another level of subdivision on the faces of now, before it moves.
+    """Root hair between guides on the present faces if it is rooted at another level of subdivision, before it moves.
 
-    before: (V, 3) where vertices of the surface were when strands began where they do.
+    before: (V, 3) positions of the surface's vertices that correspond to the strands' first points.
     """
     for hair in _between(strands):
         topology = hair.vellus.topology
@@ -124,10 +124,10 @@ def _firsts(strands, surface):
 
 
 def _carry(strands, surface, before, places, roots):
-    """Carry strands as their surface was moved; those without a place stay.
+    """Move strands with their surface; strands without a place do not move.
 
-    places: (S, 3) vertices and (S, 3) weights; roots: `SurfacePoints` of the same, which lie apart where a face is cut
-    otherwise than it was.
+    places: (S, 3) vertices and (S, 3) weights; roots: the same as `SurfacePoints`, which differ where a face is
+    triangulated differently than before.
     """
     vertices, weights = places
     counts, is_lost = curves.point_counts(strands), ~weights.any(axis=1)
@@ -159,7 +159,7 @@ def _edit(before, surface):
 
 
 def _rooted(strands, edit):
-    """((S, 3) vertices of now and (S, 3) weights, zeros where the face is gone), `SurfacePoints` (S,)."""
+    """Return ((S, 3) present vertices and (S, 3) weights, zeros if the face was deleted), `SurfacePoints` (S,)."""
     surface = edit.surface
     stored = stored_roots.places(strands, len(edit.matching))
     if stored is None:
@@ -184,7 +184,7 @@ def _rooted(strands, edit):
 
 
 def _polygons_with(surface, vertices):
-    """`face_places.polygons_with` of roots, many of which are between the same vertices."""
+    """Return `face_places.polygons_with` of roots, computed once for roots between the same vertices."""
     count = len(surface.rest)
     keys = (vertices[:, 0].astype(np.float64) * count + vertices[:, 1]) * count + vertices[:, 2]
     if count > 200_000:  # beyond which such a number is not exact
@@ -194,6 +194,6 @@ def _polygons_with(surface, vertices):
 
 
 def _write(strands, edit, roots, depsgraph):
-    """Store roots as of a mask that is as it was, where nobody has painted it."""
+    """Store roots, and count them as placed by the present mask unless it was painted."""
     curves.write_roots(strands, edit.surface, roots)
     staleness.keep_roots(strands, depsgraph, edit.matching)

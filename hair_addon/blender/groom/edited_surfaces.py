@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides on an edited mesh: transform with the surface, and new roots on changed faces."""
+"""Guides on an edited mesh: deformation with the surface, and new roots on changed faces."""
 
 import enum
 from collections.abc import Callable
@@ -16,15 +16,15 @@ from ..data.surfaces import cage_of, faces_of
 from . import applied_transforms, bindings, edited_faces, frame_faces
 
 _ROOTED_AGAIN = {
-    "GUIDES": '{guides} guides and {strands} strands lost their faces of "{name}": rooted at the nearest points.',
-    "HAIR": '{strands} strands lost their faces of "{name}": rooted at the nearest points.',
+    "GUIDES": 'Faces of "{name}" were deleted: {guides} guides and {strands} strands moved to the nearest points.',
+    "HAIR": 'Faces of "{name}" were deleted: {strands} strands moved to the nearest points.',
 }
 
 
 class Followed(enum.Enum):
-    """What strands followed: nothing new, a transform that was applied, which moves nothing in the world, or an edit.
+    """The change that strands followed: none, an applied transform, which moves nothing in the world, or an edit.
 
-    Where a transform was applied, the hair between guides has gone along, and stays as it is seen.
+    After an applied transform, the hair between guides has followed too and keeps its posed shape.
     """
 
     NOTHING = enum.auto()
@@ -35,11 +35,11 @@ class Followed(enum.Enum):
 def follow_surface(
     guide_curves: Curves, depsgraph: Depsgraph, to_world_before: Affine | None = None, follows_edits: bool = True
 ) -> Followed:
-    """Carry guides, combed or not, or hair that is kept as it came, with an edited surface.
+    """Move guides, combed or not, or kept hair with an edited surface.
 
-    to_world_before: where the surface's object was before the edit, None if unknown. Shape keys and modifiers are not
-    edits: strands are stored on the surface at rest. Roots whose face is gone move to the nearest points.
-    follows_edits: not transforms alone that were applied. Raises `HairError`, for linked guides only if they would
+    to_world_before: transform of the surface's object before the edit, None if unknown. Shape keys and modifiers are
+    not edits: strands are stored on the surface at rest. Roots of deleted faces move to the nearest points.
+    follows_edits: if false, follow only applied transforms. Raises `HairError`, for linked guides only if they would
     change.
     """
     if surface_space.has_other_surface(guide_curves):
@@ -92,7 +92,7 @@ def follow_surface(
 
 
 def _is_divided_alone(guide_curves, surface, before):
-    """Whether the faces of before are there, where they were, and are subdivided otherwise."""
+    """Whether the former faces exist unchanged, with another level of subdivision."""
     if before is None or cage_of(guide_curves.vellus.topology) != cage_of(surface.topology):
         return False
     if faces_of(guide_curves.vellus.topology) == faces_of(surface.topology) or attributes.is_from_library(guide_curves):
@@ -101,7 +101,7 @@ def _is_divided_alone(guide_curves, surface, before):
 
 
 def _carry(guide_curves, surface, change, depsgraph):
-    """Keep guides and the hair between them in place, as an `Affine` was applied to their surface."""
+    """Keep guides and the hair between them in place after an `Affine` was applied to their surface."""
     curves.require_not_linked(guide_curves)
     require_finite(surface.rest)
     between = applied_transforms.followed_by(guide_curves)
@@ -122,9 +122,9 @@ def _carry(guide_curves, surface, change, depsgraph):
 def follow_alone(
     surface_object: Object, depsgraph: Depsgraph, place_before: Callable[[Curves], Affine | None] = lambda _hair: None
 ) -> None:
-    """Keep hair that no guides carry where it is, if a transform was applied to its surface.
+    """Keep hair without guides on its surface in place, if a transform was applied to the surface.
 
-    place_before: where the surface of Curves was before, as far as is known. What is wrong becomes the hair's status.
+    place_before: former transform of the surface of Curves, if known. Errors become the hair's status.
     """
     for hair in applied_transforms.left_alone(surface_object):
         try:

@@ -25,7 +25,7 @@ _TOLERATED = 0.002
 
 
 def delete(parts: Iterable[Curves]) -> None:
-    """Remove guide or hair Curves with their objects, and materials and guides that nothing else uses then."""
+    """Remove guide or hair Curves with their objects, and materials and guides that become unused."""
     for part in parts:
         curves.require_editable(part)
     guides = {part.vellus.guide_curves for part in parts} - {None, *parts}
@@ -74,7 +74,7 @@ def make_uv_map(surface_object: Object, view_layer: ViewLayer) -> None:
 
 
 def renew_uvs(surface_object: Object, depsgraph: Depsgraph) -> None:
-    """Write the UV coordinates of roots, of all hair on a mesh object, by the UV map that is active now."""
+    """Write the UV coordinates of the roots of all hair on a mesh object from its active UV map."""
     surface, parts = scene.read_surface(surface_object, depsgraph), _parts_on(surface_object)
     for part in parts:
         curves.require_editable(part)
@@ -88,7 +88,7 @@ def _parts_on(surface_object):
 
 
 def check_uvs(surface_object: Object, depsgraph: Depsgraph) -> float:
-    """Return the misleading share of a mesh object's UVs, in [0, 1]; hair on it stores the problem."""
+    """Return the fraction, in [0, 1], of a mesh object's surface with bad UVs, and store the problem with its hair."""
     surface = scene.read_surface(surface_object, depsgraph)
     mesh.check_mesh(surface.mesh)
     if surface.corner_uvs is None:
@@ -100,13 +100,13 @@ def check_uvs(surface_object: Object, depsgraph: Depsgraph) -> float:
 
 
 def flip_normals(surface_object: Object, view_layer: ViewLayer) -> None:
-    """Turn the faces of a mesh object over; guides that nobody has combed grow again, on the other side."""
+    """Flip the faces of a mesh object; uncombed guides are regenerated on the other side."""
     curves.require_overridable(surface_object)
     curves.require_editable(surface_object.data)
     grown = [guides for guides in curves_on(surface_object, "GUIDES") if not curves.is_combed(guides)]
     surface_object.data.flip_normals()
     surface_object.data.update()
-    view_layer.update()  # which roots guides again
+    view_layer.update()  # roots the guides again
     for guides in grown:
         guides.vellus.is_stale = True
         guides.update_tag()

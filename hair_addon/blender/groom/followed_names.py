@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names in settings that follow what they name: images, objects and collections that are renamed.
+"""Names in settings that follow renamed images, objects and collections.
 
-Settings hold names. Beside them Curves keep a pointer for images and collections, as a custom property, which Blender
-updates itself: it also brings what is named along where hair is appended, under another name if there is one of that
-name. A pointer would keep an object that is deleted, so objects are known by their session UID, while a file is open.
-Vertex groups, UV maps and attributes have neither: where they are missing, a sentence says so.
+Settings store names. For images and collections, Curves also store a pointer in a custom property, which Blender
+updates; when hair is appended, Blender appends the referenced datablock too, renamed if its name is in use. A pointer
+would keep a deleted object alive, so objects are tracked by session UID while the file is open. Vertex groups, UV maps
+and attributes have neither: if they are missing, a warning names them.
 """
 
 from collections.abc import Iterator
@@ -23,9 +23,9 @@ from ..host.notices import name_of, text_of
 from ..settings import setting_properties
 from . import staleness
 
-_POINTERS = "vellus_named"  # custom property of Curves: {setting: {"name": as it was, "to": what it names}}
+_POINTERS = "vellus_named"  # custom property of Curves: {setting: {"name": former name, "to": datablock}}
 
-object_cache = Cache()  # (session UID of Curves, setting) → (name as it was, session UID of the object it names)
+object_cache = Cache()  # (session UID of Curves, setting) → (former name, session UID of the object)
 
 _SETTINGS = {
     "GUIDES": (
@@ -78,9 +78,9 @@ def _follow(datablock: Curves) -> None:
 
 
 def _kept(datablock):
-    """{setting: {"name": str, "to": ID}}; nothing where a damaged file has text that is not UTF-8.
+    """Return {setting: {"name": str, "to": ID}}; empty if a damaged file has text that is not UTF-8.
 
-    Entry by entry: `to_dict` leaves such an error to whatever runs next.
+    It reads entry by entry, as `to_dict` would leave the error set for the code that runs next.
     """
     try:
         entries = datablock.get(_POINTERS, {})
@@ -90,7 +90,7 @@ def _kept(datablock):
 
 
 def _object(datablock, key, name, found):
-    """The object that a setting has named by this name since it was set, whatever its name is now; None if unknown."""
+    """Return the object that had this name when the setting was set, whatever its present name; None if unknown."""
     place = datablock.session_uid, key
     known_name, uid = object_cache.get(place) or ("", 0)
     if known_name != name or (found is not None and found.session_uid == uid):
@@ -100,7 +100,7 @@ def _object(datablock, key, name, found):
 
 
 def _named(datablock: Curves) -> Iterator[tuple[str, PropertyGroup, str, str]]:
-    """(key, property group, field, collection of `bpy.data`) of the settings that name something."""
+    """Yield (key, property group, field, collection of `bpy.data`) of the settings that store a name."""
     state = datablock.vellus
     for owner, field, source in _SETTINGS[state.kind]:
         group = getattr(state, owner)
@@ -116,14 +116,14 @@ def _named(datablock: Curves) -> Iterator[tuple[str, PropertyGroup, str, str]]:
 
 def _rename(datablock, group, field, to):
     renew = _renewed_key(datablock, group, to) if field == "density_image" else None
-    # Not by the property, whose `update` marks its Curves: nothing but the name has changed.
+    # Bypasses the property, whose `update` would mark its Curves stale: only the name has changed.
     group.bl_system_properties_get(do_create=True)[field] = name_of(to)
     if renew is not None:
         datablock.vellus.root_key = renew
 
 
 def _renewed_key(datablock, group, image):
-    """The key of roots that were placed by an image, under its new name; None where they are to be placed again."""
+    """Return the root key with the new name of a renamed density image; None if roots are to be placed again."""
     settings_class = GuideSettings if datablock.vellus.kind == "GUIDES" else HairSettings
     try:
         settings = setting_properties.to_settings(group, settings_class)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces that have other faces in other frames, as a keyed modifier makes them: that is no edit.
+"""Surfaces whose faces differ between frames, for example by an animated modifier: this is not an edit.
 
-Strands stay rooted on the faces of the frame that they were made in. Undo, redo and anything that reports the surface
-find other faces there than strands know: those that came with the frame are told by their number, noted as it came.
+Strands stay rooted on the faces of the frame in which they were generated. When the surface is reported later, as after
+undo, faces that came with the frame are distinguished from edits by their number, recorded at each frame change.
 """
 
 from collections.abc import Collection
@@ -15,13 +15,13 @@ from ..data.surfaces import Surface
 from ..host import scene_time
 from ..host.caches import Cache
 
-# (session_uid of Curves, frame, the topology that they are rooted on) → (vertices, triangles) that their surface has
-# there, where these are not as many as they are rooted on.
+# (session_uid of Curves, frame, topology of their roots) → (vertices, triangles) of their surface in that frame, if
+# these numbers differ from those of the topology.
 count_cache = Cache(capacity=4096)
 
 
 def note(surfaces: Collection[Object], depsgraph: Depsgraph) -> None:
-    """Note how many faces surfaces have in a frame that has just come."""
+    """Record the numbers of faces of surfaces after a frame change."""
     for datablock in bpy.data.hair_curves if surfaces else ():
         surface, count = datablock.surface, surface_space.vertex_count_before(datablock)
         if surface not in surfaces or count is None:
@@ -35,12 +35,12 @@ def note(surfaces: Collection[Object], depsgraph: Depsgraph) -> None:
 
 
 def came_with_the_frame(datablock: Curves, surface: Surface) -> bool:
-    """Whether the faces of a surface, other than those that Curves are rooted on, are those of the present frame."""
+    """Whether a surface differs from the one that Curves are rooted on because of the frame, not because of an edit."""
     return count_cache.get(_key(datablock)) == (len(surface.rest), len(surface.mesh.triangles))
 
 
 def are_others(datablock: Curves) -> bool:
-    """Whether Curves, or the guides of hair, are rooted on the faces of another frame, as far as it was noted."""
+    """Whether Curves, or the guides of hair, are rooted on the faces of another frame, as far as recorded."""
     known = (datablock, datablock.vellus.guide_curves)
     return any(one is not None and count_cache.get(_key(one)) is not None for one in known)
 

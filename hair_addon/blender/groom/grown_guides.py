@@ -17,7 +17,7 @@ from ..data.surfaces import Surface
 from ..settings import preferences
 from ..settings.translations import error_text
 
-HANGING = 0.5  # gravity from which new hair hangs, of a dome: less makes fur, which stands
+HANGING = 0.5  # least gravity of new hair that hangs, as on a dome; less gives standing fur
 _QUICK = 1.0  # [s] limit for draping new hair
 _GROWN = 0.6  # fraction of the progress
 
@@ -33,10 +33,10 @@ class GrownGuides:
 def draped_if_new(
     given: GuideSettings, completed: GuideSettings, surface: Surface, density: np.ndarray | None
 ) -> GuideSettings:
-    """Completed settings that drape new guides on a dome such as a scalp, where that takes a second at most.
+    """Return completed settings with draping on for new guides on a dome such as a scalp, if it takes at most a second.
 
-    given: the settings before they were completed for the surface; density: their mask. Who gives their gravity, or
-    draws flow lines, has said how guides grow.
+    given: the settings before they were completed for the surface; density: their mask. With a given gravity or flow
+    lines, settings do not change.
     """
     is_free = given.gravity is None and not given.flow_lines
     if not is_free or groom_defaults.known(completed.gravity) < HANGING:
@@ -53,8 +53,8 @@ def grow(
     progress: Progress,
     roots: SurfacePoints | None = None,
 ) -> GrownGuides:
-    """The `GrownGuides` of completed settings; mask: (density, texture), flow and roots as in
-    `groom.distribute_guides`. Guides that cannot be draped stay as they grew. Raises `HairError`.
+    """Return the `GrownGuides` of completed settings; mask: (density, texture), flow and roots as in
+    `groom.distribute_guides`. Guides that cannot be draped keep their grown shape. Raises `HairError`.
     """
     density, texture = mask
     device = preferences.device()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guides of strands and their weights, for exporters: as strands follow guides now, stored or not."""
+"""The present guides of strands and their weights, for exporters, whether they are stored or not."""
 
 import numpy as np
 from bpy.types import Curves, Depsgraph
@@ -10,9 +10,9 @@ from . import bindings, pipeline
 
 
 def of(hair: Curves, depsgraph: Depsgraph) -> tuple[np.ndarray, np.ndarray] | None:
-    """(S, k) int32 guides of strands, -1 for none, and (S, k) float32 weights, whether hair stores them or not.
+    """Return (S, k) int32 guides of strands, -1 for none, and (S, k) float32 weights, whether stored or not.
 
-    None where hair follows no guides, or its strands are not those that its settings and guides give.
+    None if hair follows no guides, or if its strands do not match its settings and guides.
     """
     guides, bound = hair.vellus.guide_curves, bindings.of(hair)
     if guides is None:

@@ -9,7 +9,7 @@ from ..host import memory
 
 
 def strand_bytes(settings: HairSettings, target: Curves | None = None) -> int:
-    """Memory that strands would take beside that of `target` now, which is free when they are made [bytes].
+    """Return the additional memory of strands [bytes]; the present strands of `target` are freed.
 
     settings: `HairSettings`, or properties of the same names.
     """
@@ -22,15 +22,15 @@ def strand_bytes(settings: HairSettings, target: Curves | None = None) -> int:
 
 
 def require_strands(settings: HairSettings, target: Curves | None = None, other_bytes: int = 0) -> None:
-    """Raise `HairError` where strands would take more memory than there is to spare, as `memory.require_for_hair`.
+    """Raise `HairError` if strands need more memory than is available, as `memory.require_for_hair`.
 
-    other_bytes: that something else takes with them.
+    other_bytes: memory of other data generated with the strands.
     """
     memory.require_for_hair(strand_bytes(settings, target) + other_bytes)
 
 
 def guide_bytes(settings: GuideSettings, face_count: int) -> int:
-    """Memory of guides while they are made, and afterwards [bytes]."""
+    """Return the memory of guides during and after their generation [bytes]."""
     return cost.guide_work_bytes(settings, face_count) + cost.curves_bytes(settings.guide_count)
 
 

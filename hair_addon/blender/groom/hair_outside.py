@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is kept out of what its simulated guides collide with, where it is written: for renders and exports."""
+"""Hair kept outside the colliders of its simulated guides when it is written, for renders and exports."""
 
 from dataclasses import replace
 
@@ -18,13 +18,13 @@ _SKIN = 1e-5  # [m] distance of hair from its own surface
 
 
 def is_wanted(hair: Curves) -> bool:
-    """Whether hair is to be kept outside in the frame that its guides are shown in."""
+    """Whether to keep hair outside: the setting is on and simulated guides are shown."""
     guides = hair.vellus.guide_curves
     return guides is not None and guides.vellus.dynamics.keeps_hair_outside and simulated_guides.is_shown(guides)
 
 
 def keep_outside(hair: Curves, bound: BoundHair) -> None:
-    """Move strands that are about to be written out of the surface and the colliders of their guides."""
+    """Move strands out of the surface and the colliders of their guides before they are written."""
     bound.let_go()
     if not is_wanted(hair):
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The hair systems of a mesh: hair with the guides that it follows, or guides without hair, edited as one.
+"""The hair systems of a mesh: hair with its guides, or guides without hair, edited as one.
 
 A system is identified by its Curves datablock, of the hair or of guides without hair. Nothing is stored: the list and
 the edited system are computed from the objects of a view layer and the active object.
@@ -17,7 +17,7 @@ from .selection import active_of_kind, make_active, object_of, painted_hair, sur
 
 
 def systems_of(surface: Object, view_layer: ViewLayer) -> list[Curves]:
-    """The Curves of the hair systems on a mesh object, as far as a view layer has objects of them; oldest first."""
+    """Return the Curves of the hair systems on a mesh object that have objects in a view layer, oldest first."""
     if surface is None or not any(c.surface == surface for c in bpy.data.hair_curves):
         return []  # panels call this on every redraw, and a view layer may have thousands of objects
     curves = {o.data for o in view_layer.objects if o is not None and o.type == "CURVES"}
@@ -29,8 +29,8 @@ def systems_of(surface: Object, view_layer: ViewLayer) -> list[Curves]:
 
 
 def edited_system(view_layer: ViewLayer) -> Curves | None:
-    """The Curves of the system that is edited: of the active object, or on the active mesh that `selection.hair_of`
-    gives; None if none."""
+    """Return the Curves of the edited system: of the active object, or the one that is painted or the newest on the
+    active mesh; None if there is none."""
     active = view_layer.objects.active
     systems = systems_of(surface_of(active), view_layer)
     guides, hair = active_of_kind(active, "GUIDES"), active_of_kind(active, "HAIR")
@@ -47,19 +47,19 @@ def edited_system(view_layer: ViewLayer) -> Curves | None:
 
 
 def guides_of_system(system: Curves) -> Curves | None:
-    """The guide Curves of a system; None of hair that lost its guides."""
+    """Return the guide Curves of a system; None for hair without guides."""
     return system if system.vellus.kind == "GUIDES" else system.vellus.guide_curves
 
 
 def parts_of_system(system: Curves) -> list[Curves]:
-    """The Curves that are deleted with a system: its hair, and its guides unless other hair follows them."""
+    """Return the Curves to delete with a system: its hair, and its guides unless other hair follows them."""
     guides = guides_of_system(system)
     others = [c for c in bpy.data.hair_curves if c != system and c.vellus.guide_curves == guides and c.users]
     return [system] if guides in {None, system} or others else [system, guides]
 
 
 def edit(system: Curves, view_layer: ViewLayer) -> None:
-    """Make the hair of a system active; its guides, in the same mode, where guides are being edited."""
+    """Make the hair of a system active, or its guides in the same mode while guides are edited."""
     active = view_layer.objects.active
     chosen, mode = object_of(system, view_layer), "OBJECT"
     active_guides = active_of_kind(active, "GUIDES")
@@ -77,7 +77,7 @@ def edit(system: Curves, view_layer: ViewLayer) -> None:
 
 
 def rename(curves_object: Object, name: str) -> None:
-    """Give an object and its Curves a name, and its guides one after it, unless they have a name of their own."""
+    """Rename an object and its Curves, and its guides unless an artist has named them."""
     if not name.strip() or curves_object.library is not None:
         return
     before = curves_object.name
@@ -87,9 +87,9 @@ def rename(curves_object: Object, name: str) -> None:
 
 
 def name_guides(hair_object: Object, before: str = "") -> None:
-    """Name guides after the hair that follows them, *Fringe Guides*, unless an artist has named them.
+    """Name guides after the hair that follows them, as *Fringe Guides*, unless an artist has named them.
 
-    before: the name that the hair had. Other hair may follow them too: then they keep theirs.
+    before: former name of the hair. Guides that other hair follows too keep their name.
     """
     guides = hair_object.data.vellus.guide_curves
     if guides is None or guides.library is not None or len(followers(guides)) > 1:
@@ -160,7 +160,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take both away again; nothing is stored in files."""
+    """Remove both; nothing is stored in files."""
     del bpy.types.ViewLayer.vellus_system
     del bpy.types.Object.vellus_system
     del bpy.types.Object.vellus_new_hair

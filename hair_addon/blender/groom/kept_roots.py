@@ -11,10 +11,10 @@ from ..data.surfaces import Surface, cage_of
 
 
 def of(target: Curves | None, surface: Surface, key: str, count: int | None) -> SurfacePoints | None:
-    """The `SurfacePoints` that Curves store, if they were placed by this `root_key` on these faces; else None.
+    """Return the `SurfacePoints` stored by Curves if they were placed by this `root_key` on these faces; else None.
 
-    Those nearest to where strands begin, if these faces were subdivided otherwise. count: how many are wanted. Somebody
-    may have deleted some, or all.
+    If the level of subdivision has changed, the points nearest to the strands' first points. count: required number, as
+    an artist may have deleted strands.
     """
     if target is None or target.vellus.root_key != key or len(target.curves) != count:
         return None

@@ -11,7 +11,7 @@ from ..host.notices import text_of
 
 
 def mask_of(surface: Object) -> str:
-    """The mask that an artist has chosen for new hair on a mesh object, or else the group that is named like one."""
+    """Return the mask that an artist has chosen for new hair on a mesh object, or else the suggested one."""
     state = surface.vellus
     chosen = text_of(state, "new_hair_mask")
     if state.has_new_hair_mask:
@@ -20,7 +20,7 @@ def mask_of(surface: Object) -> str:
 
 
 def suggested(surface: Object) -> str:
-    """The vertex group whose name says that hair grows there: of no bone, and of no hair yet; empty for none."""
+    """Return the name of a vertex group named after hair, without a bone and unused by hair; empty if there is none."""
     names = [group.name for group in surface.vertex_groups]
     if not names:
         return ""
@@ -32,6 +32,6 @@ def suggested(surface: Object) -> str:
 
 
 def filled(surface: Object) -> str:
-    """`mask_of` a mesh object if some vertex has a weight in it, else none: new hair needs a place."""
+    """Return `mask_of` a mesh object if the group has any weights, else an empty name."""
     name = mask_of(surface)
     return name if name and has_weights(surface, name) else ""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair and guides that Blender need not carry while their surface moves, since Vellus draws them.
+"""Pausing of Blender's deformation of hair and guides while their surface moves, as Vellus draws them itself.
 
-Viewports' evaluation leaves their strands at rest then, and carries them again before anything else may read them.
-Renders are never affected.
+While paused, evaluation for viewports leaves strands at rest; it resumes before anything else may read them. Renders
+are never affected.
 """
 
 import bpy
@@ -26,7 +26,7 @@ def is_paused(datablock: Curves) -> bool:
 
 
 def pause(surfaces: set[Object]) -> None:
-    """Pause what grows on surfaces that move, unless anything but Vellus may show or read it."""
+    """Pause hair and guides on moving surfaces, unless something other than Vellus may show or read them."""
     if not running.has_window() or running.job() is not None or _is_read_elsewhere():
         if is_any():  # iterating over all objects is too slow for each frame
             resume()
@@ -48,7 +48,7 @@ def pause(surfaces: set[Object]) -> None:
 
 
 def resume() -> None:
-    """Let Blender carry all hair and guides again, also copies, and what undo or a file brings back paused."""
+    """Resume the deformation of all hair and guides, also of copies, and of those paused in a file or an undo step."""
     paused_cache.clear()
     for curves_object in bpy.data.objects:
         if curves_object.type == "CURVES" and follow_nodes.is_paused(curves_object):
@@ -56,13 +56,13 @@ def resume() -> None:
 
 
 def _is_drawn_here(datablock):
-    """Whether Vellus alone draws Curves in viewports, if anybody does."""
+    """Whether Blender does not draw Curves in viewports."""
     kind = datablock.vellus.kind
     return datablock.vellus.is_drawn if kind == "HAIR" else kind == "GUIDES" and not datablock.vellus.show_guides
 
 
 def _may_pause(curves_object):
-    """Whether an object is not displayed by Blender, nobody edits it, and no other modifier takes what it becomes."""
+    """Whether an object is neither displayed by Blender nor edited, and has no other active modifiers."""
     if curves_object.mode != "OBJECT" or curves_object.display_type != "BOUNDS":
         return False
     if curves_object.override_library is not None:
@@ -72,14 +72,14 @@ def _may_pause(curves_object):
 
 
 def _are_read_by_others(curves_objects):
-    """Whether nodes, modifiers or constraints of anything else refer to objects."""
+    """Whether nodes, modifiers or constraints of other data refer to objects."""
     found = bpy.data.user_map(subset=set(curves_objects))
     holders = bpy.types.Collection | bpy.types.Scene | bpy.types.WindowManager | bpy.types.Screen
     return any(not isinstance(user, holders) for users in found.values() for user in users)
 
 
 def _is_read_elsewhere():
-    """Whether a window shows or edits Blender's own Curves, or a file is about to be chosen, which may be exported."""
+    """Whether a window shows or edits Curves with Blender's own drawing, or a file browser may start an export."""
     for manager in bpy.data.window_managers:
         for window in manager.windows:
             active = window.view_layer.objects.active

@@ -39,9 +39,9 @@ def distribute_guides(
     target: Curves | None = None,
     keeps_roots: bool = False,
 ) -> Curves:
-    """Grow guides on a mesh object; returns their Curves object's data, a new object's unless `target` is given.
+    """Grow guides on a mesh object; returns their Curves, of a new object unless `target` is given.
 
-    keeps_roots: guides of `target` stay where they are if what placed them is the same. Raises `HairError` before
+    keeps_roots: keep the roots of `target` if the inputs of their placement have not changed. Raises `HairError` before
     anything in the scene changes.
     """
     return run_now(distributing_guides(surface_object, settings, depsgraph, target, keeps_roots))
@@ -79,7 +79,7 @@ def distributing_guides(
 def interpolate_hair(
     guide_curves: Curves, settings: HairSettings, depsgraph: Depsgraph, target: Curves | None = None
 ) -> Curves:
-    """Grow strands between guides; returns their Curves data, a new object's unless `target` is given.
+    """Grow strands between guides; returns their Curves, of a new object unless `target` is given.
 
     Raises `HairError` before anything in the scene changes.
     """
@@ -94,11 +94,11 @@ def interpolating_hair(
     target: Curves | None = None,
     styles: Sequence[StyleSettings] = (),
 ) -> Work[Curves]:
-    """`interpolate_hair` as work in steps; styles: of new hair, whose Curves then keep them (`writing.keep_styles`)."""
+    """`interpolate_hair` as work in steps; styles: of new hair, to be stored by `writing.keep_styles`."""
     place, its_guides, its_target = map(Remembered, (guide_curves.surface, guide_curves, target))
     bound = yield from _binding_hair(guide_curves, settings, depsgraph, target, styles)
     writing.require_count(its_target.find(), len(bound.binding.positions), len(bound.radii))
-    # Last, so that nothing comes between this and writing.
+    # Last, so that nothing happens between this and writing.
     bindings.grow_in_place_of(its_target.find(), bound)
     return writing.write_strands(its_target.find(), place.find(), its_guides.find(), bound)
 
@@ -106,14 +106,14 @@ def interpolating_hair(
 def bind_hair(
     guide_curves: Curves, settings: HairSettings, depsgraph: Depsgraph, target: Curves | None = None
 ) -> BoundHair:
-    """The `BoundHair` that grows between guides, written nowhere. Strands of `target` keep their roots if they may."""
+    """Return the `BoundHair` between guides without writing it. Strands of `target` keep their roots if possible."""
     bound = run_now(_binding_hair(guide_curves, settings, depsgraph, target))
     bound.grow()
     return bound
 
 
 def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
-    """The `BoundHair` that is to grow between guides, as work in steps."""
+    """Compute the `BoundHair` between guides, without its points, as work in steps."""
     surface = read_surfaces.read(guide_curves.surface, depsgraph, target)
     bound = None if target is None else bindings.of(target)
     its_guides = bound.guides if bound is not None and bound.surface is surface else None
@@ -150,7 +150,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
 
 
 def _known_binding(target, settings, key, parting_key, guides, surface):
-    """Return the `BoundHair` whose guides a search would find again; otherwise None.
+    """Return the present `BoundHair` if a search would find the same guides; otherwise None.
 
     Changes of weights, limits and widths therefore need no search.
     """
@@ -165,7 +165,7 @@ def _known_binding(target, settings, key, parting_key, guides, surface):
 def complete(
     surface_object: Object, guide_settings: GuideSettings, hair_settings: HairSettings, depsgraph: Depsgraph
 ) -> tuple[GuideSettings, HairSettings]:
-    """`GuideSettings` and `HairSettings` with open settings computed from a mesh object. Raises `HairError`."""
+    """Return `GuideSettings` and `HairSettings` with unset values fitted to a mesh object. Raises `HairError`."""
     read_surfaces.require_mesh(surface_object)
     surface = scene.read_surface(surface_object, depsgraph).sized_cage
     sized, _masks = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
@@ -173,7 +173,7 @@ def complete(
 
 
 def _completed(surface_object, surface, guide_settings, hair_settings, depsgraph, may_drape=False):
-    """((`Sized` guides, `Sized` hair), their masks): weights (V,) and `Texture` of guides, and of strands."""
+    """Return ((`Sized` guides, `Sized` hair), their masks); a mask: (weights (V,), `Texture`)."""
     guide_mask, hair_mask = masks.own(guide_settings), masks.of_strands(hair_settings, guide_settings)
     of_guides = guide_mask.read(surface_object, surface, depsgraph)
     of_hair = of_guides if hair_mask == guide_mask else hair_mask.read(surface_object, surface, depsgraph)
@@ -191,11 +191,10 @@ def adding_hair(
     styles: Sequence[StyleSettings] = (),
     may_drape: bool = False,
 ) -> Work[tuple[Curves, Curves]]:
-    """Guides on a mesh object and hair between them, as work in steps; returns the Curves of both.
+    """Grow guides on a mesh object and hair between them, as work in steps; returns the Curves of both.
 
-    styles: as in `interpolating_hair`; may_drape: drape guides as `grown_guides.draped_if_new`, whatever the settings
-    say.
-    No object is made before all of it is computed.
+    styles: as in `interpolating_hair`; may_drape: let `grown_guides.draped_if_new` choose draping. No object is created
+    before everything is computed.
     """
     surface = read_surfaces.read(surface_object, depsgraph)
     sized, read = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph, may_drape)
@@ -231,10 +230,10 @@ def adding_hair(
 def hair_between(
     surface_object: Object, surface: Surface, settings: HairSettings, depsgraph: Depsgraph
 ) -> Callable[..., BoundHair]:
-    """A function of (guides, progress, density) that computes the `BoundHair` between `Strands` in no Curves yet.
+    """Return a function of (guides, progress, density) that computes the `BoundHair` between unwritten `Strands`.
 
-    surface: as it is subdivided now; density: (V,) of it, where strands grow, None for the vertex group that settings
-    name.
+    surface: at its present level of subdivision; density: (V,) where strands grow, None for the vertex group of the
+    settings.
     """
     hair_memory.require_strands(settings)
     shown, surface = surface, surface.sized_cage
@@ -259,19 +258,19 @@ def hair_between(
 
 
 def write_between(guide_curves: Curves, bound: BoundHair) -> Curves:
-    """The Curves of new hair that `hair_between` computed, when its guides are written."""
+    """Write hair computed by `hair_between` to new Curves, after its guides are written; returns the Curves."""
     bound.guide_uid = guide_curves.session_uid
     return writing.write_strands(None, guide_curves.surface, guide_curves, bound)
 
 
 def _as_written(guides, surface, device):
-    """Guides as Curves will give them back, rounded in local coordinates: hair is the same as if they were there."""
+    """Return guides rounded in local coordinates, as they would be read from Curves."""
     points = surface.to_local(guides.numpy())
     return strands.from_numpy(surface.from_local(points), guides.roots, device)
 
 
 class _Ground(TypedDict):
-    """The surface as strands and clump sites are placed on it: arguments of `groom.bind_hair`, which describes them."""
+    """The surface on which strands and clump sites are placed: arguments of `groom.bind_hair`, described there."""
 
     density: np.ndarray | None
     texture: Texture | None
@@ -284,7 +283,7 @@ class _Ground(TypedDict):
 
 
 def _ground(surface, shown, mask, parting, device) -> _Ground:
-    """The `_Ground` of a surface. mask: (density, texture); shown: as modifiers subdivide it now, lines drawn on it."""
+    """Return the `_Ground` of a surface. mask: (density, texture); shown: the subdivided surface with drawn lines."""
     density, texture = mask
     return _Ground(
         density=density,
@@ -303,25 +302,25 @@ def _bind(surface, guides, settings, ground, roots, progress):
 
 
 def _trees_on(surface, guides, settings, ground):
-    """Function that builds the `ClumpTrees` of hair."""
+    """Return a function that builds the `ClumpTrees` of hair."""
     return lambda: hair_styles.clump_trees(surface.mesh, guides.roots, settings, **ground)
 
 
 def _styled(read, binding, guides, settings, surface, ground, progress=no_progress):
-    """`StyledHair` of new hair."""
+    """Return the `StyledHair` of new hair."""
     make_trees = _trees_on(surface, guides, settings, ground)
     return styled_hair.bind(read, binding, guides, settings, surface, make_trees, progress)
 
 
 def _growing(bound, progress):
-    """The `BoundHair` when all about its strands is known but where their points are: these grow on other threads."""
+    """Complete a `BoundHair` and start computing its points on other threads; returns it."""
     _known_by(bound, progress)
     bound.grow()
     return bound
 
 
 def _known_by(bound, progress):
-    """The `BoundHair` when all about its strands is known but where their points are."""
+    """Complete a `BoundHair` except for its points; returns it."""
     progress("Growing strands", 0.8)
     _ = bound.binding.leaders, bound.binding.identities  # before other threads need the CPU
     return bound
@@ -331,10 +330,10 @@ def _known_by(bound, progress):
 def restyle(
     target: Curves, depsgraph: Depsgraph, is_drawn: Callable[[BoundHair, StyledHair], bool] = lambda *_given: False
 ) -> bool:
-    """Apply the styles of bound hair as they are set now, if nothing else of it has changed; whether that is so.
+    """Apply the present styles to bound hair; returns whether only styles had changed.
 
-    is_drawn: whether the GPU makes the strands that are shown with other styles. Nothing is searched; nothing at all is
-    computed where the styles are those that it has. Raises `HairError`.
+    is_drawn: whether the GPU generates the shown strands. Nothing is searched, and nothing is computed if styles are
+    unchanged. Raises `HairError`.
     """
     bound = bindings.of(target)
     guide_curves, settings = inputs_of(target)
@@ -359,7 +358,7 @@ def restyle(
 def evaluate(target: Curves, depsgraph: Depsgraph) -> None:
     """Regenerate Curves from their stored settings and inputs. Errors become their status.
 
-    Combed Curves are unchanged: only an operator replaces them.
+    Combed Curves do not change: only an operator replaces them.
     """
     state = target.vellus
     state.is_stale = False
@@ -388,7 +387,7 @@ def require_uncombed(target: Curves) -> None:
         return
     if target.vellus.kind == "HAIR":
         if curves.is_hand_made(target):
-            raise HairError("Kept as it came: these settings do not apply. Regenerate Strands replaces the strands.")
+            raise HairError("Kept unchanged: these settings do not apply. Regenerate Strands replaces the strands.")
         raise HairError("Hand-edited: these settings no longer apply. Regenerate Strands discards the edits.")
     if curves.is_hand_made(target):
         raise HairError("Hand-made: these settings do not apply. Regenerate Guides replaces the guides.")

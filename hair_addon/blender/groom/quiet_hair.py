@@ -13,10 +13,11 @@ from ..settings import properties
 
 @contextlib.contextmanager
 def unevaluated(guides_list: Sequence[Curves], scene: Scene) -> Generator[None]:
-    """Disable hair and guides in viewports, and enable those again that were, on every way out.
+    """Disable hair and guides in viewports, and enable them again on exit.
 
-    Only without a window, and if the meshes that the guides need are visible: what is hidden may be evaluated only
-    because hair follows it. Those with keys or drivers stay: Blender moves no settings of what it does not evaluate.
+    Only without a window, and if the meshes that the guides need are visible: hidden meshes may be evaluated only
+    because hair follows them. Curves with keyframes or drivers stay enabled: Blender does not animate the settings of
+    disabled objects.
     """
     if not bpy.app.background or not all(needed.visible_get() for needed in _needed(guides_list)):
         yield
@@ -40,7 +41,7 @@ def _may_hide(curves_object):
 
 
 def _needed(guides_list: Sequence[Curves]) -> list[Object]:
-    """Meshes that guides grow on and collide with."""
+    """Return the meshes that guides grow on and collide with."""
     needed = [guides.surface for guides in guides_list if guides.surface is not None]
     for guides in guides_list:
         needed += simulated_world.colliders(properties.dynamics_of(guides.vellus).colliders)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface that guides and hair are made on: as it is now, or as hair is bound to it."""
+"""Reading of the surface that guides and hair grow on: the present one, or the one that hair is bound to."""
 
 from bpy.types import Curves, Depsgraph, Object
 
@@ -13,10 +13,10 @@ from .bindings import BoundHair
 
 
 def read(surface_object: Object | None, depsgraph: Depsgraph, target: Curves | None = None) -> Surface:
-    """The `Surface` that guides and hair are made on: the `sized_cage` of a mesh object that may be changed.
+    """Return the `Surface` that guides and hair grow on, the `sized_cage` of an editable mesh object.
 
-    The surface that `target` is bound to, if that is the same: of which normals and areas are known. That of hair
-    that follows a library only carries it. Raises `HairError`.
+    If it equals the surface that `target` is bound to, that one is returned, as its normals and areas are cached. The
+    surface of hair of a library is only used to deform the hair. Raises `HairError`.
     """
     if target is None or not curves.follows_library(target):
         require_mesh(surface_object)
@@ -28,9 +28,9 @@ def read(surface_object: Object | None, depsgraph: Depsgraph, target: Curves | N
 
 
 def _is_as_bound(bound: BoundHair, surface: Surface, target: Curves) -> bool:
-    """Whether only the level of subdivision is another than when hair was bound, and it reads nothing of faces.
+    """Whether only the level of subdivision has changed since hair was bound, and hair reads no masks of faces.
 
-    Strands are then as at that level: viewports have other levels than renders.
+    Strands then keep that level, as viewports have other levels than renders.
     """
     state = target.vellus
     reads_faces = partings.is_wanted(state.hair) or any(any(style_items.masks_of(item)) for item in state.styles)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bound hair with other weights of its guides, other lengths or radii: what sliders change where strands are drawn."""
+"""Bound hair with other guide weights, lengths or radii, for sliders that take effect where strands are drawn."""
 
 from dataclasses import replace
 
@@ -12,15 +12,15 @@ from ..settings import style_items
 from . import bindings, pipeline, styled_hair
 from .bindings import BoundHair
 
-# Settings that change neither where strands are rooted nor which guides may be theirs: of their weights, and others.
+# Settings of guide weights, and settings applied after weights; neither change roots or the candidates for guides.
 _WEIGHING = ("automatic_influence", "influence_distance", "neighbour_limit")
 _AFTER_WEIGHING = ("keep_length", "angle_limit", "length_limit", "radius", "tip_taper", "guide_map")
 
 
 def reweighed(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
-    """The `BoundHair` of hair whose weights, lengths or radii are set otherwise; its points have to grow.
+    """Return the `BoundHair` for changed weights, lengths or radii, without its points.
 
-    None where more has changed: nothing is read or searched. Raises `HairError`.
+    None if other inputs have changed. Nothing is read or searched. Raises `HairError`.
     """
     known = bindings.of(target)
     guide_curves, settings = pipeline.inputs_of(target)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that stay as they are seen where a transform is applied to a surface that is deformed.
+"""Strands that keep their posed shape when a transform is applied to a deformed surface.
 
-Strands turn rigidly with their surface in its local coordinates, which are other ones then: what turned by some angle
-in a space that is stretched turns by another in one that is not. Turns of vertices are blended by two of their axes,
-so a turn of the coordinates alone counts too: 3e-4 of the surface's size on one of 160 faces.
+Strands rotate rigidly with their surface in its local coordinates. Applying a transform changes these coordinates: a
+rotation in a stretched space is another rotation without the stretch. Even a rotation of the coordinates alone matters,
+as rotations of vertices are blended by two of their axes: 3e-4 of the size of a surface with 160 faces.
 """
 
 from collections.abc import Callable
@@ -20,9 +20,9 @@ Points = Callable[[np.ndarray], np.ndarray]
 
 
 def kept_by(strands: Curves, surface: Surface, change: Affine) -> Points | None:
-    """A function of (N, 3) points of strands at rest that an `Affine` was applied to: where they are to be at rest.
+    """Return a function that moves (N, 3) rest points of strands so that their posed shape before `change` is kept.
 
-    None where they stay as they are. surface: to which it was applied.
+    None if they do not move. surface: the one to which the `Affine` was applied.
     """
     if not surface.is_deformed or change.is_uniform_scale or not len(strands.curves):
         return None

@@ -13,7 +13,7 @@ from ..settings import style_items
 
 
 def is_shown(hair: Curves) -> bool:
-    """Whether an object has hair Curves: when it is deleted Blender keeps its Curves until the file is saved."""
+    """Whether an object uses hair Curves: Blender keeps the Curves of deleted objects until the file is saved."""
     return hair.users > hair.use_fake_user
 
 
@@ -23,19 +23,19 @@ def followers_shown(guides: Curves) -> list[Curves]:
 
 
 def has_object(guides: Curves) -> bool:
-    """Whether anything uses guide Curves but the hair that follows them."""
+    """Whether anything except hair that follows them uses guide Curves."""
     return guides.users - guides.use_fake_user > len(followers(guides))
 
 
 def active_of_kind(active: Object | None, kind: str) -> Curves | None:
-    """The Curves of the active object if they are ours and of this kind, GUIDES or HAIR; else None."""
+    """Return the Curves of the active object if they are of a kind, GUIDES or HAIR; else None."""
     if active is not None and active.type == "CURVES" and active.data.vellus.kind == kind:
         return active.data
     return None
 
 
 def surface_of(active: Object | None) -> Object | None:
-    """The mesh object that is active, or that the active guides or hair grow on; None if there is none."""
+    """Return the active mesh object, or the one that the active guides or hair grow on; None if there is none."""
     if active is None:
         return None
     if active.type == "MESH":
@@ -44,20 +44,20 @@ def surface_of(active: Object | None) -> Object | None:
 
 
 def guides_again(active: Object | None) -> Curves | None:
-    """The guides that distributing again would replace: the active ones, or the active hair's; None on a mesh."""
+    """Return the guides to replace when regenerating: the active ones, or those of the active hair; None on a mesh."""
     hair = active_of_kind(active, "HAIR")
     return active_of_kind(active, "GUIDES") if hair is None else hair.vellus.guide_curves
 
 
 def guides_of(active: Object | None) -> Curves | None:
-    """The active guides, the active hair's guides, or the newest guides on the active mesh; None if there are none."""
+    """Return the active guides, the active hair's guides, or the newest guides on the active mesh; None if none."""
     if active is None or active.type != "MESH":
         return guides_again(active)
     return _newest(curves_on(active, "GUIDES"))
 
 
 def guides_named(name: str) -> Curves | None:
-    """The guide Curves of a name, or of the object of that name; None if there are none."""
+    """Return the guide Curves with a name, or of the object with that name; None if there are none."""
     found = bpy.data.hair_curves.get(name)
     if found is not None and found.vellus.kind == "GUIDES":
         return found
@@ -65,7 +65,7 @@ def guides_named(name: str) -> Curves | None:
 
 
 def hair_of(active: Object | None) -> Curves | None:
-    """The active hair, the newest that follows the active guides, or the newest on the active mesh; None if none.
+    """Return the active hair, the newest hair of the active guides, or the newest on the active mesh; None if none.
 
     On a mesh in a paint mode, the hair whose mask is painted.
     """
@@ -78,9 +78,9 @@ def hair_of(active: Object | None) -> Curves | None:
 
 
 def painted_hair(active: Object) -> Curves | None:
-    """The hair on a mesh object in a paint mode that what is painted masks; None if there is none.
+    """Return the hair whose mask is painted on a mesh object in a paint mode; None if there is none.
 
-    First that whose active style is masked, then that with another such style, then that which it limits.
+    Hair whose active style has the mask comes first, then hair with another such style, then hair that it limits.
     """
     painted = _painted(active)
     if not any(painted):
@@ -93,7 +93,7 @@ def painted_hair(active: Object) -> Curves | None:
 
 
 def _painted(active):
-    """(name of the group or attribute, name of the image) that a paint mode paints; empty for none."""
+    """Return the names (group or attribute, image) that a paint mode paints; empty for none."""
     if active.mode == "TEXTURE_PAINT":
         settings = bpy.context.scene.tool_settings.image_paint
         return "", _name_of(settings.canvas if settings.mode == "IMAGE" else None)
@@ -109,7 +109,7 @@ def _name_of(owner):
 
 
 def _are_alike(mask, painted):
-    """Whether the name of a mask's group or image is that of what is painted."""
+    """Whether a mask's group or image is the painted one."""
     return any(one and one == other for one, other in zip(mask, painted, strict=True))
 
 
@@ -129,7 +129,7 @@ def _density_masks(hair):
 
 
 def curves_on(surface: Object, kind: str) -> list[Curves]:
-    """Every guide or hair Curves datablock on a mesh object but those that were deleted, guides with their hair."""
+    """Return all guide or hair Curves on a mesh object except deleted ones, guides with their hair."""
     found = [c for c in bpy.data.hair_curves if c.vellus.kind == kind and c.surface == surface]
     if kind == "HAIR":
         return [hair for hair in found if is_shown(hair)]
@@ -137,8 +137,8 @@ def curves_on(surface: Object, kind: str) -> list[Curves]:
 
 
 def parts_of(active: Object | None) -> list[Curves]:
-    """The Curves that are deleted together: the active guides and their hair, or the active hair and its guides if
-    no other hair follows those, or all on the active mesh."""
+    """Return the Curves to delete together: the active guides and their hair, or the active hair and its guides if
+    no other hair follows these, or all on the active mesh."""
     hair, guides = active_of_kind(active, "HAIR"), active_of_kind(active, "GUIDES")
     if hair is not None:
         its_guides = hair.vellus.guide_curves
@@ -151,13 +151,13 @@ def parts_of(active: Object | None) -> list[Curves]:
 
 
 def drawn_with(active: Object | None) -> list[Curves]:
-    """Hair whose drawing is toggled: the active hair, or all hair in the file."""
+    """Return the hair whose drawing is toggled: the active hair, or all hair in the file."""
     hair = active_of_kind(active, "HAIR")
     return [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR"] if hair is None else [hair]
 
 
 def mesh_to_attach_to(context: Context) -> Object | None:
-    """The mesh object to attach active guides or hair to: the one selected with them, or their surface."""
+    """Return the mesh object to attach active guides or hair to: the one selected with them, or their surface."""
     if not any(active_of_kind(context.object, kind) for kind in ("GUIDES", "HAIR")):
         return None
     selected = next((o for o in context.selected_objects if o.type == "MESH"), None)
@@ -166,7 +166,7 @@ def mesh_to_attach_to(context: Context) -> Object | None:
 
 
 def object_of(curves: Curves, view_layer: ViewLayer) -> Object | None:
-    """The first object of a view layer that shows Curves; None if there is none."""
+    """Return the first object of Curves in a view layer; None if there is none."""
     return next((o for o in _there(view_layer) if o.data == curves), None)
 
 
@@ -181,7 +181,7 @@ def make_active(chosen: Object | None, view_layer: ViewLayer) -> None:
 
 
 def reveal(hidden: Object, view_layer: ViewLayer, viewport: SpaceView3D | None) -> None:
-    """Show an object in its view layer, with its collections, and in the local view of a 3-D viewport, or None.
+    """Show an object in its view layer, with its collections, and in the local view of a 3-D viewport (None: no view).
 
     Objects hidden by a library or a driver stay hidden.
     """
@@ -198,7 +198,7 @@ def reveal(hidden: Object, view_layer: ViewLayer, viewport: SpaceView3D | None) 
 
 
 def _path_to(contained, layer_collection):
-    """The layer collections from one down to the first below that holds an object; empty if none does."""
+    """Return the path of layer collections from one down to the first that contains an object; empty if none does."""
     if layer_collection.exclude:
         return []
     if contained in {*layer_collection.collection.objects}:
@@ -208,7 +208,7 @@ def _path_to(contained, layer_collection):
 
 
 def _there(view_layer):
-    """The objects of a view layer; those that a script has just removed are listed as None until the next update."""
+    """Return the objects of a view layer; Blender lists objects removed by a script as None until the next update."""
     return [o for o in view_layer.objects if o is not None]
 
 

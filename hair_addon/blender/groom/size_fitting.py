@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sizes of guides and hair fitted to the surface, and refitted when the mask or the count changes.
 
-No other change refits them: hair keeps its thickness in all frames of a moving surface.
+Other changes do not refit them, so hair keeps its thickness in all frames of a moving surface.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ Mask = tuple[np.ndarray | None, Texture | None]
 
 @dataclass(frozen=True)
 class Fits:
-    """Names of the sizes that are fitted, and the key of what they were fitted to."""
+    """Names of the fitted sizes, and the key of their inputs."""
 
     names: frozenset[str] = frozenset()
     key: str = ""
@@ -33,7 +33,7 @@ class Fits:
 
 @dataclass(frozen=True)
 class Sized(Generic[S]):
-    """Settings that are complete, the `staleness.root_key` of them, and their `Fits`."""
+    """Completed settings, their `staleness.root_key` and their `Fits`."""
 
     settings: S
     root_key: str
@@ -43,9 +43,9 @@ class Sized(Generic[S]):
 def of_guides(
     given: GuideSettings, surface: Surface, mask: Mask, target: Curves | None = None, may_drape: bool = False
 ) -> Sized[GuideSettings]:
-    """`GuideSettings` with open sizes computed; target: guides that are updated, whose fitted ones are fitted again.
+    """Return `GuideSettings` with unset sizes fitted; target: updated guides, whose fitted sizes are refitted.
 
-    may_drape: drape guides as `grown_guides.draped_if_new`, whatever the settings say.
+    may_drape: let `grown_guides.draped_if_new` choose draping.
     """
     key = root_key(given, surface, mask)
     kept = _kept(target and target.vellus.guides, given)
@@ -65,7 +65,7 @@ def of_guides(
 def of_hair(
     given: HairSettings, surface: Surface, mask: Mask, guide_count: int, target: Curves | None = None
 ) -> Sized[HairSettings]:
-    """`HairSettings` with open sizes computed; target: as for `of_guides`."""
+    """Return `HairSettings` with unset sizes fitted; target: as for `of_guides`."""
     key = root_key(given, surface, mask)
     fit_key = f"{key} {guide_count}"
     kept = _kept(target and target.vellus.hair, given)
@@ -76,13 +76,13 @@ def of_hair(
 
 
 def root_key(settings: Settings, surface: Surface, mask: Mask) -> str:
-    """The `staleness.root_key` of settings and their mask."""
+    """Return the `staleness.root_key` of settings and their mask."""
     density, texture = mask
     return staleness.root_key(settings, surface.of_cage(density), None if texture is None else texture.values)
 
 
 def keep(target: Curves, fits: Fits) -> None:
-    """Store `Fits` with Curves, whose sizes have just been written."""
+    """Store `Fits` with Curves, after their sizes were written."""
     group = target.vellus.guides if target.vellus.kind == "GUIDES" else target.vellus.hair
     target.vellus.fit_key = fits.key
     fitted_sizes.keep_flags(group, dict.fromkeys(fits.names, True))
@@ -95,7 +95,7 @@ def show(hair: Curves, settings: HairSettings, fits: Fits) -> None:
 
 
 def _kept(group, given):
-    """The fitted sizes of a property group that `given` settings leave as they are."""
+    """Return the fitted sizes of a property group that `given` settings do not change."""
     if group is None:
         return set()
     stored = setting_properties.to_settings(group, type(given))

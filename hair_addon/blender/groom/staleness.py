@@ -18,11 +18,11 @@ _HALF = 16  # digits of a root key that encode settings
 
 
 def root_key(settings: Settings, density: np.ndarray | None, image: np.ndarray | None = None) -> str:
-    """Key of the inputs of root placement, apart from the surface. image: its values, if there is one.
+    """Return the key of the inputs of root placement, without the surface. image: its values, if there is one.
 
     density: of the vertices of a `Surface.of_cage`, which are the same at every level of subdivision.
 
-    Its first half is that of the settings, its second that of what is painted.
+    The first half of the key encodes settings, the second half painted weights and images.
     """
     names = (
         *("seed", "guide_count", "relax_iterations", "density_image", "curvature", "symmetric"),
@@ -41,10 +41,10 @@ def _half_key(data):
 
 
 def keep_roots(target: Curves, depsgraph: Depsgraph, matching: np.ndarray) -> None:
-    """Let the roots of guides or hair count as placed on a surface with other faces, as they are stored.
+    """Count the stored roots of guides or hair as placed on a surface with other faces.
 
-    matching: (V,) each vertex of before now, -1 where it is gone. Where weights of those that are still there show that
-    the mask was painted meanwhile, roots stay out of date. Raises `HairError`.
+    matching: (V,) present index of each former vertex, -1 if deleted. If the weights of matched vertices show that the
+    mask was painted meanwhile, roots stay out of date. Raises `HairError`.
     """
     state = target.vellus
     if not state.root_key:
@@ -60,7 +60,7 @@ def keep_roots(target: Curves, depsgraph: Depsgraph, matching: np.ndarray) -> No
 
 
 def guides_digest(guide_curves: Curves | None) -> str:
-    """Digest of guides, to detect hair written for other ones: undo may restore only one of them."""
+    """Return the digest of guides, to detect hair written for other guides: undo may restore only one of both."""
     if guide_curves is None:
         return ""
 
@@ -68,7 +68,7 @@ def guides_digest(guide_curves: Curves | None) -> str:
 
 
 def is_left_by_undo(hair: Curves) -> bool:
-    """Whether hair was written for other guides: undo may restore only one of them."""
+    """Whether hair was written for other guides: undo may restore only one of both."""
     followed = hair.vellus.followed
     return followed != "" and followed != guides_digest(hair.vellus.guide_curves)
 
@@ -93,12 +93,12 @@ def has_other_flow(guides: Curves, depsgraph: Depsgraph) -> bool:
 
 
 def has_other_mask(target: Curves, depsgraph: Depsgraph) -> bool:
-    """Whether the mask has changed since roots were placed: other names, or painted. Raises `HairError`."""
+    """Whether the mask was replaced or painted since roots were placed. Raises `HairError`."""
     return target.vellus.root_key != root_key(*_placing(target, depsgraph))
 
 
 def _placing(target, depsgraph):
-    """Settings, weights (V,) and the values of the image that place roots of guides or hair now."""
+    """Return the settings, weights (V,) and image values that place roots of guides or hair now."""
     state, mask = target.vellus, masks.of_curves(target)
     group, settings_class = (
         (state.guides, groom.GuideSettings) if state.kind == "GUIDES" else (state.hair, groom.HairSettings)

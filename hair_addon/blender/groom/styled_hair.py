@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The styles of bound hair: read from its Curves, bound to its strands, and bound again when they change."""
+"""The styles of bound hair: reading them from its Curves, and binding them to its strands."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReadStyles:
-    """Styles of a hair, and what they name, as read.
+    """Styles of a hair, and the inputs that they refer to.
 
-    applied: from the local coordinates that the hair was made in, whose axes and origin random shapes follow, to those
-    of now.
+    applied: from the local coordinates in which the hair was generated, which define the axes and the origin of random
+    shapes, to the present ones.
     """
 
     styles: tuple[StyleSettings, ...] = ()
@@ -55,7 +55,7 @@ class ReadStyles:
 class StyledHair:
     """Styles bound to strands.
 
-    styling: None where strands follow the guides as they are; trees: a function that makes the hair's `ClumpTrees`.
+    styling: None if strands follow the guides unchanged; make_trees: a function that builds the hair's `ClumpTrees`.
     """
 
     read: ReadStyles
@@ -68,7 +68,7 @@ class StyledHair:
         return np.float32(program.radius_factor(self.read.styles))
 
     def continue_from(self, other: "StyledHair") -> None:
-        """Keep the guides that another one has computed, where these lean them as it does."""
+        """Reuse the guides that another `StyledHair` has computed, where styles lean them equally."""
         if self.styling is not None and other.styling is not None:
             self.styling.followed.continue_from(other.styling.followed)
 
@@ -88,7 +88,7 @@ class StyledHair:
         return self.make_trees() if self.styling is None else self.styling.trees
 
     def lend_trees(self) -> Callable[[], ClumpTrees]:
-        """A function that makes `trees` for other styles of the hair, and keeps nothing else of these."""
+        """Return a function that gives other styles of the hair these `trees`, without a reference to this object."""
         if self.styling is None and "trees" not in vars(self):
             return self.make_trees
         trees = self.trees
@@ -103,7 +103,7 @@ def read_styles(
     depsgraph: Depsgraph,
     hair: Curves | None = None,
 ) -> ReadStyles:
-    """The `ReadStyles` of hair on a surface; guide_curves, hair: None for what is new. Raises `HairError`."""
+    """Return the `ReadStyles` of hair on a surface; guide_curves, hair: None if they are new. Raises `HairError`."""
     if not styles:
         return ReadStyles()
     styles = [setting_properties.as_stored(settings) for settings in styles]  # rounded as Curves store them
@@ -121,7 +121,7 @@ def bind(
     make_trees: Callable[[], ClumpTrees],
     progress: Progress = no_progress,
 ) -> StyledHair:
-    """Bind styles to strands; make_trees: called where a style needs clump trees, or a surface."""
+    """Bind styles to strands; make_trees: called if a style needs clump trees or a surface."""
     if not any(map(has_effect, read.styles)) and settings.point_count == guides.point_count:
         return StyledHair(read, None, make_trees)
     styling = grooming.hair_styles.bind_styles(
@@ -138,9 +138,9 @@ def bind(
 
 
 def trees_again(styles: StyledHair, settings: HairSettings) -> Callable[[], ClumpTrees]:
-    """A function that makes the clump trees of a hair for other weights, limits or lengths: nothing is searched."""
+    """Return a function that builds a hair's clump trees for other weights, limits or lengths, without a search."""
     if styles.styling is None and "trees" not in vars(styles):
-        # Not the settings between: a slider would keep all of them.
+        # Skips settings in between: else a dragged slider would keep all of them in memory.
         known = styles.make_trees
         make = known.args[0] if isinstance(known, partial) and known.func is _weighed_trees else known
         return partial(_weighed_trees, make, settings)
@@ -155,7 +155,7 @@ def _weighed_trees(make_trees, settings):
 def unstyled(
     styles: StyledHair, binding: HairBinding, guides: Strands, settings: HairSettings, surface: Surface
 ) -> StyledHair:
-    """The `StyledHair` of the same strands without styles, and with as many points."""
+    """Return the `StyledHair` of the same strands without styles, with the same number of points."""
     return bind(ReadStyles(), binding, guides, settings, surface, styles.lend_trees())
 
 

@@ -36,10 +36,10 @@ def write_guides(
     flow_key: str,
     fits: Fits,
 ) -> Curves:
-    """Write guides into Curves, a new object's for None; returns them.
+    """Write guides to Curves, None for those of a new object; returns the Curves.
 
-    settings: completed for the surface, so with a length; key: `staleness.root_key`; flow_key: `drawn_lines.key` of
-    their flow lines; fits: which settings are fitted to the surface.
+    settings: completed, so with a length; key: `staleness.root_key`; flow_key: `drawn_lines.key` of their flow lines;
+    fits: settings that are fitted to the surface.
     """
     guides = grown.strands
     require_count(target, *guides.points.shape)
@@ -58,7 +58,7 @@ def write_guides(
 
 
 def write_hand_made(surface_object: Object, surface: Surface, guides: Strands) -> Curves:
-    """The Curves of a new object with guides that settings do not change, such as those derived from hair."""
+    """Create an object with guides that settings do not change, such as derived guides; returns the Curves."""
     target = curves_objects.new_object("Guides", surface_object, is_rendered=False).data
     points = guides.numpy()
     length = float(np.median(lengths(points)))
@@ -72,7 +72,7 @@ def write_hand_made(surface_object: Object, surface: Surface, guides: Strands) -
 
 
 def write_strands(target: Curves | None, surface_object: Object, guide_curves: Curves, bound: BoundHair) -> Curves:
-    """Write hair that was bound and grows into Curves, a new object's for None; returns them."""
+    """Write growing hair to Curves, None for those of a new object; returns the Curves."""
     target = target or curves_objects.new_object("Hair", surface_object).data
     curves.require_not_linked(target)
     target.vellus.guide_curves = guide_curves
@@ -85,7 +85,7 @@ def write_strands(target: Curves | None, surface_object: Object, guide_curves: C
 
 @memory_as_sentence()
 def write_hair(target: Curves) -> None:
-    """Bring a hair Curves datablock up to what it is bound to, if it is: the one place where hair is written."""
+    """Write the `BoundHair` of a hair Curves datablock, if there is one: all writes of hair go through here."""
     bound, state = bindings.of(target), target.vellus
     if bound is None or bound.is_written:
         return
@@ -115,21 +115,21 @@ def write_hair(target: Curves) -> None:
         curves.write_guide_map(target, bound.guide_map if _is_map_wanted(target, bound.settings) else None)
     hair_outside.keep_outside(target, bound)
     curves.write_points(target, bound.growing)
-    state.is_stale = False  # as another choice of guides marks it
+    state.is_stale = False  # choosing other guides has marked it
     state.followed = staleness.guides_digest(state.guide_curves)
     bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
     _store_roots(state.guide_curves, bound)
 
 
 def _is_map_wanted(target, settings):
-    """Whether hair Curves are to store their guide map: exporters compute what they need (`guide_maps.of`)."""
+    """Whether hair Curves store their guide map; exporters compute it if necessary (`guide_maps.of`)."""
     return settings.guide_map or guide_map_readers.are_read(target)
 
 
 def fits(target: Curves, bound: BoundHair) -> bool:
-    """Whether a hair Curves datablock has as many points as what it is bound to.
+    """Whether a hair Curves datablock has as many points as its binding.
 
-    Raises `HairError` where it has not and another file holds it: what Blender resizes there is lost.
+    Raises `HairError` if it has not and belongs to another file, as Blender would not save its new size.
     """
     if bound.points.size == 3 * len(target.points):
         return True
@@ -139,9 +139,9 @@ def fits(target: Curves, bound: BoundHair) -> bool:
 
 
 def require_count(target: Curves | None, strand_count: int, point_count: int) -> None:
-    """Raise `HairError` where a change of settings would give Curves of another file another size, which is lost.
+    """Raise `HairError` if changed settings would resize Curves of another file, as Blender would not save that.
 
-    Keys may: a shot plays them as the file does.
+    Animated settings may resize them: a shot plays them as the file does.
     """
     if target is None or not attributes.is_from_library(target) or animated.are_keyed(target):
         return
@@ -157,7 +157,7 @@ def _other_count(target):
 
 
 def keep_styles(target: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> None:
-    """Store the styles that new hair was grown with; names: of each, empty ones for any."""
+    """Store the styles that new hair was generated with; names: of the styles, empty for default names."""
     style_items.assign(target.vellus, styles, names)
     target.vellus.is_stale = False
     looks.evaluate_shading(target)
@@ -170,7 +170,7 @@ def _store_roots(guide_curves, bound):
     roots, surface = bound.guides.roots, bound.surface
     present, firsts, stored = guide_curves.vellus.topology, None, stored_roots.cage_points(guide_curves, surface)
     if stored is None and present != surface.topology and cage_of(present) == cage_of(surface.topology):
-        # They are rooted on the surface as it is subdivided now, and were not placed on its cage.
+        # They are rooted on the subdivided surface, and were not placed on its cage.
         surface = scene.shown_surface(guide_curves.surface, surface)
         if present != surface.topology:
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The asset shelf of the 3D Viewport: grooms of asset libraries, a click on one puts it on the active mesh."""
+"""The asset shelf of the 3D Viewport: grooms of asset libraries, applied to the active mesh with a click."""
 
 import bpy
 

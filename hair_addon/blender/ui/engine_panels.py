@@ -23,14 +23,14 @@ def _panels():
     while pending:
         for panel in pending.pop().__subclasses__():
             pending.append(panel)
-            # A panel of the shader editor shares its list with the one that it is made of.
+            # A panel of the shader editor shares its list with the panel that it was created from.
             engines, name = getattr(panel, "COMPAT_ENGINES", ()), panel.__name__.removeprefix("NODE_")
             if name in _OURS or (_GENERAL in engines and not name.startswith(_NOT_OURS)):
                 yield panel
 
 
 def register():
-    """Show Blender's panels where Vellus is the render engine."""
+    """Show Blender's panels for the Vellus render engine."""
     for panel in _panels():
         panel.COMPAT_ENGINES.add(NAME)
 

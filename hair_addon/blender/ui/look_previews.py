@@ -34,7 +34,7 @@ def picture(identifier):
 
 
 def style_picture(identifier):
-    """Icon of a style preset, None where there is no picture beside its file."""
+    """Icon of a style preset, None if there is no picture beside its file."""
     path = style_presets.FOLDER / f"{identifier.lower()}.png"
     key = f"style {identifier}"
     previews = _collection()
@@ -46,7 +46,7 @@ def style_picture(identifier):
 
 
 def swatch(name):
-    """Icon of a saved look in its mean color, 0 where its file cannot be read; a file is read once after each save."""
+    """Icon with the mean color of a saved look, 0 if its file cannot be read; a file is read once after each save."""
     key = f"saved {name} {saved_looks.change_time(name)}"
     previews = _collection()
     if key not in previews:

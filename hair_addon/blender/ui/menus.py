@@ -30,7 +30,7 @@ _MOST_REFUSALS = 5  # entries listed in a menu
 
 
 def draw_guide_tools(layout):
-    """A button or menu entry for each tool that changes combed guides."""
+    """Draw a button or menu entry for each tool that changes combed guides."""
     layout.operator_context = "INVOKE_DEFAULT"
     for place, tools in enumerate(_GUIDE_TOOLS):
         if place:
@@ -51,7 +51,7 @@ class VELLUS_MT_guide_tools(bpy.types.Menu):
 
 
 class VELLUS_MT_unlocked_render(bpy.types.Menu):
-    """What a render from a window could not show, and the setting that lets the next one"""
+    """Hair that a render from a window could not show, and the setting that enables it"""
 
     bl_label = "Hair in This Render"
     bl_idname = "VELLUS_MT_unlocked_render"
@@ -63,9 +63,9 @@ class VELLUS_MT_unlocked_render(bpy.types.Menu):
 
 
 class VELLUS_MT_refused_hair(bpy.types.Menu):
-    """What hair a render lacks or shows as it is combed, and why"""
+    """Hair that is missing or not simulated in a render, with the reasons"""
 
-    bl_label = "Hair Is Missing or as Combed in This Render"
+    bl_label = "Hair Is Missing or Not Simulated in This Render"
     bl_idname = "VELLUS_MT_refused_hair"
     bl_translation_context = CONTEXT
 

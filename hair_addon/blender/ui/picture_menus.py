@@ -13,11 +13,11 @@ from ..settings.translations import interface_text
 from . import look_previews
 
 _ATTRIBUTE = "vellus_pictures"
-_OWN = "own "  # before the name of a saved one; identifiers of built-in ones have no spaces
+_OWN = "own "  # prefix of saved names; identifiers of built-in pictures have no spaces
 
 
 def draw(layout, context, name):
-    """A small picture of what is there, which opens the menu of all pictures; name: "look" or "style"."""
+    """Draw a small picture of the present look or style, which opens the picture menu; name: "look" or "style"."""
     group = getattr(context.window_manager, _ATTRIBUTE)
     layout.template_icon_view(group, name, show_labels=True, scale=1.0, scale_popup=5.0)
 
@@ -43,7 +43,7 @@ def _present_look():
     look = _own_look()
     if look is not None:
         for name, (_label, known) in PRESETS.items():
-            if setting_properties.is_stored_as(look, known, skip=("mode",)):  # which is no part of a look
+            if setting_properties.is_stored_as(look, known, skip=("mode",)):  # the mode is not part of a look
                 return name
     return PRESENT
 
@@ -81,11 +81,9 @@ class VellusPictures(bpy.types.PropertyGroup):
     """Menus of pictures"""
 
     __annotations__ = {
-        "look": picture_choices.pictured(
-            "Look", "Give the hair the look of a picture", _looks, _present_look, _choose_look
-        ),
+        "look": picture_choices.pictured("Look", "Apply a look to the hair", _looks, _present_look, _choose_look),
         "style": picture_choices.pictured(
-            "Style Preset", "Give the hair the styles of a picture", _styles, lambda: PRESENT, _choose_style
+            "Style Preset", "Apply a style preset to the hair", _styles, lambda: PRESENT, _choose_style
         ),
     }
 

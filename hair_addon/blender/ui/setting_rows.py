@@ -12,7 +12,7 @@ from ..host.notices import text_of
 from ..settings import fitted_sizes, length_steps, setting_properties, style_items
 from ..settings.translations import interface_text
 
-# Blender's own property split gives names 40 % of the width, which cuts them in a sidebar of its default width.
+# Blender's own property split gives labels 40 % of the width, which truncates them at the default sidebar width.
 NAME_SHARE = 0.54
 
 # Names too long for one line are drawn above the value.
@@ -45,9 +45,9 @@ _VOLUME = ("hair_friction", "hair_pressure", "cell_size")
 
 
 def row(layout, owner, name, size=""):
-    """A row of a property, its name in a column of its own.
+    """Draw a row of a property with its label in a separate column.
 
-    size: of a property that may be fitted to the surface, the name that its flag is called by.
+    size: for a property that can be fitted to the surface, the name that identifies its flag.
     """
     value_side = _below_name(layout, owner, name) if name in WIDE else _value_side(layout, owner, name)
     shown, flag = length_steps.shown_name(owner, name), fitted_sizes.flag_of(size or name)
@@ -68,7 +68,7 @@ def _below_name(layout, owner, name):
 
 
 def search_row(layout, owner, name, source, collection, **details):
-    """A `row` whose value is picked by name from a collection, such as the vertex groups of an object."""
+    """Draw a `row` whose value is picked by name from a collection, such as the vertex groups of an object."""
     _value_side(layout, owner, name).prop_search(owner, name, source, collection, text="", **details)
 
 
@@ -83,19 +83,19 @@ def _value_side(layout, owner, name, title=""):
 
 
 def rows(layout, owner, settings_class, names):
-    """A row for each of these settings of a class, in the order of declaration."""
+    """Draw a row for each of these settings of a class, in the order of declaration."""
     for name, _default, details in declared(settings_class):
         if name in names:
             row(layout, owner, details.diameter[0] if details.diameter else name, name)
 
 
 def all_rows(layout, owner, settings_class):
-    """A row for each setting of a class."""
+    """Draw a row for each setting of a class."""
     rows(layout, owner, settings_class, others(settings_class))
 
 
 def others(settings_class, *shown):
-    """Names of the settings of a class that are in none of some tuples: a new one is never without its row."""
+    """Return the names of a class's settings that are in none of the tuples, so that every new setting has a row."""
     names = {name for names in shown for name in names}
     return tuple(name for name, _default, _details in declared(settings_class) if name not in names)
 
@@ -103,7 +103,7 @@ def others(settings_class, *shown):
 def guide_rows(layout, owner, surface, are_combed=False):
     """Number, length and masks of guides; owner: has properties of `GuideSettings`; surface: object or None.
 
-    are_combed: gray out what has no effect on combed guides. Masks have, on the strands.
+    are_combed: gray out settings without effect on combed guides; masks still affect strands.
     """
     column = layout.column()
     column.active = not are_combed
@@ -126,7 +126,7 @@ def placement_rows(layout, owner):
 
 
 def strand_rows(layout, owner, surface, skip=()):
-    """Number, thickness and mask of strands; owner: has the properties of `HairSettings` but for those of `skip`."""
+    """Number, thickness and mask of strands; owner: has the properties of `HairSettings` except those in `skip`."""
     apart = (_PARTING_LIMITS, _PARTING_REGIONS, _BLENDING, _MASKS, _INFLUENCE, skip)
     rows(layout, owner, HairSettings, others(HairSettings, *apart))
     if "density_group" not in skip:
@@ -166,7 +166,7 @@ def _density_rows(layout, owner, surface):
 
 
 def style_rows(layout, item):
-    """Settings of a style but for its mask and profile; item: its properties."""
+    """Settings of a style except its mask and profile; item: its properties."""
     owner, settings_class = style_items.group_of(item), KINDS[item.kind]
     row(layout, owner, "amount")
     shared = setting_properties.names_of(StyleSettings)
@@ -185,7 +185,7 @@ def profile_rows(layout, item):
 
 
 def style_mask_rows(layout, item, surface):
-    """Where on the surface a style acts; surface: object or None."""
+    """Mask of a style; surface: object or None."""
     owner = style_items.group_of(item)
     if surface is None:
         row(layout, owner, "mask")
@@ -199,7 +199,7 @@ def style_mask_rows(layout, item, surface):
 def material_rows(layout, owner, wetness):
     """Stiffness, damping and weight; owner: has the properties of `DynamicsSettings`, as for the rows below.
 
-    wetness: (owner, name) of the slider that wets the hair, which may be that of its look or of a Wet style.
+    wetness: (owner, name) of the slider that wets the hair, possibly of its look or of a Wet style.
     """
     rows(layout, owner, DynamicsSettings, _MATERIAL)
     _value_side(layout, *wetness, title="Wetness").prop(*wetness, text="")
@@ -242,7 +242,7 @@ def solver_rows(layout, owner):
 
 
 def collider_rows(layout, owner):
-    """How hair collides with an object; owner: has the properties of `ColliderSettings`."""
+    """Collision of hair with an object; owner: has the properties of `ColliderSettings`."""
     for switch, name in (("overrides_friction", "friction"), ("overrides_distance", "collision_distance")):
         row(layout, owner, switch)
         if getattr(owner, switch):
@@ -265,7 +265,7 @@ def all_strand_rows(layout, owner, surface, skip=()):
 
 
 def titled(layout, title):
-    """A column under a title."""
+    """Return a column under a title."""
     column = layout.column()
     column.separator()
     column.label(text=interface_text(title), translate=False)

@@ -9,7 +9,7 @@ from hair_addon.blender.groom import diagnostics
 from tests.support.dynamics.following import assert_follows, grow, update
 from tests.support.reading import evaluated_points, points
 
-LACKING = 'Modifiers of "Shown" make faces without rest positions: hair does not follow where they deform.'
+LACKING = 'Modifiers of "Shown" create faces without rest positions: hair does not follow their deformation.'
 
 
 def shown(build):

@@ -276,7 +276,7 @@ def test_an_edit_in_such_a_frame_is_followed(changing, scene):
     select(0, 1, 2)
     with edit_mode():
         bpy.ops.mesh.delete(type="FACE")
-    assert "lost their faces" in bpy.data.objects["Hair Guides"].data.vellus.status
+    assert "were deleted" in bpy.data.objects["Hair Guides"].data.vellus.status
 
 
 def test_a_setting_that_is_changed_back_is_an_edit_too(hair, scene):

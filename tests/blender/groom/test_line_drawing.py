@@ -98,7 +98,7 @@ def test_flow_is_drawn_for_guides_that_are_not_combed(hair):
 
 def test_what_is_no_curve_is_not_drawn_on(hair):
     hair.data.vellus.hair.part_lines = "Sphere"
-    with pytest.raises(RuntimeError, match='"Sphere" is no curve that can be drawn'):
+    with pytest.raises(RuntimeError, match='"Sphere" is not a curve that can be drawn on'):
         bpy.ops.vellus.draw_parting()
     assert line_drawing.drawn_for(bpy.context.object) is None
 

@@ -207,7 +207,7 @@ def test_what_cannot_be_delivered_is_refused(shot, tmp_path):
     refuse(shot, "Frame .* cannot be read")
     damaged.write_bytes(whole)
     shot.vellus.simulates = False
-    refuse(shot, "do not simulate")
+    refuse(shot, "are not simulated")
     shot.vellus.simulates = True
     assert not [*tmp_path.glob(".vellus*"), *tmp_path.glob("*.usdc")]
 

@@ -328,7 +328,7 @@ def test_of_others_nothing_is_said(still, settings):
 def test_the_order_of_styles_is_explained(still):
     style_items.assign(state(), [wet.Settings(), curl.Settings(), lean.Settings()])
     first, second, third = (style_notes.notes_of(still.data, item) for item in state().styles)
-    assert "Wet belongs last" in first[0] and second == [] and "Lean acts on guides" in third[0]
+    assert "Wet should be the last style" in first[0] and second == [] and "Lean acts on guides" in third[0]
     state().styles[1].curl.is_on = state().styles[2].lean.is_on = False
     assert style_notes.notes_of(still.data, state().styles[0]) == []
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames that were baked before: how far they may stay, and the state that baking goes on from.
+"""Resuming a bake: which earlier frames are still valid, and the state from which baking continues.
 
-They may as long as they are of the present settings, guides and animation. So each of their frames is visited, which
-also tells where colliders were when their topology changed.
+Frames are valid while settings, guides and animation match. Each frame is visited to compare its animation, and to find
+the positions of colliders when their topology changed.
 """
 
 import time
@@ -38,23 +38,23 @@ class Task:
     there: FrameCache  # frames baked earlier
     broken: int = 0
     worst: Broken = broken_guides.NONE
-    seconds: float = 0.0  # that the frame at hand has taken so far
-    numbers: set[int] = field(default_factory=set)  # of states that are there
-    state: tuple[int, Mapping[str, np.ndarray], FrameInput] | None = None  # to go on from: frame, arrays, what was seen
+    seconds: float = 0.0  # time that the current frame has taken so far
+    numbers: set[int] = field(default_factory=set)  # frames with a stored state
+    state: tuple[int, Mapping[str, np.ndarray], FrameInput] | None = None  # to resume from: frame, arrays, input
 
     @property
     def last_number(self) -> int:
-        """The last frame that frames may stay up to: beyond, there is no state to go on from."""
+        """The last frame up to which earlier frames can be kept, as baking resumes only from a stored state."""
         return max(self.numbers, default=self.done)
 
 
 def digest_of(guides: Curves, scene: Scene, settings: "guide_simulation.DynamicsSettings") -> str:
-    """Digest of the animation in the current frame. Raises `HairError`."""
+    """Return the digest of the animation in the current frame. Raises `HairError`."""
     return frame_animation.digest_of(guides, scene, scenes.present_depsgraph(), settings)
 
 
 def going_on(tasks: list[Task], its_scene: Remembered) -> Work[None]:
-    """Bring tasks, which have come to their first frames, to the last states that the frames lead to; work in steps."""
+    """Advance tasks from their first frames to the last valid states, as work in steps."""
     kept = {id(task): task.done for task in tasks if task.last_number > task.done}
     frame, said = min(kept.values(), default=0), time.perf_counter()
     while kept:
@@ -78,7 +78,7 @@ def going_on(tasks: list[Task], its_scene: Remembered) -> Work[None]:
 
 
 def _may_stay(task, frame, scene):
-    """Whether a frame is there, of the present settings and animation; its state is taken if it has one."""
+    """Whether a frame exists and matches the present settings and animation; stores its state in the task, if any."""
     found = task.there.read_frame(frame)
     if found is None or found.key != task.writer.manifest.key:
         return False

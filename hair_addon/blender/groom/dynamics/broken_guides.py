@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that break while they are simulated, and are put back as they were combed: in which frame most of them do."""
+"""Guides that become unstable in the simulation and are reset to their combed shape: the frame with most of them."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ _NOTE = "broken"  # of a manifest
 
 @dataclass(frozen=True, order=True)
 class Broken:
-    """How many guides broke in the frame in which most did."""
+    """The largest number of guides that broke in one frame."""
 
     count: int
     frame: int
@@ -26,9 +26,9 @@ class Broken:
         return ((_NOTE, f"{self.count} {self.frame}"),) if self.count else ()
 
     def said_of(self, guides: Curves) -> HairError:
-        """The sentence of some guides."""
+        """Return the message for the user."""
         return HairError(
-            '{count} of {total} guides of "{name}" broke in frame {frame} and were put back: increase Substeps.',
+            '{count} of {total} guides of "{name}" broke in frame {frame} and were reset: increase Substeps.',
             count=self.count,
             total=len(guides.curves),
             name=name_of(guides),
@@ -40,7 +40,7 @@ NONE = Broken(0, 0)
 
 
 def noted(manifest: Manifest | None) -> Broken:
-    """What a manifest notes of its frames."""
+    """Return the `Broken` stored in a manifest."""
     for name, reason in () if manifest is None else manifest.notes:
         words = reason.split()
         if name == _NOTE and len(words) == 2 and all(word.lstrip("-").isdecimal() for word in words):
@@ -49,6 +49,6 @@ def noted(manifest: Manifest | None) -> Broken:
 
 
 def baked(guides: Curves) -> Broken:
-    """The same of the baked frames of guides: panels ask with every redraw, so no file is read."""
+    """Return the `Broken` of the baked frames of guides. Reads no file: panels call this on every redraw."""
     kept = frame_folders.folder_cache.get(guides.session_uid)
     return noted(None if kept is None or kept[1] is None else kept[1].manifest)

@@ -22,7 +22,7 @@ LONGEST = 1.5  # [m]: longer hair suggests a character that is not modeled to sc
 
 
 def bend_note(guides: Curves, blender_scene: Scene) -> str:
-    """Translated sentence on how far guides bend under their weight; empty without gravity."""
+    """Return a translated sentence on how far guides bend under their weight; empty without gravity."""
     try:
         settings = properties.dynamics_of(guides.vellus)
     except HairError as error:
@@ -39,11 +39,11 @@ def bend_note(guides: Curves, blender_scene: Scene) -> str:
 
 
 def stiffness_note(guides: Curves) -> str:
-    """How many guides cannot hold their shape, as a translated sentence; empty where all can, or nobody knows yet."""
+    """Return a translated sentence with the number of guides that cannot hold their shape; empty if none or unknown."""
     try:
         settings = properties.dynamics_of(guides.vellus)
     except HairError:
-        return ""  # `bend_note` says it
+        return ""  # `bend_note` reports it
     needed = guide_simulation.known_stiffness(guides, settings)
     if needed is None or settings.hold > 0.0:
         return ""
@@ -65,7 +65,7 @@ def rounded_up(stiffness: float) -> float:
 
 
 def size_note(guides: Curves, blender_scene: Scene) -> str:
-    """Translated advice for guides that are too long to be hair; empty otherwise."""
+    """Return translated advice for guides that are too long to be hair; empty otherwise."""
     length = _length(guides, blender_scene)
     if is_hand_made(guides) or not length > LONGEST:
         return ""
@@ -76,14 +76,14 @@ def size_note(guides: Curves, blender_scene: Scene) -> str:
 
 
 def is_delivery_outdated(hair: Curves) -> bool:
-    """Whether guides were baked otherwise since their hair was delivered, as far as is known without reading files."""
+    """Whether guides were baked again since their hair was delivered, as far as is known without reading files."""
     kept = frame_folders.folder_cache.get(hair.vellus.guide_curves.session_uid)
     manifest = None if kept is None or kept[1] is None else kept[1].manifest
     return manifest is not None and hair.vellus.delivered_key != manifest.key
 
 
 def _length(guides, blender_scene):
-    """Of guides as they are grown, the median of those that are combed [m]."""
+    """Return the length of grown guides, or the median length of combed guides [m]."""
     state = guide_states.of(guides)
     length = state.length if state.is_combed else guides.vellus.guides.length
     return length * simulated_world.metres_of(blender_scene, guides.vellus.dynamics)

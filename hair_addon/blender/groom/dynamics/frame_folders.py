@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders of baked frames: one per guides, inside the cache folder that the guides name."""
+"""Folders of baked frames: one for each guides datablock, inside the cache folder of its settings."""
 
 import contextlib
 from collections.abc import Iterable
@@ -19,36 +19,36 @@ from ...host import paths, scene_time
 from ...host.caches import Cache
 from ...host.notices import name_of
 
-_CLOSE = 1e-5  # parts of coordinates
+_CLOSE = 1e-5  # fraction of coordinates
 
 folder_cache = Cache()  # session_uid of guide Curves → (folder, its loaded FrameCache)
 
 
 def folder_of(guides: Curves) -> Path:
-    """The folder of the frames of some guides, whether it exists or not. Raises `HairError` if it leads nowhere.
+    """Return the folder of the frames of guides, whether it exists or not. Raises `HairError` if the path is invalid.
 
-    Of linked guides it is that of the file that links them: a shot has frames of its own, also where others are saved
-    in the same folder.
+    Linked guides have the folder of the file that links them: each shot has frames of its own, even if several shots
+    are saved in one folder.
     """
     base = paths.resolve(guides.vellus.cache_folder)
     return frame_cache.folder_of(base, _identity_of(guides, _file_seen_from(base)))
 
 
 def _identity_of(guides, file):
-    """The name of the folder of guides that a file, as `_file_seen_from` its parent, has baked."""
-    if attributes.is_from_library(guides):  # what is stored is the library's
+    """Return the name of the folder of guides baked by a file; file: from `_file_seen_from` the parent folder."""
+    if attributes.is_from_library(guides):  # the stored identity is that of the library
         linked_from = None if guides.library is None else paths.from_open_file(guides.library)
         return _identity_of_names(name_of(guides), linked_from, file)
     return guides.vellus.cache_identity or _identity_of_names(name_of(guides), None, file)
 
 
 def _identity_of_names(guides, library, file):
-    """The same in every session of a file that was not saved since guides were baked, as by the command line."""
+    """Return an identity that is the same in every session, even if a file was not saved after baking."""
     return frame_manifest.digest([guides, library, file])[:16]
 
 
 def _file_seen_from(base):
-    """The open file as seen from a folder of caches, so that both may be moved; "." if it was never saved."""
+    """Return the path of the open file relative to a folder of caches, so both can be moved; "." if unsaved."""
     if not bpy.data.filepath:
         return "."
     file = Path(bpy.data.filepath)
@@ -56,9 +56,9 @@ def _file_seen_from(base):
 
 
 def frames_of(guides: Curves) -> FrameCache | None:
-    """The baked frames of some guides, of which there may be none; None where their folder leads nowhere.
+    """Return the baked frames of guides, possibly none; None if the path of their folder is invalid.
 
-    Linked guides that are not baked in this file have those of the file that it was saved from, or else of their
+    Linked guides that are not baked in this file use the frames of the file that it was saved from, or else of their
     library.
     """
     known = folder_cache.get(guides.session_uid)
@@ -74,9 +74,9 @@ def frames_of(guides: Curves) -> FrameCache | None:
 
 
 def rooted(guides: Curves, points: np.ndarray) -> np.ndarray:
-    """(G, P, 3) points of a frame, whose roots are to the last bit those of the guides where these were not slid.
+    """Return the (G, P, 3) points of a frame with the exact roots of the guides, except of guides that were slid.
 
-    Hair is bound to guides by their roots, which are rounded where coordinates change.
+    Hair is bound to guides by their roots, and changes of coordinates round these.
     """
     roots = curves.first_points(guides)
     if surface_space.applied(guides).is_identity or len(roots) != len(points):
@@ -92,7 +92,7 @@ def _leads_somewhere(guides):
 
 
 def _read(guides, folder):
-    """The `FrameCache` of a folder; another one that has frames, where the folder has none or None stands for it."""
+    """Return the `FrameCache` of a folder, or of another folder with frames if it is None or has none."""
     read = None if folder is None else FrameCache(folder)
     if read is not None and read.manifest is not None:
         return read
@@ -101,7 +101,7 @@ def _read(guides, folder):
 
 
 def _other_folders(guides, folder):
-    """Folders that guides have frames in before they are baked in this file; folder: `folder_of` them, or None."""
+    """Yield folders with frames of guides that were baked in other files; folder: from `folder_of`, or None."""
     before = scene_time.present_scene().vellus.baked_in
     if folder is not None and before and attributes.is_from_library(guides):
         yield frame_cache.folder_of(folder.parent, _identity_of(guides, before))
@@ -113,7 +113,7 @@ def _other_folders(guides, folder):
 
 
 def remember() -> None:
-    """Store in the open file where its frames are, before it is saved: under another name they play, too."""
+    """Store the location of frames in the open file before it is saved, so that they play under another name too."""
     for guides in simulating():
         baked = frames_of(guides)
         with contextlib.suppress(HairError):  # the folder path is invalid
@@ -128,7 +128,7 @@ def remember() -> None:
 
 
 def new_folder(guides: Curves) -> Path:
-    """The folder to bake some guides to: theirs, or a new one where they have none or share it with other guides."""
+    """Return the folder to bake guides to: theirs, or a new one if they have none or share it with other guides."""
     folder = folder_of(guides)
     if attributes.is_from_library(guides):
         return folder
@@ -139,10 +139,10 @@ def new_folder(guides: Curves) -> Path:
 
 
 def require_baked(numbers: Iterable[int], scene: Scene) -> None:
-    """Raise `HairError` unless all guides that simulate have whole baked frames for pictures of frames of a scene.
+    """Raise `HairError` unless all simulated guides have readable baked frames for rendering frames of a scene.
 
-    From their start frame on. Renders of sequences ask: they never simulate. Hair that plays delivered frames needs no
-    others.
+    Checks frames from their start frame on. Renders of sequences call this, as they never simulate. Delivered hair
+    needs no baked frames.
     """
     numbers = list(numbers)
     exposed = sorted({frame for number in numbers for frame in scene_time.exposed_frames(scene, number)})
@@ -152,9 +152,9 @@ def require_baked(numbers: Iterable[int], scene: Scene) -> None:
 
 
 def require_readable(numbers: Iterable[int], scene: Scene) -> None:
-    """Raise `HairError` where baked frames that pictures of frames of a scene show cannot be read whole.
+    """Raise `HairError` if baked frames for rendering frames of a scene cannot be read.
 
-    Motion is read of the frames beside them, too. Every picture asks: those guides would be as combed in it.
+    Includes adjacent frames, which are read for motion. Every picture calls this: guides would have their combed shape.
     """
     is_moving = scene.render.use_motion_blur or any(layer.use_pass_vector for layer in scene.view_layers)
     beside = range(-2, 3) if is_moving else range(1)
@@ -166,7 +166,7 @@ def require_readable(numbers: Iterable[int], scene: Scene) -> None:
 
 
 def rendered(last: int) -> list[Curves]:
-    """Guides that simulate and whose baked frames are rendered up to a frame: not those whose hair plays others."""
+    """Return the simulated guides whose baked frames are rendered up to a frame; guides of delivered hair are not."""
 
     def is_read(guides):
         hair = followers(guides)
@@ -177,9 +177,9 @@ def rendered(last: int) -> list[Curves]:
 
 
 def require_frames(guides: Curves, numbers: Iterable[int]) -> None:
-    """Raise `HairError` unless guides simulate, and have baked frames of these numbers from their start frame on."""
+    """Raise `HairError` unless guides are simulated and all of these frames, from their start frame on, are baked."""
     if not is_simulated(guides):
-        raise HairError('The guides "{name}" do not simulate: switch Dynamics on.', name=name_of(guides))
+        raise HairError('The guides "{name}" are not simulated: switch Dynamics on.', name=name_of(guides))
     numbers, start = list(numbers), guides.vellus.dynamics.start_frame
     baked = frames_of(guides)
     is_theirs = baked is not None and baked.manifest is not None and baked.manifest.guide_count == len(guides.curves)
@@ -197,9 +197,9 @@ def require_frames(guides: Curves, numbers: Iterable[int]) -> None:
 
 
 def fault_of(guides: Curves, numbers: Iterable[int]) -> HairError | None:
-    """Which of the baked frames of guides cannot be read whole, the first of these numbers; None where all can.
+    """Return the error of the first of these baked frames of guides that cannot be read; None if all can.
 
-    Frames that are missing are none of them.
+    Missing frames are ignored.
     """
     baked = frames_of(guides)
     if baked is None or baked.manifest is None or baked.manifest.guide_count != len(guides.curves):
@@ -212,7 +212,7 @@ def fault_of(guides: Curves, numbers: Iterable[int]) -> HairError | None:
 
 
 def simulating() -> list[Curves]:
-    """Guide Curves that are simulated, but for those of a library that this file overrides."""
+    """Return the simulated guide Curves, except those of a library that this file overrides."""
     overrides = (guides.override_library for guides in bpy.data.hair_curves)
     replaced = {override.reference for override in overrides if override is not None}
     return [guides for guides in bpy.data.hair_curves if is_simulated(guides) and guides not in replaced]
@@ -230,7 +230,7 @@ def forget(guides: Curves) -> None:
 
 
 def have_changed(guides: Curves) -> None:
-    """Show guides with the next update as they are baked now: frames were written or removed."""
+    """Show the present baked frames of guides with the next update, after frames were written or removed."""
     forget(guides)
     guides.vellus.is_dynamics_stale = True
     guides.update_tag()

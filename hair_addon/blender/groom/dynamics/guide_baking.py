@@ -32,7 +32,7 @@ from . import bake_resuming, broken_guides, frame_folders, guide_simulation
 from .bake_resuming import Task
 from .broken_guides import Broken
 
-SOLVER_VERSION = 3  # of all that frames follow from beside settings: raised when they come out otherwise
+SOLVER_VERSION = 3  # increased when the same inputs give other frames
 STATE_FRAMES = 24  # between states
 _PARTING = "parting"  # a part of `key_of`
 _BEYOND = 1  # extra frames after the last, for motion blur
@@ -47,9 +47,9 @@ def is_baking() -> bool:
 
 @dataclass(frozen=True)
 class Baked:
-    """What was baked: frames simulated now, and how often strands broke and were put back to their groom.
+    """Result of a bake: the number of simulated frames, and how often strands broke and were reset to the groom.
 
-    worst: the frame in which most did, of all that are there.
+    worst: of all existing frames, the one in which most broke.
     """
 
     first: int
@@ -61,9 +61,9 @@ class Baked:
 
 @dataclass(frozen=True)
 class BakedFrame:
-    """A frame that was simulated and written: of which guides, in how many substeps, how many strands broke.
+    """A simulated and written frame: its guides, number of substeps and number of broken strands.
 
-    seconds: that reading, simulating and writing these guides took, with their share of the scene's change of frame.
+    seconds: time for reading, simulating and writing these guides, including their share of the scene's frame change.
     """
 
     guides: str
@@ -81,10 +81,7 @@ def memory_of(guides_list: Sequence[Curves]) -> int:
 
 
 def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
-    """{part: digest} of what the frames of some guides follow from, but for the animation, of settings too.
-
-    Raises `HairError`.
-    """
+    """Return {part: digest} of the inputs of the frames of guides, except all animation. Raises `HairError`."""
     settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
     parts = {
         "solver": SOLVER_VERSION,
@@ -100,13 +97,13 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
 
 
 def changed_parts(guides: Curves, scene: Scene, manifest: Manifest) -> list[str]:
-    """The parts of `key_of` some guides that are otherwise than when their frames were baked. Raises `HairError`.
+    """Return the parts of `key_of` that have changed since frames were baked. Raises `HairError`.
 
-    A part line that a deformed surface leaves behind divides guides otherwise in each frame. Nothing has changed while
-    the hair is parted as it was: guides are baked with the regions of their first frame.
+    A part line that does not follow a deformed surface divides guides differently in each frame. This is not a change
+    while hair keeps its parting, as guides are baked with the regions of their first frame.
     """
     now, baked = key_of(guides, scene), manifest.keys[-1]
-    # Guides that are where they were in the world count as they were when other coordinates were applied.
+    # Applied transforms change local coordinates but not the guides' positions in the world: this is not a change.
     as_before = {part: surface_space.known_as(guides, digest) for part, digest in now.items()}
     changed = sorted(part for part in {*now, *baked} if baked.get(part) not in {now.get(part), as_before.get(part)})
     if _PARTING in changed and manifest.parted_by == _parted_by(guides) and not isinstance(_regions(guides), str):
@@ -115,7 +112,7 @@ def changed_parts(guides: Curves, scene: Scene, manifest: Manifest) -> list[str]
 
 
 def _now():
-    """[s], of a clock that tests turn by hand."""
+    """Return the time [s]; tests replace this clock."""
     return time.perf_counter()
 
 
@@ -124,7 +121,7 @@ def _parted_by(guides):
 
 
 def _regions(guides):
-    """Regions of guides, None for one; why they cannot be read, as then frames that are baked still play."""
+    """Return the regions of guides, None for one, or the text of the error, so that baked frames still play."""
     if not guide_regions.is_parted(guides):
         return None
     try:
@@ -140,10 +137,10 @@ def baking(
     starts_over: bool = False,
     tell: Callable[[BakedFrame], None] = lambda _frame: None,
 ) -> Work[list[Baked]]:
-    """Bake guides up to a frame, as work in steps: a computation a frame.
+    """Bake guides up to a frame, as work in steps: one computation per frame.
 
-    The scene is at the frame where it was, on every way out. starts_over: simulate frames again that are there; tell:
-    called for each frame of each guides when it is written. Raises `HairError`.
+    The scene returns to its frame on every exit. starts_over: simulate existing frames again; tell: called for each
+    written frame of each guides datablock. Raises `HairError`.
     """
     global _baking
     memory.require(memory_of(guides_list))
@@ -188,7 +185,7 @@ def _baked_frame(task, frame):
 
 
 def _note_broken(task, frame):
-    """Keep the frame in which most guides broke in the manifest, for the panel of whoever opens the file."""
+    """Store the frame in which most guides broke in the manifest, for panels in later sessions."""
     count = len(task.simulated.simulation.broken)
     if count > task.worst.count:
         task.worst = Broken(count, frame)
@@ -200,7 +197,7 @@ def _results(tasks, counts):
 
 
 def _end(its_scene, present, baked):
-    """Go back to the frame where the scene was; guides are shown there, as baked, after the next update."""
+    """Return to the scene's former frame; its baked guides are shown after the next update."""
     global _baking
     try:
         with contextlib.suppress(HairError):  # the scene was deleted in the meantime
@@ -213,8 +210,9 @@ def _end(its_scene, present, baked):
 
 
 def _begin(guides, last, scene):
-    """Guides in their first frame, which stays as it is: they, their `GuideSimulation`, the `Manifest` of their frames,
-    the digest of the animation, and their points.
+    """Return guides, `GuideSimulation`, `Manifest` of the frames, digest of the animation and points.
+
+    All are of the first frame, which is not simulated.
     """
     start = properties.dynamics_of(guides.vellus).start_frame
     if last < start:
@@ -238,7 +236,7 @@ def _begin(guides, last, scene):
 
 
 def _open(named, simulated, manifest, digest, combed, last, starts_over, stack):
-    """A `Task` in its first frame, whose folder this process has claimed."""
+    """Claim the folder of guides and return their `Task` in its first frame."""
     guides, start = named.find(), manifest.first
     folder = frame_folders.new_folder(guides)
     frame_folders.forget(guides)
@@ -257,7 +255,7 @@ def _open(named, simulated, manifest, digest, combed, last, starts_over, stack):
 
 
 def _read(task, scene, depsgraph):
-    """(`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
+    """Return (`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
     guides, started = task.guides.find(), _now()
     settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
     read = guide_simulation.read(guides, scene, depsgraph, settings, task.simulated.masks)
@@ -267,7 +265,7 @@ def _read(task, scene, depsgraph):
 
 
 def _computing(tasks, inputs, frame, part, is_last):
-    """A function of (progress) that simulates a frame of some guides and writes it."""
+    """Return a function of (progress) that simulates and writes a frame of guides."""
 
     def compute(progress):
         progress(f"Frame {frame}", part)

@@ -17,12 +17,12 @@ from ...settings import preferences, properties
 from ..guides import guide_tools
 from . import guide_simulation
 
-LEAST_STIFFNESS = 1e-3  # of dynamics' settings
-_FRAMES = 24.0  # a second, of as many substeps as the settings say
+LEAST_STIFFNESS = 1e-3  # lower limit of the bend stiffness
+_FRAMES = 24.0  # per second, with the number of substeps of the settings
 
 
 def drape(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) -> int:
-    """Let guides fall on their surface as it is deformed now, until they are at rest; returns how many have changed.
+    """Let guides fall on their deformed surface until they are at rest; returns the number of changed guides.
 
     Raises `HairError` before anything changes.
     """
@@ -71,6 +71,6 @@ def seconds(datablock: Curves, settings: DrapeSettings, face_count: int) -> floa
 
 
 def _softened(datablock, settings):
-    """`DynamicsSettings` of guides, with the stiffness that they are draped with."""
+    """Return the `DynamicsSettings` of guides with the stiffness for draping."""
     present = properties.dynamics_of(datablock.vellus)
     return replace(present, bend_stiffness=max(settings.stiffness * present.bend_stiffness, LEAST_STIFFNESS))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulation of guides of a scene: begun with their groom, and brought from frame to frame.
+"""The simulation of guides in a scene: it starts with their groom and advances frame by frame.
 
 `begin` and `read` use Blender's data; `GuideSimulation.advance` does not, and may run in another thread.
 """
@@ -28,15 +28,15 @@ from ...settings import preferences, properties
 from .. import staleness
 from ..guides import guide_regions
 
-# session_uid of guides → ((G,) bend stiffness that each needs to hold its shape, `_load` of the settings then)
+# session_uid of guides → ((G,) bend stiffness with which each holds its shape, `_load` of the settings used)
 stiffness_cache = Cache()
 
 
 @dataclass(frozen=True)
 class FrameInput:
-    """What guides follow in one frame, as read. errors: of colliders that were left out, or stay where they were.
+    """Input of the simulation in one frame. errors: of colliders that were left out or do not move.
 
-    wetness: (G,) of each guide, None where they do not differ.
+    wetness: (G,) of each guide, None if it does not vary.
     """
 
     frame: int
@@ -50,11 +50,11 @@ class FrameInput:
 
 @dataclass
 class GuideSimulation:
-    """Guides that are simulated, and the frame they have come to.
+    """Simulated guides and their current frame.
 
     digest, topology: of guides and surface; identity: of both, as `_identity_of`; start: their pose in the first frame;
-    start_space, space: `surface_space.applied` to guides in the first frame, and now; obstacles: {name: as hair last
-    collided with it}; masks: {mask of wetness: (G,) its weights}; wetness: of the last frame, as in `FrameInput`.
+    start_space, space: `surface_space.applied` to guides in the first frame, and now; obstacles: {name: obstacle in its
+    last valid state}; masks: {mask of wetness: (G,) its weights}; wetness: of the last frame, as in `FrameInput`.
     """
 
     digest: str
@@ -66,18 +66,18 @@ class GuideSimulation:
     space: Affine
     roots: np.ndarray  # (G, 3) float32 at rest, local
     simulation: "dynamics.simulation.Simulation"
-    metres: float  # in a unit of the world
+    metres: float  # per world unit
     obstacles: dict[str, "dynamics.simulation.Obstacle"] = field(default_factory=dict)
     parted_by: tuple[str, ...] = ()  # `guide_regions.parting_keys` when regions were read
     masks: dict[tuple[str, str, bool], np.ndarray] = field(default_factory=dict)
     wetness: np.ndarray | None = None
     errors: tuple[HairError, ...] = ()  # of colliders, in the last frame
-    may_have_other_faces: bool = False  # the obstacles, in the next frame
+    may_have_other_faces: bool = False  # whether obstacles may change topology in the next frame
 
     def see(self, frame: FrameInput) -> FrameInput:
-        """The next frame as guides are simulated in it: where a collider has another topology, it stays as it was.
+        """Return the input of the next frame, in which colliders with a changed topology keep their former state.
 
-        Called for each frame in turn, it need not be simulated.
+        Call it for each frame in turn, even for frames that are not simulated.
         """
         if self.may_have_other_faces:
             self.may_have_other_faces = False
@@ -89,7 +89,7 @@ class GuideSimulation:
         return replace(frame, world=replace(frame.world, obstacles=obstacles), errors=(*frame.errors, *notes))
 
     def advance(self, frame: FrameInput) -> np.ndarray:
-        """Simulate the next frame: (G, P, 3) float32 points at rest, in local coordinates."""
+        """Simulate the next frame; returns (G, P, 3) float32 points at rest, in local coordinates."""
         frame = self.see(frame)
         self._change(frame)
         self.simulation.advance(self._root_pose(frame.pose), frame.world, frame.seconds)
@@ -99,13 +99,13 @@ class GuideSimulation:
         return points
 
     def _change(self, frame):
-        """Go on with the settings and the wetness of a frame."""
+        """Use the settings and the wetness of a frame."""
         if frame.settings != self.settings or not _are_same(frame.wetness, self.wetness):
             self.simulation.change(in_metres(frame.settings, self.metres), wetness=frame.wetness)
             self.settings, self.wetness = frame.settings, frame.wetness
 
     def follow_parting(self, guides: Curves, depsgraph: Depsgraph) -> bool:
-        """Divide guides as their hair is parted now; returns whether that is otherwise. Raises `HairError`."""
+        """Update the regions of guides to the present parting; returns whether they changed. Raises `HairError`."""
         keys = guide_regions.parting_keys(guides)
         if keys == self.parted_by:
             return False
@@ -114,13 +114,13 @@ class GuideSimulation:
         return is_other
 
     def go_on(self, state: Mapping[str, np.ndarray], frame: FrameInput) -> None:
-        """Go on from a state that the simulation's `save` gave in a frame, as `see` returned it. Raises `HairError`."""
+        """Resume from a state that `save` returned in a frame; frame: as from `see`. Raises `HairError`."""
         self.obstacles = {obstacle.name: obstacle for obstacle in frame.world.obstacles}
         self._change(frame)
         self.simulation.load(state, self._root_pose(frame.pose), frame.world)
 
     def is_of(self, guides: Curves, settings: DynamicsSettings) -> bool:
-        """Whether it simulates these guides as they are combed now, with as many vertices."""
+        """Whether it simulates the present combed shape of guides, with the number of vertices of the settings."""
         return (
             self.topology == guides.vellus.topology
             and self.settings.vertex_count == settings.vertex_count
@@ -128,10 +128,10 @@ class GuideSimulation:
         )
 
     def follow_applied(self, guides: Curves) -> Affine | None:
-        """Go on in the local coordinates of now where transforms were applied to the surface, or undone.
+        """Continue in the present local coordinates after transforms were applied to the surface, or undone.
 
-        Returns what has become of the local coordinates since; None where these are other guides in the world, too.
-        Strands, their velocities and their shapes at rest are in the world, and stay.
+        Returns the change of local coordinates; None if the guides have changed in the world too. Strands, velocities
+        and rest shapes are in world axes and do not change.
         """
         if self.identity != _identity_of(guides):
             return None
@@ -142,11 +142,11 @@ class GuideSimulation:
         return since
 
     def has_other_space(self, guides: Curves) -> bool:
-        """Whether a transform was applied to the surface since, which `follow_applied` has not followed yet."""
+        """Whether a transform was applied to the surface since the last `follow_applied`."""
         return not np.array_equal(surface_space.applied(guides).matrix, self.space.matrix)
 
     def _root_pose(self, pose):
-        """The `RootPose` of a pose in the coordinates of now, for the groom of the first frame."""
+        """Return the `RootPose` of a pose in present coordinates, relative to the groom of the first frame."""
         change = self.space @ self.start_space.inverse
         if change.is_identity:
             return pose.root_pose(self.start)
@@ -156,7 +156,7 @@ class GuideSimulation:
 
 
 def _identity_of(guides):
-    """Digests of guides and faces, the same ones after a transform was applied to their surface; () without guides."""
+    """Return digests of guides and faces that applied transforms do not change; () without guides."""
     if not len(guides.curves):
         return ()
     parts = curves.even_local_points(guides), cage_of(guides.vellus.topology)
@@ -170,7 +170,7 @@ def _are_same(one, other):
 
 
 def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation:
-    """The simulation of guides from the frame that a depsgraph was evaluated for. Raises `HairError`."""
+    """Start a simulation of guides in the frame that a depsgraph was evaluated for. Raises `HairError`."""
     settings = simulated(properties.dynamics_of(guides.vellus))
     simulated_world.require_colliders(settings, depsgraph)
     masks: dict[tuple[str, str, bool], np.ndarray] = {}
@@ -205,9 +205,9 @@ def read(
     settings: DynamicsSettings,
     masks: dict[tuple[str, str, bool], np.ndarray],
 ) -> FrameInput:
-    """What guides follow in the frame that a depsgraph was evaluated for. Raises `HairError`.
+    """Return the `FrameInput` of guides in the frame that a depsgraph was evaluated for. Raises `HairError`.
 
-    masks: as in `GuideSimulation`; those that are missing are read and added.
+    masks: as in `GuideSimulation`; missing ones are read and added.
     """
     pose = guide_poses.read(guides, depsgraph, simulated_world.metres_of(scene, settings))
     local = combed_points(guides)
@@ -219,24 +219,24 @@ def read(
 
 
 def simulated(settings: DynamicsSettings) -> DynamicsSettings:
-    """Settings without those that guides do not follow from, but hair: to be compared with others."""
+    """Return settings with those that affect only hair, not guides, at their defaults, for comparison."""
     return replace(settings, keeps_hair_outside=False)
 
 
 def unkeyed(guides: Curves, settings: DynamicsSettings) -> dict[str, Any]:
-    """{name: value} of the settings that are the same in all frames: keys and drivers move the others."""
+    """Return {name: value} of the settings without keyframes or drivers."""
     keyed = properties.keyed_dynamics_of(guides.vellus)
     return {name: value for name, value in given(settings).items() if name not in keyed}
 
 
 def needed_stiffness(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> np.ndarray:
-    """(G,) bend stiffness with which each guide can hold its shape, 0 of those that hang. Raises `HairError`."""
+    """Return the (G,) bend stiffness with which each guide holds its shape, 0 if it hangs. Raises `HairError`."""
     settings = properties.dynamics_of(guides.vellus)
     return _keep_stiffness(guides, read(guides, scene, depsgraph, settings, {}), combed_points(guides))
 
 
 def known_stiffness(guides: Curves, settings: DynamicsSettings) -> np.ndarray | None:
-    """The same from when they began to be simulated, with the settings of now; None if they never were."""
+    """Return `needed_stiffness` from the start of the simulation, for the present settings; None if never simulated."""
     kept = stiffness_cache.get(guides.session_uid)
     if kept is None or len(kept[0]) != len(guides.curves):
         return None
@@ -245,7 +245,7 @@ def known_stiffness(guides: Curves, settings: DynamicsSettings) -> np.ndarray | 
 
 
 def _keep_stiffness(guides, frame, local):
-    """Keep and return (G,) bend stiffnesses; frame: `FrameInput`; local: `combed_points`."""
+    """Cache and return (G,) bend stiffnesses; frame: `FrameInput`; local: `combed_points`."""
     settings, pose = frame.settings, frame.pose
     groom = pose.groom(local)
     standing = pose.root_pose(pose).carried(groom - groom[:, :1])

@@ -22,8 +22,8 @@ _THIN = {"bevel_depth": 0.0, "extrude": 0.0, "bevel_object": None, "dimensions":
 
 @dataclass(frozen=True)
 class SeenCurves:
-    """points (N, 3) float32 in the object's own coordinates, starts (C+1,) of each curve, is_smooth (C,) bool: which
-    are Catmull-Rom splines.
+    """Evaluated curves: points (N, 3) float32 in local coordinates, starts (C+1,) of each curve, is_smooth (C,) bool:
+    whether a curve is a Catmull-Rom spline.
     """
 
     points: np.ndarray
@@ -32,7 +32,7 @@ class SeenCurves:
 
 
 def is_foreign(curves_object: Object) -> bool:
-    """Whether an object holds curves that could become guides: a Curves object that is not ours, or a curve object."""
+    """Whether an object's curves can become guides: a Curves object not created by Vellus, or a curve object."""
     if curves_object is None:
         return False
     return curves_object.type == "CURVE" or (
@@ -41,18 +41,18 @@ def is_foreign(curves_object: Object) -> bool:
 
 
 def chosen(active: Object, selected: Iterable[Object]) -> list[Object]:
-    """The objects with such curves among the active and the selected ones; the active one first."""
+    """Return the active and selected objects for which `is_foreign` is true, the active one first."""
     return [one for one in dict.fromkeys((active, *selected)) if is_foreign(one)]
 
 
 def require_foreign(curves_object: Object) -> None:
-    """Raise `HairError` for guides and hair, which the redo panel's operator would take a second time."""
+    """Raise `HairError` for guides and hair, which the operator would convert twice from the redo panel."""
     if not is_foreign(curves_object):
         raise HairError('"{name}" is already guides or hair.', name=name_of(curves_object))
 
 
 def require_editable(curves_object: Object) -> None:
-    """Raise `HairError` unless the object and its curves may be changed without a change to any other object."""
+    """Raise `HairError` unless the object and its curves can be changed without changing other objects."""
     for datablock in (curves_object, curves_object.data):
         curves.require_editable(datablock)
     if sum(user.data == curves_object.data for user in bpy.data.objects) > 1:
@@ -67,9 +67,9 @@ def require_editable(curves_object: Object) -> None:
 
 
 def read(curves_object: Object, applies_modifiers: bool) -> SeenCurves:
-    """The `SeenCurves` of an object. Raises `HairError`.
+    """Return the `SeenCurves` of an object. Raises `HairError`.
 
-    applies_modifiers: as modifiers leave them in viewports; else as they are stored.
+    applies_modifiers: evaluated with modifiers as in viewports; else as stored.
     """
     if not _is_evaluated(curves_object, applies_modifiers):
         return _read(curves_object.data)
@@ -79,9 +79,9 @@ def read(curves_object: Object, applies_modifiers: bool) -> SeenCurves:
 
 
 def take(curves_object: Object, applies_modifiers: bool) -> Curves:
-    """Make an object's own curves those that `read` gave, without modifiers that change them; returns its Curves data.
+    """Replace an object's own curves by those that `read` returned; returns its Curves.
 
-    Modifiers that were applied are gone, the others are switched off.
+    Applied modifiers are removed, other modifiers are switched off.
     """
     if _is_evaluated(curves_object, applies_modifiers):
         bevel = curves_object.data.bevel_depth if curves_object.type == "CURVE" else None
@@ -113,7 +113,7 @@ def _read(datablock):
 
 
 def _evaluated(curves_object):
-    """The `GeometrySet` of an object after its modifiers, which has curves."""
+    """Return the evaluated `GeometrySet` of an object, with curves. Raises `HairError`."""
     geometry = curves_object.evaluated_get(scene.present_depsgraph()).evaluated_geometry()
     if geometry.curves is None and curves_object.type == "CURVE" and not curves_object.data.splines:
         raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
@@ -125,7 +125,7 @@ def _evaluated(curves_object):
 
 @contextmanager
 def _as_polylines(curves_object, applies_modifiers):
-    """Have Blender evaluate an object to polylines and Catmull-Rom splines; everything is as before afterwards."""
+    """Context: Blender evaluates an object to polylines and Catmull-Rom splines. Everything is restored at its end."""
     layer, data = bpy.context.view_layer, curves_object.data
     if not curves_object.visible_get(view_layer=layer):
         raise HairError('"{name}" is hidden: show it first.', name=name_of(curves_object))
@@ -157,7 +157,7 @@ def _as_polylines(curves_object, applies_modifiers):
 
 
 def _resampling_nodes():
-    """Nodes that make polylines of curves as finely as Blender draws them."""
+    """Create nodes that convert curves to polylines with the resolution at which Blender draws them."""
     nodes = bpy.data.node_groups.new(_NAME, "GeometryNodeTree")
     nodes.is_modifier = True
     for direction in ("INPUT", "OUTPUT"):
@@ -171,7 +171,7 @@ def _resampling_nodes():
 
 
 def _convert(curves_object):
-    """Make a Curves object of a curve object, in place."""
+    """Convert a curve object to a Curves object, in place."""
     layer = bpy.context.view_layer
     with bpy.context.temp_override(
         active_object=curves_object,
@@ -186,7 +186,7 @@ def _convert(curves_object):
 
 
 def _write_radii(datablock, bevel):
-    """Curve objects have factors of their bevel in place of radii: make radii of them, none where there is no bevel."""
+    """Convert factors of a curve object's bevel to radii; remove them if there is no bevel."""
     radii = attributes.read(datablock, "radius", "FLOAT", "POINT")
     if radii is None:
         return

@@ -61,9 +61,9 @@ class HandMade:
 
 @dataclass(frozen=True)
 class PlacedCurves:
-    """Curves as they are to be written: (N, 3) float32 local points at rest, (C,) point counts, (C,) bool.
+    """Curves to be written: (N, 3) float32 local points at rest, (C,) point counts, (C,) bool.
 
-    to_surface: what has taken the curves' own coordinates to the surface's, and is to take their widths there.
+    to_surface: from the curves' own coordinates to those of the surface, for their widths.
     """
 
     points: np.ndarray
@@ -74,21 +74,21 @@ class PlacedCurves:
 
     @property
     def starts(self) -> np.ndarray:
-        """(C+1,) where each curve's points begin."""
+        """(C+1,) offsets of each curve's points."""
         return strands.curve_offsets(self.counts)
 
     def even(self, surface: Surface) -> np.ndarray:
-        """(C, POINT_COUNT, 3) float32 [m]: the curves with as many points each, along what is drawn of them."""
+        """Return (C, POINT_COUNT, 3) float32 [m]: the curves as Blender draws them, resampled evenly."""
         return curves.even_points(surface.from_local(self.points), self.starts, lambda: self.is_smooth)
 
 
 def find_surface(
     curves_object: Object, view_layer: ViewLayer, selected: Iterable[Object] = (), name: str = ""
 ) -> Object:
-    """Mesh object on which an object's curves grow. Raises `HairError`.
+    """Return the mesh object on which an object's curves grow. Raises `HairError`.
 
-    The one of a name; else the surface that the curves name, the one mesh among the selected objects, the mesh that
-    they are parented to, or the only mesh there is.
+    In order: the mesh object with a given name, the surface of the curves, the only mesh among the selected objects,
+    the curves' parent, or the only mesh in the file.
     """
     if name:
         found = view_layer.objects.get(name)
@@ -115,7 +115,7 @@ def find_surface(
 
 
 def use_as_guides(curves_object: Object, surface_object: Object, depsgraph: Depsgraph, **options: Any) -> HandMade:
-    """Make guides of an object's curves; returns `HandMade`. Arguments as of `using_as_guides`."""
+    """Convert an object's curves to guides; returns `HandMade`. Arguments as of `using_as_guides`."""
     return run_now(using_as_guides(curves_object, surface_object, depsgraph, **options))
 
 
@@ -131,10 +131,9 @@ def using_as_guides(
 ) -> Work[HandMade]:
     """`use_as_guides` as work in steps.
 
-    every: keep every n-th curve; applies_modifiers: take curves as modifiers leave them, not as they are stored;
-    hair_settings: of hair that is grown between them, None for no hair; where they name no mask and the curves
-    are not all over the surface, it becomes a new one that is painted where curves are. Raises `HairError` before
-    anything changes.
+    every: keep every n-th curve; applies_modifiers: use evaluated curves, not stored ones; hair_settings: of hair
+    grown between the guides, None for no hair. Without a mask in the settings, and if the curves do not cover the whole
+    surface, hair gets a new vertex group painted around the curves. Raises `HairError` before anything changes.
     """
     every = grooming.rooted_curves.checked_every(every)
     applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
@@ -171,7 +170,7 @@ def using_as_guides(
 
 
 def require_usable(curves_object: Object, surface_object: Object) -> None:
-    """Raise `HairError` unless an object's curves may be put on a mesh object."""
+    """Raise `HairError` unless an object's curves can be attached to a mesh object."""
     foreign_curves.require_editable(curves_object)
     curves.require_overridable(surface_object)
     usable_surfaces.require_evaluated(surface_object)
@@ -183,7 +182,7 @@ def require_usable(curves_object: Object, surface_object: Object) -> None:
 
 
 def on_surface(surface: Surface, seen: SeenCurves, to_surface: Affine, every: int = 1) -> PlacedCurves:
-    """`PlacedCurves` of curves whose coordinates an `Affine` takes to the surface's."""
+    """Return `PlacedCurves`; to_surface: from the curves' coordinates to those of the surface."""
     points = to_surface.points(seen.points)
     mesh = surface.mesh
     if surface.is_deformed:
@@ -213,13 +212,13 @@ def _paint(surface_object, weights):
 
 
 def paint_area(surface_object: Object, surface: Surface, roots: SurfacePoints) -> str:
-    """Create a vertex group of the area around roots of guides; its name, empty where they are all over the mesh."""
+    """Create a vertex group of the area around roots of guides; returns its name, empty if that is the whole mesh."""
     weights = _area(surface_object, surface, roots)
     return "" if weights is None else _paint(surface_object, weights)
 
 
 def _area(surface_object, surface, roots):
-    """(V,) weights of the area around roots of guides at an object's own vertices; None where it is all of them."""
+    """Return the (V,) weights of the area around roots at an object's own vertices; None if it is the whole mesh."""
     own_mesh = scene.read_own_mesh(surface_object, surface.to_world_axes)
     return _coverage(own_mesh, positions(surface.mesh, roots))
 
@@ -243,7 +242,7 @@ def write(
     applies_modifiers: bool,
     kind: str = "GUIDES",
 ) -> bpy.types.Curves:
-    """Make an object's curves GUIDES or HAIR that settings do not change; returns its Curves. Raises `HairError`."""
+    """Convert an object's curves to hand-made GUIDES or HAIR; returns its Curves. Raises `HairError`."""
     whole_changes.keep_copy(curves_object)
     datablock = foreign_curves.take(curves_object, applies_modifiers)
     if len(datablock.points) != seen.starts[-1]:

@@ -23,10 +23,10 @@ def using(
     use: Callable[[Object, bool], Work[Any]],
     applies_modifiers: bool,
 ) -> Work[Any]:
-    """Use the curves of objects as one, whose name and coordinates are those of the first; the others are gone then.
+    """Join the curves of objects into one with the name and coordinates of the first, and use it; removes the others.
 
-    use: a function of (object, whether its modifiers are to be applied) that gives the work. The objects stay as they
-    are until it is done, and where it is stopped or raises `HairError`.
+    use: a function of (object, whether to apply its modifiers) that returns the work. The objects do not change until
+    it is done, nor if it is canceled or raises `HairError`.
     """
     if len(objects) == 1:
         return (yield from use(objects[0], applies_modifiers))
@@ -47,7 +47,7 @@ def _rename(curves_object, name):
 
 
 def _joined(objects, applies_modifiers):
-    """A new object with the curves of all, in the coordinates of the first, where that is."""
+    """Return a new object with the curves of all, with the transform of the first."""
     copies, before = [], {data.session_uid for data in _all_data()}
     for one in objects:
         copies.append(_copy(one))
@@ -58,7 +58,7 @@ def _joined(objects, applies_modifiers):
         active_object=first, object=first, selected_objects=copies, selected_editable_objects=copies
     ):
         bpy.ops.object.join()
-    # Blender keeps the data of what it has converted and joined, and counts users that are gone.
+    # Blender keeps the data of converted and joined objects, with wrong user counts.
     used = {one.data for one in bpy.data.objects}
     bpy.data.batch_remove([data for data in _all_data() if data.session_uid not in before and data not in used])
     bpy.context.view_layer.update()
@@ -79,9 +79,9 @@ def _copy(curves_object):
 
 
 def _unite_radii(copies):
-    """Give all curves radii if some have them, which are as wide in the world when they are joined.
+    """Give all curves radii if some have them, scaled so that joining keeps widths in the world.
 
-    Blender takes radii as they are, and 1 m where there are none.
+    Blender joins radii unscaled, and uses 1 m for curves without radii.
     """
     found = [attributes.read(copy.data, "radius", "FLOAT", "POINT") for copy in copies]
     if all(radii is None for radii in found):

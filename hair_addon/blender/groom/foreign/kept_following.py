@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kept hair that follows its guides: each strand keeps its offset from the strand that guides interpolate at its root.
+"""Kept hair that follows its guides: each strand keeps its offset from the strand interpolated at its root.
 
-The shapes that guides and strands had when the hair came are kept with them (`kept_shapes`), so strands depend on where
-guides are now and not on where they were in between, and are the original ones, to the last bit, where guides are.
+The original shapes of guides and strands are stored with them (`kept_shapes`). So strands depend only on the present
+guides, not on changes in between, and original guides give the original strands bit for bit.
 """
 
 from dataclasses import dataclass, replace
@@ -29,9 +29,9 @@ from .. import bindings, staleness
 class KeptBinding:
     """Kept strands bound to guides.
 
-    shape: `Strands` of the guides as the hair came, on the roots that they have now; rest: (N, 3) float32 local points
-    of the strands then; starts: (S+1,); followed: the guides that the strands have followed last. Another `rest` takes
-    another `KeptBinding`: what follows from it is computed once.
+    shape: `Strands` of the original guides on their present roots; rest: (N, 3) float32 original local points of the
+    strands; starts: (S+1,); followed: the guides that the strands have followed last. A changed `rest` needs a new
+    `KeptBinding`, as values derived from it are cached.
     """
 
     surface: Surface
@@ -58,15 +58,15 @@ class KeptBinding:
         return following.strands_now(self.binding, guides, weights).numpy()
 
     def _some_interpolated(self, guides, chosen):
-        """(M, P, 3) rows of `_interpolated` for (M,) indices; where most are wanted, all are computed."""
+        """Return (M, P, 3) rows of `_interpolated` for (M,) indices; computes all rows if most are requested."""
         if len(chosen) > len(self.binding.positions) // 2:
             return self._interpolated(guides)[chosen]
         return following.follow_some(self.binding, guides, chosen)[0]
 
     def points_for(self, guides: Strands, points: np.ndarray | None = None, is_back: bool = False) -> np.ndarray:
-        """(N, 3) float32 local: the strands where guides carry them; points: others to carry than `rest`.
+        """Return the (N, 3) float32 local points of the strands for guides; points: to deform instead of `rest`.
 
-        is_back: the inverse, from where guides carry strands to where they were.
+        is_back: the inverse, from deformed to original strands.
         """
         points = self.rest if points is None else points
         moved = self._reach.of(_combed(guides, self.shape))
@@ -91,9 +91,9 @@ class KeptBinding:
 
 
 def follow(hair: Curves, depsgraph: Depsgraph, local: np.ndarray | None = None) -> bool:
-    """Move kept strands to where their guides are now; whether these are others than they have followed.
+    """Move kept strands with their present guides; returns whether the guides have changed.
 
-    local: (N, 3) points of the guides, if they have been read. Raises `HairError`.
+    local: (N, 3) points of the guides, if already read. Raises `HairError`.
     """
     state = hair.vellus
     guide_curves = state.guide_curves
@@ -105,7 +105,7 @@ def follow(hair: Curves, depsgraph: Depsgraph, local: np.ndarray | None = None) 
         return False
     present = curves.read_points(hair)
     bound, guides = _up_to_date(bound, hair, present, depsgraph, local)
-    # Strands that follow a simulation are to come back after it, though guides are as they were.
+    # Strands return after a simulation, although the guides have not changed.
     digest = "" if is_simulated else digest
     is_other = state.followed != digest or len(_combed(guides, bound.followed)) > 0
     points = bound.points_for(guides)
@@ -119,13 +119,13 @@ def follow(hair: Curves, depsgraph: Depsgraph, local: np.ndarray | None = None) 
 
 
 def _combed(guides, before):
-    """(M,) indices of guides that differ; all of them where they are rooted elsewhere."""
+    """Return the (M,) indices of guides that differ; all if their roots differ."""
     combed = following.combed(guides, before)
     return np.arange(len(guides)) if combed is None else combed
 
 
 def _up_to_date(bound, hair, present, depsgraph, local):
-    """(`KeptBinding`, its guides now): bound again where guides came, went or slid, or strands were edited."""
+    """Return (`KeptBinding`, its present guides), bound again if guides were added, removed or slid, or hair edited."""
     guide_curves, known = hair.vellus.guide_curves, bound
     if bound is None or kept_shapes.is_edited(hair, present) or len(bound.rest) != len(present):
         bound = None
@@ -139,7 +139,7 @@ def _up_to_date(bound, hair, present, depsgraph, local):
 
 
 def _bind(hair, present, depsgraph, followed):
-    """A new `KeptBinding`; followed: guides that strands were last written for, None where these are unknown."""
+    """Return a new `KeptBinding`; followed: guides that strands were last written for, None if unknown."""
     guide_curves = hair.vellus.guide_curves
     if not np.isfinite(present).all():
         raise HairError('"{name}" has non-finite coordinates: undo, or delete those strands.', name=name_of(hair))
@@ -171,7 +171,7 @@ def _bind(hair, present, depsgraph, followed):
 
 
 def _rest_of_edited(bound, followed, present):
-    """Where strands that an artist has moved were, had guides not carried them; others stay as they are."""
+    """Return rest points with those of edited strands replaced by the inverse of the guides' deformation."""
     is_other = (bound.points_for(followed) != present).any(axis=1)
     rest = bound.rest.copy()
     rest[is_other] = bound.points_for(followed, present, is_back=True)[is_other]
@@ -179,9 +179,9 @@ def _rest_of_edited(bound, followed, present):
 
 
 def _shape_of(guide_curves, surface):
-    """(G, POINT_COUNT, 3) float32 [m]: guides as the hair came, at the roots that they have now.
+    """Return the (G, POINT_COUNT, 3) float32 [m] original shape of guides, at their present roots.
 
-    New guides have been so since they were added, which is kept.
+    The original shape of new guides is stored when they are first seen.
     """
     present, shape = curves.read_points(guide_curves), kept_shapes.read(guide_curves)
     starts = curves.curve_offsets(guide_curves)

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that came as curves: its strands are kept as they are, and guides that reproduce it are derived from them.
+"""Existing curves used as hair: strands are kept unchanged, and guides that reproduce them are derived.
 
-Points, their numbers and all attributes stay, to the last bit, until guides are moved, which strands follow
-(kept_following.py). Vellus regenerates such hair only where an artist asks for it; it then has as many strands, on the
-same roots.
+Points, their numbers and all attributes keep their bits until guides are moved, which strands follow
+(kept_following.py). Vellus regenerates such hair only on request, with the same number of strands on the same roots.
 """
 
 from dataclasses import dataclass, replace
@@ -39,12 +38,12 @@ _MOST_RADIUS = next(details.high for name, _default, details in declared(HairSet
 
 @dataclass(frozen=True)
 class KeptHair:
-    """Hair Curves, the guide Curves derived from them, statistics of the curves, and how close the guides come."""
+    """Hair Curves, the guide Curves derived from them, statistics of the curves, and errors of the reproduction."""
 
     hair: Curves
     guides: Curves
     rooted: RootedCurves
-    mean_error: float  # root mean square of strands' distances to their reproduction, as parts of their lengths
+    mean_error: float  # root mean square distance of strands to their reproduction, as a fraction of their lengths
     high_error: float  # 95th percentile of the same errors
 
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
@@ -63,11 +62,11 @@ def using_as_hair(
     follows_guides: bool = False,
     guides_object: Object | None = None,
 ) -> Work[KeptHair]:
-    """Make an object's curves hair and derive guides, as work in steps; returns `KeptHair`.
+    """Convert an object's curves to hair and derive guides, as work in steps; returns `KeptHair`.
 
-    applies_modifiers: as of `hand_made_guides.using_as_guides`; follows_guides: regenerate the strands, on their roots,
-    by the guides; guides_object: of guides that came with the hair, which are kept in place of derived ones; weights
-    that the hair stores of them too. Raises `HairError` before anything changes.
+    applies_modifiers: as of `hand_made_guides.using_as_guides`; follows_guides: regenerate the strands from the guides,
+    on the same roots; guides_object: of guides that came with the hair, used with their stored weights instead of
+    derived guides. Raises `HairError` before anything changes.
     """
     applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
     follows_guides = plain_value("Follow Guides", follows_guides, False, _SWITCH)
@@ -134,13 +133,13 @@ def using_as_hair(
 
 
 def _given_guides(guides_object, surface_object):
-    """(`SeenCurves`, `Affine` to the surface's coordinates) of guides that came with hair."""
+    """Return (`SeenCurves`, `Affine` to the surface's coordinates) of guides that came with hair."""
     hand_made_guides.require_usable(guides_object, surface_object)
     return foreign_curves.read(guides_object, True), surface_space.between(guides_object, surface_object)
 
 
 def _among(kept, indices, weights):
-    """A map to some guides as a map to those of them that are kept, (K,) rising."""
+    """Restrict a guide map to kept guides; kept: (K,) rising indices."""
     places = np.minimum(np.searchsorted(kept, indices), len(kept) - 1)
     is_there = (indices >= 0) & (kept[places] == indices)
     return np.where(is_there, places, -1).astype(np.int32), np.where(is_there, weights, np.float32(0.0))
@@ -156,7 +155,7 @@ def _write_hair(hair, guides, surface, placed, settings, guide_map):
             attributes.write(hair, name, data_type, "CURVE", values)
     curves.write_guide_map(hair, guide_map)
     kept_shapes.keep(guides, curves.read_points(guides))
-    # So that regenerated strands take these roots, and nothing is regenerated unless asked for.
+    # So that regenerated strands use these roots, and nothing is regenerated automatically.
     state.root_key = staleness.root_key(settings, None)
     state.followed = staleness.guides_digest(guides)
     state.is_stale = False
@@ -166,7 +165,7 @@ def _write_hair(hair, guides, surface, placed, settings, guide_map):
 
 
 def _write_widths(hair, surface: Surface, placed: PlacedCurves, settings) -> float:
-    """The mean radius at the roots [m]; curves without any radius get that of the settings, which taper."""
+    """Write tapering radii of the settings to curves without radii; returns the mean radius at the roots [m]."""
     starts = strands.curve_offsets(placed.counts)
     if attributes.read(hair, "radius", "FLOAT", "POINT") is None:
         along = geometry.strands.places_along(placed.points, starts)

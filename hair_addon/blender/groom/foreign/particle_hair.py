@@ -14,14 +14,14 @@ from ...host.notices import name_of
 
 
 def systems_of(surface: Object | None) -> list[ParticleSystem]:
-    """Hair particle systems of a mesh object."""
+    """Return the hair particle systems of a mesh object."""
     if surface is None or surface.type != "MESH":
         return []
     return [system for system in surface.particle_systems if system.settings.type == "HAIR"]
 
 
 def system_to_convert(surface: Object) -> ParticleSystem:
-    """The active particle system of a mesh object if it is hair, else the first that is. Raises `HairError`."""
+    """Return a mesh object's active particle system if it is hair, else the first with hair. Raises `HairError`."""
     found = systems_of(surface)
     if not found:
         raise HairError('"{name}" has no particle system of hair.', name=name_of(surface))
@@ -31,9 +31,9 @@ def system_to_convert(surface: Object) -> ParticleSystem:
 
 @contextmanager
 def as_curves(surface: Object) -> Iterator[Object]:
-    """A context with a new Curves object of a mesh object's particle hair. Raises `HairError`.
+    """Context with a new Curves object of a mesh object's particle hair. Raises `HairError`.
 
-    If it ends well the system is switched off, else the object is gone again.
+    On success the system is switched off; otherwise the object is removed.
     """
     system = system_to_convert(surface)
     curves.require_overridable(surface)
@@ -58,7 +58,7 @@ def as_curves(surface: Object) -> Iterator[Object]:
 
 
 def _convert(surface, settings):
-    """Convert the parents of the active system: Blender would convert their children in place of them."""
+    """Convert the parents of the active system; otherwise Blender would convert their children instead."""
     layer = bpy.context.view_layer
     for other in layer.objects:
         if other is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's brushes for guides: those that add fit in with the guides around, and strokes stay outside of the mesh."""
+"""Blender's brushes for guides: added guides match their neighbors, and strokes keep guides outside of the mesh."""
 
 import bpy
 import numpy as np
@@ -19,16 +19,16 @@ _SHIPPED = {
     "use_point_count_interpolate": False,
 }
 
-_OFF_SURFACE = 0.02  # of the median length of guides: how far above the surface strokes keep them
+_OFF_SURFACE = 0.02  # distance of guides from the surface in strokes, as a fraction of their median length
 
 _fitted = {}  # name of a brush → settings last written by the add-on
 
 
 def fit(guides: Curves, sculpt: CurvesSculpt) -> None:
-    """Fit Blender's Add and Density brushes to guide Curves, unless an artist has set them; sculpt mode is on.
+    """Fit Blender's Add and Density brushes to guide Curves, unless an artist has set them; requires Sculpt Mode.
 
-    They take length, shape and number of points from the guides around, which may be draped, and the medians of all
-    where there are none. sculpt: the `CurvesSculpt` settings of the scene, whose active brush stays active.
+    New guides get length, shape and number of points of the guides around them, or the medians of all guides if there
+    are none around. sculpt: the `CurvesSculpt` settings of the scene; its active brush does not change.
     """
     if not len(guides.curves):
         return
@@ -55,7 +55,7 @@ def fit(guides: Curves, sculpt: CurvesSculpt) -> None:
 
 
 def collide(guides: Curves) -> None:
-    """Let strokes of Blender's brushes keep guides above their surface: once, as an artist may switch it off again."""
+    """Switch on collision of Blender's brush strokes with the surface, once: an artist may switch it off."""
     if guides.vellus.was_combed or not len(guides.curves):
         return
     guides.vellus.was_combed = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tools that add and remove guides: all others keep their bits, their order and their attributes."""
+"""Tools that add and remove guides: all others keep their bits, order and attributes."""
 
 import numpy as np
 from bpy.types import Curves, Depsgraph
@@ -18,7 +18,7 @@ from .. import pipeline
 from . import guide_tools
 from .guide_tools import CombedGuides
 
-# Points (M, P, 3) [m], the guides (M,) whose attributes they take, and their roots.
+# Points (M, P, 3) [m], guides (M,) whose attributes are copied, and roots.
 Additions = tuple[np.ndarray, np.ndarray, SurfacePoints]
 
 
@@ -38,7 +38,7 @@ def change_count(datablock: Curves, settings: CountSettings, depsgraph: Depsgrap
 
 
 def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) -> int:
-    """Replace the guides of one side of the object with images of the other's; returns the number of images.
+    """Replace the guides on one side of the object by mirror images of the others; returns the number of images.
 
     Raises `HairError` before anything changes.
     """
@@ -67,7 +67,7 @@ def write(guides: CombedGuides, additions: list[Additions], removed: np.ndarray)
             guide_curves.append(datablock, surface.to_local(points), sources, starts)
             roots = roots.joined(new_roots)
             identities, randoms = surface.identities(new_roots)
-            # Those made of curves may be rooted off the surface, and so their images.
+            # Guides made from curves, and so their images, may start off the surface.
             apart = np.linalg.norm(points[:, 0] - mesh_math.positions(surface.mesh, new_roots), axis=1)
             guide_curves.write_tail(datablock, "id", "INT", identities)
             guide_curves.write_tail(datablock, "strand_random", "FLOAT", randoms)
@@ -79,7 +79,7 @@ def write(guides: CombedGuides, additions: list[Additions], removed: np.ndarray)
 
 
 def _between(guides, count, mask, depsgraph):
-    """`Additions` of new guides that take their shape from those around them, as hair does."""
+    """Return `Additions` of new guides, interpolated from the guides around them as strands are."""
     datablock, surface, device = guides.datablock, guides.surface, preferences.device()
     density, texture = _density(guides, mask, depsgraph)
     roots = grooming.guide_count.new_roots(
@@ -114,9 +114,9 @@ def _between(guides, count, mask, depsgraph):
 
 
 def _density(guides, mask, depsgraph):
-    """Density of new guides: (V,) weights or None, and `Texture` or None.
+    """Return the density of new guides: (V,) weights or None, and `Texture` or None.
 
-    Inside the mask that guides were placed by, and inside the tool's own mask.
+    It combines the mask of the guides with the mask of the tool.
     """
     datablock, surface = guides.datablock, guides.surface
     density = texture = None
@@ -129,7 +129,7 @@ def _density(guides, mask, depsgraph):
 
 
 def _crowded(guides, count, depsgraph):
-    """Indices of the guides to remove: at least half selected and half inside the mask; one of all stays."""
+    """Return the guides to remove, of those at least half selected and half inside the mask; at least one remains."""
     may_go = guides.weights >= 0.5
     count = min(count, np.count_nonzero(may_go), len(may_go) - 1)
     if count <= 0:
@@ -146,6 +146,6 @@ def _crowded(guides, count, depsgraph):
 
 
 def _hair_settings(datablock):
-    """The `HairSettings` of the first hair that follows guides; the defaults where none does."""
+    """Return the `HairSettings` of the first hair that follows guides, or the defaults."""
     following = curves.followers(datablock)
     return pipeline.inputs_of(following[0])[1] if following else HairSettings()

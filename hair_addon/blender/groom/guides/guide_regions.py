@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Regions of guides, as the hair between them is parted: hair of two of them does not rub or press on each other."""
+"""Regions of guides, divided by the parting of their hair: no friction or pressure acts between two regions."""
 
 import numpy as np
 from bpy.types import Curves, Depsgraph
@@ -13,7 +13,7 @@ from .. import bindings
 
 
 def regions_of(guides: Curves, depsgraph: Depsgraph) -> np.ndarray | None:
-    """(G,) int32 from 0: alike where no hair between the guides is parted; None where none is. Raises `HairError`."""
+    """Return the (G,) int32 regions of guides, from 0; None if no hair has a parting. Raises `HairError`."""
     parted = _parted_hair(guides)
     if not parted or guides.surface is None:
         return None
@@ -41,7 +41,7 @@ def _parted_hair(guides):
 
 
 def parting_keys(guides: Curves) -> tuple[str, ...]:
-    """What parted the hair between guides when it was grown: changes where `regions_of` may."""
+    """Return the keys of the partings with which hair between guides was generated, to detect other `regions_of`."""
     followers = curves.followers(guides)
     bound = [bindings.of(hair) for hair in followers]  # newer than the datablock
     keys = [

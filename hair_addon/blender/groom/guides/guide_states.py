@@ -15,7 +15,7 @@ from . import guide_tools
 
 @dataclass(frozen=True)
 class GuideState:
-    """Of guides, in a surface of some scale: whether settings do not apply to them, and their median length [m]."""
+    """Whether settings do not apply to guides, and their median length [m] at the surface's scale."""
 
     is_combed: bool
     length: float
@@ -26,7 +26,7 @@ state_cache = Cache()  # session_uid of Curves → GuideState
 
 
 def of(guides: Curves) -> GuideState:
-    """The `GuideState` of guide Curves."""
+    """Return the `GuideState` of guide Curves."""
     surface = guides.surface
     scale = () if surface is None else tuple(surface.matrix_world.to_scale())
     known = state_cache.get(guides.session_uid)

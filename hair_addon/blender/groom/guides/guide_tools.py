@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tools that change combed guides in place: read guides, compute, write back what has changed.
+"""Tools that change combed guides in place: read guides, compute, write changed guides.
 
-Guides keep their roots, and those that a tool does not change all their bits. As after combing, settings no longer
-apply to them, and hair follows at Blender's next update.
+Guides keep their roots, and unchanged guides keep all their bits. As after combing, settings no longer apply to the
+guides, and hair follows at Blender's next update.
 """
 
 from collections.abc import Callable
@@ -31,15 +31,15 @@ from ...data.strands import attributes, curves, cutters, guide_curves, posed_str
 from ...data.surfaces import Surface
 from ...host.notices import name_of
 
-_FARTHEST = 1e14  # [m] from the surface's origin: squares of such lengths are still floats
+_FARTHEST = 1e14  # [m] from the surface's origin: squares of such lengths are still finite
 
 
 @dataclass(frozen=True)
 class CombedGuides:
-    """Guides as they are, G of them, of any point counts.
+    """Guides, G of them, with any point counts.
 
-    local (N, 3) float32 in local coordinates, points (N, 3) float32 [m] as their `Surface` is, starts (G+1,); weights
-    (G,) float64 in [0, 1]: how much of a change each gets.
+    local (N, 3) float32 in local coordinates, points (N, 3) float32 [m] in the axes of the `Surface`, starts (G+1,);
+    weights (G,) float64 in [0, 1]: fraction of a change that each guide gets.
     """
 
     datablock: Curves
@@ -52,12 +52,12 @@ class CombedGuides:
 
     @property
     def counts(self) -> np.ndarray:
-        """(G,) how many points each guide has."""
+        """(G,) number of points of each guide."""
         return np.diff(self.starts)
 
     @cached_property
     def normals(self) -> np.ndarray:
-        """(G, 3) float32: unit, of the surface at the roots."""
+        """(G, 3) float32 unit normals of the surface at the roots."""
         return mesh_math.normals(self.surface.mesh, self.roots)
 
     @property
@@ -66,11 +66,11 @@ class CombedGuides:
         return self.points[self.starts[:-1]]
 
     def of_count(self, count: int, chosen: np.ndarray) -> np.ndarray:
-        """(M, count) indices of the points of chosen guides (M,), which have `count` points each."""
+        """Return (M, count) indices of the points of chosen guides (M,) with `count` points each."""
         return self.starts[chosen][:, None] + np.arange(count)
 
     def even(self, point_count: int) -> np.ndarray:
-        """(G, point_count, 3) float32 [m]: the guides as they are if all have as many points, else evenly resampled."""
+        """Return (G, point_count, 3) float32 [m] guides, unchanged if all have that many points, else resampled."""
         if (self.counts == point_count).all():
             return self.points.reshape(-1, point_count, 3)
         return geometry.resampling.resample(
@@ -78,7 +78,7 @@ class CombedGuides:
         )
 
     def carried_back(self, posed: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Points (M, P, 3) float32 [m] of chosen guides on the deformed surface → the same on the surface at rest."""
+        """Return points (M, P, 3) float32 [m] of chosen guides at rest; posed: on the deformed surface."""
         pose = posed_strands.pose_of(self.surface)
         if not pose.is_deformed:
             return posed
@@ -88,7 +88,7 @@ class CombedGuides:
         return self.surface.from_local(posed_strands.carried(self.surface.to_local(posed), motion, some, is_back=True))
 
     def posed(self) -> np.ndarray:
-        """(N, 3) float32 [m]: the points on the surface as shape keys and modifiers deform it now."""
+        """(N, 3) float32 [m] points on the surface deformed by shape keys and modifiers."""
         pose = posed_strands.pose_of(self.surface)
         if not pose.is_deformed:
             return self.points
@@ -98,7 +98,7 @@ class CombedGuides:
 
 
 def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
-    """The `CombedGuides` of guide Curves, all of weight one. Raises `HairError` where they cannot be read."""
+    """Return the `CombedGuides` of guide Curves, all with weight one. Raises `HairError` if they cannot be read."""
     surface = scene.read_surface(datablock.surface, depsgraph)
     mesh_math.check_mesh(surface.mesh)
     starts = curves.curve_offsets(datablock).astype(np.int64)
@@ -114,7 +114,7 @@ def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
 
 
 def read(datablock: Curves, settings: ToolSettings, depsgraph: Depsgraph) -> CombedGuides:
-    """The `CombedGuides` of guide Curves, weighted by selection and mask. Raises `HairError`."""
+    """Return the `CombedGuides` of guide Curves, weighted by selection and mask. Raises `HairError`."""
     curves.require_editable(datablock)
     guides = open_guides(datablock, depsgraph)
     weights = guides.weights.copy()
@@ -129,7 +129,10 @@ def read(datablock: Curves, settings: ToolSettings, depsgraph: Depsgraph) -> Com
 
 
 def weights_in_group(guides: CombedGuides, name: str, depsgraph: Depsgraph) -> np.ndarray:
-    """(G,) in [0, 1]: weights of a vertex group at the roots; the guides' own for no name. Raises `HairError`."""
+    """Return (G,) weights in [0, 1] of a vertex group at the roots; the guides' own without a name.
+
+    Raises `HairError`.
+    """
     weights = scene.read_vertex_group(guides.datablock.surface, depsgraph, name)
     if weights is None:
         return guides.weights
@@ -140,10 +143,10 @@ Shaping = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def reshape(guides: CombedGuides, shaped: Shaping) -> int:
-    """Give guides other points; returns how many have changed.
+    """Change the points of guides; returns the number of changed guides.
 
-    shaped: a function of points (M, P, 3) [m] and the indices (M,) of these guides, all of P points, that returns such
-    points. Guides of no weight, and of a single point, are not given to it.
+    shaped: a function of points (M, P, 3) [m] and indices (M,) of guides with P points each that returns new points. It
+    is not called for guides without weight or with a single point.
     """
     after = guides.points.copy()
     for chosen, places in to_shape(guides):
@@ -152,7 +155,7 @@ def reshape(guides: CombedGuides, shaped: Shaping) -> int:
 
 
 def to_shape(guides: CombedGuides) -> list[tuple[np.ndarray, np.ndarray]]:
-    """[((M,) indices of guides, (M, P) of their points)] of those with weight and several points, by their number."""
+    """Return [((M,) guides, (M, P) indices of points)] of guides with weight and several points, by point count."""
     found = []
     for count in np.unique(guides.counts[(guides.counts > 1) & (guides.weights > 0.0)]):
         chosen = np.flatnonzero((guides.counts == count) & (guides.weights > 0.0))
@@ -181,7 +184,7 @@ def change_lengths(datablock: Curves, settings: LengthSettings, depsgraph: Depsg
 
 
 def trim(datablock: Curves, settings: TrimSettings, depsgraph: Depsgraph) -> int:
-    """Cut guides where an object crosses them, on the surface as it is deformed now; returns and raises as above."""
+    """Cut guides where an object crosses them, on the deformed surface; returns and raises as `change_lengths`."""
     guides = read(datablock, settings, depsgraph)
     cutter = cutters.read_cutter(settings.cutter, datablock.surface, depsgraph)
     posed = guides.posed()
@@ -198,14 +201,14 @@ def trim(datablock: Curves, settings: TrimSettings, depsgraph: Depsgraph) -> int
 
 
 def smooth(datablock: Curves, settings: SmoothSettings, depsgraph: Depsgraph) -> int:
-    """Smooth guides along their length; returns and raises as above."""
+    """Smooth guides along their length; returns and raises as `change_lengths`."""
     guides = read(datablock, settings, depsgraph)
     smoothed = grooming.guide_shapes.smoothed
     return reshape(guides, lambda points, chosen: smoothed(points, settings, guides.weights[chosen]))
 
 
 def lift(datablock: Curves, settings: LiftSettings, depsgraph: Depsgraph) -> int:
-    """Turn guides toward the surface normal; returns and raises as above."""
+    """Turn guides toward the surface normal; returns and raises as `change_lengths`."""
     guides = read(datablock, settings, depsgraph)
     lifted = grooming.guide_shapes.lifted
     return reshape(
@@ -214,7 +217,7 @@ def lift(datablock: Curves, settings: LiftSettings, depsgraph: Depsgraph) -> int
 
 
 def attract(datablock: Curves, settings: AttractSettings, depsgraph: Depsgraph) -> int:
-    """Turn guides toward the surface; returns and raises as above."""
+    """Turn guides toward the surface; returns and raises as `change_lengths`."""
     guides = read(datablock, settings, depsgraph)
     mesh, attracted = guides.surface.mesh, grooming.guide_attraction.attracted
     return reshape(
@@ -223,7 +226,7 @@ def attract(datablock: Curves, settings: AttractSettings, depsgraph: Depsgraph) 
 
 
 def copy_shape(datablock: Curves, settings: CopySettings, depsgraph: Depsgraph) -> int:
-    """Give guides of one region the shape of those of another; returns and raises as above."""
+    """Copy the shape of guides of one region to those of another; returns and raises as `change_lengths`."""
     curves.require_editable(datablock)
     guides = open_guides(datablock, depsgraph)
     is_source, weights = _regions(guides, settings, depsgraph)
@@ -242,7 +245,7 @@ def copy_shape(datablock: Curves, settings: CopySettings, depsgraph: Depsgraph) 
 
 
 def _regions(guides, settings, depsgraph):
-    """(G,) bool, the guides to copy from, and (G,) float64, how much of a copy each of the others gets."""
+    """Return (G,) bool, the guides to copy from, and (G,) float64, the fraction of the copied shape for the others."""
     selected = guide_curves.selection(guides.datablock, guides.starts)
     if settings.source:
         is_source = weights_in_group(guides, settings.source, depsgraph) >= 0.5
@@ -272,7 +275,7 @@ def is_any_selected(datablock: Curves) -> bool:
 
 
 def median_length(datablock: Curves) -> float:
-    """The median length [m] of guides; 0 for none."""
+    """Return the median length [m] of guides; 0 without guides."""
     starts, points = curves.curve_offsets(datablock), curves.read_points(datablock)
     if datablock.surface is not None:
         points = points @ np.array(datablock.surface.matrix_world.to_3x3(), np.float32).T

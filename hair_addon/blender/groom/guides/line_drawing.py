@@ -10,7 +10,7 @@ from ...host.notices import name_of, text_of
 from .. import selection
 from . import guide_states
 
-# Of the Draw tool: corners as they were drawn, on the surface and nothing else. A Bézier curve would cut through it.
+# Settings of the Draw tool: exact corners, on the surface only. A Bézier curve would cut through the surface.
 _TOOL = {
     "curve_type": "POLY",
     "depth_mode": "SURFACE",
@@ -23,7 +23,7 @@ _TOOL = {
 
 
 def drawn_for(active: Object | None) -> Curves | None:
-    """The Curves whose part lines or flow lines are drawn in Edit Mode of the active object; None if none are."""
+    """Return the Curves whose part lines or flow lines the active object is, in Edit Mode; None otherwise."""
     if active is None or active.type != "CURVE" or active.mode != "EDIT":
         return None
     users = (datablock for datablock in bpy.data.hair_curves if active.name in _names_of(datablock))
@@ -43,7 +43,7 @@ def draw_flow(guides: Curves, context: Context) -> None:
 
 
 def stop(context: Context) -> None:
-    """Leave Edit Mode, and make active whose lines were drawn. Lines without a stroke are removed again."""
+    """Leave Edit Mode and make the hair or guides of the lines active. Lines without a stroke are removed."""
     lines = context.object
     target = drawn_for(lines)
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -64,7 +64,7 @@ def _begin(target, group, field, title, context):
         raise HairError("The surface is missing: pick a mesh.")
     lines = bpy.data.objects.get(text_of(group, field))
     if lines is not None and lines.type != "CURVE":
-        sentence = '"{name}" is no curve that can be drawn: clear the field to draw new lines.'
+        sentence = '"{name}" is not a curve that can be drawn on: clear the field to draw new lines.'
         raise HairError(sentence, name=name_of(lines))
     if lines is None:
         lines = _new_lines(f"{title} of {surface.name}", surface)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles of a hair: added, fitted, painted, and why one does nothing."""
+"""Styles of a hair: adding, fitting and painting them, and diagnostics of styles without effect."""
 
 from typing import TYPE_CHECKING
 

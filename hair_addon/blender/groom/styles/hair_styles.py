@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Styles of a hair: add, replace, and fit to the size of its surface.
 
-Where locks stand is found before styles are written, in steps: the update that follows finds it done.
+Locks are placed, in steps, before styles are written, so that the following update finds them in the cache.
 """
 
 import math
@@ -36,8 +36,8 @@ def adding(
     """Add a style to a hair Curves datablock, after its other styles, as work in steps; returns its settings.
 
     is_fitted: whether lengths are for a human head, and fitted to the surface; kept: names of settings that are not
-    fitted. A seed that is none of them becomes one that no other style of the hair has. Raises `HairError` before any
-    change.
+    fitted. Unless `kept` contains the seed, it becomes one that no other style of the hair has. Raises `HairError`
+    before any change.
     """
     curves.require_editable(hair)
     style_items.require_room(len(hair.vellus.styles) + 1)
@@ -53,7 +53,7 @@ def adding(
 
 
 def assigning(hair: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> Work[None]:
-    """Replace the styles of a hair Curves datablock, as work in steps; styles that stay keep their keys.
+    """Replace the styles of a hair Curves datablock, as work in steps; styles that remain keep their keyframes.
 
     Raises `HairError` before any change.
     """
@@ -77,10 +77,10 @@ def duplicating(hair: Curves) -> Work[None]:
 def applying_preset(
     hair: Curves, preset: PartialSettings, is_fitted: bool = True, keeps_styles: bool = False
 ) -> Work[None]:
-    """Apply a style preset to a hair Curves datablock, as work in steps; what it leaves out stays.
+    """Apply a style preset to a hair Curves datablock, as work in steps; settings not in the preset do not change.
 
-    Raises `HairError` before any change. is_fitted: as in `adding`; keeps_styles: whether the preset's styles come
-    after the present ones, which stay.
+    is_fitted: as in `adding`; keeps_styles: add the preset's styles after the present ones. Raises `HairError` before
+    any change.
     """
     if is_fitted:
         preset = style_presets.fit(preset, *surface_fit(hair))
@@ -96,13 +96,13 @@ def applying_preset(
 
 
 def _found(place: Remembered) -> Curves:
-    """The hair that was remembered. Raises `HairError`."""
+    """Return the remembered hair. Raises `HairError` if it was deleted."""
     found: Curves = place.find()
     return found
 
 
 def _placing_locks(hair, styles):
-    """The computation that finds where locks of styles stand on the surface of a hair, if its strands are known."""
+    """Return the computation that places the locks of styles on a hair's surface, if the hair is bound."""
     trees = [tree for tree, _level in program.tree_levels([setting_properties.as_stored(style) for style in styles])]
     bound = bindings.of(hair) if trees else None
 
@@ -114,7 +114,7 @@ def _placing_locks(hair, styles):
 
 
 def surface_fit(hair: Curves) -> tuple[float, float]:
-    """(factor of lengths, mean distance of strands [m]) for a hair's surface; the factor is 1 on a human scalp.
+    """Return (factor of lengths, mean distance of strands [m]) for a hair's surface; the factor is 1 on a human scalp.
 
     Raises `HairError`.
     """
@@ -123,20 +123,19 @@ def surface_fit(hair: Curves) -> tuple[float, float]:
 
 
 def fit_of(surface_object: Object, guide_settings: GuideSettings, hair_settings: HairSettings) -> tuple[float, float]:
-    """The same for hair of these settings on a mesh object."""
+    """Return `surface_fit` for hair with these settings on a mesh object."""
     open_guides, open_hair = replace(guide_settings, length=None), replace(hair_settings, influence_distance=None)
     known_guides, known_hair = pipeline.complete(surface_object, open_guides, open_hair, scene.present_depsgraph())
-    # Found by `complete`, which leaves none open.
+    # `complete` leaves no value unset.
     length, influence = known_guides.length or _HEAD_LENGTH, known_hair.influence_distance or 0.0
     spacing = influence / groom_defaults.INFLUENCE * math.sqrt(guide_settings.guide_count / hair_settings.strand_count)
     return length / _HEAD_LENGTH, spacing
 
 
 def points_wanted(hair: Curves, length: float | None = None) -> int:
-    """Points per strand that the curls of a hair want, within the setting's range; 0 without curls.
+    """Return the points per strand that the curls of a hair need, within the setting's range; 0 without curls.
 
-    length [m]: of strands, None for what the guides are set to; of hand-made guides it must be given. Raises
-    `HairError`.
+    length [m]: of strands, None for the guides' setting; required for hand-made guides. Raises `HairError`.
     """
     guides = hair.vellus.guide_curves
     if guides is None or (length is None and curves.is_hand_made(guides)):
@@ -149,10 +148,7 @@ def points_wanted(hair: Curves, length: float | None = None) -> int:
 
 
 def use_points(hair: Curves) -> int:
-    """Give hair the points per strand that its curls want, or those it has if these are more; returns their number.
-
-    Raises `HairError`.
-    """
+    """Increase the points per strand to the number that curls need; returns the number. Raises `HairError`."""
     curves.require_editable(hair)
     guides, _settings = pipeline.inputs_of(hair)
     wanted = points_wanted(hair, _mean_length(guides) if curves.is_hand_made(guides) else None)
@@ -163,7 +159,7 @@ def use_points(hair: Curves) -> int:
 
 
 def _mean_length(guides):
-    """[m] in the world; 0 where all guides were deleted."""
+    """Return the mean length of guides in the world [m]; 0 without guides."""
     if not len(guides.curves):
         return 0.0
     scale = 1.0 if guides.surface is None else guides.surface.matrix_world.median_scale
@@ -171,7 +167,7 @@ def _mean_length(guides):
 
 
 def _with_new_seeds(added, present):
-    """Styles with seeds that none before them has."""
+    """Return styles with seeds that no style before them has."""
     taken = {style.seed for style in present}
     renewed = []
     for style in added:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Masks of styles that are painted with Blender's brushes: on the surface, or by a selection of guides."""
+"""Masks of styles, painted on the surface with Blender's brushes or made from a selection of guides."""
 
 import bpy
 import numpy as np
@@ -24,7 +24,7 @@ def is_painting(active: Object | None) -> bool:
 
 
 def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
-    """Enter the paint mode of a style's mask on the surface of hair, whose vertex group is made if there is none.
+    """Enter the paint mode of a style's mask on the surface of hair; creates a vertex group for a style without mask.
 
     item: the style's properties. Raises `HairError` before anything changes.
     """
@@ -54,11 +54,11 @@ def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
     except RuntimeError as error:  # hidden by a library or a driver
         raise HairError('"{name}" cannot be painted: {cause}.', name=name_of(surface), cause=cause_of(error)) from error
     if group.mask != mask:
-        group.mask = mask  # last: nothing is left to fail
+        group.mask = mask  # last: nothing can fail after it
 
 
 def stop(surface: Object, context: Context) -> None:
-    """Leave the paint mode of a surface, and select the hair whose mask was painted again."""
+    """Leave the paint mode of a surface, and select the hair whose mask was painted."""
     painted = selection.painted_hair(surface)
     bpy.ops.object.mode_set(mode="OBJECT")
     present = reversed(selection.curves_on(surface, "HAIR"))
@@ -70,7 +70,7 @@ def stop(surface: Object, context: Context) -> None:
 
 
 def from_selection(hair: Curves, item: PropertyGroup) -> int:
-    """Store the selection of a hair's guides as their attribute, the mask of a style; how many guides are selected.
+    """Store the selection of a hair's guides as an attribute, the mask of a style; returns the number selected.
 
     item: the style's properties. Raises `HairError`.
     """
@@ -87,7 +87,7 @@ def from_selection(hair: Curves, item: PropertyGroup) -> int:
     for follower in followers:
         bound = bindings.of(follower)
         if bound is not None and not bound.is_written and follower.library is None:
-            writing.write_hair(follower)  # as hair that is ahead of its datablock has other weights
+            writing.write_hair(follower)  # bound hair may have newer weights than its datablock
     group.mask = name
     for follower in followers:
         follower.vellus.is_stale = True
@@ -105,7 +105,7 @@ def _require_paintable(surface, context):
 
 
 def _require_group(hair, mask):
-    """Raise `HairError` for the mask of an attribute that is no vertex group."""
+    """Raise `HairError` if a mask is an attribute that cannot be painted."""
     if mask and mask not in hair.surface.vertex_groups and _has_attribute(hair, mask):
         sentence = 'The mask "{mask}" is not a vertex group or color attribute: clear it to paint a new one.'
         raise HairError(sentence, mask=mask)
@@ -117,7 +117,7 @@ def _has_attribute(hair, name):
 
 
 def _canvas(surface, name):
-    """The image to paint. Raises `HairError`."""
+    """Return the image to paint. Raises `HairError`."""
     image = bpy.data.images.get(name)
     if image is None:
         raise HairError('There is no image "{name}": pick another image, or clear the field.', name=name)
@@ -129,7 +129,7 @@ def _canvas(surface, name):
 
 
 def _new_name(hair, item):
-    """A name after the style that no vertex group and no attribute of surface and guides has."""
+    """Return a name after the style that no vertex group or attribute of surface and guides has."""
     owners = [hair.surface.data.attributes] if hair.surface is not None else []
     owners += [] if hair.surface is None else [hair.surface.vertex_groups]
     owners += [] if hair.vellus.guide_curves is None else [hair.vellus.guide_curves.attributes]
@@ -137,7 +137,7 @@ def _new_name(hair, item):
 
 
 def _is_guide_mask(hair, mask):
-    """Whether a mask is an attribute that `from_selection` has written, and nothing else of that name."""
+    """Whether a mask is an attribute written by `from_selection`, and no other data has its name."""
     surface = hair.surface
     if not mask or (surface is not None and (mask in surface.vertex_groups or mask in surface.data.attributes)):
         return False

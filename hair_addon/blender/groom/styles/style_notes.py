@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Why a style does nothing, or not what its place in the list suggests.
+"""Notes on styles without effect, or in a misleading place in the list.
 
-Panels ask with every redraw, so geometry is not read.
+Panels call these on every redraw, so geometry is not read.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from ...settings import style_items
 from ...settings.translations import interface_text
 from .. import bindings
 
-# Settings that are all zero, or empty, where a style of a kind does nothing.
+# {kind: settings}; a style has no effect if all of them are zero or empty.
 _WITHOUT = {
     "CURL": ("radius",),
     "FRIZZ": ("amplitude",),
@@ -29,7 +29,7 @@ _OBJECTS = {"TRIM": "cutter", "LEAN": "target"}
 
 
 def notes_of(hair: Curves, item: PropertyGroup) -> list[str]:
-    """Translated sentences about a style of a hair Curves datablock; item: the style's properties."""
+    """Return translated sentences about a style of a hair Curves datablock; item: the style's properties."""
     return [*_without_effect(item), *_missing_data(hair, item), *_too_small(hair, item), *_order(hair, item)]
 
 
@@ -67,7 +67,7 @@ def _missing_data(hair: Curves, item: PropertyGroup) -> Iterator[str]:
 
 
 def _has_mask(hair, name):
-    """Whether surface or guides have it; modifiers of the surface may make any attribute."""
+    """Whether surface or guides have a mask; modifiers of the surface may create any attribute."""
     surface, guides = hair.surface, hair.vellus.guide_curves
     if surface is not None and (surface.modifiers or name in surface.vertex_groups or name in surface.data.attributes):
         return True
@@ -75,7 +75,7 @@ def _has_mask(hair, name):
 
 
 def _too_small(hair: Curves, item: PropertyGroup) -> Iterator[str]:
-    """Known of hair whose strands were styled since the file was opened."""
+    """Yield a note on locks that are too small; only for hair styled since the file was opened."""
     bound = bindings.of(hair)
     if bound is None or bound.styles.styling is None:
         return
@@ -93,6 +93,6 @@ def _order(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     items = list(hair.vellus.styles)
     place = items.index(item)
     if item.kind == "WET" and any(style_items.group_of(below).is_on for below in items[place + 1 :]):
-        yield interface_text("Wet belongs last: move it down.")
+        yield interface_text("Wet should be the last style: move it down.")
     if item.kind == "LEAN" and any(above.kind != "LEAN" for above in items[:place]):
         yield interface_text("Lean acts on guides, before all other styles.")

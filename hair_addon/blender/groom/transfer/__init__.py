@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms taken from a hair and put on another mesh; all settings of a hair."""
+"""Transfer of grooms to other meshes; all settings of a hair."""
 
 from typing import TYPE_CHECKING
 

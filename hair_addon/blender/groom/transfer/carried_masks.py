@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vertex groups that mask a groom, carried to the mesh that it comes to; a group that the mesh has stays as it is."""
+"""Vertex groups that mask a groom, transferred to another mesh; groups that exist there are not changed."""
 
 import numpy as np
 from bpy.types import Curves, Depsgraph, Object
@@ -16,7 +16,7 @@ from ...settings import style_items
 
 
 def read(guides: Curves, hair: Curves | None, target: Object, depsgraph: Depsgraph) -> dict[str, np.ndarray]:
-    """{name: (V,) weights} of the vertex groups that the settings of a groom name and a mesh object lacks."""
+    """Return {name: (V,) weights} of the vertex groups in the settings of a groom that the target mesh object lacks."""
     source = guides.surface
     names = [text_of(guides.vellus.guides, "density_group")]
     if hair is not None:
@@ -34,7 +34,7 @@ def read(guides: Curves, hair: Curves | None, target: Object, depsgraph: Depsgra
 def carried(
     masks: dict[str, np.ndarray], source: TransferSurface, target: TransferSurface, warp: Warp | None, reach: float
 ) -> dict[str, np.ndarray]:
-    """{name: (W,) weights} at the vertices of the target; arguments as of `groom_passage.carried_weights`."""
+    """Return {name: (W,) weights} at the vertices of the target; arguments as of `groom_passage.carried_weights`."""
     if not masks:
         return {}
     weights = np.stack(list(masks.values()), axis=1)
@@ -43,12 +43,12 @@ def carried(
 
 
 def paint(target: Object, surface: Surface, masks: dict[str, np.ndarray]) -> list[str]:
-    """Create vertex groups of weights (W,) at the vertices of a surface as it was read; their names."""
+    """Create vertex groups of weights (W,) at the vertices of a read surface; returns their names."""
     return [new_group(target, name, at_own_vertices(target, surface, weights)) for name, weights in masks.items()]
 
 
 def at_own_vertices(surface_object: Object, surface: Surface, values: np.ndarray) -> np.ndarray:
-    """Values (W, …) at the vertices of a surface as it was read → at those of its mesh without modifiers."""
+    """Convert values (W, …) at the vertices of a read surface to those of its mesh without modifiers."""
     own = scene.read_own_mesh(surface_object, surface.to_world_axes).vertices
     if np.array_equal(own, surface.mesh.vertices):
         return values
@@ -57,7 +57,7 @@ def at_own_vertices(surface_object: Object, surface: Surface, values: np.ndarray
 
 
 def new_group(surface_object: Object, name: str, weights: np.ndarray) -> str:
-    """Create a vertex group of weights (V,); its name. Raises `HairError`."""
+    """Create a vertex group of weights (V,); returns its name. Raises `HairError`."""
     usable_surfaces.require_paintable(surface_object)
     group = surface_object.vertex_groups.new(name=name)
     vertex_groups.paint(group, np.round(weights, 6))

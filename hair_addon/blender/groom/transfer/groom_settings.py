@@ -17,7 +17,7 @@ from ..foreign import hand_made_guides
 
 
 def settings_of(hair: Curves) -> GroomSettings:
-    """The `GroomSettings` of a hair Curves datablock and its guides. Raises `HairError`."""
+    """Return the `GroomSettings` of a hair Curves datablock and its guides. Raises `HairError`."""
     guides, hair_settings = pipeline.inputs_of(hair)
     guide_settings = setting_properties.to_settings(guides.vellus.guides, GuideSettings)
     look, tables = properties.own_look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
@@ -29,8 +29,8 @@ def settings_of(hair: Curves) -> GroomSettings:
 def apply_settings(hair: Curves, settings: GroomSettings) -> None:
     """Apply settings to a hair Curves datablock and its guides; Blender's next update regenerates them.
 
-    Combed guides or hair are not changed, as with any change of settings. Open
-    settings are computed from the surface. Raises `HairError` before anything changes.
+    Combed guides and hair do not change, as with any change of settings. Unset values are fitted to the surface. Raises
+    `HairError` before anything changes.
     """
     guides, _settings = pipeline.inputs_of(hair)
     for target in (guides, hair):
@@ -39,7 +39,7 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
     of_guides, of_hair = pipeline.complete(guides.surface, settings.guides, settings.hair, depsgraph)
     groups = (guides.vellus.guides, settings.guides, of_guides), (hair.vellus.hair, settings.hair, of_hair)
     for group, given, wanted in groups:
-        # Otherwise everything would be regenerated without need.
+        # Otherwise everything would be regenerated unnecessarily.
         if setting_properties.to_settings(group, type(wanted)) != wanted:
             setting_properties.assign(group, wanted)
         is_open = fitted_sizes.open_names(given)
@@ -50,14 +50,14 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
 
 
 def assign_look(hair: Curves, look: Appearance) -> None:
-    """Assign an `Appearance` including its mode, which a look does not change. Raises `HairError`."""
+    """Assign an `Appearance` including its mode, which looks do not change. Raises `HairError`."""
     curves.require_editable(hair)
     hair.vellus.appearance.mode = look.mode
     looks.apply_look(hair, look)
 
 
 def assign_dynamics(guides: Curves, settings: DynamicsSettings) -> None:
-    """Assign settings of the simulation to guide Curves; the same settings again mark nothing. Raises `HairError`."""
+    """Assign simulation settings to guide Curves; equal settings mark nothing stale. Raises `HairError`."""
     curves.require_overridable(guides)
     if properties.own_dynamics_of(guides.vellus) != setting_properties.as_stored(settings):
         setting_properties.assign(guides.vellus.dynamics, settings)
@@ -65,7 +65,7 @@ def assign_dynamics(guides: Curves, settings: DynamicsSettings) -> None:
 
 @whole_changes.whole
 def adding_hair(surface_object: Object, settings: GroomSettings, depsgraph: Depsgraph) -> Work[tuple[Curves, Curves]]:
-    """Guides and hair of some `GroomSettings` on a mesh object, as work in steps; returns the Curves of both."""
+    """Grow guides and hair with `GroomSettings` on a mesh object, as work in steps; returns the Curves of both."""
     growing = pipeline.adding_hair(surface_object, settings.guides, settings.hair, depsgraph, settings.styles)
     guides, hair = yield from growing
     writing.keep_styles(hair, settings.styles, settings.style_names)
@@ -78,7 +78,7 @@ def adding_hair(surface_object: Object, settings: GroomSettings, depsgraph: Deps
 def using_as_guides(
     curves_object: Object, surface_object: Object, settings: GroomSettings, depsgraph: Depsgraph
 ) -> Work[hand_made_guides.HandMade]:
-    """Guides of an object's curves and hair of some `GroomSettings` between them, as work in steps; a `HandMade`."""
+    """Convert an object's curves to guides with hair of `GroomSettings`, as work in steps; returns `HandMade`."""
     made = yield from hand_made_guides.using_as_guides(
         curves_object, surface_object, depsgraph, hair_settings=settings.hair
     )
@@ -86,7 +86,7 @@ def using_as_guides(
     if made.hair is not None:
         style_items.assign(made.hair.vellus, settings.styles, settings.style_names)
         _assign_shading(made.hair, settings)
-        # Styled now that there are guides, whose attributes may be masks.
+        # Styled after the guides exist, as their attributes may be masks.
         pipeline.evaluate(made.hair, scene.present_depsgraph())
     return made
 

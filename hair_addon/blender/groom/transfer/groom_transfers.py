@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A hair system on another mesh: a copy of its guides there, and of its hair, with all settings, styles and the look.
+"""Transfer of a hair system: a copy of its guides and hair on another mesh, with all settings, styles and the look.
 
-Guides are carried as core/grooming/groom_transfer.py says. The copies keep their attributes, and as guides made by
-hand they are not regenerated. Hair grows between them anew.
+Guides are mapped by core/grooming/groom_transfer.py. The copies keep their attributes, and like hand-made guides they
+are not regenerated. The hair between them is generated again.
 """
 
 from dataclasses import dataclass
@@ -32,15 +32,15 @@ from ..foreign import hand_made_guides
 from ..guides import guide_tools
 from . import carried_masks, transferred_names
 
-_OVERLAPPING = 0.01  # of a surface's area: UVs that lead elsewhere are said
+_OVERLAPPING = 0.01  # fraction of a surface's area: more ambiguous UVs are reported
 
 
 @dataclass(frozen=True)
 class TransferredGroom:
-    """New guide Curves and hair Curves, None of guides without hair; and what to say about it.
+    """New guide Curves and hair Curves (None for guides without hair), and results to report.
 
-    guide_count: of the source; places: `Places` of its guides; painted: vertex groups that the mesh has got from the
-    source; cleared: names of what it does not have.
+    guide_count: of the source; places: `Places` of its guides; painted: vertex groups created from the source; cleared:
+    names in settings that the mesh lacks.
     """
 
     guides: Curves
@@ -56,9 +56,7 @@ class TransferredGroom:
         places, surface = self.places, name_of(self.guides.surface)
         said: list[tuple[str, dict[str, Any]]] = []
         if places.lost_count:
-            sentence = (
-                "{count} of {all} guides found no place: {far} too far from the surface, {other} where it faces away."
-            )
+            sentence = "{count} of {all} guides could not be placed: {far} too far from the surface, {other} where it faces away."
             values = {"all": self.guide_count, "far": places.far_count, "other": places.other_side_count}
             said.append((sentence, {"count": places.lost_count, **values}))
         if self.painted:
@@ -66,7 +64,7 @@ class TransferredGroom:
                 ('"{name}" has new vertex groups: {names}.', {"name": surface, "names": ", ".join(self.painted)})
             )
         if self.cleared:
-            sentence = '"{name}" does not have these, which were cleared: {names}.'
+            sentence = 'These do not exist on "{name}" and were cleared from the settings: {names}.'
             said.append((sentence, {"name": surface, "names": ", ".join(self.cleared)}))
         if self.has_overlap:
             said.append(('The UVs of "{name}" overlap: guides may be on another part of it.', {"name": surface}))
@@ -77,7 +75,7 @@ class TransferredGroom:
 def transferring(
     guides: Curves, hair: Curves | None, target: Object, settings: TransferSettings, depsgraph: Depsgraph
 ) -> Work[TransferredGroom]:
-    """Copy guides, and hair that follows them or None, to another mesh object, as work in steps.
+    """Copy guides, and hair that follows them (or None), to another mesh object, as work in steps.
 
     Raises `HairError` before anything changes.
     """
@@ -126,7 +124,7 @@ def transferring(
 
 
 def _warp(its_object, its_surface: Surface, target, surface: Surface, settings, depsgraph):
-    """The `Warp` of space by which the nearest surface is found; None by UV. Raises `HairError`."""
+    """Return the `Warp` before the nearest surface is searched; None for the UV method. Raises `HairError`."""
     if settings.method == "UV":
         return None
     if settings.method == "LANDMARKS":
@@ -143,7 +141,7 @@ def _warp(its_object, its_surface: Surface, target, surface: Surface, settings, 
 
 
 def _places(source: TransferSurface, target: TransferSurface, roots, warp, settings):
-    """The `Places` of guides. Raises `HairError`."""
+    """Return the `Places` of guides. Raises `HairError`."""
     transfer, scales = grooming.groom_transfer, settings.scale_lengths
     if warp is None:
         return transfer.places_by_uv(source, target, roots, scales)
@@ -164,7 +162,7 @@ def _through_landmarks(own, others):
 
 
 def _copy(datablock, target, is_rendered):
-    """A copy of Curves in a new object on a mesh."""
+    """Copy Curves to a new object on a mesh; returns the copy."""
     copy = datablock.copy().make_local(clear_liboverride=True)
     copy.surface = target
     kept_shapes.forget(copy)
@@ -178,7 +176,7 @@ def _copy(datablock, target, is_rendered):
 
 
 def _write_guides(guides, surface: Surface, places: Places, points, scale):
-    """Give copied guides their places; scale: of the lengths in their coordinates before [m]."""
+    """Write the places and points of copied guides; scale: [m] per unit of their former coordinates."""
     lost = np.setdiff1d(np.arange(len(guides.curves)), places.kept)
     guide_curves.remove(guides, lost)
     starts = curves.curve_offsets(guides)
@@ -207,7 +205,7 @@ def _growing(guides, hair, surface, places):
         name = hand_made_guides.paint_area(guides.surface, surface, places.roots)
         if name:
             state.hair.density_group = name
-    was_live, state.is_live = state.is_live, False  # or the update would grow it, before this does
+    was_live, state.is_live = state.is_live, False  # else the update would generate it first
     bpy.context.view_layer.update()
     state.is_live, state.is_stale = was_live, False
     settings = setting_properties.to_settings(state.hair, HairSettings)

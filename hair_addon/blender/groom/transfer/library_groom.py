@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms apart from a scene, for an asset library: taken from a hair, and put on a mesh object.
+"""Grooms for an asset library: extraction from hair, and application to a mesh object.
 
-A groom is in metres and in the axes of its surface's object without that object's rotation, so that a turned or scaled
-object carries it exactly.
+A groom is in metres and in the axes of its surface's object without that object's rotation, so that a rotated or scaled
+object reproduces it exactly.
 """
 
 from collections.abc import Callable
@@ -31,16 +31,16 @@ if TYPE_CHECKING:
     from ....core.grooming.groom_transfer import TransferSurface
 
 _GUIDE_RADIUS = 1.0 / 300.0  # of guides in viewports, by their length
-_UNEQUAL = 1e-4  # weights that differ by less are of the same mask
+_UNEQUAL = 1e-4  # masks whose weights differ by less are equal
 
 
 @dataclass(frozen=True)
 class LibraryGroom:
-    """A groom as it is kept: guides on their surface, masks and settings.
+    """A saved groom: guides on their surface, masks and settings.
 
-    ground: the surface; roots: G `SurfacePoints`; points: (N, 3) float32 [m] of the guides, curve after curve; counts:
-    (G,) of each; masks: {name: (V,) weights}; regions: {name: (G,) int32 or float32}, attributes of the guides; left:
-    names of objects and images that settings named and that are no part of the groom.
+    ground: the surface; roots: G `SurfacePoints`; points: (N, 3) float32 [m] of the guides, concatenated; counts: (G,)
+    of each; masks: {name: (V,) weights}; regions: {name: (G,) int32 or float32}, attributes of the guides; left: names
+    of objects and images in settings that are not part of the groom.
     """
 
     name: str
@@ -56,7 +56,7 @@ class LibraryGroom:
 
 @dataclass(frozen=True)
 class Applied:
-    """Guide and hair Curves of a groom that was put on a mesh object, and how it came there."""
+    """Guide and hair Curves of a groom applied to a mesh object, and results to report."""
 
     made: HandMade
     method: str
@@ -67,7 +67,7 @@ class Applied:
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
         """[(sentence, values)] to report to the user."""
         said = [
-            (self.lost_count, "{count} of {all} guides found no place on this surface and were left out.", {}),
+            (self.lost_count, "{count} of {all} guides could not be placed on this surface and were left out.", {}),
             (len(self.left), "Not part of the groom: {names}.", {"names": ", ".join(self.left)}),
         ]
         values = {"all": self.guide_count}
@@ -75,7 +75,7 @@ class Applied:
 
 
 def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:
-    """The groom of a hair Curves datablock, as it is combed at rest. Raises `HairError`."""
+    """Return the groom of a hair Curves datablock, as combed, at rest. Raises `HairError`."""
     guides, _settings = pipeline.inputs_of(hair)
     surface_object = guides.surface
     if surface_object is None or surface_object.type != "MESH":
@@ -109,7 +109,7 @@ def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:
 
 
 def _with_mask_of_guides(settings):
-    """`HairSettings` that name their mask: strands without one take that of their guides."""
+    """Return `HairSettings` with an explicit mask: strands without a mask use that of their guides."""
     hair = settings.hair
     return hair if hair.density_group else replace(hair, density_group=settings.guides.density_group)
 
@@ -122,7 +122,7 @@ def _of_guides(guides, name):
 
 
 def _rotation(surface):
-    """(3, 3): the rotation in an object's local coordinates → world axes, without scale, shear and mirroring."""
+    """Return the (3, 3) rotation of an object's local-to-world transform, without scale, shear and mirroring."""
     left, _scales, right = np.linalg.svd(surface.to_world_axes)
     sign = np.sign(np.linalg.det(left) * np.linalg.det(right))
     rotation = (left * [1.0, 1.0, sign]) @ right
@@ -147,10 +147,10 @@ def adding_groom(
     method: str = "AUTO",
     changed: Callable[[GroomSettings], GroomSettings] | None = None,
 ) -> Work[Applied]:
-    """Put a groom on a mesh object as new guides and hair, as work in steps; returns what was `Applied`.
+    """Apply a groom to a mesh object as new guides and hair, as work in steps; returns `Applied`.
 
-    method: of `groom_passage.METHODS`; changed: a function of the settings on this surface that gives others. Raises
-    `HairError`, when nothing is left in the scene.
+    method: one of `groom_passage.METHODS`; changed: a function from the fitted settings to the ones to use. Raises
+    `HairError` and then leaves nothing in the scene.
     """
     curves.require_overridable(surface_object)
     usable_surfaces.require_evaluated(surface_object)
@@ -171,7 +171,7 @@ def adding_groom(
     settings = library_settings.renamed(settings, painted)
     drawn = _drawn(groom, surface_object, places.kept, surface.to_local(_turned(points, rotation)[None])[0])
     bpy.context.view_layer.update()
-    # Attributes of guides are found when these are written.
+    # Attributes of guides exist only after the guides are written.
     unparted = replace(settings, hair=replace(settings.hair, region_attribute=""))
     made = yield from groom_settings.using_as_guides(drawn, surface_object, unparted, scene.present_depsgraph())
     _keep_settings(made, settings)
@@ -179,7 +179,7 @@ def adding_groom(
 
 
 def _painted(surface_object, surface, groom, target, found, depsgraph):
-    """{mask: name of the vertex group of the surface}; equal groups are used again, others are new."""
+    """Return {mask: name of the surface's vertex group}; equal groups are reused, others are created."""
     if not groom.masks:
         return {}
     weights = np.stack(list(groom.masks.values()), axis=1)
@@ -195,7 +195,7 @@ def _painted(surface_object, surface, groom, target, found, depsgraph):
 
 
 def _drawn(groom, surface_object, kept, points):
-    """A Curves object of guides at points (N, 3) in the surface's local coordinates, with the groom's regions."""
+    """Create a Curves object of guides at points (N, 3), local to the surface, with the groom's regions."""
     datablock = bpy.data.hair_curves.new("Guides")
     datablock.add_curves([int(count) for count in groom.counts[kept]])
     datablock.set_types(type="POLY")
@@ -213,10 +213,10 @@ def _drawn(groom, surface_object, kept, points):
 
 
 def _keep_settings(made, settings):
-    """Store the settings that the guides were grown with where the groom was made, and the hair's as they were."""
+    """Store the settings of the groom's guides and hair unchanged."""
     setting_properties.assign(made.guides.vellus.guides, settings.guides)
     if settings.hair.density_group == settings.guides.density_group:
-        made.hair.vellus.hair.density_group = ""  # that of the guides, which are written now
+        made.hair.vellus.hair.density_group = ""  # strands use the mask of the guides, which exist now
     if settings.hair.region_attribute:
         made.hair.vellus.hair.region_attribute = settings.hair.region_attribute
         pipeline.evaluate(made.hair, scene.present_depsgraph())

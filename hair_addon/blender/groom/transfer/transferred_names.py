@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of a groom that came to another mesh: names of what that mesh lacks are cleared, lengths scaled."""
+"""Settings of a groom transferred to another mesh: names that the mesh lacks are cleared, and lengths scaled."""
 
 from bpy.types import Curves, Object, PropertyGroup
 
@@ -12,10 +12,10 @@ from ...settings import style_items
 
 
 def clear(guides: Curves, hair: Curves | None, target: Object) -> list[str]:
-    """Clear what the settings of guides, or of hair that follows them, name and a mesh object lacks; those names."""
+    """Clear names in the settings of guides and their hair that a mesh object lacks; returns these names."""
     if hair is None:
         settings = guides.vellus.guides
-        # Drawn on the other mesh, and guides made by hand do not follow them.
+        # They are drawn on the other mesh, and hand-made guides do not follow them.
         settings.flow_lines = ""
         return _clear_masks(settings, "density_group", "density_image", target)
     settings = hair.vellus.hair
@@ -39,7 +39,7 @@ def clear(guides: Curves, hair: Curves | None, target: Object) -> list[str]:
 
 
 def scale_lengths(owner: PropertyGroup, factor: float) -> None:
-    """Multiply the lengths among the settings of guides, hair or dynamics that a property group holds."""
+    """Multiply the lengths in a property group of guide, hair or dynamics settings."""
     names = {entry.identifier for entry in owner.bl_rna.properties}
     for settings_class in (GuideSettings, HairSettings, DynamicsSettings):
         for name, _default, details in declared(settings_class):
@@ -48,7 +48,7 @@ def scale_lengths(owner: PropertyGroup, factor: float) -> None:
 
 
 def scale_style(item: PropertyGroup, factor: float) -> None:
-    """Multiply the lengths among the settings of a style."""
+    """Multiply the lengths in the settings of a style."""
     owner = style_items.group_of(item)
     for name, _default, details in declared(KINDS[item.kind]):
         if details.unit == "LENGTH":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All operators: one file a subject. An operator reads, computes and writes."""
+"""All operators, one file per subject. An operator reads, computes and writes."""
 
 from . import conversion, dynamics, guide_tools, library, looks, output, pictures, styles, surface, systems
 

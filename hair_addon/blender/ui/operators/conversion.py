@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that make guides or hair from curves, particles or the groom of another mesh."""
+"""Operators that create guides or hair from curves, particles or the groom of another mesh."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -199,18 +199,18 @@ class VELLUS_OT_import_groom(BrowsedOperator, bpy.types.Operator):
         "filter_glob": properties.only_files("*.abc;*.usd;*.usdc;*.usda;*.usdz;*.npz"),
         "kind": properties.choice(
             "Import As",
-            "What the curves become. Of a groom, which has both, hair brings its guides",
+            "Type of the imported curves. Hair of a groom that has both is imported with its guides",
             {"HAIR": "Hair", "GUIDES": "Guides"},
         ),
         "object_name": properties.text("Object", "Object or group in the file. Leave empty for all curves"),
         "unit": properties.choice(
             "Unit",
-            "Unit of the file's coordinates. Automatic takes what the file says, or what puts roots on the mesh",
+            "Unit of the file's coordinates. Automatic uses the file's own unit, or one that puts roots on the mesh",
             {_FOUND: "Automatic", **{name: _UNIT_NAMES[name] for name in UNITS}},
         ),
         "up": properties.choice(
             "Up",
-            "Axis that points up in the file. Automatic takes what the file says, or what puts roots on the mesh",
+            "Axis that points up in the file. Automatic uses the file's own axis, or one that puts roots on the mesh",
             {_FOUND: "Automatic", "X": "X", "Y": "Y", "Z": "Z"},
         ),
         **setting_properties.annotations(DerivationSettings),
@@ -230,7 +230,7 @@ class VELLUS_OT_import_groom(BrowsedOperator, bpy.types.Operator):
         setting_rows.row(column, self.properties, "guide_count")
 
     def seconds(self, context):
-        return float("inf")  # the number of curves is stored in the file
+        return float("inf")  # the number of curves is in the file
 
     def work(self, context):
         path, surface = paths.resolve(self.filepath), surface_of(context.object)

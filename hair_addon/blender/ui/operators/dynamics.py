@@ -44,7 +44,7 @@ class VELLUS_OT_play_dynamics(HairOperator, bpy.types.Operator):
         is_changed = simulated_hair.begin(context.scene)
         bpy.ops.screen.animation_play()
         if is_changed:
-            return "Every frame is played until playing stops: the simulation needs each of them", {}
+            return "Every frame is played until playback stops: the simulation needs every frame", {}
         return None
 
 
@@ -55,7 +55,7 @@ class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):
     bl_label = "Bake Dynamics"
     __annotations__ = {
         "starts_over": properties.switch(
-            "Start Over", "Simulate all frames again; when off, baking goes on after the frames that are there", False
+            "Start Over", "Simulate all frames again; when off, baking continues after the existing frames", False
         )
     }
     applies = needs_guides
@@ -76,7 +76,7 @@ class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):
         return baked
 
     def _say_memory(self, byte_count):
-        """Warn about work that needs much of the free memory; Esc stops it."""
+        """Warn about baking that needs much of the free memory; Esc stops it."""
         part = memory.share_of_free(byte_count)
         if memory.MUCH < part <= memory.MOST:
             said = "Baking takes {percent}% of the free memory"
@@ -85,14 +85,14 @@ class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):
     def message(self, made):
         if made.broken:
             return (
-                "Frames {first} to {last} baked; strands broke {count} times and were put back as they were combed",
+                "Frames {first} to {last} baked; strands broke {count} times and were reset to their combed shape",
                 {"first": made.first, "last": made.last, "count": made.broken},
             )
         return "Frames {first} to {last} baked", {"first": made.first, "last": made.last}
 
     def stopped(self):
-        """What is reported after Esc."""
-        return report_text("Stopped: the frames so far are kept, and Bake Dynamics goes on after them.")
+        """Return the report after Esc."""
+        return report_text("Stopped: the frames so far are kept, and Bake Dynamics continues after them.")
 
 
 class VELLUS_OT_free_dynamics(HairOperator, bpy.types.Operator):
@@ -106,7 +106,7 @@ class VELLUS_OT_free_dynamics(HairOperator, bpy.types.Operator):
     def applies(cls, context):
         cls.poll_message_set("Select guides whose frames have been baked.")
         guides = guides_of(context.object)
-        # Read once and kept: nothing else has looked where the add-on was enabled while the file is open.
+        # Read here and cached: nothing else has read the folder if the add-on was enabled while the file is open.
         baked = None if guides is None else frame_folders.frames_of(guides)
         return baked is not None and baked.manifest is not None
 
@@ -141,12 +141,12 @@ Blender without Vellus show the same hair"""
         return "Frames {first} to {last} delivered in {file}", values
 
     def stopped(self):
-        """What is reported after Esc."""
+        """Return the report after Esc."""
         return report_text("Canceled: hair was not delivered.")
 
 
 class VELLUS_OT_remove_delivery(HairOperator, bpy.types.Operator):
-    """Let the hair follow its guides again, in place of the delivered frames. Their file stays"""
+    """Let the hair follow its guides again instead of playing the delivered frames. The file is kept"""
 
     bl_idname = "vellus.remove_delivery"
     bl_label = "Remove Delivered Hair"
@@ -187,7 +187,7 @@ _MOST = next(details.high for name, _default, details in declared(DynamicsSettin
 
 
 class VELLUS_OT_stiffen_dynamics(HairOperator, bpy.types.Operator):
-    """Raise the bend stiffness to the least at which all guides can hold their shape under their weight"""
+    """Raise the bend stiffness to the lowest value at which all guides hold their shape under their weight"""
 
     bl_idname = "vellus.stiffen_dynamics"
     bl_label = "Stiffen"
@@ -205,7 +205,7 @@ class VELLUS_OT_stiffen_dynamics(HairOperator, bpy.types.Operator):
         stiffness = dynamics_notes.rounded_up(float(needed.max()))
         if stiffness > _MOST:
             raise HairError(
-                "Guides would need a bend stiffness of {stiffness}, more than there is: shorten them, or use Hold.",
+                "Guides need a bend stiffness of {stiffness}, above the maximum: shorten them, or use Hold.",
                 stiffness=f"{stiffness:g}",
             )
         settings.bend_stiffness = stiffness

@@ -45,10 +45,10 @@ class GuideTool(HairOperator):
         raise NotImplementedError
 
     def prefill(self, guides):
-        """Set values that follow from the guides, when the tool is called with a mouse or a key."""
+        """Set defaults that depend on the guides, when the tool is called with a mouse or a key."""
 
     def invoke(self, context, _event):
-        """Set values that follow from the guides, and change these."""
+        """Set defaults that depend on the guides, and change the guides."""
         self.prefill(guides_of(context.object))
         return self.execute(context)
 
@@ -125,7 +125,7 @@ class VELLUS_OT_trim_guides(GuideTool, bpy.types.Operator):
 
 
 class VELLUS_OT_change_guide_count(GuideTool, bpy.types.Operator):
-    """Add guides between those that are there, or remove the most crowded ones; all others stay as they are combed"""
+    """Add guides between existing guides, or remove the most crowded ones; all others keep their combing"""
 
     bl_idname = "vellus.change_guide_count"
     bl_label = "Change Guide Count"
@@ -163,7 +163,7 @@ class VELLUS_OT_mirror_guides(GuideTool, bpy.types.Operator):
 
 
 class VELLUS_OT_copy_guide_shape(GuideTool, bpy.types.Operator):
-    """Give guides the shape of the selected guides, or of those in a vertex group, turned with the surface"""
+    """Copy the shape of the selected guides, or of those in a vertex group, to other guides"""
 
     bl_idname = "vellus.copy_guide_shape"
     bl_label = "Copy Guide Shape"
@@ -212,7 +212,7 @@ class VELLUS_OT_lift_guides(GuideTool, bpy.types.Operator):
         return guide_tools.lift(guides, settings, depsgraph)
 
 
-_PART = 0.02  # of the guides' length: a clearance that fits a surface of any size
+_PART = 0.02  # default clearance as a fraction of the guides' length, which fits a surface of any size
 
 
 class VELLUS_OT_attract_guides(GuideTool, bpy.types.Operator):
@@ -229,7 +229,7 @@ class VELLUS_OT_attract_guides(GuideTool, bpy.types.Operator):
 
     def message(self, count):
         if not count and not self.amount:
-            return "No guides changed: at an amount of 0 they stay as they are", {}
+            return "No guides changed: the amount is 0", {}
         return super().message(count)
 
     def apply(self, guides, settings, depsgraph):

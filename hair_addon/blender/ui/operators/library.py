@@ -59,14 +59,14 @@ class VELLUS_OT_save_groom(LongOperator, bpy.types.Operator):
 
 _METHODS = {"AUTO": "Automatic", "UV": "UV Map", "NEAREST": "Nearest Surface"}
 _TOOLTIPS = {
-    "AUTO": "As saved on a copy of the surface; by UV maps if they agree; else by the nearest surface",
+    "AUTO": "At the saved places on a copy of the surface; by UV maps if they match; otherwise by the nearest surface",
     "UV": "Each guide keeps its UV coordinates",
     "NEAREST": "Each guide goes to the nearest surface after both meshes are aligned",
 }
 
 
 class VELLUS_OT_apply_groom(BrowsedOperator, bpy.types.Operator):
-    """Put a groom from an asset library on the active mesh, as new guides and hair"""
+    """Apply a groom from an asset library to the active mesh, as new guides and hair"""
 
     bl_idname = "vellus.apply_groom"
     bl_label = "Apply Groom"
@@ -74,7 +74,7 @@ class VELLUS_OT_apply_groom(BrowsedOperator, bpy.types.Operator):
         "filepath": properties.file("File of an asset library, .blend"),
         "filter_glob": properties.only_files("*.blend"),
         "name": properties.text("Name", "Groom to apply, if the file has several"),
-        "method": properties.choice("Method", "How guides find their places on the mesh", _METHODS, _TOOLTIPS),
+        "method": properties.choice("Method", "How guides are placed on the mesh", _METHODS, _TOOLTIPS),
         **asset_libraries.reference(),
     }
     asked = "filepath"
@@ -85,7 +85,7 @@ class VELLUS_OT_apply_groom(BrowsedOperator, bpy.types.Operator):
         return surface_of(context.object) is not None
 
     def invoke(self, context, event):
-        """Use the asset that the operator was called for, or open the file browser."""
+        """Use the asset of the context, or open the file browser."""
         asset = getattr(context, "asset", None)
         try:
             found = asset_libraries.referenced(self)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that write files and make meshes from a groom: exports, settings, cards, tubes."""
+"""Operators that write files and create meshes from a groom: exports, settings, cards, tubes."""
 
 import bpy
 
@@ -92,7 +92,7 @@ class VELLUS_OT_load_groom_settings(BrowsedOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_export_groom(BrowsedOperator, bpy.types.Operator):
-    """Write the hair on the active mesh and its guides to a file: Alembic as Unreal imports grooms, or USD"""
+    """Write the hair on the active mesh and its guides to a file: Alembic for Unreal, or USD"""
 
     bl_idname = "vellus.export_groom"
     bl_label = "Export Groom"
@@ -124,7 +124,7 @@ class VELLUS_OT_export_groom(BrowsedOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
-    """Make ribbons in place of clumps of strands, with textures drawn of the strands; the hair stays"""
+    """Create ribbons that replace clumps of strands, with textures of the strands; the hair itself is kept"""
 
     bl_idname = "vellus.hair_cards"
     bl_label = "Hair Cards"
@@ -164,7 +164,7 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):
-    """Make a mesh in which each strand is a closed tube; the hair stays"""
+    """Create a mesh with a closed tube for each strand; the hair itself is kept"""
 
     bl_idname = "vellus.hair_tubes"
     bl_label = "Hair Tubes"

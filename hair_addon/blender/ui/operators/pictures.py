@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators of how hair is drawn: engine, tables, pictures."""
+"""Operators for drawing hair: engine, tables, pictures."""
 
 import bpy
 
@@ -112,7 +112,7 @@ class VELLUS_OT_render_picture(BrowsedOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_toggle_composite(HairOperator, bpy.types.Operator):
-    """Render surfaces by Cycles or EEVEE and hair by Vellus into one picture, by the compositor; again to undo this"""
+    """Render surfaces with Cycles or EEVEE and hair with Vellus into one picture; press again to undo this"""
 
     bl_idname = "vellus.toggle_composite"
     bl_label = "Composite Hair"

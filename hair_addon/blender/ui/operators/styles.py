@@ -18,7 +18,7 @@ from .base.modal import LongOperator
 
 
 def active_style_of(context):
-    """The properties of the active hair's active style, None where there is none."""
+    """Return the properties of the active hair's active style, None if there is none."""
     hair = hair_of(context.object)
     return None if hair is None else style_items.active_of(hair.vellus)
 
@@ -30,29 +30,29 @@ def has_styles(operator, context):
 
 
 def fit_switch():
-    """The property of operators whose lengths may follow the surface."""
-    description = "Multiply lengths, which are for a human head, by the size of the surface"
+    """Return the property of operators that can fit lengths to the surface."""
+    description = "Scale lengths, which suit a human head, to the size of the surface"
     return properties.switch("Fit to Surface", description, True)
 
 
 def keep_switch():
-    """The property of operators that may add styles in place of replacing them."""
-    description = "Add the styles of the preset after the present ones, in place of replacing them"
+    """Return the property of operators that can add styles instead of replacing them."""
+    description = "Add the styles of the preset after the existing ones instead of replacing them"
     return properties.switch("Keep Styles", description, False)
 
 
 class _GivesStyles(LongOperator):
-    """Operators that give hair styles: where locks stand is found in a thread."""
+    """Operators that add styles to hair; locks are placed in a thread."""
 
     applies = needs_hair
     has_run = True  # kernels of styles are loaded like those of hair
 
     def styles(self, context):
-        """The styles to be given, as far as they need time."""
+        """Return the styles to add that take time to place."""
         raise NotImplementedError
 
     def seconds(self, context):
-        """Known before for nothing that has locks: on slivers they take a hundred times as long as elsewhere."""
+        """Unknown for styles with locks: on slivers these take a hundred times as long as elsewhere."""
         return math.inf if any(tree_settings(style) is not None for style in self.styles(context)) else 0.0
 
 
@@ -152,7 +152,7 @@ class VELLUS_OT_use_points(HairOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_paint_style_mask(HairOperator, bpy.types.Operator):
-    """Paint where the active style acts with Blender's brushes, while the hair follows; or stop painting"""
+    """Paint the mask of the active style with Blender's brushes, while the hair follows; or stop painting"""
 
     bl_idname = "vellus.paint_style_mask"
     bl_label = "Paint Style Mask"
@@ -174,7 +174,7 @@ class VELLUS_OT_paint_style_mask(HairOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_mask_from_selection(HairOperator, bpy.types.Operator):
-    """Limit the active style to the guides that are selected, as painted in Sculpt Mode"""
+    """Limit the active style to the selected guides, as painted in Sculpt Mode"""
 
     bl_idname = "vellus.mask_from_selection"
     bl_label = "Mask from Selected Guides"
@@ -192,7 +192,7 @@ class VELLUS_OT_mask_from_selection(HairOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_apply_style_preset(_GivesStyles, bpy.types.Operator):
-    """Give the active hair the styles of a built-in preset"""
+    """Apply the styles of a built-in preset to the active hair"""
 
     bl_idname = "vellus.apply_style_preset"
     bl_label = "Apply Style Preset"
@@ -214,7 +214,7 @@ class VELLUS_OT_apply_style_preset(_GivesStyles, bpy.types.Operator):
 
 
 class VELLUS_OT_apply_saved_style(_GivesStyles, bpy.types.Operator):
-    """Give the active hair the styles of a saved preset"""
+    """Apply the styles of a saved preset to the active hair"""
 
     bl_idname = "vellus.apply_saved_style"
     bl_label = "Apply Saved Style"

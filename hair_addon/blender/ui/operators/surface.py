@@ -87,7 +87,7 @@ class VELLUS_OT_apply_scale(HairOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_flip_normals(HairOperator, bpy.types.Operator):
-    """Flip the normals of the surface's faces. Guides that were not combed grow again, on the other side"""
+    """Flip the normals of the surface's faces. Guides that were not combed are regenerated on the other side"""
 
     bl_idname = "vellus.flip_normals"
     bl_label = "Flip Normals"

@@ -86,7 +86,7 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
         make_active(hair_object, context.view_layer)
 
     def _settings(self):
-        """The seed is asked for once; strands take the mask of their guides."""
+        """Return settings with one seed for both; strands use the mask of their guides."""
         hair_settings = setting_properties.given_settings(self, HairSettings, skip=("density_group", "density_image"))
         return setting_properties.given_settings(self, GuideSettings), hair_settings
 
@@ -177,7 +177,7 @@ def is_combing(context):
 
 
 def _stop(context):
-    """Return to Object Mode, with the hair active that follows the guides, if any does."""
+    """Return to Object Mode and make the hair of the guides active, if there is any."""
     guides = context.object.data
     bpy.ops.object.mode_set(mode="OBJECT")
     shown = (object_of(hair, context.view_layer) for hair in followers(guides))
@@ -224,13 +224,13 @@ class VELLUS_OT_comb_guides(HairOperator, bpy.types.Operator):
 
 
 class _DrawLines(HairOperator):
-    """Mixin of operators that draw the lines of what is active, or stop drawing them."""
+    """Mixin of operators that start or stop drawing part lines or flow lines of the active object."""
 
-    asked = ""  # to select what the lines are for
+    asked = ""  # message if no hair or guides are active
 
     @staticmethod
     def target_of(active):
-        """The Curves of the active object that lines are drawn for, None where it has none."""
+        """Return the Curves of the active object that lines are drawn for, None if there are none."""
         raise NotImplementedError
 
     @staticmethod
@@ -264,12 +264,12 @@ class VELLUS_OT_draw_parting(_DrawLines, bpy.types.Operator):
 
 
 class VELLUS_OT_draw_flow(_DrawLines, bpy.types.Operator):
-    """Draw lines on the surface in whose direction guides grow, with Blender's Draw tool; or stop drawing"""
+    """Draw lines on the surface that set the direction of guides, with Blender's Draw tool; or stop drawing"""
 
     bl_idname = "vellus.draw_flow"
     bl_label = "Draw Flow"
 
-    asked = "Select guides that are to follow lines."
+    asked = "Select guides to draw flow lines for."
     target_of = staticmethod(guides_of)
     begin = staticmethod(line_drawing.draw_flow)
 
@@ -403,7 +403,7 @@ class VELLUS_OT_make_own_guides(HairOperator, bpy.types.Operator):
 
 
 def _sharing(context):
-    """The active hair, if other hair follows its guides; or the hair with guides on another surface than its own."""
+    """Return the active hair if it shares its guides, or the hair whose guides grow on another surface."""
     hair = active_of_kind(context.object, "HAIR")
     if hair is not None:
         return [hair] if copied_hair.sharing(hair) or copied_hair.are_elsewhere(hair) else []

@@ -63,7 +63,7 @@ class VELLUS_PT_dynamics(_OfGuides, bpy.types.Panel):
 
 
 def _draw_delivery(layout, context):
-    """The buttons of delivery, and what renders show of the active hair."""
+    """Draw the buttons of delivery, and the state of the delivered hair."""
     hair = hair_of(context.object)
     if hair is None:
         return
@@ -78,7 +78,7 @@ def _draw_delivery(layout, context):
 
 
 def _settings_column(layout, context):
-    """(column for rows of settings, their owner)."""
+    """Return (column for rows of settings, their owner)."""
     state = guides_of(context.object).vellus
     column = split(layout).column()
     column.active = state.simulates

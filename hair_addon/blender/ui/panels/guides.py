@@ -75,7 +75,7 @@ def _draw_hand_made(layout, context, guides):
 
 
 def _draw_work(layout, context, surface, settings):
-    """settings: `GuideSettings`, or properties of the same names."""
+    """Draw the estimate for generating guides; settings: `GuideSettings`, or properties of the same names."""
     face_count = triangle_count(surface, context.view_layer)
     seconds, byte_count = (cost(settings, face_count) for cost in (cost.guide_seconds, cost.guide_work_bytes))
     draw_work(layout, seconds, byte_count)
@@ -92,7 +92,7 @@ class _OfGuides(HairTab):
 
 
 def _column(layout, context):
-    """A column for settings that combed guides do not follow."""
+    """Return a column for settings without effect on combed guides."""
     column = split(layout).column()
     column.active = not guide_states.of(guides_of(context.object)).is_combed
     return column

@@ -38,9 +38,7 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
         if error is not None:
             write(layout, context, error_text(error), "ERROR")
         if is_hand_made(hair):
-            text = (
-                "These strands are kept as they came. Regenerate Strands replaces them with strands between the guides."
-            )
+            text = "These strands are kept unchanged. Regenerate Strands replaces them with strands between the guides."
             write(layout, context, interface_text(text), "INFO")
         setting_rows.row(layout, state, "guide_curves")
         shared = sharing_note(hair)
@@ -65,7 +63,7 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
 
 
 def _draw_cost(layout, group, drawn_bytes):
-    """Draw the memory estimate for the strand count, and what the GPU has where strands are drawn."""
+    """Draw the memory estimate for the strand count, and the memory in use on the GPU while strands are drawn."""
     slot_count = group.neighbour_limit if group.guide_map else 0
     text = interface_text(
         "{memory}, {gpu_memory} on the GPU",

@@ -9,9 +9,9 @@ from .tab import HairTab
 
 
 class VELLUS_PT_progress(HairTab, bpy.types.Panel):
-    """The work that is under way"""
+    """The running operation"""
 
-    # With a header: Blender puts panels without one before all others, and would move the tab to the top of all tabs.
+    # With a header: Blender places panels without one before all others, which would move the tab above all other tabs.
     bl_label = "Progress"
     bl_idname = "VELLUS_PT_progress"
 

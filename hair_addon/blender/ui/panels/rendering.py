@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Render and View Layer properties, where Vellus is the render engine."""
+"""Panels of the Render and View Layer properties for the Vellus render engine."""
 
 import bpy
 

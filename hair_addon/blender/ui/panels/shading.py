@@ -68,7 +68,7 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
 
 
 def _hair_object(context):
-    """The active object if it is hair, else the object of the hair that is shown; None if there is none."""
+    """Return the active object if it is hair, else the object of the hair in the panel; None if there is none."""
     if active_of_kind(context.object, "HAIR") is not None:
         return context.object
     return object_of(hair_of(context.object), context.view_layer)

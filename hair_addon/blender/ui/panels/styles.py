@@ -21,7 +21,7 @@ _ROWS = 5  # minimum rows of the list, as high as its buttons
 
 
 def _active_of(context):
-    """The active style's properties, None where there is none."""
+    """Return the active style's properties, None if there is none."""
     hair = hair_of(context.object)
     return None if hair is None else style_items.active_of(hair.vellus)
 
@@ -102,7 +102,7 @@ class VELLUS_PT_styles(HairTab, bpy.types.Panel):
 
 
 def _draw_points(layout, context, hair):
-    """Offer the points that curls want where strands have fewer."""
+    """Draw a note and a button if curls need more points per strand."""
     try:
         wanted, present = points_wanted(hair), hair.vellus.hair.point_count
     except HairError:  # already shown as the status of the hair

@@ -25,7 +25,7 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
         layout = split(self.layout)
         drawn = line_drawing.drawn_for(context.object)
         if drawn is not None:
-            said = "Draw lines on the surface. They are used at once."
+            said = "Draw lines on the surface. They take effect immediately."
             write(layout, context, interface_text(said), "INFO")
             name = "vellus.draw_parting" if drawn.vellus.kind == "HAIR" else "vellus.draw_flow"
             layout.operator(name, text="Stop Drawing", icon="CHECKMARK")
@@ -64,7 +64,7 @@ def _draw_foreign(layout, context):
         "INFO",
     )
     layout.operator("vellus.use_as_guides", icon="OUTLINER_OB_CURVES")
-    write(layout, context, interface_text("Or keep them as the hair itself, strand by strand."), "INFO")
+    write(layout, context, interface_text("Or use the curves themselves as hair."), "INFO")
     layout.operator("vellus.use_as_hair", icon="CURVES")
     count = len(chosen(context.object, context.selected_objects))
     if count > 1:

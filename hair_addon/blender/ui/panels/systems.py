@@ -18,7 +18,7 @@ class VELLUS_UL_systems(bpy.types.UIList):
     bl_idname = "VELLUS_UL_systems"
 
     def filter_items(self, context, data, propname):
-        """Show the Curves that are systems of the present mesh, and no others."""
+        """Show only the Curves of hair systems on the active mesh."""
         systems = set(systems_of(surface_of(context.object), context.view_layer))
         shown = [self.bitflag_filter_item if curves in systems else 0 for curves in getattr(data, propname)]
         return shown, []

@@ -10,7 +10,7 @@ from ..operators.systems import is_combing
 _CHARACTER_WIDTH = 6.8  # pixels of Blender's interface font on average, at a scale of one
 _ICON_AND_MARGINS = 66.0
 _NARROWEST = 18  # characters
-_LONGEST = 1500  # characters, more than any sentence has: a damaged file may hold a book
+_LONGEST = 1500  # characters, more than any message has; damaged files may contain longer text
 
 LONG, LARGE = 2.0, 500e6  # [s], [bytes]: smaller estimates are not shown
 
@@ -25,7 +25,7 @@ class HairTab:
 
 
 def split(layout):
-    """The layout with names in a column of their own."""
+    """Return the layout with labels in a separate column."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     return layout
@@ -44,14 +44,14 @@ def write(layout, context, text, icon="NONE"):
 
 
 def write_status(layout, context, state, name="status"):
-    """What is wrong with guides or hair, if anything is; state: `VellusCurves`; name: of the property that says it."""
+    """Draw the error of guides or hair, if there is one; state: `VellusCurves`; name: of the error's property."""
     status = text_of(state, name)
     if status:
         write(layout, context, status_text(status), "ERROR")
 
 
 def write_stale(layout, context, state):
-    """That guides or hair wait for an update, where they are not updated automatically, and the button that does it."""
+    """Draw a note and a button if guides or hair are out of date and Auto Update is off."""
     if state.is_stale and not state.is_live:
         write(layout, context, interface_text("Out of date: settings or inputs have changed."), "INFO")
         layout.operator("vellus.update_hair", icon="FILE_REFRESH")

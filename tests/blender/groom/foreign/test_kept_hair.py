@@ -76,7 +76,7 @@ def test_nothing_regenerates_hair_that_is_kept(kept, sphere):
     kept.data.vellus.hair.strand_count = 77
     update()
     assert np.array_equal(stored(kept), before)
-    assert kept.data.vellus.status.startswith("Kept as it came")
+    assert kept.data.vellus.status.startswith("Kept unchanged")
 
 
 def test_regenerated_strands_stand_on_the_same_roots_and_follow_the_guides(kept):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bases of operators: when they can run, long work, dialogs and file browsers."""
+"""Base classes of operators: poll, long work, dialogs and file browsers."""

@@ -14,7 +14,7 @@ class AskedOperator(LongOperator):
 
     def invoke(self, context, event):
         """Open the dialog, or start."""
-        names = set(self.properties.bl_rna.properties.keys()) - {"rna_type"}  # which always counts as set
+        names = set(self.properties.bl_rna.properties.keys()) - {"rna_type"}  # always counts as set
         is_given = any(map(self.properties.is_property_set, names))
         if is_given or not running.has_window():
             return super().invoke(context, event)
@@ -22,7 +22,7 @@ class AskedOperator(LongOperator):
         return context.window_manager.invoke_props_dialog(self, width=_WIDTH)
 
     def execute(self, context):
-        """Compute at once, or start after the dialog: Blender does not wait for dialogs."""
+        """Compute immediately, or start after the dialog: Blender does not wait for dialogs."""
         if not self._is_asking:
             return super().execute(context)
         self._is_asking = False

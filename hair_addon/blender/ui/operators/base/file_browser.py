@@ -24,7 +24,7 @@ class BrowsedOperator(LongOperator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
-        """Compute at once, or after the file browser, which Blender does not wait for."""
+        """Compute immediately, or start after the file browser: Blender does not wait for file browsers."""
         if not self._is_browsing:
             try:
                 self.prefill(context)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Base of all operators: when they can run; `HairError` is reported without changes."""
+"""Base of all operators: poll, and reports of `HairError` without changes."""
 
 from .....core.errors import HairError, memory_as_sentence
 from ....data import whole_changes
@@ -9,14 +9,14 @@ from ....settings.translations import CONTEXT, error_text, report_text
 
 @classmethod
 def needs_hair(cls, context):
-    """The `applies` of operators on the active hair."""
+    """`applies` of operators on the active hair."""
     cls.poll_message_set("Select hair.")
     return hair_of(context.object) is not None
 
 
 @classmethod
 def needs_guides(cls, context):
-    """The `applies` of operators on the guides of the active hair or mesh."""
+    """`applies` of operators on the guides of the active hair or mesh."""
     cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
     return guides_of(context.object) is not None
 
@@ -27,16 +27,18 @@ class HairOperator:
     bl_options = {"REGISTER", "UNDO"}
     bl_translation_context = CONTEXT
 
-    applies = None  # a class method of (context) where it takes what is active: whether it can, with `poll_message_set`
+    applies = (
+        None  # class method of (context): whether the operator can run on the active object; sets the poll message
+    )
 
     @classmethod
     def poll(cls, context):
-        """Whether it `applies`, if it asks; to nothing in a context without a window, which has no active object."""
+        """Whether the operator `applies`; false without a window, as there is no active object."""
         return cls.applies is None or (hasattr(context, "object") and cls.applies(context))
 
     @classmethod
     def may_be_redone(cls, context):
-        """Whether the last operator was this one: Blender polls it before it undoes what the redo panel changes."""
+        """Whether this was the last operator: Blender polls it before it undoes its result for the redo panel."""
         done = context.window_manager.operators
         return context.object is not None and len(done) > 0 and done[-1].bl_idname == cls.__name__
 

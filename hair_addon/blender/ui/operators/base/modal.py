@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Base of long operators: short ones compute at once, others in a thread while the window responds.
+"""Base of long operators, which may compute in a thread while the window responds.
 
-Called from a script or without a window they always compute at once. In a window, long computations, and the first use,
-which may compile kernels, run in a thread, with a progress bar and Esc to cancel.
+Called from a script or without a window, they compute immediately. In a window, long computations and the first use,
+which may compile kernels, run in a thread with a progress bar; Esc cancels.
 """
 
 import bpy
@@ -29,7 +29,7 @@ class LongOperator(HairOperator):
     _said = ""  # in the status bar
 
     def work(self, context):
-        """The work in steps (core/long_work.py)."""
+        """Return the work in steps (core/long_work.py)."""
         raise NotImplementedError
 
     def _whole_work(self, context):
@@ -62,7 +62,7 @@ class LongOperator(HairOperator):
         """Select the result."""
 
     def invoke(self, context, event):
-        """Compute at once, or start in a thread."""
+        """Compute immediately, or start in a thread."""
         self._event, self._asks = event, running.has_window() and not type(self)._takes_much
         LongOperator._takes_much = False
         self.prefill(context)
@@ -73,7 +73,7 @@ class LongOperator(HairOperator):
         return self.execute(context) if bpy.app.background or is_quick else self.begin(context)
 
     def execute(self, context):
-        """Compute at once."""
+        """Compute immediately."""
         if self._is_confirming:
             LongOperator._takes_much = True
             return self._begin_as_set() & {"FINISHED"} or {"CANCELLED"}
@@ -106,7 +106,7 @@ class LongOperator(HairOperator):
         return {"RUNNING_MODAL"}
 
     def begin_anew(self):
-        """Invoke an operator like this one, after a dialog or a file browser, which Blender does not wait for."""
+        """Invoke a copy of this operator after a dialog or a file browser, as Blender does not wait for these."""
         return self._invoke_anew(self.as_keywords())
 
     def _invoke_anew(self, values):
@@ -122,7 +122,7 @@ class LongOperator(HairOperator):
         return context.window_manager.invoke_confirm(self, self._event, title=title, message=said, icon="WARNING")
 
     def _begin_as_set(self):
-        """Invoke an operator like this one, with what is set in it alone."""
+        """Invoke a copy of this operator with the properties that are set."""
         names = [name for name in self.as_keywords() if self.properties.is_property_set(name)]
         return self._invoke_anew({name: getattr(self, name) for name in names})
 
@@ -140,7 +140,7 @@ class LongOperator(HairOperator):
         return {"PASS_THROUGH"} if event.type in _NAVIGATION else {"RUNNING_MODAL"}
 
     def cancel(self, context):
-        """The window was closed, or another file is being opened."""
+        """Stop when the window is closed or another file is opened."""
         self._end(context, {"CANCELLED"})
 
     def _advance(self, context, job):
