@@ -56,7 +56,9 @@ class TransferredGroom:
         places, surface = self.places, name_of(self.guides.surface)
         said: list[tuple[str, dict[str, Any]]] = []
         if places.lost_count:
-            sentence = "{count} of {all} guides could not be placed: {far} too far from the surface, {other} where it faces away."
+            sentence = (
+                "{count} of {all} guides could not be placed: {far} too far from the surface, {other} facing away."
+            )
             values = {"all": self.guide_count, "far": places.far_count, "other": places.other_side_count}
             said.append((sentence, {"count": places.lost_count, **values}))
         if self.painted:
