@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that keep their shape beside a course, such as the strand interpolated at their root, when the course moves.
+"""Strands that keep their shape relative to a moving course, such as the strand interpolated at their root.
 
-A strand's point x beside the place c(s) of its course keeps its offset in a frame that moves with the course:
+A strand's point x beside the point c(s) of its course keeps its offset in a frame that moves with the course:
 
     x' = x + (c'(s) - c(s)) + (Q(s) - 1) (x - c(s))
 
-Where the course rests, both terms are zero and no bit changes. Q turns the course's tangents into those that it has
-now. At the root it is a turn about the surface's normal, as far as the course lies along the surface, and then the
-least rotation; from each point of the course to the next it goes on by least rotations [Bishop75], so that no twist
-arises along a strand.
+Where the course does not move, both terms are zero and no bit changes. Q rotates the former tangents of the course to
+the present ones. At the root it is a rotation about the surface's normal, in proportion to how closely the course lies
+along the surface, followed by the least rotation; it continues along the course by least rotations [Bishop75], so that
+strands are not twisted.
 """
 
 import numpy as np
@@ -33,11 +33,11 @@ def carried(
     *,
     is_back: bool = False,
 ) -> np.ndarray:
-    """(N, 3) float32 [m]: ragged strands, moved with their courses.
+    """Return the (N, 3) float32 [m] points of ragged strands moved with their courses.
 
-    points (N, 3) float32 [m] and starts (S+1,) of the strands; places (N,) float32, where each point is along its
-    course, 0 to 1; before and now (S, P, 3) float32 [m], P > 1: their courses; normals (S, 3) float32, unit, of the
-    surface at their roots; is_back: the inverse, for points beside the courses as they are now.
+    points (N, 3) float32 [m] and starts (S+1,) of the strands; places (N,) float32, the position of each point along
+    its course, 0 to 1; before and now (S, P, 3) float32 [m], P > 1: their courses; normals (S, 3) float32, unit, of the
+    surface at their roots; is_back: the inverse, for points beside the present courses.
     """
     counts = np.diff(starts)
     require_count("courses", len(before), len(counts))
@@ -47,7 +47,7 @@ def carried(
     require_count("points", len(points), int(starts[-1]))
     require_count("places", len(places), len(points))
     if before.shape[1] < 2:
-        raise ValueError("A course has two points or more.")
+        raise ValueError("A course needs at least two points.")
     out = np.empty((len(points), 3), np.float32)
     parallel.launch(
         _carried,
@@ -71,20 +71,20 @@ def carried(
 
 
 def _vectors(values):
-    """A Warp array that shares (..., 3) float32."""
+    """Return a Warp array that shares the memory of (..., 3) float32."""
     return wp.array(np.ascontiguousarray(values, np.float32), dtype=wp.vec3, device="cpu", copy=False)
 
 
 @wp.func
 def _tangent(courses: wp.array2d[wp.vec3], strand: int, point: int):
-    """Unit, by central differences; zero where points of the course coincide."""
+    """Unit tangent by central differences; zero if points of the course coincide."""
     last = courses.shape[1] - 1
     return wp.normalize(courses[strand, wp.min(point + 1, last)] - courses[strand, wp.max(point - 1, 0)])
 
 
 @wp.func
 def _least_rotation(unit: wp.vec3, other: wp.vec3):
-    """The quaternion that turns one unit vector into another; none for opposite ones."""
+    """Quaternion that rotates one unit vector to another; the identity for opposite vectors."""
     cosine = wp.dot(unit, other)
     if cosine < -0.99999:
         return wp.quat_identity()
@@ -94,13 +94,13 @@ def _least_rotation(unit: wp.vec3, other: wp.vec3):
 
 @wp.func
 def _leaning(part: float):
-    """By this power of its lean a course turns about the normal: one at 30° above the surface does, one at 60° not."""
+    """Weight of the rotation about the normal by the lean of a course: one at 30° above the surface, zero at 60°."""
     return part * part * part * part
 
 
 @wp.func
 def _turn_at_root(before: wp.array2d[wp.vec3], now: wp.array2d[wp.vec3], strand: int, normal: wp.vec3):
-    """The rotation about the normal by which a course that lies along the surface comes closest to what it is now."""
+    """Rotation about the normal that best aligns a course along the surface with its present state."""
     tangent, bitangent = frame(normal)
     turned = wp.vec2()
     upright = float(0.0)
@@ -118,8 +118,8 @@ def _turn_at_root(before: wp.array2d[wp.vec3], now: wp.array2d[wp.vec3], strand:
     turned *= level / lying
     x, y = turned[0] + _leaning(upright / (lying + upright)), turned[1]
     if y == 0.0 and x >= 0.0:
-        return wp.quat_identity()  # to the last bit: courses rest
-    # By the tangent of half the angle, without functions that each system's library rounds in its own way.
+        return wp.quat_identity()  # exact: the course does not move
+    # By the tangent of half the angle, without functions whose rounding depends on the system's library.
     size = wp.length(wp.vec2(x, y))
     if x < 0.0:
         return wp.normalize(wp.quat((size - x) * normal, y))

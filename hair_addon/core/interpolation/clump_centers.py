@@ -19,7 +19,7 @@ def _nearest(
     out_squared: wp.array[float],
     out_leader: wp.array[int],
 ):
-    # One after the other, on one core: of several in one place the first stays.
+    # Sequential, on one core: of several strands at equal distance the first is chosen.
     for strand in range(guide_index.shape[0]):
         guide = guide_index[strand]
         squared = wp.length_sq(roots[strand] - guide_roots[guide])
@@ -29,9 +29,9 @@ def _nearest(
 
 
 def clump_centers(guide_index: wp.array[int], roots: np.ndarray, guide_roots: np.ndarray) -> np.ndarray:
-    """(S,) int32: for each strand the index of the strand that is rooted nearest to its guide, among the guide's own.
+    """Return (S,) int32: for each strand the index of the strand rooted nearest to its guide, among the guide's own.
 
-    guide_index: (S,) the guide that each strand follows first; roots (S, 3) and guide_roots (G, 3) [m].
+    guide_index: (S,) nearest guide of each strand; roots (S, 3) and guide_roots (G, 3) [m].
     """
     guide_index, roots, guide_roots = (
         wp.array(np.ascontiguousarray(array, scalar), dtype=kind, device="cpu", copy=False)

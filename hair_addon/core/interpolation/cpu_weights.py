@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Weights of guide_weights.py for eight guides at once, in the CPU's vector registers.
 
-weigh.cpp and limit.cpp hold them, written once for both kinds of device in the vectors of lanes.h: on a GPU, whose
+weigh.cpp and limit.cpp implement them once for both kinds of device with the vectors of lanes.h: on a GPU, whose
 threads are lanes already, a vector is one number.
 """
 
@@ -12,7 +12,7 @@ from ..kernels import native_code
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-NUMBERS = 8  # that are known of a guide
+NUMBERS = 8  # per guide
 
 
 @wp.func_native(native_code.body(__file__, "weigh.cpp", WIDTH=NUMBERS))
@@ -31,7 +31,7 @@ def weigh(
     out_weights: wp.array2d[float],
     out_turns: wp.array2d[wp.vec2],
 ):
-    """Guides, weights and turns of a strand. frames: (G, 8), the tangent and the normal of each guide."""
+    """Compute guides, weights and rotations of a strand. frames: (G, 8), tangent and normal of each guide."""
 
 
 @wp.func_native(native_code.body(__file__, "limit.cpp", WIDTH=NUMBERS))
@@ -47,4 +47,4 @@ def limit(
     per_length: float,
     out_weights: wp.array2d[float],
 ):
-    """Weights of a strand without guides that differ too much. shapes: (G, 8) of `guide_weights.shapes`."""
+    """Remove guides that differ too much from a strand's weights. shapes: (G, 8) of `guide_weights._shapes`."""

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guides between which interpolation reproduces given strands: linear least squares.
 
-With the weights w of a binding and guides' arms a_j (points less root) in the frames of their roots, interpolation
-without kept lengths gives strand s the arms sum_j w_sj Z_sj a_j in its own frame, Z_sj being the turn about the normal
-(interpolation.py). As complex numbers x + iy that turn is a factor e^(i phi), so both (x + iy) and z are sparse linear
-least squares with one matrix each for all points, solved by the normal equations. Each guide is held at the shape that
-it has by its own weight, as in damped least squares: repeated steps then go on while interpolation is not linear, and
-guides that few strands follow are not thrown about.
+With the weights w of a binding and guides' arms a_j (points minus root) in the frames of their roots, interpolation
+without preserved lengths gives strand s the arms sum_j w_sj Z_sj a_j in its own frame, Z_sj being the rotation about
+the normal (interpolation.py). For complex numbers x + iy that rotation is a factor e^(i phi), so x + iy and z are
+sparse linear least squares with one matrix each for all points, solved by the normal equations. Each guide is damped
+towards its present shape with its own weight: so the steps can be repeated although interpolation is not linear, and
+guides with few strands are stable.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ from .hair_binding import HairBinding
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_HOLD = 1.0  # of a guide's own weight in the normal equations
+_HOLD = 1.0  # damping, as a factor of a guide's own weight in the normal equations
 
 
 def fitted(
@@ -32,12 +32,12 @@ def fitted(
     chosen: np.ndarray,
     stretches: np.ndarray | None = None,
 ) -> np.ndarray:
-    """(G, P, 3) float32 [m]: arms of guides by which interpolation comes nearest to strands.
+    """Return (G, P, 3) float32 [m]: arms of guides whose interpolation best fits strands.
 
-    binding: on the processor, of the S strands to G guides; guide_weights: of the same, as `guide_weights.limited`
-    leaves them; arms (S, P, 3) float32 [m]: points less root of the strands; guide_arms (G, P, 3) float32 [m]: the
-    guides' present ones; chosen: (M,) indices of the strands that count; stretches (S,): factors by which kept lengths
-    make strands longer than the sums, None for no factors.
+    binding: on the processor, of S strands to G guides; guide_weights: of the same, from `guide_weights.limited`; arms
+    (S, P, 3) float32 [m]: points minus root of the strands; guide_arms (G, P, 3) float32 [m]: present arms of the
+    guides; chosen: (M,) indices of the strands to fit; stretches (S,): factors by which preserved lengths lengthen
+    strands, None for no factors.
     """
     require_count("strands", len(arms), len(binding.positions))
     require_count("guides", len(guide_arms), guide_weights.guide_count)
@@ -61,7 +61,7 @@ def _complex(arms):
 
 
 def _solved(indices, factors, wanted, before):
-    """(G, P): the least squares of sum_k factors_sk x_(indices_sk) = wanted (M, P), held at `before` (G, P)."""
+    """Return (G, P): least squares of sum_k factors_sk x_(indices_sk) = wanted (M, P), damped to `before` (G, P)."""
     count, slot_count = len(before), indices.shape[1]
     matrix = np.zeros(count * count, factors.dtype)
     right = np.zeros(before.shape, factors.dtype)
@@ -81,19 +81,19 @@ def _solved(indices, factors, wanted, before):
 
 
 def _summed(places, values, count):
-    """(count,): sums of values (M,), which may be complex, by place."""
+    """Return (count,): sums of values (M,), real or complex, by index."""
     if np.iscomplexobj(values):
         return np.bincount(places, values.real, count) + 1j * np.bincount(places, values.imag, count)
     return np.bincount(places, values, count)
 
 
 def _in_frames(arms, normals):
-    """(N, P, 3) float32: arms in the frames of unit normals (N, 3)."""
+    """Return (N, P, 3) float32: arms in the frames of unit normals (N, 3)."""
     return _turned(arms, normals, _to_frames)
 
 
 def _out_of_frames(arms, normals):
-    """(N, P, 3) float32: arms in the frames of unit normals (N, 3) → in the axes of the scene."""
+    """Return (N, P, 3) float32: arms in scene axes; arms: in the frames of unit normals (N, 3)."""
     return _turned(arms, normals, _from_frames)
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Regions of guides: whole numbers, the same for guides whose hair may touch, by regions of the surface and part lines.
+"""Regions of guides, by regions of the surface and part lines: integers, equal for guides whose hair may touch.
 
-A guide is on that side of a part line to which it has the shorter way. As ways do not cross lines, one that goes from
-border to border, or is closed, divides the guides as it does the surface. Past the end of another one its sides go on
-straight ahead, each with the guides that are nearer to it.
+A guide is on the side of a part line to which its path is shorter. As paths do not cross lines, a closed line, or one
+from border to border, divides guides as it divides the surface. Beyond an open end, the sides continue straight ahead,
+each with the guides that are nearer to it.
 """
 
 import itertools
@@ -18,9 +18,9 @@ from . import part_lines
 from .part_lines import PartLines
 from .regions import Regions, kept_apart
 
-_APART = 1.0 / 16.0  # of the distance between points of a line: how far from it places beside it are
-_NEAREST = 8  # places on each side of a line that a guide's ways lead to
-_AT_ENDS = 8  # points of a line that tell in which direction it ends: single ones follow the faces of the surface
+_APART = 1.0 / 16.0  # distance of side points from a line, as a fraction of the distance between its points
+_NEAREST = 8  # nearest side points, on each side of a line, to which paths of a guide are measured
+_AT_ENDS = 8  # points that define a line's direction at its ends: fewer would follow single faces of the surface
 _ROWS = 4096  # guides that are compared with a line at once
 
 
@@ -31,9 +31,9 @@ def guide_regions(
     lines: PartLines | None = None,
     device: wp.DeviceLike = "cpu",
 ) -> np.ndarray:
-    """(G,) int32: alike for guides that are in one region of all `Regions` and on the same side of each line.
+    """Return (G,) int32, equal for guides in the same regions and on the same side of each line.
 
-    Numbered as `combined` does. mesh: checked, with the guides' roots on it; lines: as they are laid on it, or None.
+    Numbers are those of `combined`. mesh: checked, with the guides' roots on it; lines: laid on it, or None.
     """
     labels = [np.zeros(len(roots), np.int32)]
     apart = kept_apart(regions, roots, roots)
@@ -45,14 +45,14 @@ def guide_regions(
 
 
 def combined(labels: Sequence[np.ndarray]) -> np.ndarray:
-    """(G,) int32: alike where all of some labels (G,) are, one array at least; numbered in the order of the guides."""
+    """Return (G,) int32, equal where all labels (G,) are equal, numbered in the order of guides; needs a label."""
     rows = np.stack([label.astype(np.int64) for label in labels], axis=1)
     _, first, numbers = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[numbers.reshape(-1)].astype(np.int32)
 
 
 def _sides(mesh, roots, lines, device):
-    """For each line that is longer than a point (G,) bool: whether guides are on its left."""
+    """Yield (G,) bool for each line with at least one edge: whether guides are on its left."""
     surface = closest_point.SurfaceQuery(mesh, device=device)
     frames = root_frames.rooted(mesh, roots, device)
     points, starts = lines.points.numpy().astype(np.float64), lines.starts.numpy()
@@ -74,9 +74,9 @@ def _sides(mesh, roots, lines, device):
 
 
 def _is_left(frames, on_line, edges, lines):
-    """(G,) bool of roots with frames (positions, normals); on_line: the same of two places or more of one of the lines.
+    """Return (G,) bool for roots with frames (positions, normals); on_line: frames of at least two points of a line.
 
-    edges: (M, 3) of the line there [m]. No way at all leads to a line behind others: it does not matter to those roots.
+    edges: (M, 3) of the line there [m]. For roots without a path to the line, as it is behind others, it is false.
     """
     roots, normals = frames
     positions, places, ups = roots.numpy(), on_line[0].numpy(), on_line[1].numpy()
@@ -94,12 +94,12 @@ def _is_left(frames, on_line, edges, lines):
     there = wp.array(beside, dtype=wp.vec3, device=device)
     facing = wp.array(np.concatenate([ups, ups]), dtype=wp.vec3, device=device)
     part_lines.go_round(lines, roots, normals, there, facing, candidates, ways)
-    # Where all are infinite the first one still is as it was.
+    # If all are infinite, the first one is unchanged.
     return (candidates.numpy()[:, 0] < count) & np.isfinite(ways.numpy()[:, 1])
 
 
 def _nearest(positions, places):
-    """(G, K) int32: the places nearest to each position, K at most `_NEAREST`."""
+    """Return (G, K) int32: the points nearest to each position, K at most `_NEAREST`."""
     count = min(_NEAREST, len(places))
     found = np.empty((len(positions), count), np.int32)
     for first in range(0, len(positions), _ROWS):

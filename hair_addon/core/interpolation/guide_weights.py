@@ -6,12 +6,12 @@ that to the nearest excluded guide, the weight is the Gaussian of Eq. 9, reduced
 
     w_j = exp(-r_j² / 2σ²) (1 - r_j² / ρ²)²    where r_j < ρ,    ρ = min(d, r'),    σ = d / 2
 
-Both r_j and r' are continuous in q, so the weights are: a guide enters or leaves at ρ, where its weight is zero,
-whether it passes the influence distance d or swaps ranks with another one. Automatic: d = r', the guide spacing around
-each root. If no guide is within d / STRETCH, d is STRETCH times the distance to the nearest one.
+Both r_j and r' are continuous in q, and so are the weights: a guide enters or leaves at ρ, where its weight is zero,
+whether it passes the influence distance d or swaps ranks with another guide. Automatic: d = r', the guide spacing
+around each root. If no guide is within d / STRETCH, d is STRETCH times the distance to the nearest one.
 
-Then the weights of guides whose shape differs from the nearest one's are reduced: `limited`, which depends on the
-guides' shape and not on roots. It needs no search, and is repeated while combing.
+`limited` then reduces the weights of guides whose shape differs from the nearest one's. It depends on the guides'
+shape and not on roots, so it needs no search and is repeated while combing.
 """
 
 import math
@@ -30,8 +30,8 @@ from . import cpu_weights, part_lines
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 STRETCH = 1.25
-EVERYWHERE = 1e18  # [m]: a distance to search that leaves nothing out
-SURPLUS = 3  # times the guides wanted are looked at where a part line may be in the way of some
+EVERYWHERE = 1e18  # [m]: an unlimited search distance
+SURPLUS = 3  # factor of the number of candidates near part lines, which may separate some of them
 
 UNLIMITED = 200.0  # in logarithms of lengths: more than any two floats differ by
 FADE = math.radians(30.0)  # of the angle limit, over which a guide's weight fades
@@ -39,10 +39,10 @@ FADE = math.radians(30.0)  # of the angle limit, over which a guide's weight fad
 
 @dataclass(frozen=True)
 class Candidates:
-    """The guides nearest to each strand, nearest first, and those that are left out: (S, k + 1) arrays on one device.
+    """The guides nearest to each strand, nearest first, and the first excluded one: (S, k + 1) arrays on one device.
 
-    indices int32, -1 where there are no more; ways float32 [m] to them along the surface or through space, inf then;
-    guide_count: how many guides there were, which all indices are below.
+    indices int32, -1 in unused slots; ways float32 [m], lengths of paths to them around part lines or straight, inf in
+    unused slots; guide_count: number of guides, above all indices.
     """
 
     indices: "wp.array2d[int]"
@@ -55,8 +55,8 @@ class GuideWeights:
     """The guides that each strand follows, nearest first: (S, k) arrays on one device.
 
     indices int32, -1 in unused slots; weights float32, adding up to one in every row, 0 in unused slots; turns vec2:
-    cosine and sine of the angle about the normal from the guide's frame to the strand's; guide_count: how many guides
-    there are, which all indices are below.
+    cosine and sine of the angle about the normal from the guide's frame to the strand's; guide_count: number of guides,
+    above all indices.
     """
 
     indices: "wp.array2d[int]"
@@ -77,7 +77,7 @@ class Limits:
 
     @property
     def fading(self) -> tuple[float, float, float, float]:
-        """The cosine at which a guide has no share, 1 / the range over which it fades; so too logarithms of lengths."""
+        """(cosine at which a guide has no weight, 1 / the range over which it fades, the same for logs of lengths)."""
         none, all_of_it = -3.0, -2.0
         if self.angle < math.pi:
             none, all_of_it = math.cos(self.angle), math.cos(max(self.angle - FADE, 0.0))
@@ -87,17 +87,17 @@ class Limits:
 
 @dataclass(frozen=True)
 class Reach:
-    """The strands that follow each guide, as compressed rows: guide g's are strands[starts[g]:starts[g + 1]]."""
+    """The strands that follow each guide, as compressed rows: those of guide g are strands[starts[g]:starts[g + 1]]."""
 
     starts: np.ndarray  # (G+1,) int64
     strands: np.ndarray  # int32
 
     def of(self, guides: np.ndarray) -> np.ndarray:
-        """Indices, rising, of the strands that follow any of some guides."""
+        """Return the rising indices of the strands that follow any of some guides."""
         if len(guides) == len(self.starts) - 1:
             reached = self.strands
         else:
-            # Of few guides: time that depends on their strands, not on all.
+            # For few guides the time depends on their strands, not on all.
             rows = [self.strands[self.starts[guide] : self.starts[guide + 1]] for guide in guides]
             reached = np.concatenate([self.strands[:0], *rows])
         is_reached = np.zeros(int(reached.max(initial=-1)) + 1, bool)
@@ -106,12 +106,12 @@ class Reach:
 
 
 def reach(guide_weights: GuideWeights, guide_count: int) -> Reach:
-    """The `Reach` of guides, from the `GuideWeights` of the strands that follow them."""
+    """Return the `Reach` of guides, from the `GuideWeights` of the strands that follow them."""
     return reach_by(guide_weights.indices.numpy(), guide_count)
 
 
 def reach_by(indices: np.ndarray, guide_count: int) -> Reach:
-    """The `Reach` of guides, or whatever else strands go with: indices (S, k) int32 of those of each, -1 for none."""
+    """Return the `Reach` of guides or other owners; indices (S, k) int32: owners of each strand, -1 for none."""
     # Sorted as one number each, guide and then strand: four times as fast as by an order of indices.
     pairs = (indices.astype(np.int64) << 32) | np.arange(len(indices))[:, None]
     pairs = np.sort(pairs[indices >= 0])
@@ -120,12 +120,12 @@ def reach_by(indices: np.ndarray, guide_count: int) -> Reach:
 
 
 def rows(array: wp.array, chosen: wp.array[int]) -> wp.array:
-    """Some rows of a Warp array, in an array of their own; chosen: int32 Warp array on its device."""
+    """Return a copy of some rows of a Warp array; chosen: int32 Warp array on its device."""
     return wp.indexedarray(array, [chosen, *[None] * (array.ndim - 1)]).contiguous()
 
 
 def rows_here(array: wp.array, chosen: np.ndarray) -> np.ndarray:
-    """Some rows of a Warp array in the processor's memory; chosen: (M,) indices."""
+    """Return a copy of some rows of a Warp array in the processor's memory; chosen: (M,) indices."""
     if array.device.is_cpu:
         return array.numpy()[chosen]
     return rows(array, wp.array(chosen, dtype=int, device=array.device)).numpy()
@@ -141,10 +141,10 @@ def find_candidates(
     regions: tuple[np.ndarray, np.ndarray] | None = None,
     lines: part_lines.PartLines | None = None,
 ) -> Candidates:
-    """`Candidates` of strands at roots (S,) [m] with unit normals (S,), for guides (G,) likewise; all vec3 arrays.
+    """Find the `Candidates` of strands at roots (S,) [m] with unit normals (S,), among guides (G,); all vec3 arrays.
 
-    neighbour_limit: k; regions: (S,) and (G,) int32, no strand blends guides of two regions, nor of another
-    than its own if that has any; lines: `PartLines` that paths to guides must not cross.
+    neighbour_limit: k; regions: (S,) and (G,) int32, strands blend only guides of their own region, or of one other
+    region if theirs has no guides; lines: `PartLines` that paths to guides must not cross.
     """
     require_count("normals", len(normals), len(roots))
     require_count("guide normals", len(guide_normals), len(guide_roots))
@@ -161,7 +161,7 @@ def weigh(
     influence_distance: float | None,
     neighbour_limit: int,
 ) -> GuideWeights:
-    """`GuideWeights` (S, k) of `Candidates`, k + 1 of whom or more were looked for; normals (S,), guide_normals (G,).
+    """Return the `GuideWeights` (S, k) of at least k + 1 `Candidates`; normals (S,), guide_normals (G,).
 
     influence_distance: d [m], None for automatic; neighbour_limit: k.
     """
@@ -191,7 +191,7 @@ def weigh(
 
 
 def _nearest_guides(guide_roots, roots, count, regions):
-    """Indices and distances (S, count) as `hash_grid.neighbours` gives them, of guides in each root's own region."""
+    """Return indices and distances (S, count) as `hash_grid.neighbours`, of guides in each root's own region."""
     if regions is None:
         return hash_grid.neighbours(guide_roots, roots, EVERYWHERE, count)
     strand_regions, guide_regions = regions
@@ -215,10 +215,10 @@ def _nearest_guides(guide_roots, roots, count, regions):
 
 
 def _parted(lines, roots, normals, guide_roots, guide_normals, candidates, ways, regions):
-    """Candidates and ways (S, k + 1) as they are around part lines.
+    """Return candidates and path lengths (S, k + 1) around part lines.
 
-    More guides are looked at where a line is near: those behind it make room. The last way is no longer than to a guide
-    that was not looked at.
+    Near a line more guides are searched, to replace those behind it. The last path length is at most the distance to a
+    guide that was not searched.
     """
     near = part_lines.near(lines, roots, ways)
     if not len(near):
@@ -244,9 +244,9 @@ def _some(array, chosen):
 def limited(
     guide_weights: GuideWeights, guide_points: wp.array2d[wp.vec3], guide_normals: wp.array[wp.vec3], limits: Limits
 ) -> GuideWeights:
-    """`GuideWeights` without the guides that differ too much from the nearest, as combed now; (G, P) [m], normals (G,).
+    """Return `GuideWeights` without guides that differ too much from the nearest one; points (G, P) [m], normals (G,).
 
-    A guide's share fades over the last `FADE` of the angle limit, and from the square root of the length limit on.
+    A guide's weight fades over the last `FADE` of the angle limit, and from the square root of the length limit on.
     """
     require_count("guides", len(guide_points), guide_weights.guide_count)
     device = guide_points.device
@@ -322,7 +322,7 @@ def _weigh(
     if distance == 0.0:
         distance = left_out
         if left_out == wp.inf:
-            # There are at most k: none is excluded, and the farthest is well within range.
+            # At most k guides: none is excluded, and the farthest is well within range.
             for slot in range(limit):
                 if ways[strand, slot] < wp.inf:
                     distance = STRETCH * ways[strand, slot]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What ties hair to its guides: where strands are rooted, whom each follows, and what it is known by.
+"""Binding of hair to its guides: roots, guide indices and weights, and IDs of strands.
 
 Warp is imported late, because the import is slow.
 """
@@ -23,31 +23,31 @@ if TYPE_CHECKING:
 class HairBinding:
     """Binding of hair to a surface and its guides, which combing does not change.
 
-    The sum over guides and what follows it (grooming/following.py) know of strands what stands here.
+    It is all that the weighted sum and the following stages (grooming/following.py) need of strands.
     """
 
     roots: SurfacePoints
     positions: "wp.array[wp.vec3]"  # (S,) [m]
-    normals: "wp.array[wp.vec3]"  # (S,) unit: the frames of roots follow from them (`guide_weights.frame`)
+    normals: "wp.array[wp.vec3]"  # (S,) unit; they define the frames of roots (`guide_weights.frame`)
     guide_positions: np.ndarray  # (G, 3) float32 [m], of the guides' roots
     guide_normals: "wp.array[wp.vec3]"  # (G,) unit, at the guides' roots
     candidates: "Candidates"  # (S, k + 1)
-    guide_weights: "GuideWeights"  # (S, k), before guides that differ are left out
+    guide_weights: "GuideWeights"  # (S, k), before limits on differences of shape
     limits: "Limits"
     keep_length: float
-    is_mirrored: bool = False  # whether triangles are wound the other way than where roots are stored
+    is_mirrored: bool = False  # whether the winding of triangles is opposite to that of the stored roots
 
     @cached_property
     def identities(self) -> tuple[np.ndarray, np.ndarray]:
-        """(S,) int32 and (S,) float32 in [0, 1): what strands are known by, and differ by, whichever others there are.
+        """(S,) int32 IDs and (S,) float32 random numbers in [0, 1) of strands.
 
-        They follow from a strand's root alone: neither another number of strands nor an update of some changes them.
+        They depend only on a strand's root, not on the number or on updates of other strands.
         """
         return geometry.root_frames.identities(self.roots, self.is_mirrored)
 
     @cached_property
     def leaders(self) -> np.ndarray:
-        """(S,) int32: the strand nearest to the first guide of each."""
+        """(S,) int32: for each strand, the strand nearest to its first guide."""
         first = self.guide_weights.indices.numpy()[:, 0]
         return interpolation.clump_centers.clump_centers(first, self.positions.numpy(), self.guide_positions)
 
@@ -60,7 +60,7 @@ def weighed(
     settings: Any,
     is_mirrored: bool = False,
 ) -> HairBinding:
-    """The `HairBinding` of strands that have found their guides.
+    """Return the `HairBinding` of strands with `Candidates`.
 
     root_frames: positions (S,) [m] and unit normals (S,), vec3; guide_frames: positions (G, 3) float32 [m] and unit
     normals (G,) vec3; settings: `HairSettings`.
@@ -84,12 +84,12 @@ def weighed(
 
 
 def limited_again(binding: HairBinding, settings: Any) -> HairBinding:
-    """A `HairBinding` with the same weights and other limits or lengths; settings: `HairSettings`."""
+    """Return a `HairBinding` with the same weights and other limits or lengths; settings: `HairSettings`."""
     limits = interpolation.guide_weights.Limits(settings.angle_limit, settings.length_limit)
     return replace(binding, limits=limits, keep_length=settings.keep_length)
 
 
 def weigh_again(binding: HairBinding, settings: Any) -> HairBinding:
-    """A `HairBinding` with other weights, limits or lengths: no search. For at most as many guides as were found."""
+    """Return a `HairBinding` with other weights, limits or lengths, without a search, for at most as many guides."""
     at_roots, at_guides = (binding.positions, binding.normals), (binding.guide_positions, binding.guide_normals)
     return weighed(binding.roots, at_roots, at_guides, binding.candidates, settings, binding.is_mirrored)

@@ -15,10 +15,10 @@ normals are. With a frame F (tangent, bitangent, normal) at either root it is F_
 about the normal. So guides are transformed to their frames once, a neighbour costs five multiplications per point
 instead of nine, and the strand's frame is applied to the sum.
 
-interpolation.cpp makes eight segments of a strand at once, in vector registers of a processor (Clang's vectors, which
-Warp compiles for the processor that it runs on: AVX, NEON) or in neighboring threads of a GPU. Sums stay in registers
-over all guides, segments are added up to points, and a strand is written once. The equations stand in guide_sum.strand,
-which the shader that interpolates where strands are drawn includes too.
+interpolation.cpp computes eight segments of a strand at once, in vector registers of a processor (Clang's vectors,
+which Warp compiles for the processor that it runs on: AVX, NEON) or in neighboring threads of a GPU. Sums over all
+guides stay in registers, segments are added up to points, and a strand is written once. The equations are in
+guide_sum.strand, which the interpolating shader includes too.
 """
 
 from collections.abc import Callable
@@ -33,7 +33,7 @@ from .guide_weights import GuideWeights, frame
 
 wp.set_module_options({"enable_backward": False})
 
-SEGMENTS = 8  # that are computed at once
+SEGMENTS = 8  # computed at once
 
 
 def interpolate(
@@ -46,10 +46,10 @@ def interpolate(
     out: wp.array2d[wp.vec3] | None = None,
     under_way: Callable[[], None] | None = None,
 ) -> wp.array2d[wp.vec3]:
-    """(S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,) that follow guides (G, P) [m], normals (G,).
+    """Return (S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,), for guides (G, P) [m], normals (G,).
 
-    keep_length: how much of the way from Eq. 10 to segments as long as the guides' on average, 0 to 1; out: array to
-    fill and return, None for a new one; under_way: on the processor, as of `parallel.launch`. Raises `HairError` where
+    keep_length: blend from Eq. 10 (0) to segments with the average length of the guides' segments (1); out: array to
+    fill and return, None for a new one; under_way: on the processor, as of `parallel.launch`. Raises `HairError` if
     counts do not match.
     """
     require_count("normals", len(normals), len(roots))
@@ -123,7 +123,7 @@ def _put_strands(
     weights: wp.array2d[float],
     turns: wp.array2d[wp.vec2],
     keep_length: float,
-    threads: int,  # of a strand
+    threads: int,  # per strand
     # outputs
     out_points: wp.array2d[wp.vec3],
 ):
@@ -147,7 +147,7 @@ def _put_strands(
 
 @wp.func
 def _framed_offset(guide_points: wp.array2d[wp.vec3], guide: int, point: int, normal: wp.vec3):
-    """Eq. 7's offset to a point after the root, in the guide's frame, and its length; zero past the tip."""
+    """Offset of Eq. 7 to a point after the root, in the guide's frame, and its length; zero past the tip."""
     tangent, bitangent = frame(normal)
     if point >= guide_points.shape[1]:
         return wp.vec4()

@@ -6,9 +6,9 @@ shorter than the triangle of root, guide and any point v of that part, so with t
 
     length = min over {odd pieces, even pieces} of max over their points v of |q - v| + |v - g|
 
-which is exact for straight lines, and continuous wherever the root does not pass through the line: past an end or a
-bend that the straight path touches, the last piece is only v, on it. So the separation decreases towards
-the end of a line. No path leads around an end at the surface's border or at another line.
+which is exact for straight lines, and continuous unless the root passes through the line: where the straight path
+touches an end or a bend v, the last piece is only the point v on the path. So the separation decreases towards the end
+of a line. No path leads around an end at the surface's border or at another line.
 """
 
 from dataclasses import dataclass
@@ -26,17 +26,17 @@ from ..kernels.checks import require_count, require_indices
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-PIECES = 64  # to the longest side of the surface: how finely a line is laid on it
+PIECES = 64  # pieces of a line per longest side of the surface, when it is laid on the surface
 
 CLOSED, BLOCKED_START, BLOCKED_END = 1, 2, 4
 
 
 @dataclass(frozen=True)
 class PartLines:
-    """Lines on a surface, on a device: points (N,) vec3 [m], line after line.
+    """Lines on a surface, on a device: points (N,) vec3 [m], concatenated.
 
-    starts (L+1,) int32: where each begins; ends (L,) int32: CLOSED, BLOCKED_START, BLOCKED_END or their sum, by which
-    ends there is no way round.
+    starts (L+1,) int32: offset of each line; ends (L,) int32: CLOSED, BLOCKED_START, BLOCKED_END or their sum, for ends
+    that no path leads around.
     """
 
     points: "wp.array[wp.vec3]"
@@ -47,9 +47,9 @@ class PartLines:
 def lay(
     mesh: TriMesh, segments: ArrayLike, device: wp.DeviceLike = "cpu", drawn_on: np.ndarray | None = None
 ) -> PartLines:
-    """The `PartLines` of segments (L, 2, 3) [m] near a checked mesh; one that begins where the last ended goes on.
+    """Lay segments (L, 2, 3) [m] on a checked mesh, as `PartLines`; consecutive segments form a line.
 
-    drawn_on: the vertices (V, 3) that the segments are near to, if others than the mesh's: the surface as it is posed.
+    drawn_on: vertices (V, 3) of the posed surface that the lines were drawn on, if they differ from the mesh's.
     """
     segments = np.asarray(segments, np.float64)
     if segments.ndim != 3 or segments.shape[1:] != (2, 3) or not len(segments):
@@ -83,15 +83,15 @@ def lay(
 
 
 def at_rest(mesh: TriMesh, segments: np.ndarray, drawn_on: np.ndarray, device: wp.DeviceLike = "cpu") -> np.ndarray:
-    """(M, 2, 3) float64 segments [m] on a checked mesh that `lay` finds for those near to vertices drawn_on (V, 3)."""
+    """Return (M, 2, 3) float64 segments [m] on a checked mesh, for segments drawn near posed vertices (V, 3)."""
     if not np.isfinite(segments).all():
-        return segments  # which `lay` refuses
+        return segments  # `lay` raises the error
     lines, _step = _on_mesh(mesh, segments, drawn_on, device)
     return np.concatenate([_pairs(line) for line in lines])
 
 
 def _on_mesh(mesh, segments, drawn_on, device):
-    """[(N, 3) float64]: polylines on a mesh of those near to it, or to `drawn_on`, and how far apart points are [m]."""
+    """Return [(N, 3) float64 polylines] on a mesh, from lines near it or near `drawn_on`, and their step [m]."""
     surface = mesh if drawn_on is None else TriMesh(drawn_on, mesh.triangles)
     step = np.ptp(mesh.vertices.astype(np.float64), axis=0).max() / PIECES
     query = closest_point.SurfaceQuery(surface, device=device)
@@ -100,9 +100,9 @@ def _on_mesh(mesh, segments, drawn_on, device):
 
 
 def in_order(edges: ArrayLike) -> np.ndarray:
-    """(L, 2) indices of points → the same edges, each where the one before it ends if it can be: lines end to end.
+    """Order edges (L, 2), indices of points, so that each starts at the end of the previous one if possible.
 
-    Lines end where one edge alone ends, or more than two meet; rings begin at their first edge.
+    Lines end where only one edge ends, or more than two meet; rings start at their first edge.
     """
     pairs = [tuple(edge) for edge in np.asarray(edges).tolist()]
     at = {}
@@ -131,13 +131,13 @@ def in_order(edges: ArrayLike) -> np.ndarray:
 
 
 def chained(segments: np.ndarray) -> list[np.ndarray]:
-    """[(N, 3)]: segments (L, 2, 3) that begin where the last ended become one polyline."""
+    """Return [(N, 3) polylines]: segments (L, 2, 3) that start at the end of the previous one are joined."""
     breaks = np.flatnonzero((segments[1:, 0] != segments[:-1, 1]).any(axis=1)) + 1
     return [np.concatenate([part[:1, 0], part[:, 1]]) for part in np.split(segments, breaks)]
 
 
 def divided(line: np.ndarray, step: float) -> np.ndarray:
-    """(N, 3) → (M, 3): points of a polyline a step apart where they were farther, a quarter of one where nearer."""
+    """Resample a polyline (N, 3) → (M, 3): points at most a step apart, and at least a quarter of a step."""
     along = np.cumsum(np.concatenate([[0.0], np.linalg.norm(np.diff(line, axis=0), axis=1)]))
     is_kept = np.diff(np.floor(along / (0.25 * step)), prepend=-1.0) > 0.0
     is_kept[-1] = True
@@ -152,7 +152,7 @@ def _pairs(line):
 
 
 def _border_segments(mesh):
-    """(B, 2, 3) float64: edges that one triangle alone has, vertices in one place counting as one."""
+    """Return (B, 2, 3) float64: border edges, of only one triangle; coincident vertices count as one."""
     _places, same = np.unique(mesh.vertices, axis=0, return_inverse=True)
     triangles = same.reshape(-1)[mesh.triangles]
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -163,7 +163,7 @@ def _border_segments(mesh):
 
 
 def _nearest_on(segments, place):
-    """(3,): the point of segments (B, 2, 3) that is nearest to a place, None without any."""
+    """Return (3,): the point of segments (B, 2, 3) that is nearest to a position, None without segments."""
     if not len(segments):
         return None
     start, edge = segments[:, 0], segments[:, 1] - segments[:, 0]
@@ -174,7 +174,7 @@ def _nearest_on(segments, place):
 
 
 def near(lines: PartLines, roots: wp.array[wp.vec3], ways: wp.array2d[float]) -> np.ndarray:
-    """(N,) int32: those of roots (S,) [m] that a line is nearer to than the last of their ways (S, K) [m] is long."""
+    """Return (N,) int32: roots (S,) [m] whose distance to a line is below the length of their last path (S, K) [m]."""
     require_count("distances", len(ways), len(roots))
     is_near = wp.empty(len(roots), dtype=bool, device=roots.device)
     kernel_cache.launch(
@@ -192,9 +192,9 @@ def go_round(
     candidates: wp.array2d[int],
     ways: wp.array2d[float],
 ) -> None:
-    """Lengthen ways (S, K) [m] from roots to their candidate guides (S, K) where lines are between; sorts both again.
+    """Lengthen paths (S, K) [m] from roots to candidate guides (S, K) around lines between them; sorts both again.
 
-    A guide behind a line without ends is infinitely far away; if all are, the nearest stays where it was.
+    A guide behind a line without open ends is infinitely far away; if all are, the nearest one is unchanged.
     """
     require_count("normals", len(normals), len(roots))
     require_count("guide normals", len(guide_normals), len(guide_roots))
@@ -219,14 +219,14 @@ def _distance_to_segment(place: wp.vec3, start: wp.vec3, end: wp.vec3):
 
 @wp.func
 def _crosses(root: wp.vec3, guide: wp.vec3, up: wp.vec3, start: wp.vec3, end: wp.vec3):
-    """Whether two segments cross as seen from above, no farther apart in height than the way is long."""
+    """Whether two segments cross as seen from above, with a difference in height of at most the length of the path."""
     way = guide - root
     edge = end - start
     start_side = wp.dot(wp.cross(way, start - root), up)
     end_side = wp.dot(wp.cross(way, end - root), up)
     root_side = wp.dot(wp.cross(edge, root - start), up)
     guide_side = wp.dot(wp.cross(edge, guide - start), up)
-    # A point on the other segment counts to one side of it, so a way past a bend crosses one of its edges, or both.
+    # A point on the other segment counts to one of its sides, so a path past a bend crosses one of its edges, or both.
     if (start_side > 0.0) == (end_side > 0.0) or (root_side > 0.0) == (guide_side > 0.0):
         return False
     on_edge = start + start_side / (start_side - end_side) * edge
@@ -246,7 +246,7 @@ def _way_round(
     first: int,
     last: int,
 ):
-    """How far it is around one line, of whose points those from `first` to `last` are near; 0 if it is not between."""
+    """Length of the path around one line, whose points from `first` to `last` are near; 0 if it is not crossed."""
     is_between = bool(False)
     for point in range(first, last):
         is_between = is_between or _crosses(root, guide, up, points[point], points[point + 1])

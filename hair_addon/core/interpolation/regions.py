@@ -11,9 +11,10 @@ from ..geometry.mesh import SurfacePoints
 
 @dataclass(frozen=True)
 class Regions:
-    """corners (F, 3) int32: the region of each triangle's corners; guides (G,) int32: the guides' own.
+    """corners (F, 3) int32: the region of each triangle's corners; guides (G,) int32: regions of the guides.
 
-    Without corners, strands belong to the region of their nearest guide; without guides, guides belong to their roots'.
+    Without corners, strands belong to the region of their nearest guide; without guides, guides belong to the region at
+    their roots.
     """
 
     corners: np.ndarray | None = None
@@ -21,7 +22,7 @@ class Regions:
 
 
 def regions_at(corners: np.ndarray, points: SurfacePoints) -> np.ndarray:
-    """(N,) int32: the region that most of the corners' weight at each `SurfacePoints` is of.
+    """Return (N,) int32: the region with the largest barycentric weight at each of the `SurfacePoints`.
 
     So the border between two regions of vertices is a straight line through each triangle, halfway along its edges.
     """
@@ -31,14 +32,14 @@ def regions_at(corners: np.ndarray, points: SurfacePoints) -> np.ndarray:
 
 
 def _labels(corners, points):
-    """(N,) int64: `regions_at`, nowhere without corners."""
+    """Return (N,) int64: `regions_at`, or `_NOWHERE` without corners."""
     return np.full(len(points), _NOWHERE) if corners is None else regions_at(corners, points).astype(np.int64)
 
 
 def kept_apart(
     regions: Sequence[Regions], roots: SurfacePoints, guide_roots: SurfacePoints
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """(S,) and (G,) int32, alike where all of some `Regions` are; -1 for strands in a region that no guide is in.
+    """Return (S,) and (G,) int32, equal where all `Regions` are equal; -1 for strands in a region without guides.
 
     roots, guide_roots: `SurfacePoints`. None for no regions.
     """
@@ -55,4 +56,4 @@ def kept_apart(
     return number_of[both[len(known) :]], labels.reshape(-1).astype(np.int32)
 
 
-_NOWHERE = np.int64(2) ** 40  # no attribute of 32 bits holds it
+_NOWHERE = np.int64(2) ** 40  # outside the range of 32-bit attributes

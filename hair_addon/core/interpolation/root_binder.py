@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RootBinder:
-    """A surface with guides, as strands are bound to it.
+    """A surface with guides, to which strands are bound.
 
-    mesh: `TriMesh` [m]; settings: `HairSettings`; regions: that no strand blends guides of two of; lines: `PartLines`
-    that no strand blends guides across, or None; is_mirrored: whether triangles are wound the other way than where
-    roots are stored.
+    mesh: `TriMesh` [m]; settings: `HairSettings`; regions: strands blend only guides of one region; lines: `PartLines`
+    that strands do not blend guides across, or None; is_mirrored: whether the winding of triangles is opposite to that
+    of the stored roots.
     """
 
     mesh: TriMesh
@@ -35,7 +35,7 @@ class RootBinder:
     device: str = "cpu"
 
     def bind(self, roots: SurfacePoints) -> HairBinding:
-        """The `HairBinding` of strands at roots."""
+        """Return the `HairBinding` of strands at roots."""
         guide_positions, guide_normals = self._guide_frames
         root_positions, root_normals = geometry.root_frames.rooted(self.mesh, roots, self.device)
         candidates = interpolation.guide_weights.find_candidates(
@@ -51,9 +51,9 @@ class RootBinder:
         return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored)
 
     def nearest(self, strands: HairBinding, centres: HairBinding) -> np.ndarray:
-        """(S, 2) int32: the two centres nearest to each strand, in its region and on its side of part lines.
+        """Return (S, 2) int32: the two centres nearest to each strand, in its region and on its side of part lines.
 
-        -1 where there are not as many.
+        -1 if there are fewer.
         """
         regions = self._with_guide_regions(strands, centres)
         found = interpolation.guide_weights.find_candidates(
@@ -66,7 +66,7 @@ class RootBinder:
         return nearest
 
     def with_settings(self, settings: Any) -> "RootBinder":
-        """The same with other `HairSettings`."""
+        """Return a copy with other `HairSettings`."""
         return replace(self, settings=settings)
 
     @cached_property
@@ -74,7 +74,7 @@ class RootBinder:
         return geometry.root_frames.rooted(self.mesh, self.guide_roots, self.device)
 
     def _with_guide_regions(self, strands, centres):
-        """Regions (S,) and (K,) of strands and of centres, as of the guide that each follows first; None for none."""
+        """Return the regions (S,) and (K,) of the first guides of strands and centres; None without regions."""
         kept_apart = interpolation.regions.kept_apart(self.regions, self.guide_roots, self.guide_roots)
         if kept_apart is None:
             return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles: trim, clump, curl, frizz and others, applied in order to strands that are made."""
+"""Styles: trim, clump, curl, frizz and others, applied in order to interpolated strands."""
 
 from typing import TYPE_CHECKING
 

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all styles share: the settings of how much of a style a strand takes, and where along it.
+"""Common settings of all styles: amount, variation, mask, and profile from root to tip.
 
-The amount of a style at point i of strand s, with x_i the part of the strand's length from its root:
+The amount of a style at point i of strand s, with x_i the fraction of the strand's length from its root:
 
     A_si = amount · mask_s · (1 - vary · h_s) · profile(x_i)
     profile(x) = root + (tip - root) · g(clamp((x - start) / (1 - start), 0, 1))
 
 h_s is a random number of the strand (random_numbers.py) and g the curve of Blender's hair nodes with their Shape σ:
-x^e up to σ = ½, 1 - (1 - x)^e above, with e = -log2(1 - min(σ, 1 - σ)). Within half a segment of where it begins x^e is
-a straight line: it would begin vertically, and points would jump where its beginning passes them.
+x^e up to σ = ½, 1 - (1 - x)^e above, with e = -log2(1 - min(σ, 1 - σ)). Within half a segment after its start x^e is
+replaced by a straight line: it starts vertically, so points would jump when the start passes them.
 """
 
 import math
@@ -23,7 +23,7 @@ from ..params import Settings, param
 
 @dataclass(frozen=True)
 class StyleSettings(Settings):
-    """How much of a style a strand takes: settings of every style."""
+    """Settings of every style: amount, variation, seed and mask."""
 
     is_on: bool = param(True, "Apply this style", label="Enabled")
     amount: float = param(1.0, "Strength of the style; at 0 the hair is unchanged", low=0.0, high=1.0, subtype="FACTOR")
@@ -63,7 +63,7 @@ class ProfiledSettings(StyleSettings):
 
 @dataclass(frozen=True)
 class Profile:
-    """The numbers of a profile as a kernel reads them."""
+    """The numbers of a profile, as read by kernels."""
 
     root: float = 1.0
     tip: float = 1.0
@@ -77,10 +77,10 @@ EVERYWHERE = Profile()
 
 @dataclass(frozen=True)
 class TreeSettings:
-    """What the clump sites of a style follow from.
+    """Inputs of the clump sites of a style.
 
-    sizes: distance between the sites of each level [m], the largest first; crossover: part of the strands that belongs
-    to the second nearest site.
+    sizes: distance between the sites of each level [m], the largest first; crossover: fraction of the strands that
+    belong to the second nearest site.
     """
 
     sizes: tuple[float, ...]
@@ -90,9 +90,9 @@ class TreeSettings:
 
 @dataclass(frozen=True)
 class Cutter:
-    """A plane that trims strands: they keep what lies on the side that the unit normal (3,) points away from.
+    """A plane that trims strands: parts on the side of its unit normal (3,) are cut off.
 
-    point: (3,) [m] of the plane, in the coordinates of strands.
+    point: (3,) [m] on the plane, in the coordinates of strands.
     """
 
     point: np.ndarray
@@ -101,9 +101,9 @@ class Cutter:
 
 @dataclass(frozen=True)
 class Step:
-    """A row of a program: what one text, a .strand file, does to strands.
+    """A row of a program: one run of a .strand file.
 
-    kind: of `kinds.STEPS`; numbers: the values of that file's own numbers, by the names in `NUMBERS` of its module;
+    kind: of `kinds.STEPS`; numbers: values of the file's own parameters, by the names in `NUMBERS` of its module;
     level: of the clump centres that it needs, counted from the style's first; None for those of a style above it.
     """
 
@@ -111,13 +111,13 @@ class Step:
     settings: StyleSettings
     amount: float
     profile: Profile
-    numbers: Mapping[str, Any]  # floats, and tuples of them where a name has a size
+    numbers: Mapping[str, Any]  # floats, or tuples of floats for a name with a size
     level: int | None = None
     keep_length: float = 1.0
 
 
 def evaluated(profile: Profile, x: np.ndarray) -> np.ndarray:
-    """The profile at x (…, P), parts of the length of strands of P points, from 0 to 1."""
+    """Return the profile at x (…, P), fractions from 0 to 1 of the length of strands of P points."""
     y = np.clip((x - profile.start) / (1.0 - profile.start), 0.0, 1.0)
     if profile.is_flipped:
         y = 1.0 - _power(1.0 - y, profile.exponent)
@@ -132,7 +132,7 @@ def _power(x, exponent):
 
 
 def profile_of(settings: StyleSettings) -> Profile:
-    """The `Profile` of a style's settings; all of the amount everywhere where it has none."""
+    """Return the `Profile` of a style's settings; without profile settings, a constant one."""
     if not isinstance(settings, ProfiledSettings):
         return EVERYWHERE
     shape = settings.shape
@@ -141,7 +141,7 @@ def profile_of(settings: StyleSettings) -> Profile:
 
 
 def step_of(settings: StyleSettings, kind: str, numbers: Mapping[str, Any], **changes: Any) -> Step:
-    """The `Step` of a kind with the amount and the profile of its style; changes: other fields of it."""
+    """Return the `Step` of a kind with the amount and the profile of its style; changes: other fields."""
     return replace(Step(kind, settings, settings.amount, profile_of(settings), numbers), **changes)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bend: segments turn in a plane of the strand's frame, by default away from the surface. Roll winds up the tips.
+"""Bend: segments rotate in a plane of the strand's frame, by default away from the surface. Roll winds up the tips.
 
     o'_i = d_i (cos θ_i t_i + sin θ_i (cos ψ u_i + sin ψ v_i)),    θ_i = A_si · angle
 
@@ -49,6 +49,6 @@ ROLL = {"start": 0.75, "angle": 6.0 * math.pi}  # as added from the menu under t
 
 
 def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
-    """The steps that bend strands."""
+    """Return the steps that bend strands."""
     angle, direction = settings.angle / (2.0 * math.pi), settings.turn / (2.0 * math.pi)
     return [step_of(settings, STEP, {"angle": angle, "direction": direction, "random_turn": settings.random_turn})]

@@ -3,13 +3,13 @@
 
     ρ = R (sin(φ + 2πg/n), b sin 2(φ + 2πg/n)) for three tresses,    ρ = R (cos(φ + πg), sin(φ + πg)) for two
 
-ρ is in the frames of the lock's centre, φ grows by 2π a pitch along it, and g is the tress that a strand belongs to, by
-its place in the lock. How far along the centre a point of a strand is, a, follows from its arc length s alone:
+ρ is in the frames of the lock's centre, φ grows by 2π per pitch along it, and g is the tress of a strand, by its place
+in the lock. The distance a of a point along the centre depends only on its arc length s:
 
     da/ds = 1 / sqrt(1 + |dρ/da|²)
 
-so no point slides along its tress when the hair swings; where strands gather they stretch for it, by half at most.
-Centre lines of three tresses stay 0.90 R apart for a pitch of 6 R, so a tress may have half of that as its radius.
+so no point slides along its tress when the hair swings; where strands gather, they stretch by half at most. Centre
+lines of three tresses are at least 0.90 R apart for a pitch of 6 R, so a tress can have half of that as its radius.
 """
 
 from collections.abc import Mapping
@@ -78,12 +78,12 @@ class Settings(ProfiledSettings):
 
 
 def tree(settings: Settings) -> TreeSettings:
-    """What the places of the braids follow from."""
+    """Return the inputs of the sites of braids."""
     return TreeSettings((settings.size,), settings.seed, 0.0)
 
 
 def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
-    """The steps that weave strands."""
+    """Return the steps that weave strands."""
     numbers = {name: getattr(settings, name) for name in ("radius", "pitch", "thickness")}
     numbers |= {"flat_part": 1.0 - settings.flatness, "tress_count": 3.0 if settings.pattern == "BRAID" else 2.0}
     return [step_of(settings, STEP, numbers, level=0)]

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clump: strands gather around centre strands, which stand evenly on the surface and are not part of the hair.
+"""Clump: strands gather around centre strands, which are spaced evenly on the surface and are not part of the hair.
 
 At the arc length s_i of a point p_i, with C the centre strand of level k after the levels before, and c = C(s_i):
 
     q_i = c + (1 - B_ki (1 - thickness)) Rot(t_c, 2π twist · profile(x_i)) (p_i - c)
 
-The strand follows the curve of these points as far as its own length goes, so that what is drawn onto the centre lies
-on it (clump.strand). Roots stay: the pull that the profile has at the root grows over twice the distance to the centre.
-The part `stray` of strands joins no lock; a tenth more joins in part, so the part may be animated. clump_trees.py has
-sites and levels.
+The strand follows the curve of these points up to its own length, so that strands that are drawn onto the centre lie on
+it (clump.strand). Roots do not move: a pull at the root grows over twice the distance to the centre. The fraction
+`stray` of strands joins no lock; a tenth more joins partly, so that it can be animated. Sites and levels are in
+clump_trees.py.
 """
 
 import math
@@ -94,30 +94,30 @@ class Settings(ProfiledSettings):
 
 
 def sizes(settings: Settings) -> list[float]:
-    """Distance [m] between the centers of each level's locks, the largest first."""
+    """Return the distances [m] between the centers of each level's locks, the largest first."""
     return [settings.size * settings.ratio**level for level in range(settings.levels)]
 
 
 def amounts(settings: Settings) -> list[float]:
-    """Strength of each level's locks, the largest first. All are zero where the amount is."""
+    """Return the strength of each level's locks, the largest first. All are zero if the amount is zero."""
     parts = [level / max(settings.levels - 1, 1) for level in range(settings.levels)]
     return [min(settings.amount * (1.0 - part + part * settings.fine_amount), 1.0) for part in parts]
 
 
 def packed_thickness(strand_density: float, radius: float) -> float:
-    """The thickness at which the strands of a lock touch; strand_density: per m² of surface, radius: of a strand [m].
+    """Return the thickness at which strands of a lock touch; strand_density: per m² of surface; radius: of strands [m].
 
-    Discs are packed to 0.9 of an area at most.
+    Discs cover at most 0.9 of an area.
     """
     return min(math.sqrt(strand_density * math.pi * radius**2 / 0.9), 1.0)
 
 
 def tree(settings: Settings) -> TreeSettings:
-    """What the clump sites follow from."""
+    """Return the inputs of the clump sites."""
     return TreeSettings(tuple(sizes(settings)), settings.seed, settings.crossover)
 
 
 def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
-    """The steps that gather strands, one for each level."""
+    """Return the steps that gather strands, one for each level."""
     own = {"thickness": settings.thickness, "twist": settings.twist / settings.levels, "stray": settings.stray}
     return [step_of(settings, STEP, own, amount=amount, level=level) for level, amount in enumerate(amounts(settings))]

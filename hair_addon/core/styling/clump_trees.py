@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sites of clumps in levels, and the strands that belong to each.
 
-Sites are evenly placed on the surface and are not roots of the hair: a strand's clump depends on its own root alone,
-whichever other strands there are. A strand belongs to the nearest site of the finest level, and a site to the nearest
-one of the next coarser level, so locks are made of whole smaller locks. One in a region without sites belongs to none.
+Sites are evenly spaced on the surface and are not roots of the hair, so a strand's clump depends only on its own root.
+A strand belongs to the nearest site of the finest level, and a site to the nearest site of the next coarser level, so
+locks consist of whole smaller locks. Strands and sites in a region without sites belong to none.
 """
 
 import math
@@ -22,30 +22,30 @@ from ..long_work import Progress, no_progress, part_of
 from .base import TreeSettings
 from .random_numbers import CROSSOVER, random_numbers
 
-MOST_SITES = 20_000  # of the finest level: they take a second to place, and 50,000 on two levels seven
-MOST_SPARE = 2  # trees that no style uses at present: of a slider that goes back, of a style switched off and on
-_HEXAGON = 0.866  # area of a site's cell by the square of the distance between sites
+MOST_SITES = 20_000  # of the finest level: placing them takes a second, and 50,000 on two levels seven
+MOST_SPARE = 2  # unused trees to keep: for a slider that goes back, or a style switched off and on
+_HEXAGON = 0.866  # area of a site's cell divided by the square of the distance between sites
 
-HAIR = "hair"  # what the strands of the hair are known by; centres are by their tree and level
+HAIR = "hair"  # owner of the hair's strands; centres have their tree and level as owner
 Owner = str | tuple[TreeSettings, int]
 
 
 def site_count(area: float, size: float) -> int:
-    """Number of sites at a distance [m] from each other on an area [m²]."""
+    """Return the number of sites at a distance [m] from each other on an area [m²]."""
     return max(round(area / (_HEXAGON * size**2)), 1)
 
 
 def size_factor(area: float, tree: TreeSettings) -> float:
-    """What the sizes of a tree are multiplied by on an area [m²], so that no level has more than `MOST_SITES`."""
+    """Return the factor for the sizes of a tree on an area [m²] so that no level has more than `MOST_SITES`."""
     return max(math.sqrt(area / (_HEXAGON * MOST_SITES)) / min(tree.sizes), 1.0)
 
 
 @dataclass
 class ClumpTrees:
-    """The clump trees of one hair, each searched for once, while its surface, guides' roots and density stay.
+    """The clump trees of one hair, each computed once while its surface, guides' roots and density do not change.
 
-    binder: binds sites to guides; place(count, seed, progress): `SurfacePoints` of evenly placed sites; area: that hair
-    grows on [m²].
+    binder: binds sites to guides; place(count, seed, progress): `SurfacePoints` of evenly spaced sites; area: covered
+    by hair [m²].
     """
 
     binder: RootBinder
@@ -56,9 +56,9 @@ class ClumpTrees:
     _parents: dict[tuple[TreeSettings, int], np.ndarray] = field(default_factory=dict)
 
     def levels(self, tree: TreeSettings, progress: Progress = no_progress) -> list[HairBinding]:
-        """The centres of each level, the coarsest first, bound to guides.
+        """Return the centres of each level, the coarsest first, bound to guides.
 
-        progress(step, part): told while they are placed, and may raise to stop: then nothing of the tree is kept.
+        progress(step, part): called while they are placed; if it raises, nothing of the tree is stored.
         """
         if tree not in self._levels:
             counts = self.site_counts(tree)
@@ -68,33 +68,33 @@ class ClumpTrees:
                 for level, count in enumerate(counts)
             ]
         else:
-            self._levels[tree] = self._levels.pop(tree)  # used last
+            self._levels[tree] = self._levels.pop(tree)  # most recently used
         return self._levels[tree]
 
     def site_counts(self, tree: TreeSettings) -> list[int]:
-        """Number of sites of each level, the coarsest first."""
+        """Return the number of sites of each level, the coarsest first."""
         factor = size_factor(self.area, tree)
         return [site_count(self.area, factor * size) for size in tree.sizes]
 
     def search(self, trees: Collection[TreeSettings], progress: Progress = no_progress) -> None:
-        """Find the centres of some trees that were not searched for yet; progress as in `levels`."""
+        """Compute the centres of trees that are missing; progress as in `levels`."""
         missing = self.lacks(trees)
         for place, tree in enumerate(missing):
             self.levels(tree, part_of(progress, place / len(missing), (place + 1) / len(missing)))
 
     def lacks(self, trees: Collection[TreeSettings]) -> list[TreeSettings]:
-        """Those of some trees that were not searched for yet, each once."""
+        """Return the trees that were not computed yet, each once."""
         return [tree for tree in dict.fromkeys(trees) if tree not in self._levels]
 
     def keep_only(self, used: Collection[TreeSettings]) -> None:
-        """Forget trees that are not among the used ones, but for the last `MOST_SPARE`.
+        """Remove unused trees except the last `MOST_SPARE`.
 
         Otherwise every value of a slider would leave a tree behind.
         """
         spare = [tree for tree in self._levels if tree not in used]
         for tree in spare[: max(len(spare) - MOST_SPARE, 0)]:
             del self._levels[tree]
-        # Which copies of these trees for other weights share: what one of them forgets, another finds again.
+        # Copies of these trees for other weights share this dictionary: removed entries are computed again.
         for owner, tree in list(self._members):
             named = {tree} if isinstance(owner, str) else {tree, owner[0]}
             if not named <= self._levels.keys():
@@ -104,7 +104,7 @@ class ClumpTrees:
                 del self._parents[tree, level]
 
     def weigh_again(self, settings: Any) -> "ClumpTrees":
-        """The same trees where weights, limits or lengths of `HairSettings` changed: nothing is searched."""
+        """Return the same trees for other weights, limits or lengths of `HairSettings`, without a search."""
         weighed = {
             tree: [interpolation.hair_binding.weigh_again(binding, settings) for binding in levels]
             for tree, levels in self._levels.items()
@@ -114,9 +114,9 @@ class ClumpTrees:
         )
 
     def members(self, owner: Owner, strands: HairBinding, tree: TreeSettings) -> list[np.ndarray]:
-        """(S,) int32 per level, the coarsest first: the place of each strand's centre in its level, -1 for none.
+        """Return (S,) int32 per level, the coarsest first: the index of each strand's centre in its level, -1 for none.
 
-        owner: what the strands are known by.
+        owner: key of the strands.
         """
         key = owner, tree
         if key not in self._members:
@@ -129,12 +129,12 @@ class ClumpTrees:
         return self._members[key]
 
     def parents(self, tree: TreeSettings, level: int) -> list[np.ndarray]:
-        """(K,) int32 per level, the coarsest first: the centres that those of one level belong to, themselves last."""
+        """Return (K,) int32 per level, the coarsest first: the centres above those of a level, themselves last."""
         own = np.arange(len(self.levels(tree)[level].roots), dtype=np.int32)
         return self._upward(tree, own, level)
 
     def _upward(self, tree, places, level):
-        """Places in a level and in all coarser ones, the coarsest first."""
+        """Return indices in a level and in all coarser ones, the coarsest first."""
         found = [places]
         levels = self.levels(tree)
         for finer in range(level, 0, -1):

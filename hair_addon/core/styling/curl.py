@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curl: strands wind around their own old path, as helices or flat waves.
+"""Curl: strands wind around their former path, as helices or flat waves.
 
 With the arc of a turn ℓ = sqrt((2πR)² + h²), κ = keep_length and y the strand's progress along its path:
 
@@ -8,15 +8,14 @@ With the arc of a turn ℓ = sqrt((2πR)² + h²), κ = keep_length and y the st
                   + (2π Σ (y_j - y_(j-1)) / h_j - φ_(i-1)) h_i² / ((2πR)² (1 + (1 - flatness)²) / 2 + h_i²)
     φ_0 = 2π (h_clump + (1 - coherence) (h_s - ½)),    ρ_i = R_i (cos φ_i, ± (1 - flatness) sin φ_i)
 
-The second line leads the phase back to a turn for each pitch of y. Below a Clump, y is counted along the centre of the
-strand's lock, and ρ is in the centre's frames: strands that are rooted at different places along the lock wind as one
-(beside.strand). Without one, y is the strand's own.
+The second line corrects the phase to one turn per pitch of y. Below a Clump, y is measured along the centre of the
+strand's lock, and ρ is in the centre's frames, so that strands with different roots wind together (beside.strand).
+Without a Clump, y is the strand's own.
 
-A straight strand of length L reaches L pitch / ℓ. It is the curve of curvature R / (R² + (h/2π)²) and torsion
-(h/2π) / (R² + (h/2π)²), the helix that natural curvature gives a fibre [Bertails06]. A twentieth of the locks winds
-neither left nor right but is flat, in between, so that the part of left-handed ones may be animated. Coils whose
-handedness flips along the strand (switchbacks, or perversions) turn φ back where a one-dimensional noise of the lock
-changes sign.
+A straight strand of length L reaches L pitch / ℓ. It becomes the curve of curvature R / (R² + (h/2π)²) and torsion
+(h/2π) / (R² + (h/2π)²), the helix that natural curvature gives a fibre [Bertails06]. A twentieth of the locks, between
+left and right, is flat, so that the fraction of left-handed locks can be animated. In coils whose handedness changes
+along the strand (switchbacks, or perversions), φ reverses where a one-dimensional noise of the lock changes sign.
 """
 
 import math
@@ -31,7 +30,7 @@ DESCRIPTION = "Wind strands into coils or waves"
 STEP = "CURL"
 NUMBERS = ("radius", "pitch", "roundness", "coherence", "stretch", "left_handed", "switchback")  # of curl.strand
 
-POINTS_A_TURN = 8  # below, coils look angular
+POINTS_A_TURN = 8  # with fewer, coils look angular
 
 
 @dataclass(frozen=True)
@@ -98,18 +97,18 @@ WAVE = {"flatness": 1.0, "coherence": 0.9}  # as added from the menu under the n
 
 
 def turn_length(settings: Settings) -> float:
-    """Length [m] of strand that one turn takes at full strength."""
+    """Return the length [m] of strand in one turn at full strength."""
     radius = 2.0 * math.pi * settings.radius * settings.amount
     return math.sqrt(radius**2 * (1.0 + (1.0 - settings.flatness) ** 2) / 2.0 + settings.pitch**2)
 
 
 def points_wanted(settings: Settings, length: float) -> int:
-    """Points a strand of a length [m] needs for smooth coils."""
+    """Return the number of points that a strand of a length [m] needs for smooth coils."""
     return math.ceil(POINTS_A_TURN * length / turn_length(settings)) + 1
 
 
 def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
-    """The steps that wind strands."""
+    """Return the steps that wind strands."""
     numbers = {name: getattr(settings, name) for name in NUMBERS if name != "roundness"}
     numbers["roundness"] = 1.0 - settings.flatness
     return [step_of(settings, STEP, numbers, keep_length=settings.keep_length)]

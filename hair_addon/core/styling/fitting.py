@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings that are made for a human scalp, fitted to another surface: all lengths are multiplied by one factor."""
+"""Fitting of settings for a human scalp to another surface: all lengths are multiplied by one factor."""
 
 from collections.abc import Collection
 from dataclasses import fields, replace
@@ -16,9 +16,9 @@ _LOCKS: dict[type[StyleSettings], str] = {clump.Settings: "size", braid.Settings
 
 
 def fitted(settings: S, factor: float, strand_spacing: float = 0.0, kept: Collection[str] = ()) -> S:
-    """A style with its lengths multiplied by a factor; locks have a size of 4 strand spacings [m] at least.
+    """Return a style with its lengths multiplied by a factor; locks are at least 4 strand spacings [m] large.
 
-    kept: names of settings that stay as they are.
+    kept: names of settings that do not change.
     """
     given = {name: getattr(settings, name) for name in kept}
     if factor != 1.0:
@@ -32,12 +32,12 @@ def fitted(settings: S, factor: float, strand_spacing: float = 0.0, kept: Collec
 
 
 def fitted_value(value: Any, details: Param, factor: float) -> Any:
-    """The value of any setting: a length multiplied by a factor, within its range, and others as they are."""
+    """Return the fitted value of a setting: lengths are multiplied by a factor, within their range."""
     if details.unit != "LENGTH" or factor == 1.0:
         return value
     return _rounded(min(max(value * factor, details.low), details.high))
 
 
 def _rounded(value):
-    """To three digits, as an artist would type it."""
+    """Round to three digits, as an artist would type it."""
     return float(f"{value:.3g}")

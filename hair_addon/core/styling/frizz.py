@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frizz: strands depart from their path by band-limited noise, six waves an octave that turn left and right in turns.
+"""Frizz: strands depart from their path by band-limited noise, six waves per octave with alternating handedness.
 
     f_m = 2^((m + ½)/6 - ½) · 2^octave / wavelength,    g_m = gain^octave
     ρ_i = A_si · amplitude · (½ Σ g²)^(-½) Σ_m g_m c_m (cos θ_m, ± sin θ_m)
@@ -92,7 +92,7 @@ class Settings(ProfiledSettings):
 
 
 def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
-    """The steps that ruffle strands."""
+    """Return the steps that ruffle strands."""
     gains = settings.gain ** np.arange(settings.octaves)
     # Each coordinate of ρ has the amplitude as its root mean square: the square of a wave is one half.
     per_size = (0.5 * WAVES_AN_OCTAVE * np.sum(gains**2)) ** -0.5

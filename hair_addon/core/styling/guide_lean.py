@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that lean, kept off the surface: the styles Lean and Wet (lean.py, wet.py) on guides.
+"""Leaning of guides with a clearance from the surface: the styles Lean and Wet (lean.py, wet.py) on guides.
 
-t'_i = unit((1 - A) t_i + A D), t_i where that is shorter than 1e-3. A segment that would end nearer to the surface than
-the clearance is turned towards the surface's normal until it ends as high as that; lengths stay.
+t'_i = unit((1 - A) t_i + A D), or t_i if that sum is shorter than 1e-3. A segment that would end nearer to the surface
+than the clearance is rotated towards the surface's normal until it ends at the clearance; lengths are kept.
 """
 
 import numpy as np
@@ -16,11 +16,11 @@ from ..kernels.checks import require_count
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_LEAST_AMOUNT = wp.constant(0.05)  # from which on guides are kept off the surface fully
-_STEEPEST = wp.constant(0.9)  # sine of the angle at which guides rise: near a right angle they would turn in jumps
+_LEAST_AMOUNT = wp.constant(0.05)  # amount from which guides keep the full clearance
+_STEEPEST = wp.constant(0.9)  # largest sine of the angle at which guides rise: near a right angle they would jump
 _UNKNOWN = wp.constant(1.0e30)
-_LEAST_ROWS = 64  # guides of which a thread is worth it
-_CORRECTIONS = wp.constant(4)  # of a segment: a point that is lifted comes nearer to the surface at another place
+_LEAST_ROWS = 64  # fewer guides are not worth a thread
+_CORRECTIONS = wp.constant(4)  # per segment: a lifted point may come nearer to another part of the surface
 
 
 @wp.kernel
@@ -55,7 +55,7 @@ def _lean(
         leaned = (1.0 - amount) * forward + amount * directions[guide]
         if wp.length(leaned) >= 1.0e-3:
             forward = wp.normalize(leaned)
-        # A guide leaves the surface by degrees, and one that hardly leans stays where it was combed.
+        # A guide leaves the surface gradually, and one that hardly leans keeps its combed shape.
         wanted = wp.min(clearance, 0.5 * arc)
         hold = wp.min(largest_amount / _LEAST_AMOUNT, 1.0)
         goal = float(_UNKNOWN)
@@ -66,24 +66,24 @@ def _lean(
             if query.result:
                 normal, away = normal_and_offset(surface, vertex_normals, query.face, query.u, query.v, ahead)
                 height = wp.dot(away, normal)
-                # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
+                # Beyond the border of an open surface the nearest point is sideways: guides hang down there.
                 sideways = wp.length(away - height * normal)
                 part = sideways / (0.5 * wp.length(away) + 0.1 * wanted + 1.0e-6 * size)
                 if goal == _UNKNOWN:
                     goal = height + hold * wp.max(wanted - height, 0.0)
                 lift = wp.clamp(1.5 - part, 0.0, 1.0) * wp.max(goal - height, 0.0)
                 if lift > 0.0:
-                    # Turned towards the normal until it ends higher by the lift.
+                    # Rotated towards the normal until its end is higher by the lift.
                     rise = wp.dot(forward, normal)
                     along = forward - rise * normal
                     if wp.length(along) < 1.0e-3:
-                        # Straight at the surface every direction along it is as good: that of an edge.
+                        # Perpendicular to the surface, any direction along it works: that of an edge.
                         edge = corners[indices[3 * query.face + 1]] - corners[indices[3 * query.face]]
                         along = edge - wp.dot(edge, normal) * normal
                     rise = wp.max(rise, wp.min(rise + lift / size, _STEEPEST))
                     forward = rise * normal + wp.sqrt(1.0 - rise * rise) * wp.normalize(along)
             if lift <= 0.0:
-                break  # so would it be the next time
+                break  # further corrections would give the same
         position += size * forward
         out_points[guide, i] = position
 
@@ -96,10 +96,10 @@ def leaned(
     vertex_normals: np.ndarray,
     clearance: float,
 ) -> np.ndarray:
-    """(G, P, 3) float32 [m]: guides whose segments turn towards directions.
+    """Return (G, P, 3) float32 [m]: guides whose segments are rotated towards directions.
 
-    points: (G, P, 3) [m]; amounts: (G, P) in [0, 1]; directions: (G, 3) unit; surface: that guides keep off;
-    vertex_normals: (V, 3) of its mesh; clearance [m]. A guide whose amounts are all zero stays to the last bit.
+    points: (G, P, 3) [m]; amounts: (G, P) in [0, 1]; directions: (G, 3) unit; surface: for the clearance;
+    vertex_normals: (V, 3) of its mesh; clearance [m]. A guide whose amounts are all zero keeps its bits.
     """
     require_count("amounts", len(amounts), len(points))
     require_count("directions", len(directions), len(points))

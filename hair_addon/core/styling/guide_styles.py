@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The styles of a stack that act on guides, and the number of points a strand: guides as strands follow them.
+"""The guides that strands follow: with the styles that act on guides, and with the strands' number of points.
 
-What is combed stays as it was combed. Only guides that changed are computed again, so a stroke costs what it moves.
+Combed guides themselves do not change. Only guides that changed are computed again, so the time of a stroke depends on
+the guides that it moves.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +20,7 @@ from . import base, lean, wet
 from .base import Profile, StyleSettings, has_effect
 from .random_numbers import VARY, random_numbers
 
-_WET_ROOT = 0.3  # part of the length over which wet hair begins to lean
+_WET_ROOT = 0.3  # fraction of the length over which wet hair starts to lean
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
@@ -27,7 +28,7 @@ DOWN = np.array([0.0, 0.0, -1.0])
 class Lean:
     """One style on guides.
 
-    settings: of the style; amounts (G,): of each guide; course(x): its profile; directions (G, 3): unit; clearance [m].
+    settings: of the style; amounts (G,): of each guide; course(x): profile; directions (G, 3): unit; clearance [m].
     """
 
     settings: StyleSettings
@@ -37,7 +38,7 @@ class Lean:
     clearance: float
 
     def is_same(self, other: "Lean") -> bool:
-        """Whether guides lean alike."""
+        """Whether both lean guides equally."""
         arrays = (self.amounts, other.amounts), (self.directions, other.directions)
         return self.settings == other.settings and all(np.array_equal(*pair) for pair in arrays)
 
@@ -51,10 +52,10 @@ def leans(
     targets: dict[str, np.ndarray],
     mask_key: Callable[[StyleSettings], Any],
 ) -> list[Lean]:
-    """The `Lean` of each style that acts on guides, in order.
+    """Return the `Lean` of each style that acts on guides, in order.
 
-    roots: of the guides; identities: (G,) int32 that they are known by; masks: (G,) weights by their keys; targets:
-    unit (3,) directions by objects' names.
+    roots: of the guides; identities: (G,) int32 IDs; masks: (G,) weights by their keys; targets: unit (3,) directions
+    by objects' names.
     """
     found = []
     for settings in filter(has_effect, styles):
@@ -92,15 +93,15 @@ def _course(profile: Profile):
 
 
 class FollowedGuides:
-    """Guides as strands follow them: leaned, and with as many points as strands have."""
+    """The guides that strands follow: leaned, and with the strands' number of points."""
 
     def __init__(self, mesh: TriMesh, leans: Sequence[Lean], point_count: int) -> None:
-        """mesh: that guides keep off."""
+        """mesh: for the clearance of guides."""
         self._mesh, self._leans, self._point_count = mesh, leans, point_count
         self._before, self._after = np.empty((0, 0, 3), np.float32), np.empty((0, 0, 3), np.float32)
 
     def continue_from(self, other: "FollowedGuides") -> None:
-        """Take over the guides that another has computed, if it would compute the same ones."""
+        """Reuse the guides of another instance if it computes the same."""
         is_same = (
             self._mesh is other._mesh
             and self._point_count == other._point_count
@@ -115,7 +116,7 @@ class FollowedGuides:
         return geometry.closest_point.SurfaceQuery(self._mesh)
 
     def of(self, guides: Strands) -> Strands:
-        """The `Strands` that hair follows, for guides as they are combed."""
+        """Return the `Strands` that hair follows, for combed guides."""
         if not self._leans and guides.point_count == self._point_count:
             return guides
         points = guides.numpy()
@@ -131,7 +132,7 @@ class FollowedGuides:
         return from_numpy(after, guides.roots, str(guides.points.device))
 
     def _made(self, points, chosen):
-        """(M, point_count, 3) for the points (M, P, 3) of some guides; chosen: (M,) which."""
+        """Return (M, point_count, 3) for the points (M, P, 3) of guides with indices chosen (M,)."""
         count, own_count = len(points), points.shape[1]
         if own_count != self._point_count and count:
             starts = np.arange(count + 1) * own_count

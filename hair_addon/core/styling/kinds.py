@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The kinds of styles by their names in files and in Blender, and what the menu offers."""
+"""The kinds of styles by their names in files and in Blender, and the entries of the menu."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ _MODULES: dict[str, Any] = {
     "WET": wet,
 }
 
-# The kinds of steps, and the numbers that kernels know them by. A step's text is a file of its name: bend.strand.
+# The kinds of steps, in the order of their numbers in kernels. The text of a step is a file of its name: bend.strand.
 STEPS: dict[str, Any] = {module.STEP: module for module in _MODULES.values() if hasattr(module, "STEP")}
 STEP_KINDS = {step: number for number, step in enumerate(STEPS, start=1)}
 
@@ -35,7 +35,7 @@ MOST_STYLES = 64  # on one hair
 
 @dataclass(frozen=True)
 class Offer:
-    """An entry of the menu of new styles: a kind, and settings that depart from its defaults."""
+    """An entry of the menu of new styles: a kind, and settings that differ from its defaults."""
 
     label: str
     kind: str
@@ -43,7 +43,7 @@ class Offer:
 
     @property
     def settings(self) -> StyleSettings:
-        """The settings that a style is added with, except its seed."""
+        """Return the settings of an added style, except its seed."""
         return KINDS[self.kind](**self.changes)
 
 
@@ -66,7 +66,7 @@ OFFERS = {
 
 
 def kind_of(settings: StyleSettings) -> str:
-    """The kind of a style's settings, such as CURL. Raises `HairError` for anything else."""
+    """Return the kind of a style's settings, such as CURL. Raises `HairError` for anything else."""
     for kind, settings_class in KINDS.items():
         if type(settings) is settings_class:
             return kind
@@ -74,19 +74,19 @@ def kind_of(settings: StyleSettings) -> str:
 
 
 def module_of(settings: StyleSettings) -> Any:
-    """The file of a style's settings. Raises `HairError` for anything else."""
+    """Return the module of a style's settings. Raises `HairError` for anything else."""
     return _MODULES[kind_of(settings)]
 
 
 def needs_centre(step: str) -> bool:
-    """Whether a kind of step acts on strands with a clump centre alone."""
+    """Whether a kind of step acts only on strands with a clump centre."""
     return hasattr(STEPS[step], "NEEDS_CENTRE")
 
 
 def steps_of(settings: StyleSettings, cutters: Mapping[str, Cutter]) -> list[Step]:
-    """The steps of one style on strands, none of one that acts on guides; a level counts from the first of its own.
+    """Return the steps of one style on strands, none for one that acts on guides; levels count from its own first.
 
-    cutters: planes by the names that Trim styles know them by.
+    cutters: planes by their names in Trim styles.
     """
     module = module_of(settings)
     return module.steps(settings, cutters) if hasattr(module, "steps") else []

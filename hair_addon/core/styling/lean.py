@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lean: guides turn down, away from the surface or along an object's axis, and are kept off the surface.
+"""Lean: guides turn down, away from the surface or along an object's axis, with a clearance from the surface.
 
     t'_i = unit((1 - A) t_i + A D)
 
-It acts on guides, which are few, because each point must be compared with the surface; strands follow.
+It acts on guides, which are few, because each point is compared with the surface; strands follow.
 """
 
 from dataclasses import dataclass

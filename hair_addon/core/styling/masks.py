@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Masks: weights at roots, by which the amount of a style is multiplied."""
+"""Masks: weights at roots that multiply the amount of a style."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ from ..kernels.checks import require_count, require_indices
 
 @dataclass(frozen=True)
 class Mask:
-    """Weights of a surface and of guides, which multiply each other; each None where there is none.
+    """Weights of a surface and of guides, which are multiplied; each may be None.
 
-    corners: (F, 3) float32 at the corners of triangles; texture: `Texture`; guides: (G,) float32, which strands mix by
-    the weights of their guides.
+    corners: (F, 3) float32 at the corners of triangles; texture: `Texture`; guides: (G,) float32, which strands blend
+    with the weights of their guides.
     """
 
     corners: np.ndarray | None = None
@@ -25,7 +25,7 @@ class Mask:
     is_inverted: bool = False
 
     def of_strands(self, binding: HairBinding) -> np.ndarray:
-        """(S,) float32 in [0, 1] of bound strands."""
+        """Return (S,) float32 in [0, 1] of bound strands."""
         weights = self._on_surface(binding.roots)
         if self.guides is not None:
             indices, shares = binding.guide_weights.indices.numpy(), binding.guide_weights.weights.numpy()
@@ -35,7 +35,7 @@ class Mask:
         return self._finished(weights)
 
     def of_guides(self, roots: SurfacePoints) -> np.ndarray:
-        """(G,) float32 in [0, 1] of guides rooted at `SurfacePoints`."""
+        """Return (G,) float32 in [0, 1] of guides rooted at `SurfacePoints`."""
         weights = self._on_surface(roots)
         if self.guides is not None:
             require_count("guides", len(self.guides), len(roots))

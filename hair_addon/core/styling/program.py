@@ -14,14 +14,14 @@ from .base import Cutter, Step, StyleSettings, TreeSettings, has_effect
 # The whole numbers of a step: its kind, of `kinds.STEP_KINDS`; its seed; its row of masks or -1; its row of members or
 # -1; the first of the centres that members count from.
 CHOICES = ("kind", "seed", "mask", "level", "first_centre")
-# The numbers that all steps have, and how many they have with their own, which follow.
+# The numbers that all steps have, before their own, and the total count.
 SHARED = ("amount", "vary", "at_root", "at_tip", "exponent", "is_flipped", "from", "keep_length")
 NUMBERS = 24
 
 
 @dataclass(frozen=True)
 class Program:
-    """Steps as a kernel reads them: (N, 5) int32 `CHOICES` and (N, NUMBERS) float32, which are not changed any more."""
+    """Steps as read by kernels: (N, 5) int32 `CHOICES` and (N, NUMBERS) float32, which do not change."""
 
     choices: np.ndarray
     numbers: np.ndarray
@@ -31,37 +31,37 @@ class Program:
         return len(self.choices)
 
     def before(self, step: int) -> "Program":
-        """The steps before one of them."""
+        """Return the steps before a step."""
         return Program(self.choices[:step], self.numbers[:step])
 
 
 def tree_settings(settings: StyleSettings) -> TreeSettings | None:
-    """The `TreeSettings` of a style that gathers strands; None for others."""
+    """Return the `TreeSettings` of a style that gathers strands; None for others."""
     module = kinds.module_of(settings)
     return module.tree(settings) if hasattr(module, "tree") else None
 
 
 def tree_levels(styles: Sequence[StyleSettings]) -> list[tuple[TreeSettings, int]]:
-    """[(tree, level)] of all styles that gather strands, in the order in which their centres are made."""
+    """Return [(tree, level)] of all styles that gather strands, in the order in which their centres are computed."""
     trees = [tree_settings(settings) for settings in styles if has_effect(settings)]
     return [(tree, level) for tree in trees if tree is not None for level in range(len(tree.sizes))]
 
 
 def mask_key(settings: StyleSettings) -> tuple[str, str, bool] | None:
-    """What a style's mask is known by, (name, image, whether it is inverted); None for a style without one."""
+    """Return the key of a style's mask, (name, image, whether it is inverted); None for a style without a mask."""
     if not settings.mask and not settings.mask_image:
         return None
     return settings.mask, settings.mask_image, settings.invert_mask
 
 
 def mask_keys(styles: Sequence[StyleSettings]) -> list[tuple[str, str, bool]]:
-    """The masks of the styles that have an effect, each once."""
+    """Return the mask keys of styles that have an effect, each once."""
     found = (mask_key(settings) for settings in styles if has_effect(settings))
     return list(dict.fromkeys(key for key in found if key is not None))
 
 
 def strand_steps(styles: Sequence[StyleSettings], cutters: Mapping[str, Cutter]) -> list[Step]:
-    """The steps that act on strands, in order; cutters: planes by the names that Trim styles know them by."""
+    """Return the steps that act on strands, in order; cutters: planes by their names in Trim styles."""
     made: list[Step] = []
     level, coherent = 0, None
     for settings in filter(has_effect, styles):
@@ -80,9 +80,9 @@ def strand_steps(styles: Sequence[StyleSettings], cutters: Mapping[str, Cutter])
 def compiled(
     steps_made: Sequence[Step], masks: Sequence[tuple[str, str, bool]], first_centres: Sequence[int]
 ) -> Program:
-    """The `Program` of steps.
+    """Return the `Program` of steps.
 
-    masks: those of `mask_keys`; first_centres: where the centres of each level begin, the guides' own last.
+    masks: from `mask_keys`; first_centres: offset of the centres of each level, the guides' own last.
     """
     choices = np.zeros((len(steps_made), len(CHOICES)), np.int32)
     numbers = np.zeros((len(steps_made), NUMBERS), np.float32)
@@ -103,11 +103,11 @@ def _numbers_of(profile):
 
 
 def radius_factor(styles: Sequence[StyleSettings]) -> float:
-    """By how much styles thicken strands: soaked ones swell."""
+    """Return the factor by which styles thicken strands: soaked strands swell."""
     swellings = [s.swelling * s.amount for s in styles if isinstance(s, wet.Settings) and has_effect(s)]
     return math.prod(1.0 + swelling for swelling in swellings)
 
 
 def wetness(styles: Sequence[StyleSettings]) -> float:
-    """The wetness that styles give the shading: the largest of all."""
+    """Return the wetness for the shading: the largest of all styles."""
     return max((s.amount for s in styles if isinstance(s, wet.Settings) and has_effect(s)), default=0.0)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random numbers of strands and clumps, from an identity, the style's seed and a purpose, as style_numbers.strand has.
+"""Random numbers of strands and clumps, from an ID, the style's seed and a purpose, as in style_numbers.strand.
 
-They follow from roots alone: neither the order of strands nor their number matters, nor a style's place in the stack.
-The mixing function is lowbias32 [Wellons18].
+They depend only on roots, not on the order or number of strands, nor on a style's place in the stack. The mixing
+function is lowbias32 [Wellons18].
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ PURPOSES = {name: value for name, value in globals().items() if name.isupper() a
 
 
 def random_numbers(identities: np.ndarray, seed: int, purpose: int) -> np.ndarray:
-    """(N,) float32 in [0, 1) of strands known by identities (N,) int32."""
+    """Return (N,) float32 in [0, 1) of strands with IDs (N,) int32."""
     with np.errstate(over="ignore"):
         x = identities.astype(np.int32).view(np.uint32)
         x = (x ^ (np.uint32(seed) * np.uint32(0x9E3779B9))) + np.uint32(purpose) * np.uint32(0x85EBCA6B)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smooth: each segment takes the direction of the chord over a length around it, twice. Straighten does so over all.
+"""Smooth: each segment takes the direction of the chord over a length around it, twice. Straighten uses any length.
 
-What is left of a wave is sinc²(length / wavelength): 0.41 of one twice as long, nothing of one that is as long.
+A wave is reduced to sinc²(length / wavelength): 0.41 at twice the length, zero at the length.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ NUMBERS = ("chord",)  # of smooth.strand: the length that is averaged [m]
 
 @dataclass(frozen=True)
 class Settings(ProfiledSettings):
-    """Length that is smoothed over."""
+    """Length over which strands are smoothed."""
 
     length: float = param(
         0.02,
@@ -36,5 +36,5 @@ STRAIGHTEN = {"length": 10.0}  # as added from the menu under the name Straighte
 
 
 def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
-    """The steps that smooth strands."""
+    """Return the steps that smooth strands."""
     return [step_of(settings, STEP, {"chord": settings.length})]

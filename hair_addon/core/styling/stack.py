@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A stack of styles on one hair: its program, clump trees and masks, and the order in which they are applied.
 
-Centre strands of clumps come first, level by level: each is styled by the steps above its own, and by the levels
-before. Then all strands take the whole program in one launch.
+Centre strands of clumps come first, level by level: each is styled by the steps above its own and by earlier levels.
+Then one launch runs the whole program on all strands.
 """
 
 from collections.abc import Sequence
@@ -35,8 +35,8 @@ wp.set_module_options({"enable_backward": False})
 
 _AGAINST = -0.5  # mean cosine between guides and normals below which hair grows on the surface's other side
 
-# Points (N, P) [m] of a level's centre strands without styles, for guides as they are followed now, and (N,) indices of
-# these strands, None for all.
+# Points (N, P) [m] of a level's centre strands without styles, for the present guides, and (N,) indices of these
+# strands, None for all.
 Centres = tuple["wp.array2d[wp.vec3]", np.ndarray | None]
 
 
@@ -45,8 +45,8 @@ class _Level:
     """Centre strands of one level of a clump tree."""
 
     binding: HairBinding
-    first: int  # of its centres among all
-    steps: Program  # that style them
+    first: int  # index of its first centre among all
+    steps: Program  # applied to them
     data: StrandData
 
     @cached_property
@@ -71,7 +71,7 @@ class Styling:
     levels: list[_Level]
 
     def guides(self, guides: Strands) -> Strands:
-        """Guides as strands follow them: styles of guides applied, with the points of the hair."""
+        """Return the guides that strands follow: styled, with the strands' number of points."""
         return self.followed.of(guides)
 
     def apply(
@@ -79,7 +79,7 @@ class Styling:
     ) -> None:
         """Style strands in place: points (M, P) [m] of all strands, or of (M,) chosen ones.
 
-        centres: `Centres` of each level, of those that `centres_of` names where strands are chosen.
+        centres: `Centres` of each level; for chosen strands, only of those in `centres_of`.
         """
         if not len(self.program):
             return
@@ -93,10 +93,10 @@ class Styling:
         )
 
     def centres_of(self, chosen: np.ndarray) -> list[np.ndarray]:
-        """For each level, indices of the centres that some strands (M,) are gathered around, themselves or others.
+        """Return for each level the indices of the centres that strands (M,) need, directly or through other centres.
 
-        A centre is styled as a strand is, so it reads the centres of levels before its own. Raises `HairError` for
-        strands that are not there.
+        A centre is styled like a strand, so it reads the centres of levels before its own. Raises `HairError` for
+        indices that do not exist.
         """
         require_indices("strands", chosen, len(self.data.normals))
         members = self.data.members.numpy()[:, chosen]
@@ -107,7 +107,7 @@ class Styling:
         return read
 
     def _keep_centres(self, centres, rows, first):
-        """Write the points of centres of a level, and their arc lengths, where the kernel reads them."""
+        """Write the points and arc lengths of a level's centres to the array that the kernel reads."""
         if not len(centres):
             return
         into = self.data.centre_points
@@ -118,7 +118,7 @@ class Styling:
         kernel_cache.launch(_with_arcs, len(centres), inputs=[centres, rows], outputs=[into], device=centres.device)
 
     def reached(self, combed: np.ndarray, moved: np.ndarray) -> np.ndarray:
-        """Indices (M,), rising, of the strands that move when some guides are combed.
+        """Return the rising indices (M,) of the strands that move when guides are combed.
 
         combed: (C,) indices of guides; moved: indices of the strands that follow them. Strands whose clump centres
         follow them move too.
@@ -141,7 +141,7 @@ class Styling:
 
     @cached_property
     def _members_of(self):
-        """For each level, the strands that belong to each centre."""
+        """Return for each level the strands that belong to each centre."""
         rows = self.data.members.numpy()[: len(self.levels)]
         return [
             interpolation.guide_weights.reach_by(members[:, None], len(level.binding.roots))
@@ -149,9 +149,9 @@ class Styling:
         ]
 
     def clumps(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """(S,) int32 and (S,) float32 in [0, 1): the finest clump of each strand and a random number of that clump.
+        """Return (S,) int32 and (S,) float32 in [0, 1): the finest clump of each strand and the clump's random number.
 
-        Of the first style that gathers strands; None without one. -1 and 0 for strands in none.
+        Of the first style that gathers strands; None without one. -1 and 0 for strands without a clump.
         """
         if not self.tree_levels:
             return None
@@ -161,9 +161,9 @@ class Styling:
         return members, np.where(members >= 0, numbers, np.float32(0.0))
 
     def wetness(self) -> np.ndarray | None:
-        """(S,) float32 in [0, 1]: the wetness that styles give the shading of each strand.
+        """Return (S,) float32 in [0, 1]: the wetness of each strand for the shading.
 
-        None where no mask and no variation makes strands differ in it.
+        None if neither a mask nor a variation makes it differ between strands.
         """
         if not strand_wetness.is_uneven(self.styles):
             return None
@@ -172,7 +172,7 @@ class Styling:
 
 
 def _there(rows, count, device):
-    """Indices of some of so many strands on a device, None for all. Raises `HairError` for strands that are not."""
+    """Return indices of strands on a device, None for all. Raises `HairError` for indices that do not exist."""
     if rows is None:
         return None
     require_indices("strands", rows, count)
@@ -180,7 +180,7 @@ def _there(rows, count, device):
 
 
 def _present(members):
-    """The indices that some members name, without -1."""
+    """Return the distinct indices of members, without -1."""
     return np.unique(members[members >= 0])
 
 
@@ -211,10 +211,10 @@ def bind(
     axes: np.ndarray,
     point_count: int,
 ) -> Styling:
-    """Bind styles to strands; sites are placed and searched for where `trees` does not have them yet.
+    """Bind styles to strands; sites that `trees` does not contain yet are placed and bound.
 
-    binding: of the strands; guides: that they follow; inputs: `Inputs` with all that the styles name; axes: (4, 4),
-    from the coordinates of strands to the surface's own, without scale; point_count: of a strand.
+    binding: of the strands; guides: that they follow; inputs: `Inputs` of the styles; axes: (4, 4), from the
+    coordinates of strands to the surface's own, without scale; point_count: of a strand.
     """
     device = binding.positions.device
     levels = programs.tree_levels(styles)
@@ -234,7 +234,7 @@ def bind(
     }
 
     def data_of(owner: Owner, bound: HairBinding, known: int) -> StrandData:
-        """The `StrandData` of strands that may belong to centres of the first `known` levels."""
+        """Return the `StrandData` of strands that may belong to centres of the first `known` levels."""
         rows = np.zeros((len(levels) + 1, len(bound.roots)), np.int32)
         for row in range(known):
             tree, level = levels[row]
@@ -277,9 +277,9 @@ def bind(
 
 
 def _side(guides, normals):
-    """-1 where hair grows against the surface's normals, as where faces are turned inside out; 1 elsewhere.
+    """Return -1 if hair grows against the surface's normals, as on meshes that are inside out; otherwise 1.
 
-    Frames follow from the normal by the least rotation to a strand, which is not defined straight against it.
+    Frames are rotated from the normal to a strand by the least rotation, which is undefined for opposite directions.
     """
     points = guides.numpy()
     segments = points[:, 1] - points[:, 0]
@@ -288,7 +288,7 @@ def _side(guides, normals):
 
 
 def _steps_before(program, made, level):
-    """The steps above the one that gathers strands around the centres of a level."""
+    """Return the steps above the one that gathers strands around the centres of a level."""
     rows = (row for row, step in enumerate(made) if step.level == level and kinds.needs_centre(step.kind))
     return program.before(next(rows))
 

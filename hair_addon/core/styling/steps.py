@@ -18,14 +18,14 @@ from . import kinds, style_text
 from .program import CHOICES, NUMBERS, Program
 
 # Nothing differentiates these kernels. A GPU's approximate divisions and roots move hair by less than 2e-6 of its size;
-# where more would follow from them, steps.cpp asks for exact ones.
+# steps.cpp uses exact ones where errors would be larger.
 _OPTIONS = {"enable_backward": False, "fast_math": True}
 wp.set_module_options(_OPTIONS)
 
 LEAST_BLOCKS = 64  # fewer are not worth a thread
-WIDTH = 16  # strands that a thread of the processor styles at once: 8 take a fifth longer
+WIDTH = 16  # strands that a thread of the processor styles at once; with 8 it takes a fifth longer
 MOST_POINTS = 257  # of a strand
-SHORT_POINTS = 64  # of a strand that takes less memory of a GPU
+SHORT_POINTS = 64  # of a strand in the variant with less GPU memory
 POINTS_AT_ONCE = 5  # of a strand in the shared memory of a GPU: more take cache from directions and lengths
 
 
@@ -39,29 +39,29 @@ _CONSTANTS = style_text.constants() | {
 
 @dataclass(frozen=True)
 class StrandData:
-    """What a program needs to know of S strands beside their points: arrays on one device.
+    """Inputs of a program for S strands, except their points: arrays on one device.
 
-    Clump centres of all levels, K, follow each other in the arrays of centres.
+    The arrays of centres contain the K clump centres of all levels.
     """
 
     normals: "wp.array[wp.vec3]"  # (S,) unit
     identities: "wp.array[int]"  # (S,)
     masks: "wp.array2d[float]"  # (masks, S)
-    members: "wp.array2d[int]"  # (levels, S) place of the strand's centre among those of its level, -1: none
+    members: "wp.array2d[int]"  # (levels, S) index of the strand's centre in its level, -1: none
     centre_points: "wp.array2d[wp.vec4]"  # (K, P) x, y, z [m] and the arc length [m]
     centre_normals: "wp.array[wp.vec3]"  # (K,)
     centre_identities: "wp.array[int]"  # (K,)
 
     @cached_property
     def member_limits(self) -> tuple[np.ndarray, np.ndarray]:
-        """(levels,) least, at most 0, and greatest of the members of each level, -1 where no strand has a centre."""
+        """(levels,) least (at most 0) and greatest member of each level, -1 if no strand has a centre."""
         members = self.members.numpy()
         return members.min(axis=1, initial=0), members.max(axis=1, initial=-1)
 
 
 @dataclass(frozen=True)
 class Variant:
-    """The kernel compiled for a number of strands that a thread of the processor styles at once, and most points."""
+    """The kernel for a number of strands that a thread of the processor styles at once, and a maximum of points."""
 
     kernel: wp.Kernel
     width: int
@@ -69,7 +69,7 @@ class Variant:
 
 
 def variant(width: int, most_points: int, module: wp.Module | None = None) -> Variant:
-    """A `Variant` in a Warp module, this file's unless another is given."""
+    """Return a `Variant` in a Warp module, by default that of this file."""
     if module is not None:
         module.options.update(_OPTIONS)
 
@@ -90,7 +90,7 @@ def variant(width: int, most_points: int, module: wp.Module | None = None) -> Va
         axes: wp.mat44,
     ): ...
 
-    # Blocks of 256 threads, three on a multiprocessor: registers are what keeps a GPU from running more at once.
+    # Blocks of 256 threads, three per multiprocessor: the number of registers is the limit.
     @wp.kernel(module=module, launch_bounds=(256, 3))
     def _style_blocks(
         points: wp.array2d[wp.vec3],
@@ -127,12 +127,12 @@ def variant(width: int, most_points: int, module: wp.Module | None = None) -> Va
 
 
 _ANY = variant(WIDTH, MOST_POINTS)
-# A thread of a GPU reserves memory for the most points that there may be.
+# A thread of a GPU reserves memory for the maximum number of points.
 _SHORT = variant(WIDTH, SHORT_POINTS, wp.get_module(f"{__name__}_short"))
 
 
 def variant_for(point_count: int, device: wp.DeviceLike) -> Variant:
-    """The `Variant` for strands of some points on a device."""
+    """Return the `Variant` for a number of points on a device."""
     is_short = point_count <= SHORT_POINTS and not wp.get_device(device).is_cpu
     return _SHORT if is_short else _ANY
 
@@ -147,9 +147,9 @@ def apply_steps(
 ) -> None:
     """Style strands in place: points (M, P) [m]. One launch for the whole program; none for an empty one.
 
-    data: `StrandData` of S strands, of which chosen (M,) int32 are styled, all where it is None; axes: (4, 4),
-    from the coordinates of points to the surface's own, without scale; version: of the kernel, None for the fastest.
-    Raises `HairError` where counts or indices do not match.
+    data: `StrandData` of S strands, of which chosen (M,) int32 are styled, all if None; axes: (4, 4), from the
+    coordinates of points to the surface's own, without scale; version: of the kernel, None for the fastest. Raises
+    `HairError` if counts or indices do not match.
     """
     if not len(program) or not len(points):
         return
@@ -172,7 +172,7 @@ def apply_steps(
 
 
 def _copied(program, device):
-    """The arrays of a program on a device: copied once, as a stroke launches the same program again and again."""
+    """Return the arrays of a program on a device, copied once, as a stroke launches the same program repeatedly."""
     if device.alias not in program.copies:
         choices = wp.array(program.choices, dtype=int, device=device)
         program.copies[device.alias] = [choices, wp.array(program.numbers, dtype=float, device=device)]
@@ -180,7 +180,7 @@ def _copied(program, device):
 
 
 def _check(points, program, data, chosen, most_points):
-    """Raise `HairError` unless all that the kernel reads is there."""
+    """Raise `HairError` unless everything that the kernel reads exists."""
     point_count, strand_count, centre_count = points.shape[1], len(data.normals), len(data.centre_normals)
     if not 2 <= point_count <= most_points:
         raise HairError(f"Strands need 2 to {most_points} points to be styled, not {point_count}.")

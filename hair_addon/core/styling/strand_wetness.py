@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wetness that shading gives each strand: that of the Wet style that wets it most."""
+"""The wetness of each strand for the shading: the largest of its Wet styles."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,7 +11,7 @@ from .program import mask_key
 
 
 def is_uneven(styles: Sequence[StyleSettings]) -> bool:
-    """Whether a mask or a variation leaves some strands less wet than others may be."""
+    """Whether a mask or a variation makes the wetness differ between strands."""
     soaking = _soaking(styles)
     everywhere = max((style.amount for style in soaking if not _has_places(style)), default=0.0)
     return any(style.amount > everywhere for style in soaking if _has_places(style))
@@ -20,9 +20,9 @@ def is_uneven(styles: Sequence[StyleSettings]) -> bool:
 def of_strands(
     styles: Sequence[StyleSettings], masks: Mapping[tuple[str, str, bool], np.ndarray], identities: np.ndarray
 ) -> np.ndarray:
-    """(S,) float32 in [0, 1]: amount · mask · (1 - vary · h), as steps.cpp has it, of the wettest style of each strand.
+    """Return (S,) float32 in [0, 1]: amount · mask · (1 - vary · h), as in steps.cpp, of each strand's wettest style.
 
-    masks: (S,) weights by `program.mask_key`; identities: (S,) int32 that strands are known by.
+    masks: (S,) weights by `program.mask_key`; identities: (S,) int32 IDs of strands.
     """
     found = np.zeros(len(identities), np.float32)
     for style in _soaking(styles):
@@ -34,7 +34,7 @@ def of_strands(
 
 
 def mean_amount(style: StyleSettings) -> float:
-    """The amount that strands take of a style on the mean, where no mask lessens it: h is uniform in [0, 1)."""
+    """Return the mean amount of a style over strands, without its mask: h is uniform in [0, 1)."""
     return style.amount * (1.0 - 0.5 * style.vary)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What styles name, as it was read: masks, planes of cutters, directions of objects."""
+"""Inputs of styles: masks, planes of cutters, directions of objects."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

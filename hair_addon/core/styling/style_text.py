@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What .strand files are compiled with, alike in C++, CUDA and GLSL: constants, and texts that follow from the kinds.
+"""Constants and generated texts with which .strand files are compiled in C++, CUDA and GLSL.
 
 `#include "bend.numbers"` declares the numbers of a step by their names in `NUMBERS` of its module, and `#include
 "all.strand"` includes the file of each kind of step and chooses among them.
@@ -16,7 +16,7 @@ _ARRAY = re.compile(r"(\w+)\[(\d+)\]")
 
 
 def constants() -> dict[str, int]:
-    """{name: value} of what all .strand files know: kinds, places of numbers, purposes of random numbers."""
+    """Return {name: value} for all .strand files: kinds, indices of numbers, purposes of random numbers."""
 
     def bits(attribute):
         return sum(1 << kinds.STEP_KINDS[step] for step, module in kinds.STEPS.items() if hasattr(module, attribute))
@@ -27,13 +27,13 @@ def constants() -> dict[str, int]:
         **PURPOSES,
         "WAVES": frizz.WAVES_AN_OCTAVE,
         "MOST_OCTAVES": frizz.MOST_OCTAVES,
-        "NEEDING_CENTRE": bits("NEEDS_CENTRE"),  # of each kind a bit
+        "NEEDING_CENTRE": bits("NEEDS_CENTRE"),  # a bit for each kind
         "CHANGING_LENGTHS": bits("CHANGES_LENGTHS"),
     }
 
 
 def texts(steps: Iterable[str]) -> dict[str, str]:
-    """{file: text} of the files that follow from the kinds of steps that a program has, of `kinds.STEPS`."""
+    """Return {file: text} of the generated files for kinds of steps, of `kinds.STEPS`."""
     present = [step for step in kinds.STEPS if step in set(steps)]
     includes = [f'#include "{step.lower()}.strand"' for step in present]
     choices = [f"  if (kind == {step}) {{\n    {step.lower()}_strand();\n  }}" for step in present]
@@ -42,7 +42,7 @@ def texts(steps: Iterable[str]) -> dict[str, str]:
 
 
 def ordered(step: Step) -> list[float]:
-    """The own numbers of a step in the order in which kernels read them."""
+    """Return the own numbers of a step in the order of the kernels."""
     values = dict(step.numbers)
     found: list[float] = []
     for name in kinds.STEPS[step.kind].NUMBERS:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Trim: shorter strands, by a factor, to a length, by an undercoat or at a plane.
 
-    L' = min(L · factor · (1 - random · h), to_length or ∞), times undercoat_length for the part `undercoat` of strands
+    L' = min(L · factor · (1 - random · h), to_length or ∞), times undercoat_length for the fraction `undercoat`
 
-A strand takes L + amount (L' - L): a mask of lengths is the mask of the style. A twentieth of the strands is between
-the undercoat and the others, so that its part may be animated.
+The length of a strand becomes L + amount (L' - L), so the mask of the style is a mask of lengths. A twentieth of the
+strands is between the undercoat and the others, so that the fraction can be animated.
 """
 
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ NUMBERS = (
     "axis_z",
     "plane_distance",
 )
-NO_LIMIT = 1e30  # [m], of a length
+NO_LIMIT = 1e30  # [m]
 
 METHODS = (
     ("CUT", "Cut", "Cut strands off; the rest keeps its place"),
@@ -75,7 +75,7 @@ class Settings(StyleSettings):
 
 
 def steps(settings: Settings, cutters: Mapping[str, Cutter]) -> list[Step]:
-    """The steps that trim strands; cutters: planes by the names that settings know them by."""
+    """Return the steps that trim strands; cutters: planes by their names in settings."""
     cutter = cutters.get(settings.cutter)
     axis = (0.0, 0.0, 0.0) if cutter is None else cutter.normal
     numbers = {

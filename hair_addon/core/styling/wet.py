@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Wet: strands cling to the surface, lose their waves and join into pointed locks, small ones first.
 
-With w the amount: guides lean down by cling · w over the first 0.3; strands are smoothed over twice the lock
-size by relax · w, and clump in two levels with amounts 0.92 w^1.5 (large) and 0.92 w^½ (small; 9.2 w up to w = 0.01, as
-a root begins vertically). Shading takes the same w as its wetness, that of each strand where a mask or a variation
-makes them differ (strand_wetness.py), and so do simulated guides.
+With w the amount: guides lean down by cling · w over the first 0.3 of their length; strands are smoothed over twice the
+lock size by relax · w, and clump in two levels with amounts 0.92 w^1.5 (large) and 0.92 w^½ (small; 9.2 w up to
+w = 0.01, as a square root starts vertically). Shading and simulated guides use the same w as their wetness, per strand
+if a mask or a variation makes it differ (strand_wetness.py).
 """
 
 from collections.abc import Mapping
@@ -17,13 +17,13 @@ from .base import EVERYWHERE, Cutter, Profile, Step, StyleSettings, TreeSettings
 LABEL = "Wet"
 DESCRIPTION = "Soak hair: it clings, joins into locks and darkens"
 
-CLEARANCE = 0.15  # of wet guides from the surface, by the size of locks
+CLEARANCE = 0.15  # of wet guides from the surface, as a fraction of the size of locks
 
-_RATIO = 0.32  # of the small wet locks to the large ones
+_RATIO = 0.32  # size of the small wet locks as a fraction of the large ones
 _THICKNESS = 0.10
-_SMOOTHING = 2.0  # lengths of locks that water smooths over
+_SMOOTHING = 2.0  # smoothed length as a multiple of the size of locks
 _CLUMP = 0.92
-_START = 0.01  # below, small locks join evenly: by the square root they would begin at once
+_START = 0.01  # amount below which small locks join linearly: a square root would start abruptly
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class Settings(StyleSettings):
 
 
 def tree(settings: Settings) -> TreeSettings:
-    """What the sites of wet locks follow from."""
+    """Return the inputs of the sites of wet locks."""
     return TreeSettings((settings.lock, settings.lock * _RATIO), settings.seed, 0.0)
 
 
 def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
-    """The steps that straighten strands and gather them, in large locks and then in small ones."""
+    """Return the steps that straighten strands and gather them in large locks and then in small ones."""
     wetness = settings.amount
     along = Profile(0.0, 1.0, profile_of(clump.Settings()).exponent)
     chord = {"chord": settings.lock * _SMOOTHING}

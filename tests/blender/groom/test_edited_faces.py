@@ -130,7 +130,7 @@ def test_strands_stay_whose_face_is_left_alone(hair, name):
     else:
         # A cut face is made of others, which hold a part of its corners: some roots find theirs.
         assert 0 < said[1] <= counts[1] and said[0] <= counts[0]
-        assert "rooted at the nearest points." in guides.data.vellus.status
+        assert "moved to the nearest points." in guides.data.vellus.status
     assert hair.data.vellus.status == ""
 
 
@@ -256,7 +256,7 @@ def test_undo_across_frames_of_changing_faces_roots_nothing_again(changing, scen
     scene.frame_set(5)
     bpy.ops.ed.undo_push(message="another frame")
     panel = " ".join(draw(bpy.types.VELLUS_PT_surface).texts)
-    assert '"Skin" has other faces in this frame: hair stays on those of the frame that it was made in' in panel
+    assert '"Skin" has other faces in this frame: hair stays on the faces of the frame' in panel
     for name in ("undo", "redo", "undo", "redo"):
         step(name)
     assert bpy.context.scene.frame_current == 5
