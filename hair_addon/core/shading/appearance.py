@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What artists set, once, for the viewport's models and for Cycles: names and units are Principled Hair's.
+"""The artist's settings for the viewport's models and for Cycles, with the names and units of Principled Hair.
 
-So are the defaults, but for the pigment: dark blond, which shows its shading in the light of Blender's start-up scene.
+Defaults are those of Principled Hair too, except the pigment: dark blond, whose shading is visible in the light of
+Blender's start-up scene.
 """
 
 import math
@@ -28,23 +29,23 @@ from .tables import lookup_tables
 
 _WHITE = (1.0, 1.0, 1.0)
 
-_KEPT = 64  # results of functions of looks, which are asked for with every step of a stroke
+_KEPT = 64  # cached results of functions of looks, which are called in every step of a stroke
 
-# What `table_settings` takes from the appearance, of the fields of `lookup_tables.Settings`.
+# The fields of `lookup_tables.Settings` that `table_settings` derives from the appearance.
 TABLE_FIELDS = ("mode", "eta", "sigma_a", "tilt", "roughness", "radial_roughness", "coat", "beta_r")
 
-# What differs along strands and between them.
+# Fields of the variation along strands and between them.
 STRAND_FIELDS = ("random_color", "random_roughness", "tip_absorption", "tip_tint", "gradient_start", "gradient_end")
 
-# A film of water fills the gaps between the cuticle's scales, which gives a smooth surface (narrow highlights, no
-# tilt), and lowers the index of refraction that sends back as much light. Pigment stays as it is. Cycles takes the
-# directions of its Coat by another roughness than it weights them by, so water is none (DECISIONS.md, 256).
+# A film of water fills the gaps between the cuticle's scales: the surface becomes smooth (narrow highlights, no tilt),
+# and the effective index of refraction lower. The pigment does not change. Water is not a Coat, as Cycles samples its
+# Coat with another roughness than it weights it with (DECISIONS.md, Wet hair).
 _WET = {"roughness": 0.14, "cuticle_angle": math.radians(0.5), "ior": 1.38}
 
 # Fibres whose index is that of air reflect nothing.
 _LEAST_SCATTERING = 1e-6
 
-# What the colour follows from, by parametrization.
+# Fields that define the colour, by parametrization.
 COLOR_FIELDS = {"MELANIN": ("melanin", "redness", "tint"), "COLOR": ("color",), "ABSORPTION": ("absorption",)}
 
 
@@ -112,9 +113,9 @@ class Appearance(Settings):
 
 
 def shown_changes(changes: dict[str, Any], name_of: Callable[[str], str] = str) -> dict[str, Any]:
-    """Changes of an `Appearance`, with the parametrization that a color among them needs.
+    """Return changes of an `Appearance`, with the parametrization that a color among them needs.
 
-    name_of: what messages call a field. Raises `HairError` for a color that the parametrization would not show.
+    name_of: a field's name in messages. Raises `HairError` for a color that the parametrization would not use.
     """
     given = {name: kind for kind, names in COLOR_FIELDS.items() for name in names if name in changes}
     kinds = set(given.values())
@@ -132,7 +133,7 @@ def shown_changes(changes: dict[str, Any], name_of: Callable[[str], str] = str) 
 
 @lru_cache(maxsize=_KEPT)
 def wetted(look: Appearance, wetness: float) -> Appearance:
-    """The dry look that shows a look at a wetness from 0 to 1, in place of its own: linear to that of soaked hair."""
+    """Return the dry look that shows a look at a wetness from 0 to 1, linear between dry and soaked hair."""
     if wetness == 0.0:
         return replace(look, wetness=0.0)
     dry = {name: getattr(look, name) for name in _WET}
@@ -140,14 +141,14 @@ def wetted(look: Appearance, wetness: float) -> Appearance:
     return replace(look, wetness=0.0, **mixed)
 
 
-# Less of a look beside another is not seen.
+# A smaller share of a look is invisible.
 _LEAST_SHARE = 1.0 / 1024.0
 
 
 def wet_share(wetness: np.ndarray, least: float, most: float) -> np.ndarray:
-    """(S,) float32 in [0, 1]: how far strands of a wetness (S,) are shaded as the wettest, not as the driest.
+    """Return (S,) float32 in [0, 1]: the share of the wettest look, against the driest, of strands of a wetness (S,).
 
-    least, most: wetness of the looks of both, least < most.
+    least, most: wetness of both looks, least < most.
     """
     share = np.clip((np.asarray(wetness, np.float32) - np.float32(least)) / np.float32(most - least), 0.0, 1.0)
     share[share < _LEAST_SHARE] = 0.0
@@ -156,20 +157,20 @@ def wet_share(wetness: np.ndarray, least: float, most: float) -> np.ndarray:
 
 
 def shaded(look: Appearance) -> Appearance:
-    """The dry look of a look that may be wet; what every model is made from."""
+    """Return the dry look of a look that may be wet, from which every model is derived."""
     return wetted(look, look.wetness)
 
 
 def sigma_a(appearance: Appearance) -> tuple[float, ...]:
-    """Absorption per radius, RGB, of an average strand at its root."""
+    """Return the absorption per radius, RGB, of an average strand at its root."""
     strands = strand_settings(appearance)
     return tuple(float(pigment + dye) for pigment, dye in zip(strands.pigment, strands.dye, strict=True))
 
 
 def mean_color(appearance: Appearance) -> np.ndarray:
-    """The colour of a full head of this hair, RGB (3,), the mean over all strands from root to tip.
+    """Return the colour of a full head of this hair, RGB (3,), the mean over all strands from root to tip.
 
-    Fibres send back R and TRT, both as the reflectance of their surface says: under water that is less.
+    Fibres reflect R and TRT, both in proportion to the reflectance of their surface, which water lowers.
     """
     sigma_a_everywhere = strand_variation.sample_sigma_a(strand_settings(appearance))
     color = color_from_sigma_a(sigma_a_everywhere, appearance.radial_roughness).reshape(-1, 3).mean(axis=0)
@@ -179,7 +180,7 @@ def mean_color(appearance: Appearance) -> np.ndarray:
 
 @lru_cache(maxsize=_KEPT)
 def strand_settings(appearance: Appearance) -> strand_variation.Settings:
-    """`Appearance` → `strand_variation.Settings`: absorption from strand to strand and along each."""
+    """Convert to `strand_variation.Settings`: variation of the absorption between strands and along them."""
     pigment, dye, melanin = _absorption(appearance)
     return strand_variation.Settings(
         pigment=tuple(map(float, pigment)),
@@ -195,7 +196,7 @@ def strand_settings(appearance: Appearance) -> strand_variation.Settings:
 
 
 def _absorption(appearance):
-    """(pigment (3,), dye (3,), melanin or 0 where pigment doesn't follow from melanin)."""
+    """Return (pigment (3,), dye (3,), melanin; 0 for other parametrizations)."""
     if appearance.parametrization == "ABSORPTION":
         return appearance.absorption, (0.0, 0.0, 0.0), 0.0
     if appearance.parametrization == "COLOR":
@@ -205,7 +206,7 @@ def _absorption(appearance):
 
 
 def _dye(tint, radial_roughness):
-    """sigma_a of a dye; white is none, though the fit never lets light through whole."""
+    """Return sigma_a of a dye; zero for white, although the fit absorbs some light there."""
     return tuple(
         0.0 if component >= 1.0 else float(sigma_a_from_color(component, radial_roughness)) for component in tint
     )
@@ -213,9 +214,9 @@ def _dye(tint, radial_roughness):
 
 @lru_cache(maxsize=_KEPT)
 def table_settings(appearance: Appearance, base: lookup_tables.Settings | None = None) -> lookup_tables.Settings:
-    """`Appearance` → `lookup_tables.Settings` of an average strand at its root.
+    """Convert to `lookup_tables.Settings` of an average strand at its root.
 
-    base: settings that the rest is taken from: size and axes of the tables, shifts, glints of the classic mode.
+    base: provides the other settings: size and axes of the tables, shifts, glints of the classic mode.
     """
     appearance = shaded(appearance)
     return replace(
@@ -232,7 +233,7 @@ def table_settings(appearance: Appearance, base: lookup_tables.Settings | None =
 
 
 def kajiya_kay_settings(appearance: Appearance) -> kajiya_kay.Settings:
-    """`Appearance` → `kajiya_kay.Settings`: the groom's colour, and a highlight with R's width and R's energy."""
+    """Convert to `kajiya_kay.Settings`: the groom's colour, and a highlight with R's width and R's energy."""
     appearance = shaded(appearance)
     exponent = float(kajiya_kay.highlight_exponent((1.0 - appearance.coat) * appearance.roughness))
     peak = float(kajiya_kay.highlight_peak(_mean_reflectance(appearance.ior), exponent))
@@ -241,7 +242,7 @@ def kajiya_kay_settings(appearance: Appearance) -> kajiya_kay.Settings:
 
 
 def kajiya_kay_strand_settings(appearance: Appearance) -> kajiya_kay.StrandSettings:
-    """`Appearance` → `kajiya_kay.StrandSettings`: the same for strands that differ."""
+    """Convert to `kajiya_kay.StrandSettings`, for strands with variation."""
     appearance = shaded(appearance)
     return kajiya_kay.StrandSettings(
         falloff=float(color_falloff(appearance.radial_roughness)),
@@ -253,18 +254,18 @@ def kajiya_kay_strand_settings(appearance: Appearance) -> kajiya_kay.StrandSetti
 
 @lru_cache(maxsize=_KEPT)
 def _mean_reflectance(eta):
-    """Directional albedo of a fibre's surface under uniform light."""
+    """Return the directional albedo of a fibre's surface under uniform light."""
     nodes, weights = np.polynomial.legendre.leggauss(32)
     theta, gamma = 0.25 * np.pi * (1.0 + nodes)[:, None], 0.25 * np.pi * (1.0 + nodes)[None, :]
-    # Of directions cos(theta), of offsets in the width cos(gamma): both quadratures sum to one.
+    # Weights cos(theta) of directions and cos(gamma) of offsets across the width: both quadratures sum to one.
     measure = np.outer(weights, weights) * np.cos(theta) * np.cos(gamma)
     return float(np.average(dielectric_reflectance(np.cos(theta) * np.cos(gamma), eta), weights=measure))
 
 
 def principled_sockets(appearance: Appearance) -> dict[str, Any]:
-    """`Appearance` → {socket: value} of Principled Hair: model Chiang, parametrization Absorption.
+    """Convert to {socket: value} of Principled Hair: model Chiang, parametrization Absorption.
 
-    The absorption is that of an average strand at its root; `strand_settings` says how the others differ.
+    The absorption is that of an average strand at its root; `strand_settings` has the variation.
     """
     appearance = shaded(appearance)
     return {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colors and roughness of strands from root to tip, for programs that take them for each point."""
+"""Colors and roughness of strands from root to tip, for programs that read them at each point."""
 
 import numpy as np
 
@@ -10,22 +10,22 @@ from .fibre.pigment import color_from_sigma_a
 
 
 def colors(look: Appearance, randoms: np.ndarray, point_count: int) -> np.ndarray:
-    """Linear RGB (S, P, 3) float32 of a head of hair that were all like a point; randoms: (S,) numbers of strands.
+    """Return linear RGB (S, P, 3) float32: at each point, the color of a head of hair that is all like this point.
 
-    Points are evenly spaced along strands.
+    randoms: (S,) random numbers of strands. Points are evenly spaced along strands.
     """
     differing, position = _variation(look, np.asarray(randoms), np.linspace(0.0, 1.0, point_count))
     return np.broadcast_to(_colors(look, differing[:, None], position[None]), (len(randoms), point_count, 3))
 
 
 def colors_at(look: Appearance, randoms: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """The same (N, 3) at points of strands; randoms: (N,) of their strands, positions: (N,) from root 0 to tip 1."""
+    """Return the colors (N, 3) at points; randoms: (N,) of their strands, positions: (N,) from 0, root, to 1, tip."""
     differing, position = _variation(look, np.asarray(randoms), np.asarray(positions))
     return np.broadcast_to(_colors(look, differing, position), (len(positions), 3))
 
 
 def _variation(look, randoms, positions):
-    """Random numbers and positions, each one value where colors do not depend on them."""
+    """Return random numbers and positions, reduced to one value each if colors do not depend on them."""
     settings = appearance.strand_settings(look)
     return (
         randoms if settings.random_color > 0.0 else np.zeros(1),
@@ -39,7 +39,7 @@ def _colors(look, randoms, positions):
 
 
 def roughness(look: Appearance, randoms: np.ndarray, point_count: int) -> np.ndarray:
-    """(S, P) float32, the longitudinal roughness of each strand at all of its points."""
+    """Return (S, P) float32: the longitudinal roughness of each strand, at all of its points."""
     look = appearance.shaded(look)
     found = principled.varied_roughness(look.roughness, look.random_roughness, randoms).astype(np.float32)
     return np.broadcast_to(found[:, None], (len(found), point_count))

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """N for a range of absorptions: one 3D texture for every strand, point and colour channel.
 
-N depends on each channel's absorption alone. So a slice of one scalar sigma_a serves red, green and blue, and a shader
-looks up three times where `lookup_tables` has the three channels side by side.
+N depends only on each channel's absorption. So a slice of one scalar sigma_a serves red, green and blue, and a shader
+looks up three times instead of once in the three channels of `lookup_tables`.
 
     n    N_TT, N_TRT, N of the residual, N_R    over phi (columns), cos(theta) (rows) and sqrt(sigma_a) (slices)
-    n_g  the same, averaged over directions as `dual_scattering` does it; of the energy-conserving mode
-    n_trt  N_TRT of the four layers of `elliptic_section`; of the classic mode
+    n_g  the same, averaged over directions as in `dual_scattering`; energy-conserving mode
+    n_trt  N_TRT of the four layers of `elliptic_section`; classic mode
 
-Columns and rows are those of `lookup_tables`. Slice k of K lies at sqrt(sigma_a) = low + (high - low) k / (K - 1): the
-first and the last hold the ends of the range. Between slices values are interpolated geometrically in sigma_a: light
-along one way falls exponentially with absorption, and the mean over many ways almost so.
+Columns and rows are those of `lookup_tables`. Slice k of K is at sqrt(sigma_a) = low + (high - low) k / (K - 1): the
+first and the last slice are the ends of the range. Between slices values are interpolated geometrically in sigma_a:
+light along one path decreases exponentially with absorption, and the mean over many paths almost so.
 """
 
 from dataclasses import dataclass, replace
@@ -40,13 +40,13 @@ class Range(_Settings):
 
 @dataclass(frozen=True, eq=False)
 class Slices:
-    """Float32 texels, the range that they cover, and the settings (less sigma_a) of their bake."""
+    """Float32 texels, the range that they cover, and the settings (without sigma_a) of their bake."""
 
     n: np.ndarray  # (K, H, W, 4)
     n_g: np.ndarray | None  # (K, H, W, 4)
     range: Range
     settings: lookup_tables.Settings
-    n_trt: np.ndarray | None = None  # (K, H, W, 4), where the section is no circle
+    n_trt: np.ndarray | None = None  # (K, H, W, 4), for elliptic sections
 
     @property
     def lobes(self) -> lookup_tables.Lobes:
@@ -61,7 +61,7 @@ def bake(
     slice_count: int = SLICE_COUNT,
     device: str = "cpu",
 ) -> Slices:
-    """`lookup_tables.Settings`, (least, greatest) sigma_a → `Slices`. The settings' own sigma_a is not used."""
+    """Bake `Slices` for a range (least, greatest) of sigma_a. The settings' own sigma_a is not used."""
     covered = Range(*(float(end) for end in np.sqrt(sigma_a_range)))
     sigma_a = np.square(np.linspace(covered.low, covered.high, slice_count))
     n_r, n_tt, n_trt, n_res = lookup_tables.azimuthal_lobes(settings, sigma_a, device)
@@ -86,7 +86,7 @@ def _elliptic_trt(settings, sigma_a, device):
 
 
 def _texels(n_r, n_tt, n_trt, n_res):
-    """Lobes (H, W, K) or less → (K, H, W, 4)."""
+    """Combine lobes, which broadcast to (H, W, K), to texels (K, H, W, 4)."""
     height, width, slice_count = n_tt.shape
     texels = np.empty((slice_count, height, width, 4), np.float32)
     for channel, lobe in enumerate((n_tt, n_trt, n_res, n_r)):
@@ -97,7 +97,7 @@ def _texels(n_r, n_tt, n_trt, n_res):
 def sample_lobes(
     texels: np.ndarray, covered: Range, u: Values, v: Values, sigma_a: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Arguments of `energy_conserving.lobe_sum` except M, at coordinates (...) of fibres with sigma_a (..., 3).
+    """Return the arguments of `energy_conserving.lobe_sum` except M, at coordinates (...), for sigma_a (..., 3).
 
     texels (K, H, W, 4): n or n_g; returns N_TT and N_R (..., 4), N_TRT and N of the residual (..., 3).
     """
@@ -107,7 +107,7 @@ def sample_lobes(
 
 
 def sample(texels: np.ndarray, covered: Range, u: Values, v: Values, sigma_a: np.ndarray) -> np.ndarray:
-    """(N_TT, N_TRT, N of the residual, N_R), (..., 4), at coordinates (...) and scalar absorptions (...)."""
+    """Return (N_TT, N_TRT, N of the residual, N_R), (..., 4), at coordinates (...) and scalar absorptions (...)."""
     u, v = np.asarray(u), np.asarray(v)
     below, fraction = slice_of(sigma_a, covered.low, covered.high, len(texels))
     ends = np.empty((2, *np.shape(below), 4))
@@ -119,7 +119,7 @@ def sample(texels: np.ndarray, covered: Range, u: Values, v: Values, sigma_a: np
 
 
 def slice_of(sigma_a: np.ndarray, low: float, high: float, slice_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The slice below sigma_a (...), and which part (...) of the way to the next one in sigma_a it lies at."""
+    """Return the slice below sigma_a (...), and the fraction (...) of the distance to the next slice, in sigma_a."""
     step = max(high - low, 1e-6) / (slice_count - 1)
     below = np.clip((np.sqrt(sigma_a) - low) / step, 0.0, slice_count - 2).astype(int)
     ends = np.square(low + step * below), np.square(low + step * (below + 1))
@@ -127,7 +127,7 @@ def slice_of(sigma_a: np.ndarray, low: float, high: float, slice_count: int) -> 
 
 
 def geometric_mix(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    """a^(1 - fraction) b^fraction, down to a darkness below which it becomes linear: black may be either end."""
+    """Return a^(1 - fraction) b^fraction, linear below `_DARKEST`: either end may be black."""
     a, b = a + _DARKEST, b + _DARKEST
     return a * np.power(b / a, fraction) - _DARKEST
 
@@ -139,10 +139,10 @@ def sample_radiance(
     roughness: Values | None = None,
     cos_twice_phi_h: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Radiance per irradiance (..., 3) at `FibreAngles` (...) of strands with sigma_a (..., 3): the shader's twin.
+    """Return radiance per irradiance (..., 3) at `FibreAngles` (...) of strands with sigma_a (..., 3), as the shader.
 
-    roughness: (...) of strands that differ in it; None: the settings' own; cos_twice_phi_h (...): as in
-    `elliptic_section`, where the section is no circle.
+    roughness: (...) of varied strands; None: that of the settings; cos_twice_phi_h (...): as in `elliptic_section`, for
+    elliptic sections.
     """
     settings = slices.settings
     if settings.mode == "energy":

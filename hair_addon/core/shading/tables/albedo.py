@@ -9,35 +9,35 @@ _INCLINATIONS = 181
 
 
 def mean_albedo(tables: lookup_tables.Tables) -> np.ndarray:
-    """Radiance of a fibre in a uniform surrounding of radiance one, RGB (3,), the mean over all directions of view."""
+    """Return the radiance of a fibre in uniform light of radiance one, RGB (3,), the mean over viewing directions."""
     forward, backward = mean_parts(tables.lobes, tables.settings)
     return forward + backward
 
 
 def mean_forward(tables: lookup_tables.Tables) -> np.ndarray:
-    """The forward part of `mean_albedo`, into the half space behind the fibre, RGB (3,): a_f of [Zinke08]."""
+    """Return the part of `mean_albedo` scattered to the half space behind the fibre, RGB (3,): a_f of [Zinke08]."""
     return mean_parts(tables.lobes, tables.settings)[0]
 
 
 def mean_parts(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> list[np.ndarray]:
-    """Forward and backward scattering, (C,) each: means over all directions; lobes as `azimuthal_lobes` bakes them."""
+    """Return forward and backward scattering, (C,) each, means over all directions; lobes: from `azimuthal_lobes`."""
     theta = dual_scattering.light_inclinations(_INCLINATIONS)
     parts = dual_scattering.lobe_parts(lobes, settings, theta)
     return [np.average(part.sum(axis=0), axis=0, weights=np.cos(theta)) for part in parts]
 
 
 def azimuthal_moments(tables: lookup_tables.Tables) -> np.ndarray:
-    """(4, K, 3) float32: of light from everywhere, the radiance that leaves towards theta_o, and its moments.
+    """Return (4, K, 3) float32: the radiance towards theta_o in uniform light, and its moments.
 
-    The second row is the same integral with the weight cos(phi), phi the light's azimuth from the viewer: positive if
-    a strand sends light back. The third and fourth are the radiance in light that varies as Legendre's polynomials P1
-    and P2 of sin(theta_i). Columns are those of `DualTables.theta`.
+    The second row is the same integral with the weight cos(phi), phi the azimuth between light and viewer: positive for
+    back scattering. The third and fourth rows are the radiance in light that varies as the Legendre polynomials P1 and
+    P2 of sin(theta_i). Columns are those of `DualTables.theta`.
     """
     return fibre_moments(tables.lobes, tables.settings).astype(np.float32)
 
 
 def fibre_moments(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> np.ndarray:
-    """`azimuthal_moments` (4, K, C) of one fibre; lobes as `azimuthal_lobes` bakes them."""
+    """Return `azimuthal_moments` (4, K, C) of one fibre; lobes: from `azimuthal_lobes`."""
     theta = dual_scattering.light_inclinations()
     rows = [dual_scattering.row_weights(settings, theta, degree) for degree in range(3)]
     edges = lookup_tables.phi_edges(settings)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Multiple scattering: the tables of dual scattering [Zinke08], from those of one fibre, and light among strands.
 
-Of the light that meets a strand a_f goes on and a_b turns back, spread by beta_f² and beta_b². All are per colour
-channel, over the inclination of the light. Front and back are the two halves of the circle of phi; the light's azimuth
-may be anywhere in its half, so of light scattered by phi the share |phi| / pi goes forward. The two fluxes through a
-layer of strands follow from both parts [Kubelka31]: [Zinke08] neglects that light that has turned turns again, and
-takes the layer behind a strand to be infinitely deep.
+Of the light that hits a strand, a_f is scattered forward and a_b backward, with variances beta_f² and beta_b². All are
+per colour channel, over the inclination of the light. Front and back are the two halves of the circle of phi; the
+light's azimuth may be anywhere in its half, so of light scattered by phi the fraction |phi| / pi goes forward. Both
+parts give the two fluxes through a layer of strands [Kubelka31]; [Zinke08] neglects repeated backward scattering, and
+assumes an infinitely deep layer behind a strand.
 """
 
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ SAMPLE_COUNT = 128  # over theta
 # Rows of `DualTables.theta`, in order.
 QUANTITIES = ("a_f", "a_b", "alpha_f", "alpha_b", "beta_f", "beta_b", "back", "back_shift", "back_width")
 
-# By a strand, and of deep hair: without any loss, fluxes would not fall exponentially.
+# Of one strand, and of deep hair: without any loss, fluxes would not decrease exponentially.
 _LEAST_ATTENUATION, _MOST_REFLECTANCE = 1e-3, 0.995
 
-_LEAST_COSINE, _LEAST_FLUX = 1e-3, 1e-6  # of light from everywhere; where there is none
+_LEAST_COSINE, _LEAST_FLUX = 1e-3, 1e-6  # lower limits of the mean cosine and of fluxes
 
 _WHITEST = 0.99  # the series over scattering events must end
 
@@ -45,14 +45,14 @@ class DualTables:
     settings: lookup_tables.Settings
 
     def at(self, quantity: str, theta: Values) -> np.ndarray:
-        """A quantity (..., 3) at inclinations (...), as a texture unit reads it."""
+        """Return a quantity (..., 3) at inclinations (...), sampled as by a texture unit."""
         row = self.theta[QUANTITIES.index(quantity)][None]
         u = np.asarray(theta) / np.pi + 0.5
         return lookup_tables.sample(row, u, np.full_like(u, 0.5))
 
 
 def light_inclinations(count: int = SAMPLE_COUNT) -> np.ndarray:
-    """theta (count,) of the tables' columns."""
+    """Return theta (count,) of the tables' columns."""
     return np.pi * ((np.arange(count) + 0.5) / count - 0.5)
 
 
@@ -66,7 +66,7 @@ def bake(tables: lookup_tables.Tables) -> DualTables:
 
 
 def quantities(forward: np.ndarray, backward: np.ndarray, settings: lookup_tables.Settings) -> np.ndarray:
-    """The rows of `DualTables.theta`, (9, T, C) float32, of what `scattered_parts` finds, (4, T, C) each."""
+    """Return the rows of `DualTables.theta`, (9, T, C) float32, from both `scattered_parts`, (4, T, C) each."""
     a_f, a_b = (np.minimum(parts.sum(axis=0), _WHITEST) for parts in (forward, backward))
     alpha, beta = _centres_and_widths(settings)
     alpha_f, alpha_b = (_weighted(alpha, parts) for parts in (forward, backward))
@@ -76,14 +76,14 @@ def quantities(forward: np.ndarray, backward: np.ndarray, settings: lookup_table
 
 
 def scattered_parts(tables: lookup_tables.Tables, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(forward, backward), each (4, T, 3): scattering by R, TT, TRT and the residual; theta: (T,), of the light."""
+    """Return (forward, backward), each (4, T, 3): scattering by R, TT, TRT and residual; theta: (T,), of the light."""
     return lobe_parts(tables.lobes, tables.settings, theta)
 
 
 def lobe_parts(
     lobes: lookup_tables.Lobes, settings: lookup_tables.Settings, theta: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`scattered_parts`, (4, T, C) each, of N_R, N_TT, N_TRT and N of the residual as `azimuthal_lobes` bakes them."""
+    """Return `scattered_parts`, (4, T, C) each, of the lobes from `azimuthal_lobes`."""
     edges = lookup_tables.phi_edges(settings)
     widths = 2.0 * np.abs(np.diff(edges))  # twice: N is even in phi
     ahead = 0.5 * (edges[1:] + edges[:-1]) / np.pi
@@ -92,10 +92,10 @@ def lobe_parts(
 
 
 def lobe_albedos(lobes: lookup_tables.Lobes, weights: np.ndarray, rows: list[np.ndarray]) -> np.ndarray:
-    """(4, T, C): the integral of each lobe over phi, with weights (W,) of the columns, and over the other inclination.
+    """Return (4, T, C): integrals of lobes over phi, with weights (W,) of the columns, and over the other inclination.
 
-    rows: the `row_weights` of theta (T,), the viewer's in the energy-conserving mode; the classic one does not know
-    light from viewer.
+    rows: the `row_weights` of theta (T,), the viewer's in the energy-conserving mode; the classic mode is symmetric in
+    light and viewer.
     """
     *narrow, n_res = lobes
     n_r, n_tt, n_trt = (np.einsum("hwc,w->hc", lobe, weights) for lobe in narrow)
@@ -105,9 +105,9 @@ def lobe_albedos(lobes: lookup_tables.Lobes, weights: np.ndarray, rows: list[np.
 
 
 def row_weights(settings: lookup_tables.Settings, theta: np.ndarray, degree: int = 0) -> list[np.ndarray]:
-    """For each lobe, (T, H): weights of the rows of N in the scattering of light inclined by theta (T,).
+    """Return for each lobe (T, H): weights of the rows of N in the scattering of light inclined by theta (T,).
 
-    degree: of Legendre's polynomial of the sine of the other inclination, by which light is weighed.
+    degree: of the Legendre polynomial of the sine of the other inclination, which weights the light.
     """
     rows = lookup_tables.row_cosines(settings)
     if settings.mode == "energy":
@@ -124,22 +124,22 @@ def row_weights(settings: lookup_tables.Settings, theta: np.ndarray, degree: int
 
 
 def legendre(x: Values, degree: int) -> np.ndarray:
-    """Legendre's polynomial of a degree at x (...)."""
+    """Return the Legendre polynomial of a degree at x (...)."""
     return np.polynomial.legendre.legval(x, np.eye(degree + 1)[degree])
 
 
 def _legendre_means(settings, theta, degree):
-    """(4, T): mean of `legendre` of sin(theta_i) over M of each lobe, for viewers at theta (T,)."""
+    """Return (4, T): the mean of `legendre` of sin(theta_i) over M of each lobe, for viewers at theta (T,)."""
     incoming = np.pi * ((np.arange(721) + 0.5) / 721 - 0.5)
     m = energy_conserving.m_lobes(incoming, theta[:, None], settings) * np.cos(incoming)[:, None]  # (T, 721, 4)
-    # Narrow lobes are a mirror's; a little of it keeps them from 0 / 0.
+    # Narrow lobes are mirrors; adding a small mirror term avoids 0 / 0.
     mirrored = legendre(np.sin(-theta), degree)[:, None]
     total, least = m.sum(axis=1), 1e-6
     return ((np.einsum("tic,i->tc", m, legendre(np.sin(incoming), degree)) + least * mirrored) / (total + least)).T
 
 
 def _interpolation(cosines, rows, weights):
-    """(T, H) that sums values at rows (H,), interpolated to cosines (T, O), with weights (T, O)."""
+    """Return the (T, H) matrix that sums values at rows (H,), interpolated to cosines (T, O), with weights (T, O)."""
     place = np.clip(np.interp(cosines, rows, np.arange(len(rows))), 0.0, len(rows) - 1.0)
     below = np.minimum(place.astype(int), len(rows) - 2)
     first = below + len(rows) * np.arange(len(cosines))[:, None]
@@ -150,7 +150,7 @@ def _interpolation(cosines, rows, weights):
 
 
 def _centres_and_widths(settings):
-    """alpha and beta of the four lobes, (4,), in theta_h."""
+    """Return alpha and beta of the four lobes, (4,), in theta_h."""
     if settings.mode == "energy":
         shift, v = np.array(energy_conserving.lobes(settings)).T
         return 0.5 * shift, 0.5 * np.sqrt(v)
@@ -159,20 +159,20 @@ def _centres_and_widths(settings):
 
 
 def _weighted(values, parts):
-    """Mean (T, 3) of one value a lobe (4,), weighted by what each scatters (4, T, 3)."""
+    """Return the mean (T, 3) of one value per lobe (4,), weighted by the scattering of each (4, T, 3)."""
     return np.einsum("p,ptc->tc", values, parts) / np.maximum(parts.sum(axis=0), 1e-12)
 
 
 def back_scattering(
     a_f: Values, a_b: Values, alpha_f: Values, alpha_b: Values, beta_f: Values, beta_b: Values
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(A_b, Delta_b, sigma_b) (...): light sent back after one or three backward events and any number forward.
+    """Return (A_b, Delta_b, sigma_b) (...): light after one or three backward events and any number of forward ones.
 
     The moments are summed exactly over the numbers of events; [Zinke08] expands them for small a_b.
     """
     x = np.square(a_f)
     once, thrice = a_b * x / (1.0 - x), np.power(a_b, 3) * x / np.power(1.0 - x, 3)
-    # Mean numbers of forward events in each.
+    # Mean numbers of forward events with one and with three backward events.
     events_once, events_thrice = 2.0 / (1.0 - x), 2.0 * (1.0 + 2.0 * x) / (1.0 - x)
     total = once + thrice
     shift = once * (alpha_b + events_once * alpha_f) + thrice * (3.0 * alpha_b + events_thrice * alpha_f)
@@ -182,23 +182,26 @@ def back_scattering(
 
 
 def back_azimuth(phi: Values) -> np.ndarray:
-    """Part (...) of the light from the half circle behind that goes to its front, over the azimuth phi of the front."""
+    """Return the fraction (...) of light from the half circle behind that goes to azimuth phi in the front half."""
     return 1.0 - np.abs(phi) / np.pi
 
 
 def direct_part(count: Values) -> np.ndarray:
-    """Unscattered part (...) of light behind a mean of `count` (...) strands, Poisson distributed."""
+    """Return the unscattered fraction (...) of light behind `count` (...) strands on average, Poisson distributed."""
     return np.exp(-np.asarray(count, float))
 
 
 def deep_hair(a_f: Values, a_b: Values) -> tuple[np.ndarray, np.ndarray]:
-    """(attenuation by one strand, reflectance) (...) of infinitely many strands: gamma and R of [Kubelka31]."""
+    """Return (attenuation per strand, reflectance) (...) of infinitely many strands: gamma and R of [Kubelka31]."""
     attenuation = np.sqrt(np.maximum(np.square(1.0 - a_f) - np.square(a_b), _LEAST_ATTENUATION**2))
     return attenuation, np.minimum(a_b / (1.0 - a_f + attenuation), _MOST_REFLECTANCE)
 
 
 def layer_parts(count: Values, attenuation: np.ndarray, reflectance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(transmitted, reflected) parts (..., 3) of light by a mean of `count` (...) strands of `deep_hair` (..., 3)."""
+    """Return the (transmitted, reflected) fractions (..., 3) of light for `count` (...) strands on average.
+
+    attenuation, reflectance: from `deep_hair` (..., 3).
+    """
     left = np.exp(-attenuation * np.asarray(count, float)[..., None])
     turned = np.square(reflectance)
     kept = 1.0 - turned * np.square(left)
@@ -206,9 +209,9 @@ def layer_parts(count: Values, attenuation: np.ndarray, reflectance: np.ndarray)
 
 
 def fluxes(front: Values, behind: Values, a_f: np.ndarray, a_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(onward, backward) light (..., 3) at a strand between means of `front` and `behind` (...) others.
+    """Return the (forward, backward) light (..., 3) at a strand with `front` and `behind` (...) others on average.
 
-    Parts of what arrives at the first strand; nothing comes from behind the last.
+    Both are fractions of the light at the first strand; no light comes from behind the last.
     """
     deep = deep_hair(a_f, a_b)
     transmitted, reflected = layer_parts(front, *deep)
@@ -218,12 +221,12 @@ def fluxes(front: Values, behind: Values, a_f: np.ndarray, a_b: np.ndarray) -> t
 
 
 def mean_cosine(variance: Values) -> np.ndarray:
-    """Factor (...) by which `d_eon_lobe` of a variance (...) shrinks the mean sine of the inclination of light."""
+    """Return the factor (...) by which `d_eon_lobe` of a variance (...) reduces the mean sine of the inclination."""
     return 1.0 / np.tanh(1.0 / np.asarray(variance)) - variance
 
 
 def variance_of(cosine: Values) -> np.ndarray:
-    """The inverse (...) of `mean_cosine` (Banerjee et al. 2005); cosine: (...), 0 for light from everywhere."""
+    """Return the inverse (...) of `mean_cosine` (Banerjee et al. 2005); cosine: (...), 0 for uniform light."""
     m = np.clip(cosine, _LEAST_COSINE, 1.0)
     return (1.0 - m * m) / (m * (3.0 - m * m))
 
@@ -231,12 +234,12 @@ def variance_of(cosine: Values) -> np.ndarray:
 def drifts(
     front: Values, behind: Values, quantity: dict[str, np.ndarray]
 ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    """(shift, variance) (...) in theta_i + theta_o: of light that strands in front scattered on, and from behind.
+    """Return (shift, variance) (...) in theta_i + theta_o of light scattered forward in front, and from behind.
 
-    The latter with one event more, in this strand. Each event multiplies the mean sine of the inclination by a mean
-    cosine: fluxes among strands that scatter only this part have the mean sine after any number of events, and tell
-    that number. Each shifts light towards the same end of the strands. In deep hair the number of events is
-    distributed geometrically: its deviation is its mean.
+    The latter has one more event, in this strand. Each event multiplies the mean sine of the inclination by a mean
+    cosine, so fluxes among strands that scatter only this fraction give the mean sine after any number of events, and
+    thereby that number. Each event shifts light towards the same end of the strands. In deep hair the number of events
+    has a geometric distribution, whose deviation equals its mean.
     """
     parts = np.stack([quantity["a_f"], quantity["a_b"]])
     # Means over the channels, which differ little.
@@ -264,9 +267,9 @@ def sample_radiance(
     front: Values,
     behind: Values,
 ) -> np.ndarray:
-    """Radiance per irradiance (..., 3) of a strand between means of `front` and `behind` (...) others.
+    """Return radiance per irradiance (..., 3) of a strand with `front` and `behind` (...) others on average.
 
-    Energy-conserving mode; what the shader computes from the tables.
+    For the energy-conserving mode, from tables, as the shader computes it.
     """
     settings = tables.settings
     if tables.n_res is None:
@@ -291,11 +294,11 @@ def radiance(
     *,
     roughness: Values | None = None,
 ) -> np.ndarray:
-    """Radiance per irradiance (..., 3) of a strand between means of `front` and `behind` (...) others.
+    """Return radiance per irradiance (..., 3) of a strand with `front` and `behind` (...) others on average.
 
-    The irradiance is that outside the hair. quantity: {name: (..., 3)} of the strands around, at theta_i; n, n_g: what
-    `energy_conserving.lobe_sum` takes beside M, for light from one direction and scattered forward; roughness: (...) of
-    strands that differ in it. Widths and shifts are those of the light of all channels.
+    The irradiance is that outside the hair. quantity: {name: (..., 3)} of the surrounding strands, at theta_i; n, n_g:
+    arguments of `energy_conserving.lobe_sum` except M, for direct light and light scattered forward; roughness: (...)
+    of varied strands. Widths and shifts are means over the channels.
     """
     onward, backward = fluxes(front, behind, quantity["a_f"], quantity["a_b"])
     direct = direct_part(front)[..., None]
@@ -303,7 +306,7 @@ def radiance(
     # A view rotated past the pole continues on the other side.
     views = (angles.theta_o, 0.0), (np.arcsin(np.sin(angles.theta_o - shift)), spread)
     m = [energy_conserving.m_lobes(angles.theta_i, view, settings, roughness, widening) for view, widening in views]
-    # Light that has turned is so wide that the lobes of this strand hardly matter.
+    # Light scattered backward is so wide that the lobes of this strand hardly matter.
     turned = angles.theta_o - back_shift
     sines = np.sin(angles.theta_i), np.cos(angles.theta_i), np.sin(turned), np.abs(np.cos(turned))
     m_back = d_eon_lobe(*sines, back_spread)

@@ -7,11 +7,11 @@ In the classic mode:
     n      N_TT red, green, blue, N_R        over phi (columns) and cos(theta_d) (rows)
     n_trt  N_TRT red, green, blue            over the same
 
-In the energy-conserving mode theta_o takes the place of theta_d, m holds the residual lobe in place of the cosine, and
+In the energy-conserving mode theta_o replaces theta_d, m contains the residual lobe instead of the cosine, and
 
-    n_res  the residual's red, green, blue   over cos(theta_o) (rows), in one column: it is the same for every phi
+    n_res  the residual's red, green, blue   over cos(theta_o) (rows), in one column, as it does not depend on phi
 
-A texel is named by its middle, as a texture unit does it: column k of W lies at u = (k + 0.5) / W, row j of H at
+Coordinates are those of texel centres, as in a texture unit: column k of W is at u = (k + 0.5) / W, row j of H at
 v = (j + 0.5) / H. With the axes ANGLES, u of n is phi / pi; with COSINES, the report's, it is (cos(phi) + 1) / 2.
 The azimuthal texels are means over their cell of phi.
 """
@@ -32,7 +32,7 @@ from .cell_means import Absorptions, residual, smooth_means
 
 MAX_SIZE = 2048
 
-# N_R, N_TT, N_TRT and the residual's N, which the classic mode has not.
+# N_R, N_TT, N_TRT and the residual's N, which the classic mode lacks.
 Lobes = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]
 
 
@@ -73,9 +73,9 @@ class Tables:
 
 
 def bake(settings: Settings, device: str = "cpu", progress: Progress = no_progress) -> Tables:
-    """`Settings` → `Tables`; device: a Warp device such as "cuda:0", or the processor.
+    """Bake `Tables`; device: a Warp device such as "cuda:0", or the processor.
 
-    progress(step, part): told how far it is, and may raise to stop it.
+    progress(step, part): called with the progress, may raise to cancel.
     """
     n_r, n_tt, n_trt, n_res = azimuthal_lobes(settings, settings.sigma_a, device, progress)
     m = _longitudinal(settings, device)
@@ -85,7 +85,7 @@ def bake(settings: Settings, device: str = "cpu", progress: Progress = no_progre
 def azimuthal_lobes(
     settings: Settings, sigma_a: Absorptions, device: str = "cpu", progress: Progress = no_progress
 ) -> Lobes:
-    """N_R (H, W, 1), N_TT and N_TRT (H, W, C) and the residual's N (H, 1, C) or None, for sigma_a (C,); float32."""
+    """Bake float32 N_R (H, W, 1), N_TT and N_TRT (H, W, C), the residual's N (H, 1, C) or None, for sigma_a (C,)."""
     edges, cosines = phi_edges(settings), row_cosines(settings)
     is_rough = settings.mode == "energy"
     n_res = residual(cosines, settings.eta, sigma_a)[:, None].astype(np.float32) if is_rough else None
@@ -102,7 +102,7 @@ def azimuthal_lobes(
 
 
 def spread_columns(lobes: Sequence[np.ndarray], spread: np.ndarray) -> list[np.ndarray]:
-    """Cell means (H, W, C) each, of any C, with their columns mixed by a matrix (W, W): all in one product."""
+    """Multiply the columns of cell means (H, W, C), of any C, by a matrix (W, W), all in one product."""
     height, width, _channels = lobes[0].shape
     counts = [lobe.shape[2] for lobe in lobes]
     side_by_side = np.concatenate([lobe.swapaxes(1, 2) for lobe in lobes], axis=1)  # (H, channels, W)
@@ -111,12 +111,12 @@ def spread_columns(lobes: Sequence[np.ndarray], spread: np.ndarray) -> list[np.n
 
 
 def row_cosines(settings: Settings) -> np.ndarray:
-    """cos(theta_d), or cos(theta_o) in the energy-conserving mode, of each row of n, (H,)."""
+    """Return cos(theta_d), or cos(theta_o) in the energy-conserving mode, of each row of n, (H,)."""
     return (np.arange(settings.size) + 0.5) / settings.size
 
 
 def phi_edges(settings: Settings) -> np.ndarray:
-    """Where the columns of n meet: W + 1 values of phi, from 0 to pi, or from pi to 0 with the axes COSINES."""
+    """Return the edges of the columns of n: W + 1 values of phi from 0 to pi, or from pi to 0 with the axes COSINES."""
     u = np.arange(settings.size + 1) / settings.size
     return np.arccos(2.0 * u - 1.0) if settings.axes == "COSINES" else np.pi * u
 
@@ -135,19 +135,19 @@ def _longitudinal(settings, device):
 
 
 def m_coordinates(sin_theta_i: Values, sin_theta_o: Values, axes: str) -> tuple[Values, Values]:
-    """(u, v), each (...), of m."""
+    """Return the coordinates (u, v), each (...), in m."""
     sines = (np.clip(sine, -1.0, 1.0) for sine in (sin_theta_i, sin_theta_o))
     u, v = (0.5 * sine + 0.5 if axes == "COSINES" else np.arcsin(sine) / np.pi + 0.5 for sine in sines)
     return u, v
 
 
 def n_coordinates(phi: Values, cos_theta_d: Values, axes: str) -> tuple[Values, Values]:
-    """(u, v), each (...), of n and n_trt; phi in [-pi, pi]."""
+    """Return the coordinates (u, v), each (...), in n and n_trt; phi in [-pi, pi]."""
     return (0.5 * np.cos(phi) + 0.5 if axes == "COSINES" else np.abs(phi) / np.pi), cos_theta_d
 
 
 def sample(table: np.ndarray, u: Values, v: Values) -> np.ndarray:
-    """(H, W, C) at coordinates (...) in [0, 1] → (..., C): bilinear, clamped to the edge, as a texture unit does it."""
+    """Sample (H, W, C) at coordinates (...) in [0, 1] → (..., C): bilinear, clamped to the edge, as a texture unit."""
     height, width = table.shape[:2]
     x = np.clip(np.asarray(u) * width - 0.5, 0.0, width - 1.0)
     y = np.clip(np.asarray(v) * height - 0.5, 0.0, height - 1.0)
@@ -161,7 +161,7 @@ def sample(table: np.ndarray, u: Values, v: Values) -> np.ndarray:
 
 
 def sample_radiance(tables: Tables, angles: FibreAngles) -> np.ndarray:
-    """Radiance per irradiance (..., 3) at `FibreAngles` (...), read from the tables: the shader's hair_bsdf()."""
+    """Return radiance per irradiance (..., 3) at `FibreAngles` (...) from the tables: the shader's hair_bsdf()."""
     if tables.n_res is None:  # the classic mode
         return sample_scattering(tables, angles) * np.cos(angles.theta_i)[..., None]
     # M is evaluated: lobes of smooth hair are narrower than texels, and strands may differ in roughness.
@@ -172,7 +172,7 @@ def sample_radiance(tables: Tables, angles: FibreAngles) -> np.ndarray:
 
 
 def sample_scattering(tables: Tables, angles: FibreAngles) -> np.ndarray:
-    """S (..., 3) [1/sr] of the classic mode at `FibreAngles` (...), read from the tables."""
+    """Return S (..., 3) [1/sr] of the classic mode at `FibreAngles` (...) from the tables."""
     sin_theta_i, sin_theta_o = np.sin(angles.theta_i), np.sin(angles.theta_o)
     cosine = cos_theta_d(sin_theta_i, sin_theta_o)  # exact, where m's fourth channel is off by 0.014 near grazing
     at = n_coordinates(angles.phi, cosine, tables.settings.axes)
@@ -181,7 +181,7 @@ def sample_scattering(tables: Tables, angles: FibreAngles) -> np.ndarray:
 
 
 def to_half(values: np.ndarray) -> np.ndarray:
-    """Array → float16, clamped to the largest half float; subnormals become 0 (they cost fifty times as much)."""
+    """Convert to float16, clamped to the largest half float; subnormals become 0, as they are fifty times slower."""
     limit = np.finfo(np.float16)
     values = np.clip(values, float(limit.min), float(limit.max))
     return np.where(np.abs(values) < float(limit.tiny), 0.0, values).astype(np.float16)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tables of varied strands: N for any absorption, and multiple scattering among all strands.
 
-A strand scatters with its own absorption; what light has met before it and what lies behind it are other strands, which
-grow there with any random number but have turned from root to tip as far as it has. So dual scattering takes the means
-over the random numbers, at each part of the way from the root's colour to the tip's.
+A strand scatters with its own absorption. The strands in front of it and behind it have any random numbers, but the
+same position along the gradient from the root's colour to the tip's. So dual scattering uses means over the random
+numbers, at each position along the gradient.
 """
 
 from dataclasses import dataclass, replace
@@ -28,26 +28,26 @@ _RETURN_STEPS = 32  # rows of `StrandTables.returned`
 class StrandTables:
     """Tables of hair with the variation of `strand_variation.Settings`.
 
-    dual: rows as in `dual_scattering.QUANTITIES`, means over strands; its slices go from the root's colour to the
-    tip's, the first and the last at either. returned: `albedo.fibre_moments` side by side, over theta_o and, first and
-    last row at either end of the slices' range, over sqrt(sigma_a).
+    dual: rows as in `dual_scattering.QUANTITIES`, means over strands; its slices run from the root's colour (first) to
+    the tip's (last). returned: `albedo.fibre_moments` as channels, over theta_o (columns) and sqrt(sigma_a) (rows, from
+    one end of the slices' range to the other).
     """
 
     slices: absorption_slices.Slices
     variation: strand_variation.Settings
     dual: np.ndarray | None  # (G, 9, T, 3), of the energy-conserving mode
     returned: np.ndarray  # (32, T, 4)
-    forward: np.ndarray  # (3,): passed on of even light, the mean over all strands
-    backward: np.ndarray  # (3,): sent back
+    forward: np.ndarray  # (3,): fraction of uniform light scattered forward, the mean over all strands
+    backward: np.ndarray  # (3,): fraction scattered backward
 
     @property
     def settings(self) -> lookup_tables.Settings:
-        """The fibre's settings, less its absorption."""
+        """The fibre's settings, without its absorption."""
         return self.slices.settings
 
 
 def bake(settings: lookup_tables.Settings, variation: strand_variation.Settings, device: str = "cpu") -> StrandTables:
-    """`lookup_tables.Settings` and `strand_variation.Settings` → `StrandTables`; the former's sigma_a is not used."""
+    """Bake `StrandTables`; sigma_a of the `lookup_tables.Settings` is not used."""
     settings = replace(settings, size=min(settings.size, GREATEST_SIZE))
     least, greatest = np.minimum(strand_variation.absorption_range(variation), _BLACK)
     slice_count = 2 if least == greatest else absorption_slices.SLICE_COUNT
@@ -66,7 +66,7 @@ def bake(settings: lookup_tables.Settings, variation: strand_variation.Settings,
 
 
 def _dual(slices, around):
-    """`StrandTables.dual` among strands of sigma_a (G, R, 3)."""
+    """Return `StrandTables.dual` among strands with sigma_a (G, R, 3)."""
     theta = dual_scattering.light_inclinations()
     parts = np.stack(dual_scattering.lobe_parts(slices.lobes, slices.settings, theta))  # (2, 4, T, K)
     means = _at_absorptions(parts, slices, around).mean(axis=-2)  # (2, 4, T, G, 3)
@@ -76,23 +76,23 @@ def _dual(slices, around):
 
 
 def _returned(slices):
-    """`StrandTables.returned`."""
+    """Return `StrandTables.returned`."""
     moments = albedo.fibre_moments(slices.lobes, slices.settings)  # (4, T, K)
     roots = np.linspace(slices.range.low, slices.range.high, _RETURN_STEPS)
     below, fraction = absorption_slices.slice_of(np.square(roots), slices.range.low, slices.range.high, len(slices.n))
-    # The second may be negative, which no geometric mean takes; slices are close enough for a plain one.
+    # The second moment may be negative, so no geometric mean; slices are close enough for an arithmetic one.
     mixed = moments[..., below] * (1.0 - fraction) + moments[..., below + 1] * fraction
     return np.ascontiguousarray(mixed.transpose(2, 1, 0), np.float32)
 
 
 def _at_absorptions(values, slices, sigma_a):
-    """Values (..., K) of the slices at sigma_a (...), appended."""
+    """Return values (..., K) of the slices interpolated to sigma_a (...), whose axes are appended."""
     below, fraction = absorption_slices.slice_of(sigma_a, slices.range.low, slices.range.high, len(slices.n))
     return absorption_slices.geometric_mix(values[..., below], values[..., below + 1], fraction)
 
 
 def _part_of_length(variation, gradient):
-    """How much of the strands' length each step of the gradient stands for, (G,), in all 1."""
+    """Return the fraction (G,) of the strands' length that each step of the gradient represents; the sum is 1."""
     if len(gradient) == 1:
         return np.ones(1)
     positions = (np.arange(256) + 0.5) / 256
@@ -104,7 +104,7 @@ def _part_of_length(variation, gradient):
 def hair_return(
     tables: StrandTables, theta_o: Values, random: Values, position: Values
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """`albedo.azimuthal_moments`, (..., 3) each, of strands seen from theta_o (...): the shader's function."""
+    """Return `albedo.azimuthal_moments`, (..., 3) each, of strands viewed from theta_o (...), as the shader."""
     variation, covered = tables.variation, tables.slices.range
     roots = np.sqrt(strand_variation.strand_sigma_a(variation, random, position))
     along = np.clip((roots - covered.low) / max(covered.high - covered.low, 1e-6), 0.0, 1.0)
@@ -122,9 +122,9 @@ def sample_radiance(
     front: Values,
     behind: Values,
 ) -> np.ndarray:
-    """Radiance per irradiance (..., 3) at `FibreAngles` (...) of strands between means of `front` and `behind` (...).
+    """Return radiance per irradiance (..., 3) at `FibreAngles` (...) of strands with `front` and `behind` (...) others.
 
-    random, position (...): of the strands. Energy-conserving mode; what the shader computes from the tables.
+    random, position (...): of the strands. For the energy-conserving mode, from tables, as the shader computes it.
     """
     settings, variation, slices = tables.settings, tables.variation, tables.slices
     if slices.n_g is None:
@@ -139,7 +139,7 @@ def sample_radiance(
 
 
 def _quantity(tables, name, theta, gradient):
-    """A quantity (..., 3) of the strands around, at inclinations and parts of the gradient (...)."""
+    """Return a quantity (..., 3) of the surrounding strands, at inclinations and positions along the gradient (...)."""
     table = tables.dual[:, dual_scattering.QUANTITIES.index(name)]  # (G, T, 3)
     step_count = len(table)
     v = (gradient * (step_count - 1) + 0.5) / step_count

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Part of uniform light that a rough surface reflects towards the eye: the microfacets of [Walter07] and [Heitz14]."""
+"""Directional albedo of rough surfaces: the microfacets of [Walter07] and [Heitz14]."""
 
 from functools import cache
 
@@ -12,9 +12,9 @@ _REFRACTIVE_INDEX = 1.5  # of the dielectric whose Fresnel reflectance is scaled
 
 @cache
 def table() -> np.ndarray:
-    """(SIZE, SIZE, 4) float32: what microfacets reflect, at any Fresnel reflectance F0 of normal incidence.
+    """Return (SIZE, SIZE, 4) float32: the albedo of microfacets, for any Fresnel reflectance F0 at normal incidence.
 
-    Rows run over the roughness, columns over the cosine of the eye's angle, both from 0 to 1. Channels: the part e of
+    Rows run over the roughness, columns over the cosine of the eye's angle, both from 0 to 1. Channels: the albedo e of
     perfect mirrors; b of metals and of dielectrics, which reflect (e - b) F0 + b; the mean of e over cosines.
     """
     roughness = np.maximum(np.linspace(0.0, 1.0, SIZE), 0.02)[:, None, None]
@@ -29,7 +29,7 @@ def table() -> np.ndarray:
 
 
 def _microfacets(roughness, n_dot_v):
-    """V·H of normals chosen by their density [Walter07, Eq. 35], and the light that each would reflect as a mirror."""
+    """Return V·H of normals sampled by their density [Walter07, Eq. 35], and the light each reflects as a mirror."""
     index = np.arange(_SAMPLE_COUNT)
     share, azimuth = (index + 0.5) / _SAMPLE_COUNT, 2.0 * np.pi * np.modf(0.61803399 * index)[0]
     squared = roughness**4
@@ -44,7 +44,7 @@ def _microfacets(roughness, n_dot_v):
 
 
 def _fresnel(cosine, refractive_index):
-    """Reflectance of a dielectric for unpolarised light."""
+    """Return the reflectance of a dielectric for unpolarised light."""
     g = np.sqrt(refractive_index**2 - 1.0 + cosine**2)
     along = (cosine * (g + cosine) - 1.0) / (cosine * (g - cosine) + 1.0)
     return 0.5 * ((g - cosine) / (g + cosine)) ** 2 * (1.0 + along**2)

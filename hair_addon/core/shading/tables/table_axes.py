@@ -44,26 +44,26 @@ _DUAL_AXES = (
 
 
 def tables_of(mode: str) -> tuple[str, ...]:
-    """Names of one fibre's tables."""
+    """Return the names of one fibre's tables."""
     return ("m", "n", "n_trt", "n_res") if mode == "energy" else ("m", "n", "n_trt")
 
 
 def channels(name: str, mode: str) -> dict[str, str]:
-    """{channel: meaning} of a table."""
+    """Return {channel: meaning} of a table."""
     if name == "m":
         return _M | {"A": "M of the residual" if mode == "energy" else "cos(theta_d)"}
     return _CHANNELS[name]
 
 
 def shape(name: str, settings: Settings) -> tuple[int, int]:
-    """(height, width) of a table."""
+    """Return (height, width) of a table."""
     if name == "dual":
         return len(QUANTITIES), SAMPLE_COUNT
     return settings.size, 1 if name == "n_res" else settings.size
 
 
 def axes(name: str, settings: Settings) -> tuple[str, str]:
-    """Description of the columns and rows of a table."""
+    """Return descriptions of the columns and rows of a table."""
     if name == "dual":
         return _DUAL_AXES
     if name == "m":
