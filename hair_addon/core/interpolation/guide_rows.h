@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Numbers of guides as vectors of eight lanes, and shares of weights. Stands after lanes.h in a function's body.
+// Numbers of guides as vectors of eight lanes, and normalization of weights. Include after lanes.h in a function.
 
-// Reads `count` numbers into the first lanes, writes them; so too pairs, the first of each into one vector.
+// Reads `count` numbers into the first lanes, and writes them; likewise pairs, in one vector for each of both numbers.
 
 #if defined(__CUDA_ARCH__)
   const auto read_lanes = [](auto& vector, const auto* from, int) { vector = from[0]; };
@@ -15,8 +15,8 @@
     to[0] = first;
     to[1] = second;
   };
-  // Reads the eight numbers of each lane's guide, number i into columns[i]. numbers: (G, 8); guides below zero are
-  // none, and read as guide 0.
+  // Reads the eight numbers of each lane's guide, number i into columns[i]. numbers: (G, 8); negative guides are empty
+  // slots, and read as guide 0.
   const auto read_columns = [](lanes (&columns)[8], ints guides, const float* numbers) {
     for (int i = 0; i < 8; ++i) columns[i] = numbers[size_t(guides < 0 ? 0 : guides) * 8 + i];
   };
@@ -56,7 +56,7 @@
     __builtin_memcpy(to, &low, sizeof(lanes));
     __builtin_memcpy(to + LANES, &high, sizeof(lanes));
   };
-  // As above: each guide's eight numbers are read as a row, and the rows transposed in three steps of swapped halves.
+  // As above: each guide's eight numbers are read as a row, and the rows are transposed in three steps.
   const auto read_columns = [](lanes (&row)[8], ints guides, const float* numbers) {
     for (int lane = 0; lane < 8; ++lane) {
       __builtin_memcpy(&row[lane], numbers + size_t(guides[lane] < 0 ? 0 : guides[lane]) * 8, sizeof(lanes));

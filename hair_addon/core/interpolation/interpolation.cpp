@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A strand as the weighted sum of its guides (interpolation.py), SEGMENTS of its segments at once: in the lanes of a
-// vector on a CPU, in neighboring threads on a GPU.
+// A strand as the weighted sum of its guides (interpolation.py), SEGMENTS segments at once: in the lanes of a vector on
+// a CPU, in neighboring threads on a GPU.
 //
-// The body of `_sum_guides` in interpolation.py. Parameters, for S strands of P points, K slots of guides a strand and
+// The body of `_sum_guides` in interpolation.py. Parameters, for S strands of P points, K slots of guides per strand and
 // G guides:
 //
-//   int strand                              the strand to make
+//   int strand                              index of the strand
 //   vec3 root                               its root [m]
 //   vec3 tangent, bitangent, normal         its frame
 //   array_t<float> offsets                  (G, groups, 4 * SEGMENTS) segments of guides in the frames of their roots
-//                                           [m], 0 past the tip: of each group all x, then all y, all z, all lengths
-//                                           on a CPU; x, y, z and length of one segment after the other on a GPU
+//                                           [m], 0 past the tip. In each group: on a CPU all x, all y, all z, then all
+//                                           lengths; on a GPU x, y, z and length of each segment
 //   array_t<int> indices                    (S, K) guides of each strand
 //   array_t<float> weights                  (S, K) their weights, zero in unused slots
-//   array_t<vec2> turns                     (S, K) cosine and sine of the turn from a guide's frame to the strand's
-//   float keep_length                       0 to 1: how far segments are stretched to the guides' mean length
+//   array_t<vec2> turns                     (S, K) cosine and sine of the angle from a guide's frame to the strand's
+//   float keep_length                       0 to 1: blend to segments with the guides' mean length
 //   array_t<vec3> out_points                (S, P) [m]
 //
 // Constants:
 //
 //   SEGMENTS                                of a group: 8
 //   WIDTH                                   the same
-//   SLOT_LIMIT                              most guides of a strand
+//   SLOT_LIMIT                              maximum number of guides per strand
 
 {
 #include "lanes.h"
@@ -32,7 +32,7 @@ const int point_count = out_points.shape[1];
 const int slot_count = indices.shape[1];
 const int group_count = offsets.shape[1];
 
-// A guide of the strand: its offsets, its weight, and the cosine and sine of its turn times the weight.
+// A guide of the strand: its offsets, its weight, and the cosine and sine of its rotation times the weight.
 struct Guide {
   const float* offsets;
   float share, cosine, sine;
@@ -59,7 +59,7 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
     const float4 found = __ldg(reinterpret_cast<const float4*>(from) + lane);
     return Segments{found.x, found.y, found.z, found.w};
   };
-  // From segments to points: sums of all segments from `last` on, which becomes the last of them.
+  // From segments to points: running sums that start at `last`, which becomes the last sum.
   const auto add_up = [&](lanes& along, float& last) {
     for (int step = 1; step < SEGMENTS; step *= 2) {
       const float before = __shfl_up_sync(team, along, step, SEGMENTS);
@@ -75,7 +75,7 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
       to[3 * lane + 2] = z;
     }
   };
-  // Slots are read for each group: registers of an index known at run time would be memory.
+  // Slots are read for each group: registers with a dynamic index would be memory.
   const auto for_guides = [&](auto use) {
     for (int slot = 0; slot < slot_count; ++slot) {
       if (weights.data[size_t(strand) * slot_count + slot] > 0.0f) use(guide_of(slot));
@@ -87,7 +87,7 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
     __builtin_memcpy(&found, from, sizeof(Segments));
     return found;
   };
-  // The same by an inclusive scan over the lanes [Harris07]: vectors are moved up by some lanes, with zeros below.
+  // The same by an inclusive scan over the lanes [Harris07]: vectors are shifted up, with zeros below.
   const auto add_up = [](lanes& along, float& last) ALWAYS_INLINE {
     const lanes zeros = 0.0f;
     const auto up_by_1 = [&](lanes v) { return __builtin_shufflevector(zeros, v, 0, 8, 9, 10, 11, 12, 13, 14); };
@@ -98,7 +98,7 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
     along += up_by_4(along) + last;
     last = along[LANES - 1];
   };
-  // From three vectors to points as they lie in memory: x0 y0 z0 x1 y1 z1 …
+  // From three vectors to points in memory order: x0 y0 z0 x1 y1 z1 …
   const auto write_points = [](lanes x, lanes y, lanes z, float* to, int count) ALWAYS_INLINE {
     const lanes xy_0 = __builtin_shufflevector(x, y, 0, 8, 0, 1, 9, 0, 2, 10);
     const lanes xy_1 = __builtin_shufflevector(x, y, 0, 3, 11, 0, 4, 12, 0, 5);

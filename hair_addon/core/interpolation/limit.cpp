@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Weights of a strand's guides without those that differ too much from the nearest (guide_weights.py).
+// Weights of a strand's guides, reduced for guides that differ too much from the nearest (guide_weights.py).
 //
 // The body of `limit` in cpu_weights.py. Parameters, for S strands, K slots of guides a strand and G guides:
 //
 //   int strand                          the strand whose weights are limited
 //   array_t<int> indices                (S, K) guides of each strand, the nearest first, -1 in unused slots
 //   array_t<float> weights              (S, K) their weights
-//   array_t<vec2> turns                 (S, K) cosine and sine of the turn from a guide's frame to the strand's
+//   array_t<vec2> turns                 (S, K) cosine and sine of the angle from a guide's frame to the strand's
 //   array_t<float> shapes               (G, 8) of each guide: unit directions of its lower half and from root to tip,
 //                                       in the frame of its root; logarithm of its length; zero
-//   float cosine_none, per_cosine       cosine of the angle between directions at which a guide's share ends, and
+//   float cosine_none, per_cosine       cosine of the angle between directions at which a guide's weight is zero, and
 //                                       1 / the range of cosines over which it fades
-//   float length_limit, per_length      difference of logarithms likewise, and 1 / half of it, over which it fades
+//   float length_limit, per_length      the same for differences of logarithms, and 1 / half of it, its fading range
 //   array_t<float> out_weights          (S, K) weights of sum 1
 
 #include "lanes.h"
 #include "guide_rows.h"
 
-// 0 up to the first value, 1 from a range further on, a smooth step between.
+// 0 up to the first value, 1 beyond the range, with a smooth step between.
 const auto fade = [](float first, float per_range, lanes value) {
   lanes step = (value - first) * per_range;
   step = step < 0.0f ? lanes(0.0f) : step;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Weights of a strand's guides by distance (guide_weights.py, Eq. 9 and 10), and the turns of their frames.
+// Weights of a strand's guides by distance (guide_weights.py, Eq. 9 and 10), and the rotations of their frames.
 //
 // The body of `weigh` in cpu_weights.py. Parameters, for S strands, K slots of guides a strand and G guides:
 //
@@ -9,12 +9,12 @@
 //   float reach                         distance at which the weight is zero [m]
 //   float fall_off                      1 / (2 σ²) of Eq. 9 [m⁻²]
 //   vec3 tangent, bitangent, normal     the strand's frame
-//   array_t<int> candidates             (S, at least K) guides by rising distance, -1 for none
+//   array_t<int> candidates             (S, at least K) guides by increasing distance, -1 for none
 //   array_t<float> ways                 (S, at least K) distances to them [m]
 //   array_t<float> frames               (G, 8) tangent and normal of each guide, and two zeros
 //   array_t<int> out_indices            (S, K) guides, -1 in unused slots
 //   array_t<float> out_weights          (S, K) their weights, of sum 1
-//   array_t<vec2> out_turns             (S, K) cosine and sine of the turn from a guide's frame to the strand's
+//   array_t<vec2> out_turns             (S, K) cosine and sine of the angle from a guide's frame to the strand's
 
 #include "lanes.h"
 #include "guide_rows.h"
@@ -35,7 +35,7 @@ for (int first = 0; first < slot_count; first += LANES) {
   its_way = is_near ? its_way : lanes(nearest);
   const lanes part = its_way / reach;
   const lanes fall = 1.0f - part * part;
-  // Relative to the nearest guide's, which cancels in Eq. 10: no weight of a far root is lost to rounding.
+  // Relative to the nearest guide, whose factor cancels in Eq. 10: weights of far roots do not underflow.
   const lanes x = (nearest - its_way) * (nearest + its_way) * fall_off;
   // exp(x) = 2ⁿ exp(r), |r| at most log(2) / 2. log(2) is subtracted in two parts; the polynomial is [Moshier92].
   const lanes n = floor_of(x * 1.44269504f + 0.5f);
@@ -48,10 +48,10 @@ for (int first = 0; first < slot_count; first += LANES) {
   power = power * r * r + r + 1.0f;
   power *= lanes_of_bits((to_ints(n) + 127) << 23);
   lanes share = is_near ? power * fall * fall : lanes(0.0f);
-  // The nearest guide counts where all are as far as the nearest one that is left out.
+  // The nearest guide gets all weight if all are as far away as the nearest excluded one.
   if (first == 0 && get_lane(share, 0) == 0.0f) set_lane(share, 0, 1.0f);
-  // Where the least rotation R from one normal to the other leaves the guide's tangent. For t perpendicular to a:
-  // R t = t - (t·b) (a + b) / (1 + a·b). Opposite normals have no least rotation: any will do.
+  // The guide's tangent after the least rotation R from one normal to the other. For t perpendicular to a:
+  // R t = t - (t·b) (a + b) / (1 + a·b). Opposite normals have no least rotation: any one is used.
   lanes row[8];
   read_columns(row, guides, frames.data);
   const lanes across = row[0] * normal[0] + row[1] * normal[1] + row[2] * normal[2];

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Arrays of which each lane has a row of its own. Stands after lanes.h in a function's body.
+// Arrays with a row for each lane. Include after lanes.h in a function's body.
 //
-// read_rows(rows, first, out) reads four numbers of each lane's row, from place `first` of that lane on, into four
+// read_rows(rows, first, out) reads four numbers of each lane's row, from index `first` of that lane on, into four
 // vectors; write_rows(values, rows, first) writes them.
 
 #if defined(__CUDA_ARCH__)
@@ -20,7 +20,7 @@
   const auto least_of = [](ints value) { return value; };
   const auto most_of = [](ints value) { return value; };
 #else
-  // By transposing: part j of vector k takes the row of lane 4 j + k.
+  // By transposing: part j of vector k is the row of lane 4 j + k.
   typedef float four __attribute__((ext_vector_type(4)));
   typedef float four_anywhere __attribute__((ext_vector_type(4), aligned(4)));
   const auto low_pairs = [](auto a, auto b) {

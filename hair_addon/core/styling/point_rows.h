@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Points of strands, read and written one after the other, without an array of all. Stands after lane_rows.h.
+// Points of strands, read and written one after the other, without an array of all. Include after lane_rows.h.
 //
 // read_points(rows, take) calls take(i, point) for i = 0 … point_count - 1; write_points(rows, is_written, point_at)
-// asks for point_at(i) in the same order, and writes the rows of the lanes that are to be written. Between the two,
-// spare[k], k below SPARES, keeps numbers of each lane without registers.
+// calls point_at(i) in the same order, and writes the rows of lanes for which is_written is true. Between the two,
+// spare[k], k below SPARES, stores numbers of each lane without registers.
 
 #if defined(__CUDA_ARCH__)
-  // Rows of a warp's threads follow each other in memory. Its threads move some points of all rows together, by way of
-  // shared memory: neighbours touch neighbouring numbers, of which memory takes many at once.
-  constexpr int THREADS = 32, NUMBERS_AT_ONCE = 3 * POINTS_AT_ONCE, STRIDE = NUMBERS_AT_ONCE | 1;  // no bank twice
+  // Rows of a warp's threads are adjacent in memory. Its threads copy some points of all rows together through shared
+  // memory, so that neighbouring threads access neighbouring numbers (coalescing).
+  constexpr int THREADS = 32, NUMBERS_AT_ONCE = 3 * POINTS_AT_ONCE, STRIDE = NUMBERS_AT_ONCE | 1;  // no bank conflicts
   __shared__ float shared_rows[WP_TILE_BLOCK_DIM / THREADS][THREADS * STRIDE];
   const int thread = threadIdx.x % THREADS;
   float* const staged = shared_rows[threadIdx.x / THREADS];
@@ -18,7 +18,7 @@
   const unsigned all_threads = 0xffffffffu >> (THREADS - thread_count);
   constexpr int SPARES = NUMBERS_AT_ONCE;
   float* const spare = staged + thread * STRIDE;
-  // move(place in memory, from the thread's own row on; place in `staged`; which row), for points from `start` on.
+  // move(index in memory, relative to the thread's own row; index in `staged`; row), for points from `start` on.
   const auto move_together = [&](int start, auto move) {
     const int count = 3 * (point_count - start);
   #pragma unroll
@@ -61,7 +61,7 @@
 #else
   constexpr int SPARES = 3 * POINTS_AT_ONCE;
   lanes spare[SPARES];
-  // Four points, 12 numbers of each lane, at a time; the points that are left over number by number.
+  // Four points, 12 numbers of each lane, at a time; remaining points number by number.
   const auto read_points = [&](float* const* rows, auto take) {
     vector four_points[4];
     lanes* const numbers = reinterpret_cast<lanes*>(four_points);

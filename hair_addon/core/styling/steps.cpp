@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A program of styles on LANES strands at once: on a processor the lanes of its vectors, on a GPU one strand a thread.
+// A program of styles on LANES strands at once: the lanes of a processor's vectors, or one strand per thread of a GPU.
 //
-// The body of `_apply_steps` in steps.py. Parameters, for S strands in all of which M are styled, P points a strand, N
-// steps and K clump centres of all levels together:
+// The body of `_apply_steps` in steps.py. Parameters, for S strands in total of which M are styled, P points per strand,
+// N steps and K clump centres of all levels:
 //
-//   int block                           which LANES of the M strands
+//   int block                           index of a group of LANES of the M strands
 //   array_t<vec3> points                (M, P) [m], styled in place
 //   array_t<int> chosen_rows            (M,) their rows among S; empty where M is S
 //   array_t<vec3> normals               (S,) unit normals of the surface at the roots
-//   array_t<int> identities             (S,) what strands are known by
+//   array_t<int> identities             (S,) IDs of strands
 //   array_t<float> masks                (masks, S) weights
 //   array_t<int> members                (levels, S) the clump centre that each strand belongs to, per level; -1: none
 //   array_t<vec4> centre_points         (K, P) points of centre strands [m], and the arc length from the root
@@ -19,10 +19,10 @@
 //   array_t<float> numbers              (N, NUMBERS) of steps.py
 //   mat44 axes                          from the coordinates of points to the surface's own, without scale
 //
-// Constants: WIDTH, MOST points a strand, CHOICES, NUMBERS, and those of style_text.py.
+// Constants: WIDTH, MOST points per strand, CHOICES, NUMBERS, and those of style_text.py.
 //
-// A strand is held as its root, unit directions t_i and lengths d_i of its segments, i = 1 … P - 1. So a style that
-// turns segments keeps roots and lengths.
+// A strand is stored as its root, unit directions t_i and lengths d_i of its segments, i = 1 … P - 1. So styles that
+// rotate segments keep roots and lengths.
 
 {
 #include "lanes.h"
@@ -34,19 +34,19 @@ const int point_count = points.shape[1];
 const int first = block * LANES;
 const int left = points.shape[0] - first;
 const int lane_count = left < LANES ? left : LANES;
-// -1 where those own axes are mirrored: by their determinant.
+// -1 if these axes are mirrored, by their determinant.
 const auto minor = [&](int i, int j) {
   return axes.data[1][i] * axes.data[2][j] - axes.data[1][j] * axes.data[2][i];
 };
 const float determinant = axes.data[0][0] * minor(1, 2) + axes.data[0][1] * minor(2, 0) + axes.data[0][2] * minor(0, 1);
 const float hand = determinant < 0.0f ? -1.0f : 1.0f;
 #include "point_rows.h"
-// A style writes directions or lengths that it reads again into the second array, and swaps.
+// A style that reads directions or lengths after writing them writes to the second array, and swaps.
 lanes lengths[2][MOST];
 vector directions[2][MOST];
 lanes *length = lengths[0], *next_length = lengths[1];
 vector *t = directions[0], *next = directions[1];
-// Points from the root on, and their arc lengths, for styles that ask for them by `put_points`.
+// Points relative to the root, and their arc lengths, for styles that call `put_points`.
 vector place[MOST];
 lanes along[MOST];
 constexpr int MOST_KEPT = LANES == 1 ? 1 : MOST;
@@ -75,7 +75,7 @@ for (int lane = 0; lane < LANES; ++lane) {
   set_lane(identity, lane, identities.data[strand[lane]]);
 }
 lanes total = 0.0f;
-// Directions and lengths of the segments between points. A segment without length goes on as the one before.
+// Directions and lengths of the segments between points. A segment without length has the previous direction.
 vector before = normal, point_before;
 read_points(rows, [&](int i, const vector& point) {
   if (i == 0) {
@@ -108,8 +108,8 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
       set_lane(base, lane, get_lane(base, lane) * masks.data[size_t(mask) * masks.shape[1] + strand[lane]]);
     }
   }
-  // The clump centre of each lane: its identity, and the reference of frames by its normal, which every strand of a
-  // clump shares. A strand without a centre stands for itself.
+  // The clump centre of each lane: its ID, and the reference of frames from its normal, which all strands of a clump
+  // share. A strand without a centre is its own.
   int centre[LANES];
   vector centre_normal = normal;
   ints lock = identity;
@@ -132,7 +132,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
 
   if (!any_of(base > 0.0f)) continue;
   is_touched = is_touched | (base > 0.0f);
-  // Strands that a mask leaves out, beside others: they keep their bits.
+  // Strands excluded by a mask keep their bits.
   const bool is_partial = LANES > 1 && any_of(base <= 0.0f);
   if (is_partial) {
     for (int i = 1; i < point_count; ++i) {
@@ -160,7 +160,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   }
 }
 
-// Strands that no style has touched keep their bits.
+// Strands that no style has changed keep their bits.
 vector from_root = {};
 write_points(rows, is_touched, [&](int i) {
   if (i > 0) from_root = plus(from_root, t[i], length[i]);

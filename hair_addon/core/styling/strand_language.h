@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The language of .strand files in C++, for LANES strands at once; shaders/strands/strand_language.glsl has it in GLSL.
+// The language of .strand files in C++, for LANES strands at once; shaders/strands/strand_language.glsl is its GLSL.
 //
-// Types: lanes, ints and flags are a number, a whole number and a condition of each strand, vector is three numbers.
-// float, int and bool are the same for all strands. Every function of a .strand file is inlined, as a lambda.
+// Types: lanes, ints and flags are a number, an integer and a condition of each strand, vector is three numbers. float,
+// int and bool are the same for all strands. Every function of a .strand file is inlined, as a lambda.
 //
 // A strand is its root, unit directions t_i and lengths d_i of its segments, i = 1 … point_count - 1. A style that
-// writes directions which it reads again writes the next ones, and exchanges them. Stands within the loop over steps.
+// reads directions after writing them writes to the next ones, and swaps them. Include inside the loop over steps.
 
 #define UNROLL _Pragma("unroll")
 const vector zero_vector = {};
 const auto vector_of = [](lanes x, lanes y, lanes z) { return vector{x, y, z}; };
 const auto number_at = [&](int place) { return number[place]; };
-// Sine and cosine of whole turns: by a GPU's own instructions, 4e-7, or by polynomials.
+// Sine and cosine of an angle in turns: by a GPU's own instructions, error 4e-7, or by polynomials.
 const auto sine_and_cosine = [&](lanes turns, lanes& sine, lanes& cosine) ALWAYS_INLINE {
 #if defined(__CUDA_ARCH__)
   const lanes x = turns - floor_of(turns + 0.5f);
@@ -31,7 +31,7 @@ const auto direction_at = [&](int i) -> const vector& { return t[i]; };
 const auto length_at = [&](int i) { return length[i]; };
 const auto set_direction = [&](int i, const vector& direction) { t[i] = direction; };
 const auto set_length = [&](int i, lanes size) { length[i] = size; };
-// Lengths of next segments are kept where a style changes them.
+// The next lengths of segments, for styles that change them.
 const bool changes_lengths = ((CHANGING_LENGTHS >> kind) & 1) != 0 || keep_length != 1.0f;
 const auto next_direction_at = [&](int i) -> const vector& { return next[i]; };
 const auto next_length_at = [&](int i) { return next_length[i]; };
@@ -43,12 +43,12 @@ const auto exchange = [&]() {
   swap(t, next);
   if (changes_lengths) swap(length, next_length);
 };
-// To be called where lengths have changed.
+// Call after changing lengths.
 const auto put_total = [&]() {
   total = 0.0f;
   for (int i = 1; i < point_count; ++i) total += length[i];
 };
-// Points from the root on, which round less than places do, and their arc lengths, of present or of next directions.
+// Points relative to the root, with smaller rounding errors, and their arc lengths, of present or next directions.
 const auto put_points = [&](bool are_next) {
   const vector* const directions_now = are_next ? next : t;
   place[0] = {};
@@ -77,7 +77,7 @@ const auto arc_of = [&](ints at) {
   for (int lane = 0; lane < LANES; ++lane) set_lane(found, lane, lane_of(along[entry_of(at, lane)], lane));
   return found;
 };
-// The last point, from `at` on, that is not after an arc length, and is no tip.
+// The last point, from `at` on, that is not beyond an arc length and not the tip.
 const auto point_before = [&](ints at, lanes arc) {
   for (int lane = 0; lane < LANES; ++lane) {
     int point = entry_of(at, lane);
@@ -87,7 +87,7 @@ const auto point_before = [&](ints at, lanes arc) {
   }
   return at;
 };
-// A point, or a segment, of the strands for which a condition holds; others keep what they have.
+// Sets a point, or a segment, of the strands for which a condition holds; others do not change.
 const auto take_point = [&](flags is_asked, ints at, vector& point, lanes& arc) {
   const int last = most_of(is_asked ? at : ints(0));
   for (int i = least_of(is_asked ? at : ints(MOST)); i <= last; ++i) {
@@ -104,14 +104,14 @@ const auto take_segment = [&](flags is_asked, ints at, vector& direction, lanes&
     direction = chosen(is_here, t[i], direction);
   }
 };
-// Two numbers of each point, in the place of next directions.
+// Two numbers of each point, in the memory of the next directions.
 const auto set_offset = [&](int i, lanes to_u, lanes to_v) {
   next[i].x = to_u;
   next[i].y = to_v;
 };
 const auto offset_u_at = [&](int i) { return next[i].x; };
 const auto offset_v_at = [&](int i) { return next[i].y; };
-// Numbers of each strand that are kept without registers, below SPARES.
+// Numbers of each strand that are stored without registers, below SPARES.
 const auto keep_number = [&](int k, lanes value) { spare[k] = value; };
 const auto kept_number = [&](int k) { return spare[k]; };
 
@@ -130,7 +130,7 @@ const auto read_centre = [&](ints at, vector& point, lanes& arc) {
   arc = row[3];
 };
 
-// A place in the surface's own coordinates, and directions between those and the coordinates of points.
+// A position in the surface's own coordinates, and directions between these and the coordinates of points.
 const auto place_on_surface = [&](const vector& p) {
   return vector{
       axes.data[0][0] * p.x + axes.data[0][1] * p.y + axes.data[0][2] * p.z + axes.data[0][3],
