@@ -8,18 +8,20 @@ from bpy.app.handlers import persistent
 
 from ..data import surface_space, usable_surfaces
 from ..data.strands import curves_objects
-from ..groom import bindings, frame_faces, paused_hair, pipeline, staleness
+from ..groom import bindings, frame_faces, hidden_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import memory, running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
 from ..render import refused_strands
 from ..render.frames import composite
+from ..render.viewport import viewport
 from ..settings import animated, style_items
 from . import (
     copied_faces,
     events,
     file_changes,
+    hidden_previews,
     invalidation,
     live_hair,
     moving_surfaces,
@@ -48,6 +50,7 @@ def after_depsgraph_update(scene, depsgraph):
         return
     global _is_opening, _is_undone
     file_changes.follow([scene])
+    is_seen = viewport.is_up_to_date()
     events.scene_changed(is_hair_only=_is_hair_only(reports))
     if any(report.is_of(bpy.types.Scene) for report in reports):
         looks.follow_guides(depsgraph.view_layer)
@@ -98,6 +101,9 @@ def after_depsgraph_update(scene, depsgraph):
             if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):
                 combed[datablock] = reported.points_of(datablock)
     bindings.is_reported()
+    for hair in _of_kind("HAIR"):
+        if hair.vellus.is_stale and hair.vellus.is_live:
+            hidden_previews.hair_changed(hair, is_seen)
     animated.follow(depsgraph)
     simulated_hair.follow_settings(scene, depsgraph)
     _evaluate(depsgraph, combed)
@@ -115,11 +121,11 @@ def _surfaces():
 
 
 def _is_only_carried(update, deformed):
-    """Whether paused Curves are reported only because their surface moved: Curves that were tagged have all flags."""
+    """Whether hidden Curves are reported only because their surface moved: Curves that were tagged have all flags."""
     datablock = update.datablock
     if not isinstance(datablock, bpy.types.Curves) or datablock.surface not in deformed:
         return False
-    return paused_hair.is_paused(datablock) and not (update.is_transform or update.is_shading)
+    return hidden_hair.is_hidden(datablock) and not (update.is_transform or update.is_shading)
 
 
 def _painted(reports):
@@ -263,10 +269,16 @@ def after_frame_change(scene, depsgraph):
             live_hair.write_all()
 
 
+def _show_hidden():
+    """Let Blender evaluate all hair; what Material Preview hides is hidden again a moment later."""
+    moving_surfaces.resume()
+    hidden_hair.show_all()
+
+
 @persistent
 def before_reading(*_args):
     """Write hair before a save or a render reads its Curves, and update the hair scene that a render composites."""
-    moving_surfaces.resume()
+    _show_hidden()
     stale_marks.follow_applied()
     live_hair.write_all()
     file_changes.follow(bpy.data.scenes)
@@ -297,8 +309,8 @@ def before_saving(*_args):
 
 @persistent
 def after_import(*_args):
-    """Make names of styles readable for Blender's rename operators; resume surfaces that were saved paused."""
-    moving_surfaces.resume()
+    """Make names of styles readable for Blender's rename operators; show hair that was saved hidden."""
+    _show_hidden()
     file_changes.accept_state()
     for hair in _of_kind("HAIR"):
         style_items.make_names_readable(hair.vellus)
@@ -341,7 +353,7 @@ def after_undo(*_args):
     global _is_undone
     _is_undone = True
     live_hair.cancel_writing()
-    moving_surfaces.resume()  # the undo step may have been saved paused
+    _show_hidden()  # the undo step may have been saved while hair was hidden
     invalidation.data_replaced()
     file_changes.accept_state()
 
@@ -383,6 +395,7 @@ def register():
     """Add the handlers."""
     for handlers, handler in _HANDLERS:
         handlers.append(handler)
+    hidden_previews.register()
     # Blender gives no access to the file while it enables an add-on.
     bpy.app.timers.register(_take_over)
 
@@ -397,5 +410,6 @@ def unregister():
             bpy.app.timers.unregister(timer)
     simulated_hair.end()
     moving_surfaces.resume()
+    hidden_previews.unregister()
     live_hair.write_all()
     composite.suspend()

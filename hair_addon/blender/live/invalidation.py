@@ -9,7 +9,7 @@ from ..data.pictures import drawn_meshes
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, surface_textures, world_texture
-from ..groom import bindings, copied_hair, edited_faces, followed_names, frame_faces, paused_hair
+from ..groom import bindings, copied_hair, edited_faces, followed_names, frame_faces, hidden_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..groom.guides import guide_states
 from ..host import notices
@@ -17,7 +17,7 @@ from ..render import hair_cache
 from ..render.frames import composite
 from ..render.viewport import region_pictures, viewport
 from ..settings import animated
-from . import dynamics_state, moving_surfaces, refused_hair, reported, simulated_hair, unlocked_renders
+from . import dynamics_state, hidden_previews, moving_surfaces, refused_hair, reported, simulated_hair, unlocked_renders
 
 # Copies of Blender's data, and values computed from them. Undo and redo replace the data.
 COPIES = (
@@ -35,7 +35,9 @@ COPIES = (
     reported.guide_cache,
     reported.painting_cache,
     reported.place_cache,
-    paused_hair.paused_cache,
+    hidden_hair.paused_cache,
+    hidden_hair.hidden_cache,
+    hidden_previews.changed_cache,
     copied_hair.known_cache,
     moving_surfaces.moved_cache,
     moving_surfaces.unchecked_cache,

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces moved by an animation, a slider or a bone: Blender's nodes deform their hair again once they are at rest.
+"""Surfaces moved by an animation, a slider or a bone: Blender evaluates their hair again once they are at rest.
 
-Hair is paused only while viewports draw between two moves, so a script that moves a surface reads deformed hair.
+Hair is hidden only while viewports draw between two moves, so a script that moves a surface reads deformed hair.
 """
 
 import time
 
 import bpy
 
-from ..groom import paused_hair
+from ..groom import hidden_hair
 from ..host import running, scene_time
 from ..host.caches import Cache
 from ..render import hair_cache
@@ -22,18 +22,18 @@ _TRANSFORMS = "TRANSFORM_OT_"
 
 moved_cache = Cache()  # session_uid of a surface → `time.monotonic` of its last move
 
-# session_uid of a surface → True: its mesh was reported while hair was paused, and its weights may have changed.
+# session_uid of a surface → True: its mesh was reported while hair was hidden, and its weights may have changed.
 unchecked_cache = Cache()
 
 
 def frame_changed(surfaces):
-    """Pause the hair of surfaces that are deformed in this frame, while the animation plays."""
+    """Hide the hair of surfaces that are deformed in this frame, while the animation plays."""
     if surfaces and scene_time.is_shown_moving():
         _pause(surfaces)
 
 
 def shape_changed(surfaces):
-    """Pause the hair of deformed surfaces whose previous shape was drawn by viewports a moment ago.
+    """Hide the hair of deformed surfaces whose previous shape was drawn by viewports a moment ago.
 
     Must be called before their poses are invalidated.
     """
@@ -43,14 +43,14 @@ def shape_changed(surfaces):
         moved_cache.keep(surface_object.session_uid, now)
         if before is not None and now - before < _TOGETHER and hair_cache.is_pose_seen(surface_object):
             dragged.add(surface_object)
-    if dragged or (surfaces and paused_hair.is_any()):
+    if dragged or (surfaces and hidden_hair.is_any_paused()):
         _pause(dragged)
 
 
 def _pause(surfaces):
-    paused_hair.pause(surfaces)
+    hidden_hair.pause(surfaces)
     _cancel()  # restarts the wait with every move
-    if paused_hair.is_any() and running.has_window():
+    if hidden_hair.is_any_paused() and running.has_window():
         bpy.app.timers.register(settle, first_interval=_REST, persistent=True)
 
 
@@ -60,7 +60,7 @@ def settle():
 
 
 def resume_at_rest():
-    """Timer: let Blender deform hair again once nothing moves; returns the seconds until the next try, or None."""
+    """Timer: let Blender evaluate hair again once nothing moves; returns the seconds until the next try, or None."""
     if scene_time.is_shown_moving() or _is_transforming():
         return _REST
     resume()
@@ -68,9 +68,9 @@ def resume_at_rest():
 
 
 def resume():
-    """Let Blender deform all hair again, before its Curves are read."""
+    """Let Blender evaluate all hair again, before its Curves are read."""
     _cancel()
-    paused_hair.resume()
+    hidden_hair.resume()
     moved_cache.clear()  # the next update begins a new interaction
     for surface_object in bpy.data.objects if len(unchecked_cache) else ():
         if unchecked_cache.get(surface_object.session_uid) is not None:
@@ -83,7 +83,7 @@ def is_to_be_checked_later(surface_object):
 
     Sliders of shape keys report the mesh with each move, and reading weights is the slowest step of an update.
     """
-    is_later = paused_hair.is_any()
+    is_later = hidden_hair.is_any_paused()
     if is_later:
         unchecked_cache.keep(surface_object.session_uid, True)
     return is_later

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender does not carry hair that Vellus draws while its surface moves, and does before anybody else may read it."""
+"""Blender does not evaluate hair that Vellus draws while its surface moves, and does before anybody may read it."""
 
 import bpy
 import numpy as np
@@ -19,16 +19,21 @@ def objects():
     return bpy.data.objects["Guides"], bpy.data.objects["Hair"]
 
 
-def are_paused():
-    found = {follow_nodes.is_paused(curves_object) for curves_object in objects()}
+def are_hidden():
+    found = {follow_nodes.is_hidden(curves_object) for curves_object in objects()}
     assert len(found) == 1
     return found.pop()
 
 
-def is_at_rest(hair):
-    """Whether Blender's evaluation has left the strands where they are without the surface's deformation."""
+def is_left_out(hair):
+    """Whether Blender's evaluation has nothing but the box of the strands."""
     bpy.context.view_layer.update()
-    return np.array_equal(evaluated_points(hair), points(hair))
+    evaluated = hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    if len(evaluated.data.curves) == len(hair.data.curves):
+        return False
+    low, high = (f(points(hair).reshape(-1, 3), axis=0) for f in (np.min, np.max))
+    np.testing.assert_allclose([evaluated.bound_box[0], evaluated.bound_box[6]], [low, high], atol=1e-6)
+    return True
 
 
 def key(surface, count=8):
@@ -74,18 +79,18 @@ def drag(hair, *amounts):
         drawn(hair)
 
 
-def test_playback_leaves_blenders_strands_at_rest_and_draws_them_carried(playing, monkeypatch):
-    assert are_paused() and is_at_rest(playing)
+def test_playback_leaves_out_blenders_strands_and_draws_them_carried(playing, monkeypatch):
+    assert are_hidden() and is_left_out(playing)
     calls = counts_of(monkeypatch)
     with Traffic() as traffic:
         play(playing, 4, 5, 6)
     shown = drawn(playing)
-    assert is_at_rest(playing) and np.abs(shown - points(playing)).max() > 0.01
+    assert is_left_out(playing) and np.abs(shown - points(playing)).max() > 0.01
     # A vertex is three texels of four numbers.
     vertex_count = len(playing.data.surface.data.vertices)
     assert calls["uploads"] == calls["moves"] == 0 and traffic.sent <= 3 * 48 * 1.1 * vertex_count
     moving_surfaces.resume()
-    assert not is_at_rest(playing)
+    assert not is_left_out(playing)
     np.testing.assert_allclose(shown, evaluated_points(playing), atol=CLOSE)
 
 
@@ -132,30 +137,30 @@ def view_space():
 
 @pytest.mark.parametrize("end", [save, undo, stop_playing, begin_to_render])
 def test_hair_is_carried_again_before_anybody_reads_it(playing, tmp_path, end):
-    assert are_paused()
+    assert are_hidden()
     end(playing, tmp_path)
-    assert not are_paused() and not is_at_rest(playing)
+    assert not are_hidden() and not is_left_out(playing)
     drawn(playing)
     play(playing, 7, 8)
-    assert are_paused()
+    assert are_hidden()
 
 
 @pytest.mark.parametrize("reason", [let_blender_draw, render_viewport])
 def test_hair_that_blender_shows_is_carried_with_the_next_frame(playing, tmp_path, reason):
-    assert are_paused()
+    assert are_hidden()
     reason(playing, tmp_path)
     play(playing, 7)
-    assert not follow_nodes.is_paused(playing) and not is_at_rest(playing)
+    assert not follow_nodes.is_hidden(playing) and not is_left_out(playing)
     view_space().shading.type = "SOLID"
 
 
 @pytest.mark.parametrize("reason", [read_by_nodes, add_modifier])
-def test_hair_that_others_read_is_not_paused(bent, monkeypatch, tmp_path, reason):
+def test_hair_that_others_read_is_not_hidden(bent, monkeypatch, tmp_path, reason):
     reason(bent, tmp_path)
     monkeypatch.setattr(scene_time, "is_shown_moving", lambda: True)
     play(bent, 2, 3)
-    assert not follow_nodes.is_paused(bent)
-    assert not is_at_rest(bent)
+    assert not follow_nodes.is_hidden(bent)
+    assert not is_left_out(bent)
 
 
 def test_guides_in_sculpt_mode_are_carried(playing):
@@ -163,22 +168,22 @@ def test_guides_in_sculpt_mode_are_carried(playing):
     bpy.context.view_layer.objects.active = guides
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     play(playing, 7)
-    assert not are_paused() and not is_at_rest(guides)
+    assert not are_hidden() and not is_left_out(guides)
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_a_dragged_slider_pauses_hair_until_it_rests(bent):
+def test_a_dragged_slider_hides_hair_until_it_rests(bent):
     bent.data.surface.data.shape_keys.animation_data_clear()
     drag(bent, 0.2)
-    assert not are_paused()
+    assert not are_hidden()
     drag(bent, 0.3, 0.4)
-    assert are_paused() and is_at_rest(bent)
+    assert are_hidden() and is_left_out(bent)
     assert bpy.app.timers.is_registered(moving_surfaces.settle)
     moving_surfaces.settle()
     assert bpy.app.timers.is_registered(moving_surfaces.resume_at_rest)
     shown = drawn(bent)
     assert moving_surfaces.resume_at_rest() is None
-    assert not are_paused() and not is_at_rest(bent)
+    assert not are_hidden() and not is_left_out(bent)
     np.testing.assert_allclose(shown, evaluated_points(bent), atol=CLOSE)
     np.testing.assert_allclose(drawn(bent), shown, atol=CLOSE)
 
@@ -204,18 +209,18 @@ def test_weights_that_change_while_the_surface_is_dragged_count_at_rest(bent, mo
     live_hair.write_all()
     drawn(bent)
     drag(bent, 0.2, 0.3, 0.4)
-    assert are_paused()
+    assert are_hidden()
     read = []
     real = scene.read_vertex_group
     monkeypatch.setattr(scene, "read_vertex_group", lambda *given: read.append(1) or real(*given))
     top = [vertex.index for vertex in surface.data.vertices if vertex.co.z > 0.0]
     group.add(top, 0.0, "REPLACE")
     drag(bent, 0.5, 0.6)
-    assert not read and are_paused()
+    assert not read and are_hidden()
     moving_surfaces.resume_at_rest()
     bpy.context.view_layer.update()
     live_hair.write_all()
-    assert read and not are_paused()
+    assert read and not are_hidden()
     assert points(bent)[:, 0, 2].max() < 0.25  # of a ball of one, whose faces are as high
 
 
@@ -236,20 +241,20 @@ def test_scripts_read_carried_hair(bent):
     """Nothing is drawn between their updates, and no animation plays."""
     for amount in (0.2, 0.5, 0.8):
         bend(bent.data.surface, amount)
-        assert not are_paused() and not is_at_rest(bent)
+        assert not are_hidden() and not is_left_out(bent)
     for frame in (2, 3, 4):
         bpy.context.scene.frame_set(frame)
-        assert not are_paused() and not is_at_rest(bent)
+        assert not are_hidden() and not is_left_out(bent)
 
 
-def test_without_a_window_nothing_is_paused(bent, monkeypatch):
+def test_without_a_window_nothing_is_hidden(bent, monkeypatch):
     monkeypatch.setattr(running, "has_window", lambda: False)
     monkeypatch.setattr(scene_time, "is_shown_moving", lambda: True)
     play(bent, 2, 3)
-    assert not are_paused()
+    assert not are_hidden()
 
 
-def test_renders_carry_hair_that_viewports_have_paused(playing, monkeypatch):
+def test_renders_carry_hair_that_viewports_hide(playing, monkeypatch):
     seen = []
 
     class Reader(bpy.types.RenderEngine):
@@ -258,56 +263,56 @@ def test_renders_carry_hair_that_viewports_have_paused(playing, monkeypatch):
         def render(self, depsgraph):
             seen.append((depsgraph.mode, evaluated_points(playing, depsgraph)))
 
-    monkeypatch.setattr(moving_surfaces, "resume", lambda: None)
+    monkeypatch.setattr(handlers, "_show_hidden", lambda: None)
     bpy.utils.register_class(Reader)
     bpy.context.scene.render.engine = "READER"
     bpy.context.scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     bpy.ops.render.render()
     bpy.utils.unregister_class(Reader)
     ((mode, rendered),) = seen
-    assert are_paused() and mode == "RENDER"
+    assert are_hidden() and mode == "RENDER"
     monkeypatch.undo()
     moving_surfaces.resume()
     bpy.context.view_layer.update()
-    assert not is_at_rest(playing)
+    assert not is_left_out(playing)
     np.testing.assert_array_equal(rendered, evaluated_points(playing))
 
 
-def test_all_objects_of_hair_are_paused_and_carried_again(bent, monkeypatch):
-    """Also one that is copied while it is paused."""
+def test_all_objects_of_hair_are_hidden_and_carried_again(bent, monkeypatch):
+    """Also one that is copied while it is hidden."""
     other = bent.copy()
     bpy.context.scene.view_layers.new("Other")
     bpy.context.scene.collection.objects.link(other)
     monkeypatch.setattr(scene_time, "is_shown_moving", lambda: True)
     play(bent, 2, 3)
-    assert follow_nodes.is_paused(bent) and follow_nodes.is_paused(other)
+    assert follow_nodes.is_hidden(bent) and follow_nodes.is_hidden(other)
     last = bent.copy()
     moving_surfaces.resume()
-    assert not any(map(follow_nodes.is_paused, (bent, other, last)))
+    assert not any(map(follow_nodes.is_hidden, (bent, other, last)))
 
 
-def test_files_that_were_kept_paused_are_carried_when_opened(playing, tmp_path, monkeypatch):
+def test_files_that_were_kept_hidden_are_shown_when_opened(playing, tmp_path, monkeypatch):
     """As Blender saves by itself while an animation plays."""
-    monkeypatch.setattr(moving_surfaces, "resume", lambda: None)
+    monkeypatch.setattr(handlers, "_show_hidden", lambda: None)
     path = str(tmp_path / "kept.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, compress=False)
     monkeypatch.undo()
-    assert are_paused()
+    assert are_hidden()
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert not are_paused() and not is_at_rest(bpy.data.objects["Hair"])
+    assert not are_hidden() and not is_left_out(bpy.data.objects["Hair"])
 
 
-def test_an_undo_step_of_a_drag_brings_no_pause_back(playing):
+def test_an_undo_step_of_a_drag_hides_nothing_again(playing):
     """Blender keeps one when a bone is let go, before the surface has come to rest."""
-    assert are_paused()
-    bpy.ops.ed.undo_push(message="Paused")
+    assert are_hidden()
+    bpy.ops.ed.undo_push(message="Hidden")
     moving_surfaces.resume()
     bpy.ops.ed.undo_push(message="Carried")
     bpy.ops.ed.undo()
-    assert not are_paused() and not is_at_rest(bpy.data.objects["Hair"])
+    assert not are_hidden() and not is_left_out(bpy.data.objects["Hair"])
 
 
-def test_linked_hair_is_paused_and_carried_again(bent, tmp_path, monkeypatch):
+def test_linked_hair_is_hidden_and_shown_again(bent, tmp_path, monkeypatch):
     path = str(tmp_path / "library.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, compress=False)
     bpy.ops.wm.read_factory_settings(use_empty=False)
@@ -320,7 +325,7 @@ def test_linked_hair_is_paused_and_carried_again(bent, tmp_path, monkeypatch):
     monkeypatch.setattr(running, "has_window", lambda: True)
     monkeypatch.setattr(scene_time, "is_shown_moving", lambda: True)
     play(hair, 1, 2, 3, 4)
-    assert are_paused() and is_at_rest(hair)
+    assert are_hidden() and is_left_out(hair)
     moving_surfaces.resume()
-    assert not are_paused() and not is_at_rest(hair)
+    assert not are_hidden() and not is_left_out(hair)
     np.testing.assert_allclose(drawn(hair), evaluated_points(hair), atol=CLOSE)

@@ -41,9 +41,8 @@ def hair():
 
 
 def evaluated():
-    """(N, 3) points as Blender's evaluation has them for viewports."""
-    curves = hair().evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    return positions(curves)
+    """Curves as Blender's evaluation has them for viewports."""
+    return hair().evaluated_get(bpy.context.evaluated_depsgraph_get()).data
 
 
 def positions(curves):
@@ -53,9 +52,11 @@ def positions(curves):
 
 
 def state():
-    """(whether hair is paused, how far Blender's evaluation has moved its points at most)."""
-    moved = float(np.abs(evaluated() - positions(hair().data)).max())
-    return addon().data.strands.follow_nodes.is_paused(hair()), moved
+    """(whether Blender's evaluation leaves out the strands, how far it has moved their points at most)."""
+    shown, stored = evaluated(), hair().data
+    is_whole = len(shown.curves) == len(stored.curves)
+    moved = float(np.abs(positions(shown) - positions(stored)).max()) if is_whole else 0.0
+    return not is_whole, moved
 
 
 def hair_on_a_ball_that_bends():
@@ -85,7 +86,7 @@ def hair_on_a_ball_that_bends():
 
 
 def played():
-    """Blender leaves the strands at rest while the timeline plays, and the window shows them carried."""
+    """Blender leaves out the strands while the timeline plays, and the window shows them carried."""
     with in_viewport():
         bpy.ops.screen.animation_play()
     yield from wait_for(lambda: bpy.context.scene.frame_current >= LAST, 120.0)
@@ -134,5 +135,23 @@ def dragged():
     take_picture(OUT / "rested.png", redraws=1)
 
 
+def previewed():
+    """Material Preview shows hair once; View Selected finds it."""
+    space = viewport()[0].spaces.active
+    space.shading.type = "MATERIAL"
+    yield from wait_for(lambda: state()[0], 20.0)
+    facts["previewed"] = state()
+    yield from wait(1.0)
+    take_picture(OUT / "previewed.png", redraws=1)
+    with in_viewport():
+        hair().select_set(True)
+        bpy.ops.view3d.view_selected(use_all_regions=False)
+    yield from wait(1.0)
+    facts["view"] = list(space.region_3d.view_location)
+    space.shading.type = "SOLID"
+    yield from wait_for(lambda: not state()[0], 20.0)
+    facts["in Solid again"] = state()
+
+
 if __name__ == "__main__":
-    take((hair_on_a_ball_that_bends, played, played_beside_workbench, dragged))
+    take((hair_on_a_ball_that_bends, played, played_beside_workbench, dragged, previewed))

@@ -107,5 +107,5 @@ def new_probe(hair_object):
             probe.modifiers.remove(modifier)
     if following is not None:
         follow_nodes.modifier_of(probe).show_viewport = True
-        follow_nodes.pause(probe, False)
+        follow_nodes.hide(probe, False)
     return probe

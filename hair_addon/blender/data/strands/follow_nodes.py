@@ -14,14 +14,14 @@ from . import stored_roots
 
 _NAME = "Vellus Follow Surface"
 # Version of the nodes below. New hair does not use groups of other versions.
-_VERSION = 1
+_VERSION = 2
 # Inputs of the group: identifiers, which stay when an artist renames inputs, and types.
 _INPUTS = {
     "Surface": ("Socket_1", "NodeSocketObject"),
     "Vertices": ("Socket_2", "NodeSocketInt"),
     "Combed": ("Socket_3", "NodeSocketBool"),
     "Cage Corners": ("Socket_4", "NodeSocketInt"),
-    "Paused": ("Socket_5", "NodeSocketBool"),
+    "Hidden": ("Socket_5", "NodeSocketBool"),
 }
 
 
@@ -56,29 +56,29 @@ def _set(curves_object, inputs):
                     socket.value = inputs[name]
 
 
-def is_paused(curves_object):
-    """Whether evaluation for viewports leaves an object's strands at rest; evaluation for renders never does."""
-    return any(_paused_input(modifier).value for modifier in _pausable_modifiers(curves_object))
+def is_hidden(curves_object):
+    """Whether evaluation for viewports leaves out an object's strands; evaluation for renders never does."""
+    return any(_hidden_input(modifier).value for modifier in _hiding_modifiers(curves_object))
 
 
-def pause(curves_object, is_paused):
-    """Let evaluation for viewports leave an object's strands at rest or deform them; returns whether it can."""
-    modifiers = _pausable_modifiers(curves_object)
+def hide(curves_object, is_hidden):
+    """Let evaluation for viewports leave out an object's strands, or include them; returns whether it can."""
+    modifiers = _hiding_modifiers(curves_object)
     for modifier in modifiers:
-        if _paused_input(modifier).value != is_paused:
-            _paused_input(modifier).value = is_paused
+        if _hidden_input(modifier).value != is_hidden:
+            _hidden_input(modifier).value = is_hidden
             curves_object.update_tag(refresh={"DATA"})  # Blender does not tag the change itself
     return bool(modifiers)
 
 
-def _paused_input(modifier):
-    return getattr(modifier.properties.inputs, _INPUTS["Paused"][0])
+def _hidden_input(modifier):
+    return getattr(modifier.properties.inputs, _INPUTS["Hidden"][0])
 
 
-def _pausable_modifiers(curves_object):
-    """Our modifiers whose nodes can be paused: groups that an artist edited may lack the input."""
+def _hiding_modifiers(curves_object):
+    """Our modifiers whose nodes can hide strands: groups that an artist edited may lack the input."""
     found = (m for m in curves_object.modifiers if m.type == "NODES" and _is_ours(m.node_group))
-    return [modifier for modifier in found if "Paused" in _intact_inputs(modifier.node_group)]
+    return [modifier for modifier in found if "Hidden" in _intact_inputs(modifier.node_group)]
 
 
 def modifier_of(curves_object):
@@ -125,7 +125,7 @@ def _group():
     group.interface.new_socket("Curves", in_out="INPUT", socket_type="NodeSocketGeometry")
     for name, (_identifier, kind) in _INPUTS.items():
         group.interface.new_socket(name, in_out="INPUT", socket_type=kind)
-    group.interface.items_tree["Paused"].hide_in_modifier = True
+    group.interface.items_tree["Hidden"].hide_in_modifier = True
     group.interface.new_socket("Curves", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     _Tree(group).build()
     return group
@@ -177,7 +177,8 @@ class _Tree:
         # An undeformed surface costs only a comparison.
         is_deformed = self._is_deformed(info.outputs["Geometry"])
         carried = self._switch(is_deformed, at_rest, moved.outputs[0], "GEOMETRY")
-        self._node("NodeGroupOutput", {0: self._switch(self._is_paused(inputs), carried, inputs["Curves"], "GEOMETRY")})
+        hidden = self._ends_of_box(inputs["Curves"])
+        self._node("NodeGroupOutput", {0: self._switch(self._is_hidden(inputs), carried, hidden, "GEOMETRY")})
         self._spread_out()
 
     def _spread_out(self):
@@ -185,10 +186,20 @@ class _Tree:
         count = len(self._group.nodes)
         self._group.nodes.foreach_set("location", [part for column in range(count) for part in (180.0 * column, 0.0)])
 
-    def _is_paused(self, inputs):
-        """Paused in viewports only: renders always deform strands."""
+    def _is_hidden(self, inputs):
+        """Hidden in viewports only: renders always have strands."""
         in_viewport = self._node("GeometryNodeIsViewport").outputs[0]
-        return self._node("FunctionNodeBooleanMath", {0: inputs["Paused"], 1: in_viewport}, operation="AND").outputs[0]
+        return self._node("FunctionNodeBooleanMath", {0: inputs["Hidden"], 1: in_viewport}, operation="AND").outputs[0]
+
+    def _ends_of_box(self, curves):
+        """Two curves without length or width that have the bounding box of others, for View Selected."""
+        box = self._node("GeometryNodeBoundBox", {0: curves, "Use Radius": False}).outputs
+        joined = self._node("GeometryNodeJoinGeometry")
+        for corner in (box["Min"], box["Max"]):
+            line = self._node("GeometryNodeCurvePrimitiveLine", {"Start": corner, "End": corner}).outputs[0]
+            line = self._node("GeometryNodeSetCurveRadius", {0: line, "Radius": 0.0}).outputs[0]
+            self._group.links.new(line, joined.inputs[0])
+        return joined.outputs[0]
 
     def _is_deformed(self, surface):
         position = self._node("GeometryNodeInputPosition").outputs[0]

@@ -16,7 +16,7 @@ from ...data import scene
 from ...data.strands import curves_objects
 from ...gpu import drawing, scene_programs
 from ...gpu.display_transform import DisplayTransform
-from ...groom import bindings, paused_hair
+from ...groom import bindings, hidden_hair
 from ...host import scene_time
 from ...host.caches import Cache
 from ...host.engines import ENGINE
@@ -58,6 +58,11 @@ def unregister():
             curves_objects.draw_natively(datablock, True)
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
+
+
+def is_up_to_date():
+    """Whether a viewport has drawn its scene since something changed."""
+    return any(view.drawn is not None for view in view_cache.values())
 
 
 def invalidate(is_hair_only=False):
@@ -159,7 +164,7 @@ def drawn_scene_of(context):
     view = view_cache.get(key)
     if view is None or view.shows != shows:  # visibility settings of a viewport do not change the scene
         view = view_cache.keep(key, _View(shows))
-    is_playing = scene_time.is_playing() or paused_hair.is_any()
+    is_playing = scene_time.is_playing() or hidden_hair.is_any_paused()
     if view.is_playing and not is_playing and view.drawn is not None:  # read again in full detail at rest
         view.outdated, view.drawn = view.drawn, None
     if view.drawn is None:
