@@ -137,6 +137,7 @@ def dragged():
 
 def previewed():
     """Material Preview shows hair once; View Selected finds it."""
+    bpy.context.scene.render.engine = "BLENDER_EEVEE"  # Workbench has no Material Preview
     space = viewport()[0].spaces.active
     space.shading.type = "MATERIAL"
     yield from wait_for(lambda: state()[0], 20.0)
