@@ -9,12 +9,18 @@
 
 #include "fibre/drawn_lobes.glsl"
 #include "fibre/dual_scattering.glsl"
+#include "fibre/light_highlight.glsl"
 #include "fibre/marschner.glsl"
+
+// Of a lobe [rad²]. White hair reflects so much that rounding may leave light from a point no spread at all.
+const float LEAST_VARIANCE = 1e-4;
 
 vec4 fibre_m(float sin_i, float sin_o, float widening)
 {
   float tilt_trt = settings.shifts == 0 ? 4.0 : 3.0;
-  return m_lobes(sin_i, sin_o, settings.tilt, tilt_trt, fibre_roughness(), settings.coat, widening);
+  vec4 m = m_lobes(sin_i, sin_o, settings.tilt, tilt_trt, fibre_roughness(), settings.coat, widening);
+  m.x *= light_highlight;
+  return m;
 }
 
 vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
@@ -52,7 +58,7 @@ vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float front, float behind, float blur
   float turned = theta_o - through_drift.x;
   vec3 through = lobe_sum(fibre_m(sin_i, sin(turned), through_drift.y + blur), forward_lobes(at));
   // Backscattered light is so wide that the lobes of this strand hardly matter.
-  float back_m = shifted_lobe(sin_i, cos_i, sin_o, cos_o, back_drift.x, back_drift.y + blur);
+  float back_m = shifted_lobe(sin_i, cos_i, sin_o, cos_o, back_drift.x, max(back_drift.y + blur, LEAST_VARIANCE));
   vec3 returning = back_m / PI * mix(a_b, a_f, back_azimuth(phi));
   return direct * hair_bsdf(T, L, V, blur) +
          drawn_lobes.w * ((onward - direct) * through + backward * returning);

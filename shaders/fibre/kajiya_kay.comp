@@ -3,6 +3,7 @@
 
 #include "fibre/drawn_lobes.glsl"
 #include "fibre/kajiya_kay.glsl"
+#include "fibre/light_highlight.glsl"
 
 vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
 {
@@ -11,7 +12,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   float exponent = blurred_exponent(settings.exponent, blur);
   float peak = kajiya_kay_specular_albedo(settings.exponent) / kajiya_kay_specular_albedo(exponent);
   vec3 specular = settings.specular_color * (peak * kajiya_kay_specular(T, L, V, exponent));
-  return drawn_lobes.w * diffuse + drawn_lobes.x * specular;
+  return drawn_lobes.w * diffuse + drawn_lobes.x * light_highlight * specular;
 }
 
 void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)

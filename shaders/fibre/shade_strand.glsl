@@ -14,6 +14,7 @@
 #include "light/strand_irradiance.glsl"
 #include "fibre/drawn_lobes.glsl"
 #include "fibre/fibre.glsl"
+#include "fibre/light_highlight.glsl"
 #include "light/light_grid.glsl"
 #include "light/visibility_bytes.glsl"
 #include "visibility/strand_hit.glsl"
@@ -85,7 +86,7 @@ vec3 strand_light(SeenStrand strand)
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     LampLight lamp = lamp_on_strand(light, strand.root);
-    vec3 irradiance = lamp.irradiance * lamp.open;
+    vec3 irradiance = lamp.irradiance * lamp.open * (1.0 - light.dimmed_behind * max(-dot(lamp.L, V), 0.0));
     // Most strands are in the shadow of the others, with no light to scatter.
     if (is_visible(irradiance * transmitted(lamp.front, view.hair_forward.rgb))) {
       // If the light misses surfaces, the normal and color of the surfaces visible from the strand.
@@ -100,6 +101,7 @@ vec3 strand_light(SeenStrand strand)
       }
       vec3 bounce = surface_bounce(lit_normal, lit_color, surface_part, lamp.L, T, lamp.front, lamp.behind);
       radiance += drawn_lobes.w * irradiance * bounce * of_surfaces;
+      light_highlight = 1.0 + light.highlight_excess;
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
       radiance += irradiance * hair_radiance(T, lamp.L, V, lamp.front, lamp.behind, blur);
     }

@@ -13,12 +13,16 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..data.pictures import viewport_shading
+
 # Texels per side. With 64, the error of interpolation is at most one step of an 8-bit display, see the tests.
 SIZE = 64
 
 # The table covers scene-linear values up to MOST, spaced logarithmically except near zero.
 MOST = 512.0
 _KNEE = 1.0 / 1024.0
+
+_DEFAULT_VIEW = "Standard"  # of Solid shading, whatever the scene's view transform
 
 
 @dataclass(frozen=True)
@@ -32,12 +36,15 @@ class DisplayTransform:
     working_space: str  # color space of scene-linear colors
 
     @classmethod
-    def of(cls, scene):
-        """The settings of a scene."""
+    def of(cls, scene, part=viewport_shading.ALL):
+        """The settings of a scene; part: those of them that Blender applies to a viewport."""
         view = scene.view_settings
         look = "" if view.look == "None" else view.look
         space = bpy.data.colorspace.working_space
-        return cls(scene.display_settings.display_device, view.view_transform, look, view.gamma, space)
+        display = scene.display_settings.display_device
+        if part == viewport_shading.NO_SETTINGS:
+            return cls(display, _DEFAULT_VIEW, "", 1.0, space)
+        return cls(display, view.view_transform, look, view.gamma if part == viewport_shading.ALL else 1.0, space)
 
     def table(self):
         """(SIZE, SIZE, SIZE, 3) float32 display colors in [0, 1], red running fastest."""

@@ -15,6 +15,7 @@ from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn
 from . import uniforms
+from .studio_lights import StudioImage, image_of
 
 KINDS = {"SUN": lamps.SUN, "POINT": lamps.POINT, "SPOT": lamps.SPOT, "AREA": lamps.AREA}
 
@@ -22,6 +23,9 @@ frame_cache = Cache()  # session_uid of a sequence or movie → the loaded frame
 
 # Ray types that a light may be invisible to. A light invisible to all of them has no effect.
 _RAYS = ("visible_diffuse", "visible_glossy", "visible_transmission")
+
+
+NO_LIGHTS = np.zeros(0, uniforms.LIGHT.dtype), []  # the result of `read_lights` without lights
 
 
 def read_lights(depsgraph, for_render):
@@ -112,7 +116,7 @@ class World:
     """
 
     color: np.ndarray
-    image: bpy.types.Image | None = None
+    image: bpy.types.Image | StudioImage | None = None
     to_image: np.ndarray | None = None
     is_mirror_ball: bool = False
     frame: int = 0
@@ -125,6 +129,12 @@ class World:
         image = self.image
         read_as = image.colorspace_settings.name, image.alpha_mode, *image.size
         return (*self.color, image.session_uid, self.frame, *read_as, self.to_image.tobytes(), self.is_mirror_ball)
+
+
+def world_of_hdri(hdri):
+    """The `World` of a `viewport_shading.Hdri`. Raises `HairError`."""
+    to_image = np.array(Matrix.Rotation(hdri.rotation, 4, "Z"), np.float64)
+    return World(np.full(3, hdri.strength), image_of(hdri.path), to_image)
 
 
 def read_world(scene, view_layer=None):

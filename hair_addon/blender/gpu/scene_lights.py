@@ -103,6 +103,26 @@ def gather(found, links, world, receivers):
     return SceneLights(record, links[:count], rest, rest_links, own)
 
 
+# Lights of Solid shading that are drawn one by one: they may follow the view, which draws their maps with each turn.
+_STUDIO_COUNT = 2
+
+
+def of_studio(found, ambient):
+    """The `SceneLights` of Solid shading; found, ambient: from `studio_lights.lamps_of`. They light everything."""
+    importance = found["power"][:, :3].mean(axis=1)
+    order = np.argsort(-importance, kind="stable")
+    found, one_by_one = found[order], lamps.shares(importance[order], _STUDIO_COUNT)
+    rest = found[one_by_one < 1.0].copy()
+    rest["power"][:, :3] *= 1.0 - one_by_one[one_by_one < 1.0, None]
+    count = int(np.count_nonzero(one_by_one > 0.0))
+    record = uniforms.LIGHTS.record()
+    record["light"][:count], record["count"] = found[:count], count
+    record["light"][:count]["power"][:, :3] *= one_by_one[:count, None]
+    record["world"][:, :3] = ambient
+    record["world"][:, :3] += lamps.ambient_sides(rest, np.zeros((1, 3)))
+    return SceneLights(record, [(ALL, ALL)] * count, found[:0], [], found)
+
+
 def _importance(found, links, receivers):
     """(N,) the greatest irradiance of the receivers, averaged over the channels."""
     if not receivers:

@@ -117,6 +117,8 @@ LIGHT = Block(
         "wide_layer": "int",  # of the shadow maps, -1 without
         "wide_extent": "float",  # `extent` and `near` of that map
         "wide_near": "float",
+        "highlight_excess": "float",  # of R relative to its other light, less one
+        "dimmed_behind": "float",  # fraction of its light that is left out where it shines towards the viewer
     },
 )
 LIGHTS = Block(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The world's image on the GPU: as a background, and decomposed into lights."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gpu
 import numpy as np
@@ -11,11 +11,13 @@ from ...core.errors import HairError
 from ...core.imaging import environment
 from ..host.caches import Cache
 from . import drawing, scene_programs, uniforms
+from .studio_lights import StudioImage
 
 _HEIGHT = 64  # pixels of the picture that is decomposed
 _MOST_TAPS = 32
 
 light_cache = Cache(capacity=1)  # World.key → _ImageLight
+studio_cache = Cache(capacity=8)  # StudioImage → the result of `environment.decompose`
 
 
 @dataclass
@@ -31,6 +33,8 @@ def light_of(world):
     """([`environment.Lobe`, ...], (6, 3) mean radiance of the sides) of a `lights.World`."""
     if world.image is None:
         return [], np.broadcast_to(world.color, (6, 3))
+    if isinstance(world.image, StudioImage):
+        return _light_of_studio(world)
     known = light_cache.get(world.key)
     # Blender does not report changes of an image by a script: an unsaved image may change at any time.
     if known is None or not known.is_checked or world.image.is_dirty:
@@ -39,6 +43,14 @@ def light_of(world):
             known = light_cache.keep(world.key, _ImageLight(environment.split(_unrolled(world)), pixels))
         known.is_checked = True
     return known.light
+
+
+def _light_of_studio(world):
+    """`light_of` a studio light. Its lobes are found once, so that they turn with it."""
+    even = replace(world, color=np.ones(3), to_image=np.eye(4))
+    known = studio_cache.get(world.image, lambda: environment.decompose(_unrolled(even)))
+    lobes, sides = environment.turned(*known, world.to_image[:3, :3])
+    return [replace(lobe, irradiance=world.color * lobe.irradiance) for lobe in lobes], world.color * sides
 
 
 def picture_of(world):
@@ -91,9 +103,16 @@ def _record(world, width, height):
 
 
 def _draw(fragment, world, record):
+    if isinstance(world.image, StudioImage):
+        picture = world.image.texture()
+    else:
+        picture = _texture_of(world)
+    drawing.draw_cover(scene_programs.environment_program(fragment), {"environment": record}, {"surroundings": picture})
+
+
+def _texture_of(world):
     try:
-        picture = gpu.texture.from_image(world.image)
+        return gpu.texture.from_image(world.image)
     except RuntimeError as error:
         sentence = 'The image "{name}" of the world cannot be read: {error}.'
         raise HairError(sentence, name=world.image.name, error=error) from error
-    drawing.draw_cover(scene_programs.environment_program(fragment), {"environment": record}, {"surroundings": picture})

@@ -7,12 +7,13 @@ import numpy as np
 
 from ...core.errors import HairError
 from ...core.long_work import no_progress, part_of
-from ..data.pictures import drawn_meshes
+from ..data.pictures import drawn_meshes, viewport_shading
 from ..gpu import (
     ambient_visibility,
     drawing,
     scene_lights,
     strand_textures,
+    studio_lights,
     surface_textures,
     uniforms,
     windows,
@@ -41,6 +42,7 @@ class DrawnScene:
     surface_visibility: list  # of `surfaces`, then of `clear`
     # session_uid of the object that a click on each hair selects; in a render `drawn_meshes.owner_of` the hair.
     owners: tuple = ()
+    hair_owners: tuple = ()  # owner of each hair as of a `scene_lights.Receiver`, in viewports
     selected: tuple = ()  # whether that object is selected
     instances: tuple = ()  # of hair, from `hair_places.read_instances`
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
@@ -49,6 +51,7 @@ class DrawnScene:
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
     renewal: ambient_visibility.Renewal | None = None  # of the visibility textures, while hair moves
+    light: viewport_shading.ViewportLight = viewport_shading.SCENE_LIGHT
     hair_lights: np.ndarray | None = None  # uniforms.LIGHTS of each hair; None: `lights` for all
     surface_lights: np.ndarray | None = None  # the same for `surfaces`, then for `clear`
 
@@ -78,17 +81,19 @@ def read(
     is_draft=False,
     is_hair_only=True,
     former=None,
+    shown=viewport_shading.BY_SCENE,
 ):
     """Upload a scene to the GPU and draw its shadow maps; returns the `DrawnScene`.
 
     viewport: the 3D viewport whose visibility settings apply, None for a render; refused: called with the datablock and
     the `HairError` of hair that cannot be drawn, None: the error is raised; before: the previous `DrawnScene` if only
     hair has changed since; is_draft: hair is about to change again, and shadows may be coarse; is_hair_only: whether
-    Blender draws the rest of a viewport; former: the `DrawnScene` of the previous frame during playback.
+    Blender draws the rest of a viewport; former: the `DrawnScene` of the previous frame during playback; shown: how the
+    viewport shows hair.
     """
     # If only the geometry of hair has changed, instances are unchanged.
     instances = hair_places.read_instances(depsgraph, viewport) if before is None else before.instances
-    hair, places = _read_hair(hair_places.hair_places(view_layer, viewport, instances), viewport, refused)
+    hair, places = _read_hair(hair_places.hair_places(view_layer, viewport, instances), viewport, refused, shown)
     if viewport is not None and is_hair_only and not hair:
         # Scenes without hair cost nothing.
         return _EMPTY
@@ -98,16 +103,18 @@ def read(
         meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
         if is_shaded:
             meshes = drawn_meshes.split_clear(meshes)
-        shown = _upload(meshes, is_shaded, has_paths=viewport is None)
-        world = blender_lights.read_world(blender_scene, view_layer)
-        lamps = maps = None
+        surroundings = _upload(meshes, is_shaded, has_paths=viewport is None)
+        world, lamps, maps = _world_of(shown.light, blender_scene, view_layer), None, None
     else:
-        shown = {name: getattr(before, name) for name in _SHOWN}
+        surroundings = {name: getattr(before, name) for name in _SURROUNDINGS}
         world, lamps, maps = before.world, before.lamps, before.shadow_maps
-    hair_receivers = _hair_receivers(hair, [(place.owner, place.hair_object.session_uid) for place in places])
+        if before.light != shown.light:
+            world, lamps = _world_of(shown.light, blender_scene, view_layer), None
+    hair_owners = tuple((place.owner, place.hair_object.session_uid) for place in places)
+    hair_receivers = _hair_receivers(hair, hair_owners)
     if lamps is None:
-        found = blender_lights.read_lights(depsgraph, for_render=viewport is None)
-        lamps = scene_lights.gather(*found, world, hair_receivers)
+        lamps = _lamps_of(shown.light, depsgraph, viewport is None, world, hair_receivers)
+        maps = maps if _fit(maps, lamps, is_shaded) else None
     # Without a GPU, frames of playback are drawn like still frames. Hair that is only moved by its object is handled
     # like hair made on the GPU, also once it is at rest.
     has_played = former is not None or (before is not None and before.renewal is not None)
@@ -117,7 +124,7 @@ def read(
     if before is None and last is not None and _fit(last.shadow_maps, lamps, is_shaded):
         maps = last.shadow_maps
     renewal = None
-    drawn = replace(_EMPTY, hair=hair, world=world, **shown)
+    drawn = replace(_EMPTY, hair=hair, world=world, light=shown.light, **surroundings)
     if is_draft and last is not None and _have_same_places(last, drawn):
         seen = last.hair_visibility, last.surface_visibility
         if are_made:
@@ -131,12 +138,45 @@ def read(
         hair_visibility=seen[0],
         surface_visibility=seen[1],
         owners=owners,
+        hair_owners=hair_owners,
         selected=selected,
         instances=instances,
         renewal=renewal,
     )
     maps = maps or scene_lights.new_maps(lamps.record, is_shaded)
     return _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
+
+
+def relit(drawn, blender_scene, view_layer, depsgraph, light, maps=None, is_wide=False):
+    """A `DrawnScene` in a viewport with another light; light: a `viewport_shading.ViewportLight`.
+
+    maps: `ShadowMaps` that may be drawn again; is_wide: whether Vellus draws all of the viewport.
+    """
+    world = _world_of(light, blender_scene, view_layer)
+    hair_receivers = _hair_receivers(drawn.hair, drawn.hair_owners)
+    lamps = _lamps_of(light, depsgraph, False, world, hair_receivers)
+    if not _fit(maps, lamps, is_wide):
+        maps = scene_lights.new_maps(lamps.record, is_wide)
+    drawn = replace(drawn, world=world, light=light, hair_lights=None, surface_lights=None)
+    return _lit(drawn, lamps, maps, hair_receivers, _are_made(drawn.hair))
+
+
+def _world_of(light, blender_scene, view_layer):
+    """The `World` of a viewport's light."""
+    if light.hdri is not None:
+        return blender_lights.world_of_hdri(light.hdri)
+    if light.has_world and light.kind == viewport_shading.SCENE:
+        return blender_lights.read_world(blender_scene, view_layer)
+    return blender_lights.World(np.array(light.ambient))
+
+
+def _lamps_of(light, depsgraph, for_render, world, hair_receivers):
+    """The `SceneLights` of a viewport's light and `World`."""
+    if light.kind != viewport_shading.SCENE:
+        found, ambient = studio_lights.lamps_of(light.lights, light.has_highlights)
+        return scene_lights.of_studio(found, world.color + ambient)
+    found, links = blender_lights.read_lights(depsgraph, for_render) if light.has_lights else blender_lights.NO_LIGHTS
+    return scene_lights.gather(found, links, world, hair_receivers)
 
 
 def _are_made(hair):
@@ -225,11 +265,11 @@ def read_unlit(depsgraph, known, refused, noted, progress=no_progress):
     return replace(_EMPTY, hair=hair, owners=owners, **_upload(meshes, is_shaded=True, has_paths=True))
 
 
-_SHOWN = ("surfaces", "clear", "receivers", "surface_owners", "blockers")
+_SURROUNDINGS = ("surfaces", "clear", "receivers", "surface_owners", "blockers")
 
 
 def _upload(meshes, is_shaded, has_paths):
-    """{name of `_SHOWN`: value} of `DrawnMesh`es.
+    """{name of `_SURROUNDINGS`: value} of `DrawnMesh`es.
 
     is_shaded: whether Vellus shades surfaces; has_paths: whether light paths will be traced against them.
     """
@@ -329,7 +369,7 @@ def _read_rendered_hair(depsgraph, known, refused, noted):
         yield (strands, shading, to_world, 1.0), drawn_meshes.owner_of(instance)
 
 
-def _read_hair(places, viewport, refused):
+def _read_hair(places, viewport, refused, shown):
     """(hair of a `DrawnScene`, the `HairPlace` of each) for all places whose hair can be drawn."""
     hair, drawn_places = [], []
     for place in places:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         frame_manifest,
         groom_curves,
         library_settings,
+        light_images,
         settings_file,
         style_presets,
         table_cache,

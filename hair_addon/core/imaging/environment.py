@@ -5,7 +5,7 @@ An environment image (H, W, 3) has the azimuth in its columns, u = (k + 0.5) / W
 its rows, v = (j + 0.5) / H, from -pi/2 to pi/2; x is at azimuth 0, z at the top.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,25 @@ class Lobe:
 
 def split(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
     """Split an environment image into ([`Lobe`, ...], (6, 3) mean radiance of the cube's sides without the lobes)."""
+    lobes, left = decompose(radiance)
+    return lobes, _side_means(left, np.eye(3))
+
+
+def turned(lobes: list[Lobe], left: np.ndarray, to_image: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
+    """Return the result of `split` for an image that is turned; lobes, left: from `decompose`.
+
+    to_image: (3, 3), from world directions to directions of the image.
+    """
+    return [replace(lobe, direction=to_image.T @ lobe.direction) for lobe in lobes], _side_means(left, to_image)
+
+
+def _side_means(radiance, to_image):
+    directions, solid_angles = _texels(*radiance.shape[:2])
+    return ambient_cube.side_means(radiance.reshape(-1, 3), directions @ to_image, solid_angles / (4.0 * np.pi))
+
+
+def decompose(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
+    """Decompose an environment image into ([`Lobe`, ...], (H, W, 3) its radiance without the lobes)."""
     directions, solid_angles = _texels(*radiance.shape[:2])
     left = np.maximum(radiance.reshape(-1, 3), 0.0).astype(float)
     least = _LEAST_PART * float((left @ _LUMINANCE) @ solid_angles)
@@ -47,7 +66,7 @@ def split(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
         direction = moment / np.linalg.norm(moment)
         lobes.append(Lobe(direction, np.maximum(power, 0.0), 1.0 - float(closeness)))
         left[window] -= excess
-    return lobes, ambient_cube.side_means(left, directions, solid_angles / (4.0 * np.pi))
+    return lobes, left.reshape(radiance.shape)
 
 
 def _brightest(radiance, directions, solid_angles):

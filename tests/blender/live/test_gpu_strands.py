@@ -2,7 +2,6 @@
 """Strands that the GPU makes while guides are combed: what is written afterwards is what was shown; counted."""
 
 from itertools import cycle
-from types import SimpleNamespace
 
 import bpy
 import gpu
@@ -20,11 +19,11 @@ from hair_addon.blender.render.viewport import viewport
 from hair_addon.blender.settings import preferences
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import following
-from tests.blender.render.test_hair_places import view3d
 from tests.support import drawn_strands
 from tests.support.counting import counts_of
 from tests.support.gpu_strands import CLOSE, comb, drawn, grown, prepare
 from tests.support.reading import points
+from tests.support.viewports import context_of, view3d
 
 
 def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, monkeypatch):
@@ -190,11 +189,7 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkey
     monkeypatch.setattr(device_choice, "times", lambda: asked.append(1) or (0.0, 1.0))
 
     def view():
-        context = bpy.context
-        depsgraph = context.evaluated_depsgraph_get
-        of = SimpleNamespace(space_data=view3d(), scene=context.scene, view_layer=context.view_layer)
-        of.evaluated_depsgraph_get = depsgraph
-        return viewport.drawn_scene_of(of).hair[0][0]
+        return viewport.drawn_scene_of(context_of(view3d())).hair[0][0]
 
     before = view()
     assert asked
@@ -218,10 +213,7 @@ def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, coarse_shad
     monkeypatch.setattr(scene_time, "is_playing", lambda: is_playing[0])
 
     def view():
-        context = bpy.context
-        of = SimpleNamespace(space_data=view3d(), scene=context.scene, view_layer=context.view_layer)
-        of.evaluated_depsgraph_get = context.evaluated_depsgraph_get
-        return viewport.drawn_scene_of(of)
+        return viewport.drawn_scene_of(context_of(view3d()))
 
     comb(9)  # bound
     view()

@@ -17,9 +17,9 @@ from hair_addon.blender.live import events, invalidation
 from hair_addon.blender.render import hair_cache
 from hair_addon.blender.render.viewport import hair_picture, viewport
 from tests.blender.gpu.test_world_texture import environment_node
-from tests.blender.render.test_hair_places import view3d
 from tests.support.always import changed
 from tests.support.reading import points, write_points
+from tests.support.viewports import context_of, view3d
 from tests.test_conventions import ADDON, MODULES
 
 SIZE = 24
@@ -108,14 +108,10 @@ def stage(lit, monkeypatch):
 
 def seen():
     """What a viewport shows, and what of: arrays by name."""
-    context = bpy.context
-    shown = SimpleNamespace(
-        space_data=view3d(),
-        scene=context.scene,
-        view_layer=context.view_layer,
-        evaluated_depsgraph_get=context.evaluated_depsgraph_get,
-    )
-    drawn = viewport.drawn_scene_of(shown)
+    context, space = bpy.context, view3d()
+    space.shading.type = "MATERIAL"
+    space.shading.use_scene_lights = space.shading.use_scene_world = True
+    drawn = viewport.drawn_scene_of(context_of(space))
     camera = scene_door.read_camera(context.scene, context.evaluated_depsgraph_get(), SIZE, SIZE)
     view = SimpleNamespace(view_matrix=camera[0], window_matrix=camera[1])
     region = SimpleNamespace(width=SIZE, height=SIZE, as_pointer=lambda: 1)

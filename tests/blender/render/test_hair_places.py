@@ -10,12 +10,9 @@ from hair_addon.blender.live import invalidation
 from hair_addon.blender.render import drawn_scene, hair_cache, hair_places
 from tests.support.counting import counts_of
 from tests.support.reading import points
+from tests.support.viewports import view3d
 
 pytestmark = pytest.mark.usefixtures("coarse_shadows")
-
-
-def view3d():
-    return next(a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
 
 
 def read(space=None, **details):

@@ -82,3 +82,21 @@ def test_sides_share_every_direction(rng):
     np.testing.assert_allclose(shares.sum(axis=1), 1.0)
     for axis in range(3):
         assert (shares[directions[:, axis] > 0.0, 2 * axis + 1] == 0.0).all()
+
+
+def test_an_image_that_is_turned_gives_turned_light():
+    """A sun, and a sky that is brighter on one side, about an axis; what is split anew has only its texels' places."""
+    cosine, sine = np.cos(0.7), np.sin(0.7)
+    to_image = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    axis = np.array([0.48, 0.6, 0.64])
+
+    def radiance_of(directions):
+        return 1.0 + directions[:, 0] + 20.0 * np.exp(100.0 * (directions @ axis - 1.0))
+
+    lobes, left = environment.decompose(surroundings(radiance_of))
+    (lobe,), sides = environment.turned(lobes, left, to_image)
+    (other,), other_sides = environment.split(surroundings(lambda directions: radiance_of(directions @ to_image.T)))
+    assert lobe.direction @ other.direction > np.cos(np.radians(1.0))
+    assert lobe.direction @ (to_image.T @ axis) > np.cos(np.radians(3.0))
+    np.testing.assert_allclose(lobe.irradiance, other.irradiance, rtol=0.02)
+    np.testing.assert_allclose(sides, other_sides, rtol=0.01)

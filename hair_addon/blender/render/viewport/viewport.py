@@ -6,13 +6,14 @@ Surfaces occlude hair in that picture, sample by sample, as the viewport's own d
 are drawn. While nothing moves the picture is refined, and then only composited.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
 
 from ....core.errors import HairError
 from ...data import scene
+from ...data.pictures import viewport_shading
 from ...data.strands import curves_objects
 from ...gpu import drawing, scene_programs
 from ...gpu.display_transform import DisplayTransform
@@ -39,8 +40,9 @@ display_table_cache = Cache(capacity=4)  # DisplayTransform → texture
 class _View:
     """The cached scene of a viewport until something moves."""
 
-    shows: tuple  # key of the viewport's visibility settings
+    shows: tuple  # key of the viewport's settings that decide what is read
     drawn: drawn_scene.DrawnScene | None = None
+    lit: dict = field(default_factory=dict)  # pointer of a region → `drawn` in the light of the region's view
     outdated: drawn_scene.DrawnScene | None = None  # the previous scene, if only hair has changed
     former: drawn_scene.DrawnScene | None = None  # the previous scene
     is_playing: bool = False  # whether it was read during playback, or while a surface was being moved
@@ -71,6 +73,7 @@ def invalidate(is_hair_only=False):
         view.former = view.drawn or view.former
         view.outdated = (view.drawn or view.outdated) if is_hair_only else None
         view.drawn = None
+        view.lit.clear()
 
 
 def draw():
@@ -85,7 +88,7 @@ def draw():
 
 def _draw(context):
     try:
-        if context.space_data.shading.type == "RENDERED":  # the render engine draws hair by itself
+        if is_drawn_by_engine(context):
             _draw_outline(context)
         else:
             _draw_hair(context)
@@ -105,9 +108,10 @@ def _draw_hair(context):
     is_shadowed = viewport.shading.type == "MATERIAL" and context.scene.vellus.has_preview_shadow
     clip_planes = _clip_planes(context)
     region_picture = _picture(drawn, context.region_data, region, xray is not None, outlined, is_shadowed, clip_planes)
+    management = viewport_shading.read(viewport, context.scene, matrices_of(context.region_data)[0]).management
     region_picture.picture.show(
-        _display_table(DisplayTransform.of(context.scene)),
-        2.0**context.scene.view_settings.exposure,
+        _display_table(DisplayTransform.of(context.scene, management)),
+        2.0**context.scene.view_settings.exposure if management == viewport_shading.ALL else 1.0,
         1.0 if xray is None else xray,
         "LESS_EQUAL" if viewport.overlay.show_overlays and xray is None else "ALWAYS",
     )
@@ -138,6 +142,11 @@ def _draw_outline(context):
         region.tag_redraw()
 
 
+def is_drawn_by_engine(context):
+    """Whether a render engine draws the hair of a viewport: all engines but Workbench, which hides it."""
+    return context.space_data.shading.type == "RENDERED" and context.scene.render.engine != "BLENDER_WORKBENCH"
+
+
 def is_ours(context):
     """Whether all of a viewport is drawn by our render engine."""
     return context.space_data.shading.type == "RENDERED" and context.scene.render.engine == ENGINE
@@ -147,10 +156,10 @@ def hair_at(context, x, y):
     """The hair object in the context's viewport at, or a few pixels from, a pixel of its region; or None."""
     region_picture = region_pictures.known_picture(context.region, hair_picture.HairPicture)
     width, height = region_picture.picture.size if region_picture else (0, 0)
-    if context.space_data.shading.type == "RENDERED" or not (0 <= x < width and 0 <= y < height):
+    if is_drawn_by_engine(context) or not (0 <= x < width and 0 <= y < height):
         return None
     view = view_cache.get(context.space_data.as_pointer())
-    if view is None or region_picture.drawn is not view.drawn:
+    if view is None or region_picture.drawn is not view.lit.get(context.region.as_pointer()):
         return None  # the picture is outdated and about to be redrawn
     index = region_picture.picture.hair_near(x, y, round(_PICK_REACH * context.preferences.system.ui_scale))
     uid = None if index is None else region_picture.drawn.owners[index]
@@ -160,13 +169,15 @@ def hair_at(context, x, y):
 def drawn_scene_of(context):
     """The `DrawnScene` of the context's viewport, read if something has moved."""
     viewport = context.space_data
-    key, shows = viewport.as_pointer(), (is_ours(context), *_what_shows(viewport))
+    shading = viewport_shading.read(viewport, context.scene, matrices_of(context.region_data)[0])
+    key, shows = viewport.as_pointer(), (is_ours(context), *_what_shows(viewport), shading.strands)
     view = view_cache.get(key)
-    if view is None or view.shows != shows:  # visibility settings of a viewport do not change the scene
+    if view is None or view.shows != shows:  # settings of a viewport do not change the scene
         view = view_cache.keep(key, _View(shows))
     is_playing = scene_time.is_playing() or hidden_hair.is_any_paused()
     if view.is_playing and not is_playing and view.drawn is not None:  # read again in full detail at rest
         view.outdated, view.drawn = view.drawn, None
+        view.lit.clear()
     if view.drawn is None:
         before, view.outdated = view.outdated, None
         former, view.former = view.former, None
@@ -181,10 +192,35 @@ def drawn_scene_of(context):
             is_draft=bindings.has_unwritten(),
             is_hair_only=not is_ours(context),
             former=former if is_playing else None,
+            shown=shading,
         )
         if view.drawn.hair:
             hair_cache.choose_makers()
-    return view.drawn
+    return _lit(view, context, shading.light)
+
+
+def _lit(view, context, light):
+    """The `DrawnScene` of a `_View` in the light of the context's region.
+
+    Regions of a viewport, as in a quad view, differ in lights that follow the view.
+    """
+    region = context.region.as_pointer()
+    known = view.lit.get(region, view.drawn)
+    if known.light != light and known.hair:
+        maps = known.shadow_maps if _is_lone(view, region, known) else None
+        turned = drawn_scene.relit(
+            known, context.scene, context.view_layer, context.evaluated_depsgraph_get(), light, maps, is_ours(context)
+        )
+        if maps is not None and view.drawn is known:
+            view.drawn = turned  # the maps of `known` are drawn over
+        known = turned
+    view.lit[region] = known
+    return known
+
+
+def _is_lone(view, region, drawn):
+    """Whether no other region shows a `DrawnScene`."""
+    return all(other is not drawn for pointer, other in view.lit.items() if pointer != region)
 
 
 def _what_shows(viewport):

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair in Blender's shading modes: as bright as surfaces beside it, by the same lights, each viewport for itself."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data.pictures import viewport_shading
+from hair_addon.blender.gpu import studio_lights
+from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render.viewport import hair_picture, viewport
+from tests.support.viewports import context_of, view3d
+
+SIZE = 64
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+STUDIO_LIGHTS = ("Default", "basic.sl", "outdoor.sl", "paint.sl", "rim.sl", "studio.sl")
+
+
+def turned(angle):
+    """(3, 3): a rotation about Z."""
+    return np.array(
+        [[math.cos(angle), -math.sin(angle), 0.0], [math.sin(angle), math.cos(angle), 0.0], [0.0, 0.0, 1.0]]
+    )
+
+
+def facing(angle=0.0, is_above=False):
+    """(world to view, view to clip) of a parallel view of the ball, from the front, from beside it or from above."""
+    to_view = np.eye(4)
+    if not is_above:
+        to_view[:3, :3] = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) @ turned(-angle)
+    to_view[2, 3] = -5.0
+    to_clip = np.diag([1 / 1.6, 1 / 1.6, -0.1, 1.0])
+    return to_view, to_clip
+
+
+@pytest.fixture
+def ball(hair):
+    """A ball of short, dense hair without lamps: the space in which it is shown."""
+    hair.data.vellus.hair.strand_count, hair.data.vellus.hair.radius = 1500, 0.016
+    bpy.data.hair_curves["Guides"].vellus.guides.length = 0.25
+    bpy.context.view_layer.update()
+    return view3d()
+
+
+def solid(space, **settings):
+    space.shading.type = "SOLID"
+    for name, value in settings.items():
+        setattr(space.shading, name, value)
+
+
+def read(space, camera, shown=None):
+    """(`DrawnScene`, `ViewportShading`) of the ball in a view."""
+    context = bpy.context
+    shown = shown or viewport_shading.read(space, context.scene, camera[0])
+    depsgraph = context.evaluated_depsgraph_get()
+    return drawn_scene.read(context.scene, context.view_layer, depsgraph, space, shown=shown), shown
+
+
+def picture_of(drawn, camera):
+    """(H, W, 4) light."""
+    picture = hair_picture.HairPicture((SIZE, SIZE), 1)
+    for _ in range(2):
+        picture.add_pass(drawn, *camera)
+    return picture.read()
+
+
+def relit(drawn, light):
+    context = bpy.context
+    return drawn_scene.relit(drawn, context.scene, context.view_layer, context.evaluated_depsgraph_get(), light)
+
+
+def mean_of(light):
+    return light[..., :3].sum(axis=(0, 1)) / light[..., 3].sum()
+
+
+def albedo_of(drawn):
+    """(3,) of the ball: its radiance in even light."""
+    even = viewport_shading.ViewportLight(viewport_shading.STUDIO, ambient=(1.0, 1.0, 1.0))
+    return mean_of(picture_of(relit(drawn, even), facing()))
+
+
+def workbench_ball(light, albedo, samples=60):
+    """(3,) mean radiance of a ball that Workbench draws from the front, with its default roughness."""
+    x, z = np.meshgrid(*[np.linspace(-1.0, 1.0, samples)] * 2)
+    inside = x**2 + z**2 < 1.0
+    normal = np.stack([x, -np.sqrt(np.maximum(1.0 - x**2 - z**2, 0.0)), z], axis=-1)[inside]
+    view = np.array([0.0, -1.0, 0.0])
+    mirrored = 2.0 * (normal @ view)[:, None] * normal - view
+    diffuse, specular = (np.tile(light.ambient, (len(normal), 1)) for _ in range(2))
+    for lamp in light.lights:
+        towards, wrap = np.array(lamp.direction), lamp.wrap
+        diffuse += wrapped(normal @ towards, wrap)[:, None] * lamp.diffuse
+        gloss = 2.0 ** (10.0 * (1.0 - 0.4) * (1.0 - wrap) + 1.0)
+        half = (towards + view) / np.linalg.norm(towards + view)
+        peak = np.clip(normal @ half, 0.0, 1.0) ** gloss * np.clip(normal @ towards, 0.0, 1.0) * (0.125 * gloss + 1.0)
+        around = wrapped(mirrored @ towards, wrap + (1.0 - wrap) * 0.4)
+        specular += (peak + wrap**2 * (around - peak))[:, None] * lamp.specular
+    fresnel = 0.6 * np.exp2(-8.35 * (normal @ view))[:, None]
+    reflectance = 0.05 + 0.95 * fresnel
+    if not light.has_highlights:
+        reflectance = np.zeros_like(reflectance)
+    return (diffuse * albedo * (1.0 - reflectance) + specular * reflectance).mean(axis=0)
+
+
+def wrapped(cosine, wrap):
+    return np.clip((cosine + wrap) / (1.0 + wrap) ** 2, 0.0, 1.0)
+
+
+# ------------------------------------------------------------------------------------------------- what is read
+
+
+def test_lights_are_those_of_the_view_or_of_the_world():
+    space, (to_view, _to_clip) = view3d(), facing()
+    solid(space, light="STUDIO", studio_light="studio.sl", use_world_space_lighting=False)
+    blenders = next(light for light in bpy.context.preferences.studio_lights if light.name == "studio.sl")
+    used = [light for light in blenders.solid_lights if light.use]
+    from_front = viewport_shading.read(space, bpy.context.scene, to_view).light
+    assert len(from_front.lights) == len(used) == 3
+    for found, light in zip(from_front.lights, used, strict=True):
+        assert found.diffuse == tuple(light.diffuse_color) and found.specular == tuple(light.specular_color)
+        x, y, z = light.direction
+        np.testing.assert_allclose(found.direction, (x, -z, y), atol=1e-3)  # seen along +y
+    from_side = viewport_shading.read(space, bpy.context.scene, facing(0.4)[0]).light
+    for found, before in zip(from_side.lights, from_front.lights, strict=True):
+        np.testing.assert_allclose(found.direction, turned(0.4) @ before.direction, atol=1e-6)
+    space.shading.use_world_space_lighting, space.shading.studiolight_rotate_z = True, 0.3
+    for angle in (0.0, 0.4):  # the same from everywhere
+        of_world = viewport_shading.read(space, bpy.context.scene, facing(angle)[0]).light
+        for found, before in zip(of_world.lights, from_front.lights, strict=True):
+            np.testing.assert_allclose(found.direction, turned(-0.3) @ before.direction, atol=1e-6)
+
+
+def test_lights_that_are_edited_replace_the_studio_light():
+    space, system = view3d(), bpy.context.preferences.system
+    solid(space, light="STUDIO", studio_light="studio.sl")
+    system.use_studio_light_edit = True
+    try:
+        system.light_ambient = (0.1, 0.2, 0.3)
+        found = viewport_shading.read(space, bpy.context.scene, facing()[0]).light
+        np.testing.assert_allclose(found.ambient, (0.1, 0.2, 0.3), rtol=1e-6)
+        assert [light.diffuse for light in found.lights] == [
+            tuple(light.diffuse_color) for light in system.solid_lights if light.use
+        ]
+    finally:
+        system.use_studio_light_edit = False
+
+
+@pytest.mark.parametrize("wrap", [0.0, 0.3, 0.5, 0.8, 1.0])
+def test_a_lamp_has_the_light_and_the_mean_direction_that_wrapping_gives(wrap):
+    """Of a surface that faces it: pi times the color in all, and the first moment of the wrapped cosine."""
+    light = viewport_shading.StudioLight((0.0, 0.0, 1.0), (0.5, 0.5, 0.5), (0.25, 0.25, 0.25), wrap)
+    (lamp,), ambient = studio_lights.lamps_of([light], has_highlights=True)
+    cosine = np.linspace(-1.0, 1.0, 20_001)
+    total, moment = (2.0 * np.pi * np.trapezoid(0.5 * wrapped(cosine, wrap) * x, cosine) for x in (1.0, cosine))
+    power = lamp["power"][0]
+    # A surface's irradiance over all normals: a quarter of a sun's, pi of even light; times 4 pi normals, over pi.
+    assert power + 4.0 * np.pi * ambient[0] == pytest.approx(total, rel=1e-3)
+    mean_cosine = 1.0 - 0.25 * lamp["radius"] ** 2
+    assert 2.0 / 3.0 * power * mean_cosine == pytest.approx(moment, rel=1e-3)
+    assert power * (1.0 + lamp["highlight_excess"]) == pytest.approx(np.pi * 0.25, rel=1e-5)
+    (dull,), _ambient = studio_lights.lamps_of([light], has_highlights=False)
+    assert dull["highlight_excess"] == -1.0
+
+
+# ------------------------------------------------------------------------------------------------- what is drawn
+
+
+def test_hair_is_about_as_bright_as_a_ball_that_workbench_draws(ball):
+    camera = facing()
+    solid(ball, light="STUDIO")
+    drawn, _shown = read(ball, camera)
+    albedo, ratios = albedo_of(drawn), {}
+    for name in STUDIO_LIGHTS:
+        for has_highlights in (True, False) if name == "Default" else (True,):
+            solid(ball, studio_light=name, show_specular_highlight=has_highlights)
+            light = viewport_shading.read(ball, bpy.context.scene, camera[0]).light
+            ours = mean_of(picture_of(relit(drawn, light), camera)) @ LUMINANCE
+            ratios[name, has_highlights] = ours / (workbench_ball(light, albedo) @ LUMINANCE)
+    assert len(ratios) == 7
+    assert 0.5 < min(ratios.values()) and max(ratios.values()) < 1.5, ratios
+
+
+def test_hair_turns_with_its_lights(ball):
+    """The bright side of the ball, from above."""
+    camera = facing(is_above=True)
+    solid(ball, light="STUDIO", studio_light="studio.sl", use_world_space_lighting=True)
+    drawn, _shown = read(ball, camera)
+    azimuths = []
+    for rotation in (0.0, 0.6, 1.2):
+        ball.shading.studiolight_rotate_z = rotation
+        light = picture_of(relit(drawn, viewport_shading.read(ball, bpy.context.scene, camera[0]).light), camera)
+        y, x = np.indices((SIZE, SIZE)) - 0.5 * (SIZE - 1)
+        weights = light[..., :3] @ LUMINANCE
+        azimuths.append(math.atan2((weights * y).sum(), (weights * x).sum()))
+    np.testing.assert_allclose(np.diff(np.unwrap(azimuths)), -0.6, atol=0.15)  # clockwise, as Blender's meshes
+
+
+# ------------------------------------------------------------------------------------------------- each for itself
+
+
+def test_viewports_of_other_shading_leave_each_other_alone(ball, monkeypatch):
+    """Redraws without a change read nothing and draw no map, in any order; regions of a quad view have own lights."""
+    other = next(
+        a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D" and a.spaces.active != ball
+    )
+    solid(ball, light="STUDIO", studio_light="Default")
+    other.shading.type, other.shading.use_scene_lights, other.shading.use_scene_world = "MATERIAL", True, False
+    viewport.view_cache.clear()
+    work = []
+    for module, name in ((drawn_scene, "read"), (drawn_scene, "relit"), (drawn_scene, "visibility")):
+        real = getattr(module, name)
+        monkeypatch.setattr(
+            module, name, lambda *given, _real=real, _name=name, **more: (work.append(_name), _real(*given, **more))[1]
+        )
+    contexts = [context_of(ball, 1), context_of(ball, 2), context_of(other, 3)]
+    views = [facing(0.0), facing(1.0), facing(0.0)]
+    for context, matrices in zip(contexts, views, strict=True):
+        context.region_data = type("View", (), dict(zip(("view_matrix", "window_matrix"), matrices, strict=True)))
+
+    def shown():
+        return [viewport.drawn_scene_of(context) for context in contexts]
+
+    first = shown()
+    assert work.count("read") == 2 and work.count("relit") == 1
+    assert first[0].shadow_maps is not first[1].shadow_maps
+    assert first[0].hair_visibility is first[1].hair_visibility
+    work.clear()
+    for _ in range(2):
+        assert all(one is before for one, before in zip(shown(), first, strict=True))
+    assert not work
+    ball.shading.studio_light = "rim.sl"
+    again = shown()
+    assert work == ["relit", "relit"] and again[2] is first[2]
+    assert again[0].shadow_maps is first[0].shadow_maps  # drawn over
+    contexts[2].region_data.view_matrix = facing(0.7)[0]
+    work.clear()
+    assert shown()[2] is first[2] and not work  # an HDRI does not follow the view
+
+
+def test_white_hair_is_lit_by_lights_without_a_size(ball):
+    """Light from a point that white hair sends back may have no spread left, which was divided by."""
+    bpy.data.objects["Hair"].data.vellus.appearance.melanin = 0.0
+    camera = facing()
+    solid(ball, light="STUDIO")
+    sun = viewport_shading.StudioLight((0.0, -0.6, 0.8), (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), wrap=0.0)
+    drawn, _shown = read(
+        ball,
+        camera,
+        viewport_shading.ViewportShading(viewport_shading.ViewportLight(viewport_shading.STUDIO, lights=(sun,))),
+    )
+    light = picture_of(drawn, camera)
+    assert np.isfinite(light).all() and mean_of(light).min() > 0.1
+
+
+def test_color_management_is_what_blender_applies(ball):
+    scene_view = bpy.context.scene.view_settings
+    scene_view.view_transform, scene_view.exposure = "AgX", 1.0
+    kinds = {}
+    for kind in ("SOLID", "WIREFRAME", "MATERIAL"):
+        ball.shading.type = kind
+        kinds[kind] = viewport_shading.read(ball, bpy.context.scene, facing()[0]).management
+    assert kinds == {"SOLID": "NO_SETTINGS", "WIREFRAME": "NO_SETTINGS", "MATERIAL": "VIEW_TRANSFORM"}
+    ball.shading.use_scene_lights = True
+    assert viewport_shading.read(ball, bpy.context.scene, facing()[0]).management == "ALL"
