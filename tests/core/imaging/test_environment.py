@@ -98,5 +98,5 @@ def test_an_image_that_is_turned_gives_turned_light():
     (other,), other_sides = environment.split(surroundings(lambda directions: radiance_of(directions @ to_image.T)))
     assert lobe.direction @ other.direction > np.cos(np.radians(1.0))
     assert lobe.direction @ (to_image.T @ axis) > np.cos(np.radians(3.0))
-    np.testing.assert_allclose(lobe.irradiance, other.irradiance, rtol=0.02)
-    np.testing.assert_allclose(sides, other_sides, rtol=0.01)
+    np.testing.assert_allclose(lobe.irradiance, other.irradiance, rtol=0.05)
+    np.testing.assert_allclose(sides, other_sides, rtol=0.02)
