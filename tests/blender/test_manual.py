@@ -12,7 +12,7 @@ from bl_operators import wm
 
 from blend_samples.pictures import all_pictures
 from hair_addon.blender import manual
-from tests.support.interface import spoken
+from tests.support.interface import interface_strings
 from tools import manual_pages
 
 LARGEST_PICTURE = 150_000  # bytes
@@ -23,8 +23,8 @@ PAGES = sorted(manual_pages.SOURCE.glob("*.md"))
 def documented():
     """{doc_id: label} as Blender names what is under the mouse pointer: of all that an artist sees of ours."""
     found = {}
-    for cls in spoken.blender.CLASSES:
-        entries = [e for e in spoken.properties_of(cls) if not e.is_hidden and e.name != e.identifier]
+    for cls in interface_strings.blender.CLASSES:
+        entries = [e for e in interface_strings.properties_of(cls) if not e.is_hidden and e.name != e.identifier]
         if issubclass(cls, bpy.types.Operator):
             found[cls.bl_idname] = cls.bl_label
             category, name = cls.bl_idname.split(".")

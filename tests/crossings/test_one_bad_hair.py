@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.groom import bindings, reweighed_hair
+from hair_addon.blender.groom import bindings, changed_weights
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import drawn_scene
 from hair_addon.core.errors import HairError
@@ -101,7 +101,7 @@ def test_other_hair_follows_its_settings_where_one_mesh_was_deleted(hair, capfd,
             datablock.keyframe_insert(f"vellus.{path}", frame=10)
     update()
     bpy.context.scene.frame_set(10)
-    assert reweighed_hair.reweighed(hair.data, bpy.context.evaluated_depsgraph_get()) is None  # as a slider asks
+    assert changed_weights.rebound(hair.data, bpy.context.evaluated_depsgraph_get()) is None  # as a slider asks
     assert len(good.curves) == 30 and good.vellus.status == ""
     assert hair.data.vellus.status == "Hair needs a mesh object to grow on: select one."
     assert "Traceback" not in capfd.readouterr().err

@@ -21,19 +21,19 @@ from hair_addon.core.grooming import following, groom
 from hair_addon.core.kernels import compiled_kernels, kernel_cache
 from hair_addon.core.styling import clump, curl, frizz
 from tests.support.meshes import HEAD, read_obj
-from tests.support.strands import company
+from tests.support.strands import strand_groups
 from tests.support.strands.styled import Groom
 
 
 def laws():
-    """{company: its sizes at which a strand is not as in another company}: empty lists where all is well."""
+    """{group: sizes at which a strand differs from the same strand in another group}; all empty if correct."""
     names = "TWO CLUMPS", "STACK", "STACK, masked", "simulated"
-    return {name: list(company.companies()[name].unlike()) for name in names}
+    return {name: list(strand_groups.all_groups()[name].different()) for name in names}
 
 
 def digests():
-    """{what is made: SHA-256}: companies, and a groom from the head's mesh to styled strands."""
-    made = {name: found.all() for name, found in company.companies().items()}
+    """{name: SHA-256}: of groups, and of a groom from the head's mesh to styled strands."""
+    made = {name: found.all() for name, found in strand_groups.all_groups().items()}
     mesh = read_obj(HEAD)
     hair = Groom(mesh, groom.GuideSettings(guide_count=60, curvature=1.0), groom.HairSettings(strand_count=400), "cpu")
     made["guides"] = hair.guides.numpy()

@@ -24,7 +24,7 @@ from ..data.strands import (
     stored_roots,
 )
 from ..data.surfaces import Surface, cage_of
-from . import bindings, pipeline, seen_shapes, staleness
+from . import bindings, pipeline, posed_shapes, staleness
 
 _CLOSE = 1e-5  # fraction of the surface's size
 _ROUNDING = 1e-6  # fraction of coordinates: they may be far from the origin
@@ -112,7 +112,9 @@ def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgra
     kept_shapes.move(strands, left.points, change.points)
     _widen(strands, change)
     if shown is not None:
-        simulated_guides.show(strands, rooted_as(change.points(shown), shown, firsts, curves.first_points(strands)))
+        simulated_guides.show(
+            strands, with_exact_roots(change.points(shown), shown, firsts, curves.first_points(strands))
+        )
     for user in curves_objects.objects_of(strands):
         if delivered_hair.modifier_of(user) is not None:
             continue  # its frames stay in the former coordinates
@@ -128,9 +130,9 @@ def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgra
     _note_moved(strands, baked_as, followed)
 
 
-def keep_seen(strands: Curves, surface: Surface, change: Affine) -> None:
+def keep_posed_shape(strands: Curves, surface: Surface, change: Affine) -> None:
     """Keep the posed shape of strands whose rotation with the surface has changed; call it after `follow`."""
-    stay = seen_shapes.kept_by(strands, surface, change)
+    stay = posed_shapes.rest_correction(strands, surface, change)
     if stay is None:
         return
     baked_as, followed, firsts = _baked_as(strands), staleness.guides_digest(strands), curves.first_points(strands)
@@ -138,7 +140,7 @@ def keep_seen(strands: Curves, surface: Surface, change: Affine) -> None:
     kept_shapes.move(strands, stay)
     if shown is not None:
         moved = stay(shown.reshape(-1, 3)).reshape(shown.shape)
-        simulated_guides.show(strands, rooted_as(moved, shown, firsts, curves.first_points(strands)))
+        simulated_guides.show(strands, with_exact_roots(moved, shown, firsts, curves.first_points(strands)))
     _note_moved(strands, baked_as, followed)
 
 
@@ -165,7 +167,7 @@ def is_due(strands: Curves) -> bool:
     return any(curves_objects.has_own_transform(user) for user in curves_objects.objects_of(strands))
 
 
-def rooted_as(moved: np.ndarray, points: np.ndarray, roots: np.ndarray, moved_roots: np.ndarray) -> np.ndarray:
+def with_exact_roots(moved: np.ndarray, points: np.ndarray, roots: np.ndarray, moved_roots: np.ndarray) -> np.ndarray:
     """Set the roots of moved (G, P, 3) points to `moved_roots`, bit for bit, where they were equal to `roots`.
 
     points: before; roots, moved_roots: (G, 3) of the guides, before and now.
@@ -273,7 +275,7 @@ def followed_by(strands: Curves) -> list[Curves]:
     ]
 
 
-def left_alone(surface_object: bpy.types.Object) -> list[Curves]:
+def hair_without_guides(surface_object: bpy.types.Object) -> list[Curves]:
     """Return hair on a mesh object without guides on the same object: they are deleted or elsewhere."""
 
     def is_alone(hair):

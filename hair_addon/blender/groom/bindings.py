@@ -104,10 +104,10 @@ class BoundHair:
             self._points_have_moved()
         return moved
 
-    def follow_drawn(self, guides: Strands) -> np.ndarray | None:
+    def follow_on_gpu(self, guides: Strands) -> np.ndarray | None:
         """Store combed guides while the GPU generates the shown strands; returns the indices (M,) of moved guides.
 
-        Points are computed in `catch_up`. None as from `follow`.
+        Points are computed in `update_points`. None as from `follow`.
         """
         combed = following.combed(guides, self.guides)
         if combed is None:
@@ -117,16 +117,16 @@ class BoundHair:
             self.is_behind = True
             self._points_have_moved()
             if self.straight is not None:
-                self.straight.follow_drawn(guides)
+                self.straight.follow_on_gpu(guides)
         return combed
 
-    def hold(self, points: np.ndarray) -> None:
+    def override_points(self, points: np.ndarray) -> None:
         """Override the interpolated points until they grow again."""
         self.free, self.growing = self.growing, Future()
         self.growing.set_result(points)
 
-    def let_go(self) -> None:
-        """Restore the interpolated points after `hold`."""
+    def restore_points(self) -> None:
+        """Restore the interpolated points after `override_points`."""
         if self.free is not None:
             self.growing, self.free = self.free, None
 
@@ -146,7 +146,7 @@ class BoundHair:
     @memory_as_sentence()
     def grow(self, chosen: np.ndarray | None = None) -> None:
         """Compute strands for `guides` in other threads; if indices (M,) are given, compute only these, immediately."""
-        self.let_go()
+        self.restore_points()
         binding, styling, axes = self.binding, self.styles.styling, self.surface.to_local_axes
         guides = self.guides if styling is None else styling.guides(self.guides)
         if chosen is None:
@@ -163,7 +163,7 @@ class BoundHair:
     def restyle(self, styles: StyledHair, is_drawn: bool = False) -> None:
         """Apply other styles to the same strands, without a search.
 
-        is_drawn: whether the GPU generates the shown strands; points are then computed in `catch_up`.
+        is_drawn: whether the GPU generates the shown strands; points are then computed in `update_points`.
         """
         styles.continue_from(self.styles)
         self.styles = styles
@@ -181,13 +181,13 @@ class BoundHair:
     def show_styles(self, is_styled: bool) -> None:
         """Show strands in viewports with or without styles."""
         if is_styled:
-            self.catch_up()
+            self.update_points()
             self.straight = None
         elif self.straight is None:
             self.straight = replace(self, styles=self._unstyled(), growing=None, free=None, shares=None)
             self.straight.grow()
 
-    def catch_up(self) -> None:
+    def update_points(self) -> None:
         """Compute the points for guides that only the viewport display has followed."""
         if self.is_behind:
             self.grow()

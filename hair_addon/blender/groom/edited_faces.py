@@ -31,7 +31,7 @@ class _Edit:
     before: np.ndarray  # (W, 3) float32: former positions of the present vertices; present ones of new vertices
 
 
-def root_again(strands: Curves, surface: Surface, depsgraph: Depsgraph) -> tuple[int, int]:
+def reroot(strands: Curves, surface: Surface, depsgraph: Depsgraph) -> tuple[int, int]:
     """Root guides or kept hair, and the hair between guides, on a surface with other faces.
 
     Strands follow vertices that were moved in the same edit. Returns the numbers of guides (or kept strands) and of

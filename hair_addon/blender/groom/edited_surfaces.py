@@ -62,7 +62,7 @@ def follow_surface(
         if not follows_edits or frame_faces.came_with_the_frame(guide_curves, surface):
             return Followed.NOTHING
         curves.require_not_linked(guide_curves)
-        lost, lost_between = edited_faces.root_again(guide_curves, surface, depsgraph)
+        lost, lost_between = edited_faces.reroot(guide_curves, surface, depsgraph)
         if lost or lost_between:
             strand_count = lost_between if state.kind == "GUIDES" else lost
             sentence = _ROOTED_AGAIN[state.kind]
@@ -115,7 +115,7 @@ def _carry(guide_curves, surface, change, depsgraph):
     for target in targets:
         applied_transforms.follow(target, surface, change, depsgraph)
     for target in targets:
-        applied_transforms.keep_seen(target, surface, change)
+        applied_transforms.keep_posed_shape(target, surface, change)
     surface_space.keep_surface(guide_curves, surface)
 
 
@@ -126,7 +126,7 @@ def follow_alone(
 
     place_before: former transform of the surface of Curves, if known. Errors become the hair's status.
     """
-    for hair in applied_transforms.left_alone(surface_object):
+    for hair in applied_transforms.hair_without_guides(surface_object):
         try:
             surface = scene.read_surface(surface_object, depsgraph)
             change = applied_transforms.find(hair, surface, place_before(hair))
@@ -135,6 +135,6 @@ def follow_alone(
                 applied_transforms.note([hair], surface, change)
                 surface = scene.read_surface(surface_object, depsgraph)
                 applied_transforms.follow(hair, surface, change, depsgraph)
-                applied_transforms.keep_seen(hair, surface, change)
+                applied_transforms.keep_posed_shape(hair, surface, change)
         except HairError as error:
             hair.vellus.status = str(error)

@@ -27,6 +27,6 @@ def of(hair: Curves, depsgraph: Depsgraph) -> tuple[np.ndarray, np.ndarray] | No
             return None
         if bound.root_key != hair.vellus.root_key:
             return None
-    bound.catch_up()
+    bound.update_points()
     indices, weights = bound.guide_map
     return (indices, weights) if len(indices) == len(hair.curves) else None

@@ -25,7 +25,7 @@ def is_wanted(hair: Curves) -> bool:
 
 def keep_outside(hair: Curves, bound: BoundHair) -> None:
     """Move strands out of the surface and the colliders of their guides before they are written."""
-    bound.let_go()
+    bound.restore_points()
     if not is_wanted(hair):
         return
     try:
@@ -44,4 +44,4 @@ def keep_outside(hair: Curves, bound: BoundHair) -> None:
     if is_moved.any():
         kept = bound.points.copy()
         kept[is_moved, 1:] = pose.to_rest(moved)[is_moved, 1:]
-        bound.hold(kept)
+        bound.override_points(kept)

@@ -139,8 +139,8 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
             binding = _bind(surface, guides, settings, ground, roots, progress)
             make_trees = _trees_on(surface, guides, settings, ground)
         else:
-            binding = hair_binding.weigh_again(known.binding, settings)
-            make_trees = styled_hair.trees_again(known.styles, settings)
+            binding = hair_binding.reweighed(known.binding, settings)
+            make_trees = styled_hair.reweighed_trees(known.styles, settings)
         placing = part_of(progress, 0.5, 0.8)
         styles = styled_hair.bind(read, binding, guides, settings, surface, make_trees, placing)
         bound = BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, styles, fits=sized.fits)
@@ -349,7 +349,7 @@ def restyle(
     styles = style_items.styles_of(target.vellus)
     read = styled_hair.read_styles(styles, target.surface, bound.surface, guide_curves, depsgraph, target)
     if not read.is_same(bound.styles.read):
-        trees = bound.styles.lend_trees()
+        trees = bound.styles.shared_trees()
         styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, trees)
         bound.restyle(styles, is_drawn(bound, styles))
     return True

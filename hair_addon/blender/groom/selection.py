@@ -43,7 +43,7 @@ def surface_of(active: Object | None) -> Object | None:
     return active.data.surface if active.type == "CURVES" else None
 
 
-def guides_again(active: Object | None) -> Curves | None:
+def guides_to_regenerate(active: Object | None) -> Curves | None:
     """Return the guides to replace when regenerating: the active ones, or those of the active hair; None on a mesh."""
     hair = active_of_kind(active, "HAIR")
     return active_of_kind(active, "GUIDES") if hair is None else hair.vellus.guide_curves
@@ -52,7 +52,7 @@ def guides_again(active: Object | None) -> Curves | None:
 def guides_of(active: Object | None) -> Curves | None:
     """Return the active guides, the active hair's guides, or the newest guides on the active mesh; None if none."""
     if active is None or active.type != "MESH":
-        return guides_again(active)
+        return guides_to_regenerate(active)
     return _newest(curves_on(active, "GUIDES"))
 
 

@@ -87,7 +87,7 @@ class StyledHair:
         """Clump trees of the hair, built when a style needs them."""
         return self.make_trees() if self.styling is None else self.styling.trees
 
-    def lend_trees(self) -> Callable[[], ClumpTrees]:
+    def shared_trees(self) -> Callable[[], ClumpTrees]:
         """Return a function that gives other styles of the hair these `trees`, without a reference to this object."""
         if self.styling is None and "trees" not in vars(self):
             return self.make_trees
@@ -137,26 +137,26 @@ def bind(
     return StyledHair(read, styling, make_trees)
 
 
-def trees_again(styles: StyledHair, settings: HairSettings) -> Callable[[], ClumpTrees]:
+def reweighed_trees(styles: StyledHair, settings: HairSettings) -> Callable[[], ClumpTrees]:
     """Return a function that builds a hair's clump trees for other weights, limits or lengths, without a search."""
     if styles.styling is None and "trees" not in vars(styles):
         # Skips settings in between: else a dragged slider would keep all of them in memory.
         known = styles.make_trees
         make = known.args[0] if isinstance(known, partial) and known.func is _weighed_trees else known
         return partial(_weighed_trees, make, settings)
-    trees = styles.trees.weigh_again(settings)
+    trees = styles.trees.reweighed(settings)
     return lambda: trees
 
 
 def _weighed_trees(make_trees, settings):
-    return make_trees().weigh_again(settings)
+    return make_trees().reweighed(settings)
 
 
 def unstyled(
     styles: StyledHair, binding: HairBinding, guides: Strands, settings: HairSettings, surface: Surface
 ) -> StyledHair:
     """Return the `StyledHair` of the same strands without styles, with the same number of points."""
-    return bind(ReadStyles(), binding, guides, settings, surface, styles.lend_trees())
+    return bind(ReadStyles(), binding, guides, settings, surface, styles.shared_trees())
 
 
 def _are_same(inputs, others):

@@ -89,7 +89,7 @@ def write_hair(target: Curves) -> None:
     bound, state = bindings.of(target), target.vellus
     if bound is None or bound.is_written:
         return
-    bound.catch_up()
+    bound.update_points()
     if not bound.has_moved_only:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         size_fitting.keep(target, bound.fits)

@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data.strands import curves, simulated_guides
-from ..groom import bindings, hair_outside, pipeline, reweighed_hair, size_fitting, staleness, writing
+from ..groom import bindings, changed_weights, hair_outside, pipeline, size_fitting, staleness, writing
 from ..groom.foreign import kept_following
 from ..groom.styles import painted_masks
 from ..host import running
@@ -63,7 +63,7 @@ def follow_guides(hair, depsgraph, local=None):
     try:
         guides = _shown_guides(hair, bound, local)
         is_made = hair_cache.may_make(hair.session_uid) and not hair_outside.is_wanted(hair)
-        moved = bound.follow_drawn(guides) if is_made else bound.follow(guides)
+        moved = bound.follow_on_gpu(guides) if is_made else bound.follow(guides)
     except HairError as error:
         hair.vellus.status = str(error)
         return
@@ -150,7 +150,7 @@ def regenerate(hair, depsgraph):
 
 def _is_reweighed(hair, depsgraph):
     """Show hair with new guide weights, lengths or radii; returns False if anything else has changed."""
-    bound = None if hair_outside.is_wanted(hair) else reweighed_hair.reweighed(hair, depsgraph)
+    bound = None if hair_outside.is_wanted(hair) else changed_weights.rebound(hair, depsgraph)
     if bound is None:
         return False
     bindings.keep(hair, bound)

@@ -215,7 +215,7 @@ def _follow_applied(guides, played):
         return False
     now = played.simulated.roots
     for frame, points in played.frames.items():
-        played.frames[frame] = applied_transforms.rooted_as(change.points(points), points, roots, now)
+        played.frames[frame] = applied_transforms.with_exact_roots(change.points(points), points, roots, now)
     return True
 
 

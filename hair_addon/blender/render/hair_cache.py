@@ -76,7 +76,7 @@ def hair_on_gpu(datablock, is_viewport=True):
 
 def _upload_styled(datablock, bound):
     """`StrandsOnGPU` of bound hair with its styles, not cached."""
-    bound.catch_up()
+    bound.update_points()
     styled = _read(datablock, bound, bound)
     return strand_textures.upload_strands(
         _carried(styled, _pose_of(datablock.surface)), styled.radii, styled.randoms, styled.wetness
@@ -286,7 +286,7 @@ def _are_points(datablock, points):
 def _read_shown(datablock):
     bound = bindings.of(datablock)
     if bound is not None:
-        bound.shown.catch_up()
+        bound.shown.update_points()
     return _read(datablock, bound, bound and bound.shown)
 
 

@@ -93,7 +93,7 @@ def _is_left(frames, on_line, edges, lines):
     ways = wp.array(np.take_along_axis(ways, order, axis=1), dtype=float, device=device)
     there = wp.array(beside, dtype=wp.vec3, device=device)
     facing = wp.array(np.concatenate([ups, ups]), dtype=wp.vec3, device=device)
-    part_lines.go_round(lines, roots, normals, there, facing, candidates, ways)
+    part_lines.go_around(lines, roots, normals, there, facing, candidates, ways)
     # If all are infinite, the first one is unchanged.
     return (candidates.numpy()[:, 0] < count) & np.isfinite(ways.numpy()[:, 1])
 

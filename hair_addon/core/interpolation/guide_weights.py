@@ -229,7 +229,7 @@ def _parted(lines, roots, normals, guide_roots, guide_normals, candidates, ways,
     most = min(SURPLUS * count, hash_grid.LIMIT)
     found, lengths = _nearest_guides(guide_roots, its_roots, most, its_regions)
     unseen = lengths.numpy()[:, -1].copy()
-    part_lines.go_round(lines, its_roots, _some(normals, near), guide_roots, guide_normals, found, lengths)
+    part_lines.go_around(lines, its_roots, _some(normals, near), guide_roots, guide_normals, found, lengths)
     lengths = lengths.numpy()[:, :count].copy()
     lengths[:, -1] = np.minimum(lengths[:, -1], unseen)
     candidates, ways = candidates.numpy().copy(), ways.numpy().copy()

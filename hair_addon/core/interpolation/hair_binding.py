@@ -83,13 +83,13 @@ def weighed(
     )
 
 
-def limited_again(binding: HairBinding, settings: Any) -> HairBinding:
+def relimited(binding: HairBinding, settings: Any) -> HairBinding:
     """Return a `HairBinding` with the same weights and other limits or lengths; settings: `HairSettings`."""
     limits = interpolation.guide_weights.Limits(settings.angle_limit, settings.length_limit)
     return replace(binding, limits=limits, keep_length=settings.keep_length)
 
 
-def weigh_again(binding: HairBinding, settings: Any) -> HairBinding:
+def reweighed(binding: HairBinding, settings: Any) -> HairBinding:
     """Return a `HairBinding` with other weights, limits or lengths, without a search, for at most as many guides."""
     at_roots, at_guides = (binding.positions, binding.normals), (binding.guide_positions, binding.guide_normals)
     return weighed(binding.roots, at_roots, at_guides, binding.candidates, settings, binding.is_mirrored)

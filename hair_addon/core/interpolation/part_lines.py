@@ -183,7 +183,7 @@ def near(lines: PartLines, roots: wp.array[wp.vec3], ways: wp.array2d[float]) ->
     return np.flatnonzero(is_near.numpy()).astype(np.int32)
 
 
-def go_round(
+def go_around(
     lines: PartLines,
     roots: wp.array[wp.vec3],
     normals: wp.array[wp.vec3],

@@ -103,10 +103,10 @@ class ClumpTrees:
             if tree not in self._levels:
                 del self._parents[tree, level]
 
-    def weigh_again(self, settings: Any) -> "ClumpTrees":
+    def reweighed(self, settings: Any) -> "ClumpTrees":
         """Return the same trees for other weights, limits or lengths of `HairSettings`, without a search."""
         weighed = {
-            tree: [interpolation.hair_binding.weigh_again(binding, settings) for binding in levels]
+            tree: [interpolation.hair_binding.reweighed(binding, settings) for binding in levels]
             for tree, levels in self._levels.items()
         }
         return ClumpTrees(

@@ -17,7 +17,7 @@ from hair_addon.blender.live import events, invalidation
 from hair_addon.blender.render import hair_cache
 from hair_addon.blender.render.viewport import hair_picture, viewport
 from tests.blender.gpu.test_world_texture import environment_node
-from tests.support.always import changed
+from tests.support.invariants import changed
 from tests.support.reading import points, write_points
 from tests.support.viewports import context_of, view3d
 from tests.test_conventions import ADDON, MODULES

@@ -18,7 +18,7 @@ from hair_addon.blender.settings import translations
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import sampling
 from hair_addon.core.geometry.mesh import TriMesh, check_mesh
-from tests.support.interface import spoken
+from tests.support.interface import interface_strings
 from tests.support.interface.layout import draw
 
 LANGUAGES = translations.dictionaries()
@@ -31,15 +31,15 @@ def fields(sentence):
 
 @pytest.mark.parametrize("locale", LANGUAGES)
 def test_every_string_is_translated(locale):
-    wanted = spoken.strings_of_classes() | spoken.strings_of_sources()
+    wanted = interface_strings.strings_of_classes() | interface_strings.strings_of_sources()
     missing = {text: where for text, where in wanted.items() if text not in LANGUAGES[locale]}
     assert not missing, f"give these their lines in languages/{locale}.po: {missing}"
 
 
 @pytest.mark.parametrize("locale", LANGUAGES)
 def test_dictionaries_have_no_unused_strings(locale):
-    sources = "".join(path.read_text(encoding="utf-8") for path in spoken.ADDON.rglob("*.py"))
-    wanted = spoken.strings_of_classes() | spoken.strings_of_sources()
+    sources = "".join(path.read_text(encoding="utf-8") for path in interface_strings.ADDON.rglob("*.py"))
+    wanted = interface_strings.strings_of_classes() | interface_strings.strings_of_sources()
     quoted = sources.replace('\\"', '"')
     assert [text for text in LANGUAGES[locale] if text not in wanted and text not in quoted] == []
 
@@ -52,10 +52,10 @@ def test_translations_keep_placeholders(locale):
 
 def test_labels_have_the_translation_context_of_vellus():
     """In Blender's own dictionaries guides are lines that help to draw."""
-    for cls in spoken.blender.CLASSES:
+    for cls in interface_strings.blender.CLASSES:
         if issubclass(cls, (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu)):
             assert cls.bl_translation_context == translations.CONTEXT, cls
-        for entry in spoken.properties_of(cls):
+        for entry in interface_strings.properties_of(cls):
             if not entry.is_hidden and entry.name != entry.identifier:
                 assert entry.translation_context == translations.CONTEXT, (cls, entry.identifier)
 

@@ -9,7 +9,7 @@ import pytest
 
 from hair_addon.blender.settings import translations
 from hair_addon.blender.ui import panels, setting_rows
-from tests.support.interface import spoken
+from tests.support.interface import interface_strings
 from tests.support.interface.layout import draw
 from tools import manual_pages
 
@@ -23,11 +23,15 @@ BRITISH = re.compile(
 
 
 def test_the_interface_has_us_spelling():
-    texts = {*spoken.strings_of_classes(), *spoken.strings_of_sources(), *spoken.parts_of_errors()}
+    texts = {
+        *interface_strings.strings_of_classes(),
+        *interface_strings.strings_of_sources(),
+        *interface_strings.parts_of_errors(),
+    }
     assert sorted(text for text in texts if BRITISH.search(text)) == []
 
 
-ROOT = spoken.ADDON.parent
+ROOT = interface_strings.ADDON.parent
 PAGES = [
     *sorted(manual_pages.SOURCE.glob("*.md")),
     *sorted((ROOT / "docs").glob("*.md")),
@@ -58,12 +62,12 @@ def shown_in(locale, text):
 
 def names_in_the_sidebar():
     """{label of a property that has its row in the sidebar: where it stands}."""
-    groups = [cls for cls in spoken.blender.CLASSES if issubclass(cls, bpy.types.PropertyGroup)]
+    groups = [cls for cls in interface_strings.blender.CLASSES if issubclass(cls, bpy.types.PropertyGroup)]
     of_renders = {"VellusRenderSettings", "VellusPassSettings"}  # in the Properties editor, which is wider
     return {
         entry.name: f"{cls.__name__}.{entry.identifier}"
         for cls in groups
-        for entry in spoken.properties_of(cls)
+        for entry in interface_strings.properties_of(cls)
         if cls.__name__ not in of_renders
         and not entry.is_hidden
         and entry.name != entry.identifier
@@ -99,11 +103,11 @@ def test_buttons_fit_the_sidebar(hair, active, locale):
 def test_choices_fit_their_menus(locale):
     """The text of a menu button has the value's side, but for its arrow."""
     room = ROW_WIDTH * (1.0 - setting_rows.NAME_SHARE) - ICON_WIDTH - MARGIN
-    groups = [cls for cls in spoken.blender.CLASSES if issubclass(cls, bpy.types.PropertyGroup)]
+    groups = [cls for cls in interface_strings.blender.CLASSES if issubclass(cls, bpy.types.PropertyGroup)]
     choices = {
         shown_in(locale, choice.name): f"{cls.__name__}.{entry.identifier}"
         for cls in groups
-        for entry in spoken.properties_of(cls)
+        for entry in interface_strings.properties_of(cls)
         if entry.type == "ENUM" and entry.name != entry.identifier and entry.identifier not in setting_rows.WIDE
         for choice in entry.enum_items
     }

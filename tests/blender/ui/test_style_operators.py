@@ -20,8 +20,8 @@ from hair_addon.core.params import declared
 from hair_addon.core.styling import clump, clump_trees, curl, frizz, lean, trim, wet
 from hair_addon.core.styling.base import ProfiledSettings, scaled
 from hair_addon.core.styling.kinds import KINDS, OFFERS, kind_of
-from tests.support.always import operate
 from tests.support.interface.layout import draw, draw_all
+from tests.support.invariants import operate
 from tests.support.pairs import share_of
 from tests.support.reading import points, write_points
 

@@ -46,7 +46,7 @@ def test_a_style_is_in_strands_of_every_update(bound, styling):
 
 def test_identities_and_leaders_stay_while_guides_are_combed_and_weighed_again(bound):
     _guides, binding = bound
-    again = hair_binding.weigh_again(binding, groom.HairSettings(strand_count=2000, length_limit=1.5))
+    again = hair_binding.reweighed(binding, groom.HairSettings(strand_count=2000, length_limit=1.5))
     np.testing.assert_array_equal(again.identities, binding.identities)
     np.testing.assert_array_equal(again.leaders, binding.leaders)
     first = binding.guide_weights.indices.numpy()[:, 0]

@@ -40,7 +40,7 @@ def ways_between(ground, lines, roots, guide_roots):
     candidates = wp.array(order.astype(np.int32), device=DEVICE)
     ways = wp.array(np.take_along_axis(apart, order, axis=1).astype(np.float32), device=DEVICE)
     count, guide_count = len(roots), len(guide_roots)
-    part_lines.go_round(
+    part_lines.go_around(
         laid, vectors(flat(roots)), up(count), vectors(flat(guide_roots)), up(guide_count), candidates, ways
     )
     found, lengths = candidates.numpy(), ways.numpy()

@@ -157,7 +157,7 @@ def test_other_weights_of_guides_keep_sites(hair, monkeypatch):
     tree = program.tree_settings(STACK[0])
     trees.members(HAIR, hair.binding, tree)
     counts = Counts(monkeypatch)
-    again = trees.weigh_again(replace(hair.settings, influence_distance=0.05))
+    again = trees.reweighed(replace(hair.settings, influence_distance=0.05))
     again.members(HAIR, hair.binding, tree)
     again.levels(tree)
     assert (counts.searches, counts.sites) == (0, 0)

@@ -24,8 +24,8 @@ from hair_addon.blender.host import running
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.errors import HairError
 from hair_addon.core.params import Settings
-from tests.support import always, rooted
-from tests.support.always import activate, changed, chosen, objects, operate, ours
+from tests.support import invariants, rooted
+from tests.support.invariants import activate, changed, chosen, objects, operate, ours
 from tests.support.scenes import shrink_shadows
 from tests.support.walk import any_values, walk_lengths
 from tests.support.walk.walk_operations import Artist, walk
@@ -246,7 +246,7 @@ def things_alive():
 
 if __name__ == "__main__":
     faulthandler.enable()
-    sys.stderr = always.Echo(sys.stderr)
+    sys.stderr = invariants.Echo(sys.stderr)
     hair_addon.register()
     gpu.init()
     shrink_shadows(pytest.MonkeyPatch())

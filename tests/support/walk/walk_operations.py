@@ -27,8 +27,8 @@ from hair_addon.blender.data.strands import curves as curve_data
 from hair_addon.blender.render import offscreen
 from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
-from tests.support import always
-from tests.support.always import activate, changed, chosen, nothing_is_left_listening, objects, operate, ours
+from tests.support import invariants
+from tests.support.invariants import activate, changed, chosen, handlers_are_registered, objects, operate, ours
 from tests.support.scenes import shrink_shadows
 from tests.support.walk.walk_painting import PaintingSteps
 from tests.support.walk.walk_steps import needs_room, odd_numbers, pick, step
@@ -322,7 +322,7 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
     def switch_addon(self, meanwhile, number):
         """Off and on again; what happens meanwhile is not ours to see."""
         hair_addon.unregister()
-        nothing_is_left_listening(is_on=False)
+        handlers_are_registered(is_on=False)
         if meanwhile == "undo" and bpy.ops.ed.undo.poll():
             bpy.ops.ed.undo()
         elif meanwhile == "load":
@@ -365,8 +365,8 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
         assert np.isfinite(pixels).all()
 
     @invariant()
-    def all_is_well(self):
-        always.all_is_well()
+    def check_all(self):
+        invariants.check_all()
 
 
 def walk(run_count, operation_count, number, artist=Artist):
@@ -384,7 +384,7 @@ def walk(run_count, operation_count, number, artist=Artist):
 
 if __name__ == "__main__":
     faulthandler.enable()
-    sys.stderr = always.Echo(sys.stderr)
+    sys.stderr = invariants.Echo(sys.stderr)
     hair_addon.register()
     gpu.init()
     shrink_shadows(pytest.MonkeyPatch())

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from hair_addon.blender.settings import style_items
-from tests.support.always import activate, changed, chosen, objects, operate, ours
+from tests.support.invariants import activate, changed, chosen, objects, operate, ours
 from tests.support.walk.walk_steps import needs_room, pick, step
 
 

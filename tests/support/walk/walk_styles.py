@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hair_addon.blender.settings import style_items
 from hair_addon.core.files.style_presets import PRESETS
 from hair_addon.core.styling.kinds import OFFERS
-from tests.support.always import activate, changed, chosen, objects, operate, ours
+from tests.support.invariants import activate, changed, chosen, objects, operate, ours
 from tests.support.walk.walk_steps import odd_numbers, pick, step
 
 

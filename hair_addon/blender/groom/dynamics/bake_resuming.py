@@ -53,7 +53,7 @@ def digest_of(guides: Curves, scene: Scene, settings: "guide_simulation.Dynamics
     return frame_animation.digest_of(guides, scene, scenes.present_depsgraph(), settings)
 
 
-def going_on(tasks: list[Task], its_scene: Remembered) -> Work[None]:
+def resuming(tasks: list[Task], its_scene: Remembered) -> Work[None]:
     """Advance tasks from their first frames to the last valid states, as work in steps."""
     kept = {id(task): task.done for task in tasks if task.last_number > task.done}
     frame, said = min(kept.values(), default=0), time.perf_counter()
@@ -73,7 +73,7 @@ def going_on(tasks: list[Task], its_scene: Remembered) -> Work[None]:
     for task in tasks:
         if task.state is not None:
             task.done, arrays, seen = task.state
-            task.simulated.go_on(arrays, seen)
+            task.simulated.resume(arrays, seen)
         task.writer.remove_states(after=task.done)
 
 

@@ -26,7 +26,7 @@ from ...host import memory, scene_time
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...settings import properties
-from .. import followed_names, quiet_hair
+from .. import disabled_hair, followed_names
 from ..guides import guide_regions
 from . import bake_resuming, broken_guides, frame_folders, guide_simulation
 from .bake_resuming import Task
@@ -149,11 +149,11 @@ def baking(
     _baking = True
     with contextlib.ExitStack() as stack:
         stack.callback(_end, its_scene, present, [Remembered(guides) for guides in guides_list])
-        stack.enter_context(quiet_hair.unevaluated(guides_list, scene))
+        stack.enter_context(disabled_hair.disabled_in_viewports(guides_list, scene))
         begun = [_begin(guides, last, scene) for guides in guides_list]  # a refused bake must change nothing
         tasks = [_open(*one, last, starts_over, stack) for one in begun]
         yield Stage("Baking", 0.0)
-        yield from bake_resuming.going_on(tasks, its_scene)
+        yield from bake_resuming.resuming(tasks, its_scene)
         first = min((task.done for task in tasks), default=last)
         counts = [0] * len(tasks)
         for frame in range(first + 1, last + _BEYOND + 1):

@@ -113,7 +113,7 @@ class GuideSimulation:
         self.parted_by = keys
         return is_other
 
-    def go_on(self, state: Mapping[str, np.ndarray], frame: FrameInput) -> None:
+    def resume(self, state: Mapping[str, np.ndarray], frame: FrameInput) -> None:
         """Resume from a state that `save` returned in a frame; frame: as from `see`. Raises `HairError`."""
         self.obstacles = {obstacle.name: obstacle for obstacle in frame.world.obstacles}
         self._change(frame)

@@ -13,8 +13,8 @@ from ...groom.guides import brushes, line_drawing
 from ...groom.hair_systems import edited_system, name_guides, parts_of_system
 from ...groom.selection import (
     active_of_kind,
-    guides_again,
     guides_of,
+    guides_to_regenerate,
     hair_of,
     make_active,
     object_of,
@@ -107,7 +107,7 @@ class VELLUS_OT_distribute_guides(LongOperator, bpy.types.Operator):
         setting_rows.all_guide_rows(self.layout, self.properties, surface_of(context.object))
 
     def prefill(self, context):
-        guides = guides_again(context.object)
+        guides = guides_to_regenerate(context.object)
         if guides is not None:
             setting_properties.prefill(self, guides.vellus.guides, GuideSettings)
 
@@ -118,7 +118,7 @@ class VELLUS_OT_distribute_guides(LongOperator, bpy.types.Operator):
     def work(self, context):
         settings = setting_properties.given_settings(self, GuideSettings)
         depsgraph = context.evaluated_depsgraph_get()
-        surface, target = surface_of(context.object), guides_again(context.object)
+        surface, target = surface_of(context.object), guides_to_regenerate(context.object)
         if target is not None:
             require_editable(target)
         may_drape = fitted_sizes.is_open(self, "drape")

@@ -9,7 +9,7 @@ from ...data.scene import triangle_count
 from ...data.strands.curves import is_hand_made
 from ...groom.foreign.foreign_curves import is_foreign
 from ...groom.guides import guide_states
-from ...groom.selection import guides_again, guides_of, surface_of
+from ...groom.selection import guides_of, guides_to_regenerate, surface_of
 from ...settings.translations import interface_text
 from .. import menus, setting_rows
 from .tab import HairTab, draw_work, split, write, write_stale, write_status
@@ -47,7 +47,7 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
             layout.label(text=interface_text("{count} guides", count=len(guides.curves)), icon="INFO", translate=False)
         if surface is not None:
             _draw_work(layout, context, surface, group)
-        if guides_again(context.object) is not None:
+        if guides_to_regenerate(context.object) is not None:
             column = layout.column(align=True)  # one line would be clipped at the default sidebar width
             column.operator("vellus.distribute_guides", text="Regenerate Guides", icon="FILE_REFRESH")
             column.label(text="(Discards Combing)", icon="BLANK1")
@@ -70,7 +70,7 @@ def _draw_hand_made(layout, context, guides):
     layout.label(text=interface_text("{count} guides", count=len(guides.curves)), translate=False)
     setting_rows.row(layout, guides.vellus, "is_live")
     write_stale(layout, context, guides.vellus)
-    if guides_again(context.object) is None:
+    if guides_to_regenerate(context.object) is None:
         layout.operator("vellus.distribute_guides", text="New Guide Set", icon="ADD")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The way that the program takes through the files of the add-on while something happens."""
+"""Trace of the add-on's files that the program visits."""
 
 import sys
 import threading
@@ -9,25 +9,25 @@ import hair_addon
 
 ADDON = Path(hair_addon.__file__).resolve().parent
 
-# What launches any kernel is one place on a way, and no way back: it calls nobody who called it.
+# The package that launches kernels counts as one file, and calls to it are never returns: it calls no other package.
 LAUNCHING = "core/kernels"
 
-# A container of values is no place, as a dictionary is none.
+# A container of values is ignored, like a dictionary.
 CONTAINER = "blender/host/caches.py"
 
-# What does nothing but turn an error into a sentence is no place either, as a try statement is none.
+# Code that only converts errors to messages is ignored, like a try statement.
 SENTENCES = {"core/errors.py", "blender/gpu/driver_textures.py"}
 
 
-class Way:
-    """Files in order of their first call, in all threads, while it is entered as a context; it may be so again.
+class Trace:
+    """Files in order of their first call, in all threads, while it is entered as a context; it can be entered again.
 
-    A place is a file, or the package of LAUNCHING. A return is a call from a place into another that came before it on
-    the way, whoever called that first; (caller, called) counts once. The end of a function is none.
+    The package LAUNCHING counts as one file. A return is a call from a file to another that was visited before it;
+    (caller, called) counts once. Ends of functions are not returns.
     """
 
     def __init__(self):
-        self.places = []
+        self.files = []
         self.calls = {}  # (caller, called) → names of functions
 
     def __enter__(self):
@@ -42,33 +42,33 @@ class Way:
     @property
     def returns(self):
         """[(caller, called)]."""
-        order = {place: number for number, place in enumerate(self.places)}
+        order = {file: number for number, file in enumerate(self.files)}
         calls = [call for call in self.calls if call[0] in order and call[1] != LAUNCHING]
         return [(caller, called) for caller, called in calls if order[called] < order[caller]]
 
     def __str__(self):
-        lines = [f"{len(self.places)} places, {len(self.returns)} returns"]
-        for place in self.places:
-            by = {caller: names for (caller, called), names in self.calls.items() if called == place}
-            lines.append(f"  {place}")
+        lines = [f"{len(self.files)} files, {len(self.returns)} returns"]
+        for file in self.files:
+            by = {caller: names for (caller, called), names in self.calls.items() if called == file}
+            lines.append(f"  {file}")
             lines += [f"    {caller}: {', '.join(sorted(names))}" for caller, names in by.items()]
         lines += [f"  back from {caller} to {called}" for caller, called in self.returns]
         return "\n".join(lines)
 
     def _see(self, frame, event, _argument):
-        place = _place(frame)
-        if event != "call" or place is None:
+        file = _file_of(frame)
+        if event != "call" or file is None:
             return
-        if place not in self.places:
-            self.places.append(place)
+        if file not in self.files:
+            self.files.append(file)
         caller = frame.f_back
-        while caller is not None and _place(caller) is None:
+        while caller is not None and _file_of(caller) is None:
             caller = caller.f_back
-        if caller is not None and _place(caller) != place:
-            self.calls.setdefault((_place(caller), place), set()).add(frame.f_code.co_qualname)
+        if caller is not None and _file_of(caller) != file:
+            self.calls.setdefault((_file_of(caller), file), set()).add(frame.f_code.co_qualname)
 
 
-def _place(frame):
+def _file_of(frame):
     path = Path(frame.f_code.co_filename)
     if not path.is_relative_to(ADDON) or frame.f_code.co_name == "<module>":
         return None

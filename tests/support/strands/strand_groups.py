@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands of every kind beside each other: styled, interpolated and simulated in companies of any size and order.
+"""Strands of every kind in groups of any size and order: styled and simulated.
 
-Kernels take strands in groups, and branch where any strand of a group needs it. Inputs are made of random numbers by
-operations that are exact to the last bit on all processors, so that results of several can be compared.
+Kernels process strands in groups, and branch if any strand of a group needs it. Inputs are derived from random numbers
+by operations that are exact on all processors, so that results of several processors can be compared.
 """
 
 from collections.abc import Callable, Iterator
@@ -28,7 +28,7 @@ STYLES["STACK"] = (clump.Settings(twist=1.0), curl.Settings(keep_length=0.5), fr
 
 
 def strands(rng: np.random.Generator, count: int = COUNT, point_count: int = POINTS) -> np.ndarray:
-    """(S, P, 3) float32 [m]: some wind, some double back, some have points that coincide."""
+    """Return (S, P, 3) float32 [m]: some strands wind, some double back, some have coincident points."""
     heading = rng.uniform(-1.0, 1.0, (count, 1, 3)) + np.array([0.0, 0.0, 1.0])
     steps = heading + rng.uniform(0.0, 1.5, (count, 1, 1)) * rng.uniform(-1.0, 1.0, (count, point_count - 1, 3))
     steps *= 0.2 / point_count
@@ -40,18 +40,18 @@ def strands(rng: np.random.Generator, count: int = COUNT, point_count: int = POI
 
 
 @dataclass(frozen=True)
-class Company:
-    """Strands, and what `of` makes of some of them: `of(order)` (M, …) of strands order (M,)."""
+class Group:
+    """Strands, and a function `of(order)` that computes results (M, …) for the strands order (M,)."""
 
     of: Callable[[np.ndarray], np.ndarray]
     count: int = COUNT
 
     def all(self) -> np.ndarray:
-        """What is made of all strands."""
+        """Return the results for all strands."""
         return self.of(np.arange(self.count))
 
-    def unlike(self) -> Iterator[tuple[int, int]]:
-        """(strands of a company, strands among them that are not, to the last bit, as they are among all)."""
+    def different(self) -> Iterator[tuple[int, int]]:
+        """Yield (group size, number of strands whose bits differ from those in the group of all strands)."""
         rng, wanted = np.random.default_rng(3), bits(self.all())
         for size in range(1, LARGEST + 1):
             order = rng.permutation(self.count)[:size]
@@ -61,20 +61,20 @@ class Company:
 
 
 def bits(values: np.ndarray) -> np.ndarray:
-    """Of float32: so -0 is another number than 0, and what is no number is like itself."""
+    """Return the bits of float32 values, so that -0 differs from 0, and NaN equals NaN."""
     return np.ascontiguousarray(values, np.float32).view(np.int32)
 
 
-def styled(name: str, is_masked: bool = False) -> Company:
-    """Strands with `STYLES[name]`: of locks and of none; masked ones are left out in part or in whole."""
-    rng = np.random.default_rng(4)  # strands of which some differed while compilers fused what they liked
+def styled(name: str, is_masked: bool = False) -> Group:
+    """Return strands with `STYLES[name]`, in locks and without; a mask excludes some partly or completely."""
+    rng = np.random.default_rng(4)  # some of these strands differed with implicit fused operations
     points, centres = strands(rng), strands(rng, 6)
     normals = np.float32([0.0, 0.0, 1.0]) + np.float32(rng.uniform(-0.3, 0.3, (COUNT, 3)))
     normals = (normals / np.sqrt((normals * normals).sum(axis=1, keepdims=True))).astype(np.float32)
     members = rng.integers(-1, len(centres), COUNT)
     weights = np.clip(rng.uniform(-0.3, 1.3, COUNT), 0.0, 1.0)
     styles = tuple(replace(settings, mask="mask") for settings in STYLES[name]) if is_masked else STYLES[name]
-    return Company(
+    return Group(
         lambda order: stepped(
             points[order],
             *styles,
@@ -87,16 +87,16 @@ def styled(name: str, is_masked: bool = False) -> Company:
     )
 
 
-def companies() -> dict[str, Company]:
-    """All of them, by name."""
+def all_groups() -> dict[str, Group]:
+    """Return all groups by name."""
     found = {name: styled(name) for name in STYLES} | {f"{name}, masked": styled(name, True) for name in STYLES}
     return found | {"simulated": simulated()}
 
 
-def simulated() -> Company:
-    """Positions and velocities of strands after three frames in which roots move, some of them against a plane."""
+def simulated() -> Group:
+    """Return positions and velocities of strands after three frames with moving roots, some against a plane."""
     groom = strands(np.random.default_rng(2), COUNT, VERTICES).astype(float)
-    groom[3::7] = groom[5::7][0] - groom[5::7][0, :1] + groom[3::7, :1]  # a segment of a rod has a length
+    groom[3::7] = groom[5::7][0] - groom[5::7][0, :1] + groom[3::7, :1]  # segments of rods need a length
     planes = np.zeros((COUNT, VERTICES, rod_solver.PLANE_ROWS))
     planes[::2] = [0.0, 0.0, 1.0, -0.02, 0.0, 0.0, 0.0, 0.3]
 
@@ -109,4 +109,4 @@ def simulated() -> Company:
         state = simulation.rods.save()
         return np.concatenate([state["positions"], state["velocities"], state["frames"]], axis=1)
 
-    return Company(of)
+    return Group(of)

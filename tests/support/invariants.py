@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What holds for hair after any operation, and how an operation is done so that it can be asked."""
+"""Invariants of hair after any operation, and helpers that run operations so that these can be checked."""
 
 import io
 import sys
@@ -19,7 +19,7 @@ from tests.support.reading import snapshot
 
 
 class Echo(io.TextIOBase):
-    """Standard error that remembers: Blender prints what is raised in handlers and callbacks, and goes on."""
+    """Standard error that records its text: Blender prints exceptions of handlers and callbacks, and continues."""
 
     def __init__(self, stream):
         self.stream, self.said = stream, []
@@ -30,12 +30,12 @@ class Echo(io.TextIOBase):
 
 
 def ours(kind=None):
-    """Curves of ours in the file."""
+    """Return the guides and hair in the file, of one kind if given."""
     return [c for c in bpy.data.hair_curves if c.vellus.kind == kind or (kind is None and c.vellus.kind != "NONE")]
 
 
 def objects(kind):
-    """Names of objects of a type in the view layer."""
+    """Return the names of objects of a type in the view layer."""
     return sorted(o.name for o in bpy.context.view_layer.objects if o.type == kind)
 
 
@@ -44,7 +44,7 @@ def chosen(names, number):
 
 
 def activate(name):
-    """Leave any mode and select one object; whether it is there to be selected."""
+    """Leave any mode and make one object active and selected."""
     if bpy.context.mode != "OBJECT" and bpy.context.object is not None:
         bpy.ops.object.mode_set(mode="OBJECT")
     for other in bpy.context.view_layer.objects:
@@ -57,7 +57,7 @@ def orphans():
 
 
 def operate(operator, **arguments):
-    """Call an operator as a window does, with undo. A refusal is a sentence and leaves everything as it was."""
+    """Call an operator with undo, as a window does. If it refuses, check the message and that nothing changed."""
     if not operator.poll():
         return
     before, orphans_before = snapshot(), orphans()
@@ -72,13 +72,13 @@ def operate(operator, **arguments):
 
 
 def _is_own(name):
-    """Whether a material is what hair gives itself where it has none, with any update of the surface."""
+    """Whether a material was created for hair without material, which any update of the surface does."""
     material = bpy.data.materials[name]
     return hair_materials.is_hair_material(material) and any(material in {*c.materials} for c in ours("HAIR"))
 
 
-def nothing_is_left_listening(is_on):
-    """Handlers, draw handlers, timers and menu entries are there once while the add-on is on, and never else."""
+def handlers_are_registered(is_on):
+    """Check that handlers, draw handlers, timers and menu entries exist once if the add-on is on, otherwise never."""
     for name in dir(bpy.app.handlers):
         functions = getattr(bpy.app.handlers, name)
         if isinstance(functions, list):
@@ -91,17 +91,17 @@ def nothing_is_left_listening(is_on):
 
 
 def changed(what):
-    """Blender takes note of what a script changed, as after any operator."""
+    """Update the view layer and push an undo step after a script's changes, as after an operator."""
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message=what)
 
 
-def nothing_was_raised():
+def no_exception_was_printed():
     said = "".join(sys.stderr.said)
     assert "Traceback" not in said and "Error in bpy" not in said, said
 
 
-def hair_is_what_its_settings_say():
+def counts_match_settings():
     for datablock in ours():
         positions = curve_data.read_points(datablock)
         assert np.isfinite(positions).all(), datablock.name
@@ -114,11 +114,11 @@ def hair_is_what_its_settings_say():
             assert len(datablock.curves) == state.guides.guide_count, datablock.name
 
 
-def what_is_drawn_is_what_is_there():
-    """What is kept on the GPU is what a first drawing would bring there, once what waits for an update has had it."""
+def drawn_points_are_current():
+    """Check that the points on the GPU, after an update, equal those that a first drawing would upload."""
     bpy.context.view_layer.update()
     present = {o.data for o in bpy.context.view_layer.objects if o.type == "CURVES"}
-    # All that is kept is read first: what stands on one surface is made anew together.
+    # All points are read first, as hair on one surface is regenerated together.
     for datablock, kept in [(datablock, _drawn_points(datablock)) for datablock in ours() if datablock in present]:
         events.strands_made(datablock)
         if datablock.surface is not None:
@@ -128,28 +128,28 @@ def what_is_drawn_is_what_is_there():
 
 
 def _are_alike(kept, fresh):
-    """Equal but for the rounding of how a surface carries strands, whose scale may have changed since."""
+    """Whether points are equal within the rounding of the surface's deformation, whose scale may have changed."""
     return kept.shape == fresh.shape and np.allclose(kept, fresh, rtol=0.0, atol=1e-6 * np.abs(fresh).max())
 
 
 def _difference(datablock, kept, fresh):
     if kept.shape != fresh.shape:
-        return f"{datablock.name}: {kept.shape} are drawn, {fresh.shape} are there"
+        return f"{datablock.name}: {kept.shape} drawn, {fresh.shape} expected"
     odd, most = np.count_nonzero(~np.isfinite(kept)), np.abs(kept - fresh).max()
-    return f"{datablock.name}: up to {most} of {np.abs(fresh).max()} away, {odd} no numbers"
+    return f"{datablock.name}: differences up to {most} of {np.abs(fresh).max()}, {odd} non-finite"
 
 
 def _drawn_points(datablock):
-    """(S, P, 3) in local coordinates; None where a sentence says why not."""
+    """Return the drawn points (S, P, 3) in local coordinates; None if drawing them raises `HairError`."""
     try:
         return hair_cache.strands_on_gpu(datablock).points
     except HairError:
         return None
 
 
-def all_is_well():
-    """All of it."""
-    nothing_was_raised()
-    nothing_is_left_listening(is_on=True)
-    hair_is_what_its_settings_say()
-    what_is_drawn_is_what_is_there()
+def check_all():
+    """Check all invariants."""
+    no_exception_was_printed()
+    handlers_are_registered(is_on=True)
+    counts_match_settings()
+    drawn_points_are_current()

@@ -19,7 +19,7 @@ from ..data.surfaces import Surface
 Points = Callable[[np.ndarray], np.ndarray]
 
 
-def kept_by(strands: Curves, surface: Surface, change: Affine) -> Points | None:
+def rest_correction(strands: Curves, surface: Surface, change: Affine) -> Points | None:
     """Return a function that moves (N, 3) rest points of strands so that their posed shape before `change` is kept.
 
     None if they do not move. surface: the one to which the `Affine` was applied.

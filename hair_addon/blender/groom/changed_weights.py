@@ -17,7 +17,7 @@ _WEIGHING = ("automatic_influence", "influence_distance", "neighbour_limit")
 _AFTER_WEIGHING = ("keep_length", "angle_limit", "length_limit", "radius", "tip_taper", "guide_map")
 
 
-def reweighed(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
+def rebound(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
     """Return the `BoundHair` for changed weights, lengths or radii, without its points.
 
     None if other inputs have changed. Nothing is read or searched. Raises `HairError`.
@@ -44,10 +44,10 @@ def reweighed(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
     if not read.is_same(known.styles.read):
         return None
     if replace(known.settings, **others) == settings:
-        binding, shares = hair_binding.limited_again(known.binding, settings), known.shares
+        binding, shares = hair_binding.relimited(known.binding, settings), known.shares
     else:
-        binding, shares = hair_binding.weigh_again(known.binding, settings), None
-    make_trees = styled_hair.trees_again(known.styles, settings)
+        binding, shares = hair_binding.reweighed(known.binding, settings), None
+    make_trees = styled_hair.reweighed_trees(known.styles, settings)
     styled = styled_hair.bind(read, binding, guides, settings, known.surface, make_trees)
     styled.continue_from(known.styles)
     changed = {"settings": settings, "binding": binding, "styles": styled, "shares": shares, "guides": guides}

@@ -12,7 +12,7 @@ from ..settings import properties
 
 
 @contextlib.contextmanager
-def unevaluated(guides_list: Sequence[Curves], scene: Scene) -> Generator[None]:
+def disabled_in_viewports(guides_list: Sequence[Curves], scene: Scene) -> Generator[None]:
     """Disable hair and guides in viewports, and enable them again on exit.
 
     Only without a window, and if the meshes that the guides need are visible: hidden meshes may be evaluated only

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The way of a stroke of the comb, from guides that were combed to the texture that pictures are drawn from: short."""
+"""A combing stroke visits few files between the combed guides and the texture that pictures are drawn from."""
 
 import bpy
 import numpy as np
@@ -8,16 +8,16 @@ import pytest
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
-from tests.support.interface.ways import Way
+from tests.support.interface.visited_files import Trace
 from tests.support.reading import points, write_points
 
-# Data that goes along has its own methods: whoever is handed strands asks them.
+# Strands are passed along, and their methods may be called from any file.
 ALONG = "core/geometry/strands.py"
 
 
 @pytest.fixture
 def watched(hair, monkeypatch):
-    """Hair in a window that shows it, of whose guides one was combed already."""
+    """Hair shown in a window, one of whose guides was combed before."""
     monkeypatch.setattr(running, "has_window", lambda: True)
     hair_cache.strands_on_gpu(hair.data)
     comb(1)
@@ -35,21 +35,21 @@ def comb(count):
 
 
 @pytest.mark.parametrize("count", [1, 60])
-def test_a_stroke_passes_few_files_and_comes_back_to_none(watched, count, monkeypatch):
-    """Printed: all of it. What is drawn is handed over, and not asked for again."""
-    comb(count)  # compiles what is compiled once
+def test_a_stroke_visits_few_files_and_returns_to_none(watched, count, monkeypatch):
+    """Prints the trace. Results are passed on, not requested again."""
+    comb(count)  # compiles kernels
     hair_cache.strands_on_gpu(watched.data)
-    way, follow_guides = Way(), live_hair.follow_guides
+    trace, follow_guides = Trace(), live_hair.follow_guides
 
     def follow(*given):
-        with way:
+        with trace:
             follow_guides(*given)
 
     monkeypatch.setattr(live_hair, "follow_guides", follow)
     comb(count)
-    assert way.places
-    with way:
+    assert trace.files
+    with trace:
         hair_cache.strands_on_gpu(watched.data)
-    print(f"\n{way}")
-    assert len(way.places) <= 13
-    assert not [call for call in way.returns if call[1] != ALONG]
+    print(f"\n{trace}")
+    assert len(trace.files) <= 13
+    assert not [call for call in trace.returns if call[1] != ALONG]

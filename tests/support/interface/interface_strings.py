@@ -13,7 +13,7 @@ from hair_addon import blender
 ADDON = Path(blender.__file__).resolve().parents[1]
 
 # Functions whose first argument, or progress's step, is read by an artist.
-_SPEAKING = {
+_SHOWING = {
     "interface_text",
     "report_text",
     "HairError",
@@ -37,8 +37,8 @@ def strings_of_classes():
         for entry in properties_of(cls):
             if entry.is_hidden or entry.name == entry.identifier:  # of the latter, no name was given
                 continue
-            for spoken in (entry, *(entry.enum_items if entry.type == "ENUM" else ())):
-                found[spoken.name] = found[spoken.description] = f"{where}.{entry.identifier}"
+            for shown in (entry, *(entry.enum_items if entry.type == "ENUM" else ())):
+                found[shown.name] = found[shown.description] = f"{where}.{entry.identifier}"
     found.pop("", None)
     return found
 
@@ -58,7 +58,7 @@ def strings_of_sources():
     """{string: where it stands} of literals that are reported, drawn as labels or raised."""
     found = {}
     for path in sorted((ADDON / "blender").rglob("*.py")) + sorted((ADDON / "core").rglob("*.py")):
-        found |= {text: f"{path.relative_to(ADDON)}:{line}" for text, line in _read()[path].spoken}
+        found |= {text: f"{path.relative_to(ADDON)}:{line}" for text, line in _read()[path].shown}
     found.pop("", None)
     return found
 
@@ -70,7 +70,7 @@ def parts_of_errors():
 
 @dataclass(frozen=True)
 class _Read:
-    spoken: list  # of (string, line)
+    shown: list  # of (string, line)
     errors: list
 
 
@@ -81,17 +81,17 @@ def _read():
     for path in ADDON.rglob("*.py"):
         read = found[path] = _Read([], [])
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            read.spoken.extend((text, node.lineno) for text in _spoken(node))
+            read.shown.extend((text, node.lineno) for text in _shown(node))
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "HairError" and node.args:
                 read.errors.extend(_literals(ast.walk(node.args[0])))
     return found
 
 
-def _spoken(node):
+def _shown(node):
     if isinstance(node, ast.Call):
         name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
         texts = [keyword.value for keyword in node.keywords if keyword.arg == "text"]
-        if name in _SPEAKING:
+        if name in _SHOWING:
             texts += node.args[:1]
         return _literals(texts)
     if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple) and _ends_in_dict(node.value):
