@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Digests of hair on one processor, and whether its strands depend on each other: `any_processor.py [FOLDER …]`.
+"""Digests of hair on one processor, and checks that strands do not depend on each other: `any_processor.py [FOLDER …]`.
 
 Prints a line of JSON for each folder of compiled kernels; without one, for kernels that Warp compiles. Needs neither
-Blender nor pytest, so that it also runs where a processor is emulated, as by QEMU's user mode:
+Blender nor pytest, so that it also runs on an emulated processor, for example in QEMU's user mode:
 
     qemu-x86_64 -cpu IvyBridge .venv/bin/python tests/support/any_processor.py FOLDER
 """
@@ -50,7 +50,7 @@ def digest(values):
 
 
 def use(folder):
-    """Load kernels from a folder from now on."""
+    """Load kernels from a folder."""
     compiled_kernels.FOLDER = Path(folder)
     kernel_cache._loaded.clear()
     for module in wp._src.context.user_modules.values():
@@ -58,7 +58,7 @@ def use(folder):
 
 
 def main():
-    """The command line."""
+    """Run the command line."""
     wp.config.log_level = wp.LOG_WARNING
     for folder in sys.argv[1:] or [""]:
         if folder:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Distances from triangle meshes without any tree: every point with every triangle."""
+"""Distances from triangle meshes by brute force: every point with every triangle."""
 
 import numpy as np
 
@@ -23,14 +23,14 @@ def closest_points(points, corners):
 
 
 def distances(points, mesh):
-    """(N,) float64 [m]: the distance of points (N, 3) from a mesh, whichever side they are on."""
+    """Return the unsigned distances (N,) float64 [m] of points (N, 3) from a mesh."""
     points = points.astype(np.float64)
     apart = np.linalg.norm(closest_points(points, mesh.corners) - points[:, None], axis=2)
     return apart.min(axis=1)
 
 
 def is_inside(points, mesh):
-    """(N,) whether points are inside a closed mesh: by the solid angles of its triangles [Oosterom83]."""
+    """Return (N,) bool: whether points are inside a closed mesh, by the solid angles of its triangles [Oosterom83]."""
     a, b, c = np.moveaxis(mesh.corners[None] - points[:, None, None].astype(np.float64), 2, 0)
     la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
     below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb

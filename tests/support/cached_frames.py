@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders of known frames, as simulations leave them."""
+"""Folders of known frames, as written by simulations."""
 
 import os
 from pathlib import Path
@@ -29,7 +29,7 @@ def manifest(guide_count=3, settings=1, **changes):
 
 
 def points_of(number, guide_count=3):
-    """A frame's points, each frame's its own."""
+    """Return the points of a frame, different in each frame."""
     return np.random.default_rng(number + 100).random((guide_count, 5, 3), dtype=np.float32)
 
 
@@ -50,7 +50,7 @@ def said(cache):
 
 
 def check_whole(folder, most_complaints=0):
-    """Every frame and state that is listed is what was written; returns their numbers."""
+    """Check that every listed frame and state equals what was written; returns their numbers."""
     cache = FrameCache(folder)
     for number in cache.frame_numbers():
         frame = cache.read_frame(number)

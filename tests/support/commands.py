@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands as users call them: in a process of their own, or in this one, which is quicker."""
+"""Running of commands: in a separate process, as users do, or in this process, which is faster."""
 
 import contextlib
 import io
@@ -31,7 +31,7 @@ TETRAHEDRON = (
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended: its exit status and what it said."""
+    """Result of a command: exit status and output."""
 
     status: int
     out: str
@@ -44,21 +44,21 @@ class Ended:
 
 
 def command(*arguments):
-    """The words of a command in a process of its own."""
+    """Return the arguments for running a command in a separate process."""
     return [sys.executable, "-m", "hair_addon", *map(str, arguments)]
 
 
 def run(*arguments, **details):
-    """Run a command in a process of its own."""
+    """Run a command in a separate process."""
     details = {"cwd": ROOT, "timeout": 300, "env": os.environ | {"PYTHONPATH": str(ROOT)}} | details
     done = subprocess.run(command(*arguments), capture_output=True, text=True, check=False, **details)
     return Ended(done.returncode, done.stdout, done.stderr)
 
 
 def run_here(*arguments, terminal=None, reads_apart=False):
-    """Run a command in this process, where Blender is there already; terminal: takes errors and progress.
+    """Run a command in this process, where Blender is loaded; terminal: receives errors and progress.
 
-    reads_apart: whether importers that end on damaged files run in a process of their own, as they do for users.
+    reads_apart: whether importers that crash on damaged files run in a separate process, as they do for users.
     """
     out, errors = io.StringIO(), io.StringIO()
     try:
@@ -71,7 +71,7 @@ def run_here(*arguments, terminal=None, reads_apart=False):
 
 
 def _importers_here():
-    """A context in which files are imported by this process: starting another one takes two seconds."""
+    """Context in which this process imports files, as starting another process takes two seconds."""
     return mock.patch.multiple(
         import_mesh,
         open_apart=lambda path, up, *_others: mesh_files.open_file(path, up=up),
@@ -81,7 +81,7 @@ def _importers_here():
 
 @contextlib.contextmanager
 def largest_file(size):
-    """No file that this process writes may become larger [bytes], as on a full disk: a write fails in the middle."""
+    """Context that limits the size of written files [bytes], so that writing fails halfway, as on a full disk."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:
@@ -91,7 +91,7 @@ def largest_file(size):
 
 
 def write_obj(path, vertices, triangles, name="Tetrahedron"):
-    """A mesh as text."""
+    """Write a mesh as text."""
     lines = [f"o {name}", *("v {} {} {}".format(*vertex) for vertex in vertices)]
     lines += ["f {} {} {}".format(*(triangle + 1)) for triangle in np.asarray(triangles)]
     path.write_text("\n".join(lines) + "\n")
@@ -105,7 +105,7 @@ def load(path):
 
 
 def distance_to(points, vertices, triangles):
-    """(N,) from each point to the nearest place on any triangle, by trying all of them."""
+    """Return the distances (N,) of points from the nearest triangle, by brute force."""
     best = np.full(len(points), np.inf)
     for a, b, c in vertices[triangles]:
         ab, ac, ap = b - a, c - a, points - a

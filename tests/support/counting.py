@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How often hair is searched, uploaded and written, and bytes that are uploaded: counted where it happens."""
+"""Counters of searches, uploads and writes of hair, and of uploaded bytes."""
 
 import gpu
 import numpy as np
@@ -17,7 +17,7 @@ _COUNTED = {
 
 
 def counts_of(monkeypatch):
-    """{searches, uploads, moves, writes} from now on, counting up."""
+    """Return live counts {searches, uploads, moves, writes}, from now on."""
     counts = dict.fromkeys(_COUNTED, 0)
 
     def counted(kind, real):
@@ -34,7 +34,7 @@ def counts_of(monkeypatch):
 
 
 class Traffic:
-    """Bytes that go to textures while this is entered: `sent`."""
+    """Context that counts the bytes uploaded to textures in `sent`."""
 
     def __enter__(self):
         self.sent, self._buffer = 0, gpu.types.Buffer

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ray tracer of a smooth dielectric cylinder in three dimensions, to hold the shading tables against.
+"""A ray tracer of a smooth dielectric cylinder in three dimensions, as a reference for the shading tables.
 
-It knows vectors, Snell's law and Fresnel's equations and shares no code with the package: no effective index, no
+It uses vectors, Snell's law and Fresnel's equations and shares no code with the package: no effective index, no
 exit-angle formula, no roots. Radius 1, the axis along z, unpolarised light averaged at every surface.
 """
 
@@ -11,11 +11,11 @@ import numpy as np
 
 
 class Traced(NamedTuple):
-    """What left the cylinder, for N rays and the paths R, TT, TRT (p = 0, 1, 2)."""
+    """Exiting light for N rays and the paths R, TT, TRT (p = 0, 1, 2)."""
 
     phi: np.ndarray  # (3, N) azimuth between the exit and the way back to the light, [0, pi]
     light: np.ndarray  # (3, N, C) part of each ray's light
-    dh: np.ndarray  # (N,) width of fibre that each ray stands for; sums to 2
+    dh: np.ndarray  # (N,) width of fibre that each ray represents; sums to 2
 
 
 def trace(theta_d, eta, sigma_a, ray_count):
@@ -35,7 +35,7 @@ def trace(theta_d, eta, sigma_a, ray_count):
 
     direction = _refract(incoming, normal, eta)
     strength = np.repeat((1.0 - reflectance)[:, None], len(sigma_a), axis=1)
-    for _ in range(2):  # TT leaves at the first wall met from inside, TRT at the second
+    for _ in range(2):  # TT leaves at the first inner wall hit, TRT at the second
         across = direction[:, :2]
         distance = -2.0 * _dot(position[:, :2], across) / _dot(across, across)  # to the cylinder's other wall
         position = position + distance[:, None] * direction

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Warp device that the mathematics is tested on: the processor, unless VELLUS_TEST_DEVICE names another."""
+"""The Warp device for tests of the mathematics: the processor, unless VELLUS_TEST_DEVICE names another."""
 
 import os
 

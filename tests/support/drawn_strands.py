@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands read back from the textures that shaders read, and how far those may be from what was put there."""
+"""Strands read back from textures, and the tolerance of their coordinates."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from hair_addon.core.geometry import packed_strands
 
 
 def texels(texture, count, each):
-    """(count, each, C) of a texture whose rows hold whole strands of so many texels."""
+    """Return (count, each, C) texels of a texture whose rows contain whole strands of `each` texels."""
     rows = np.array(texture.read(), np.float32).reshape(texture.height, texture.width, -1)
     in_row = texture.width // each
     return rows[:, : in_row * each].reshape(-1, each, rows.shape[-1])[:count]
@@ -20,7 +20,7 @@ def places(on_gpu):
 
 
 def places_before(on_gpu, count):
-    """(count, P, 3): where the strands were that moved last."""
+    """Return (count, P, 3): the former positions of the strands that moved last."""
     each = 1 + packed_strands.texel_count(on_gpu.point_count)
     return packed_strands.unpack(texels(on_gpu.moved.points, count, each)[:, 1:])
 
@@ -32,11 +32,11 @@ def radii(on_gpu):
 
 
 def tolerance(points):
-    """(S, 1, 1): how far coordinates may be from points (S, P, 3)."""
+    """Return (S, 1, 1): the tolerance of coordinates of points (S, P, 3)."""
     reach = np.abs(points - points[:, :1]).max(axis=(1, 2), keepdims=True)
     return 2.0**-20 * reach + 2.0**-22 * np.abs(points).max(axis=(1, 2), keepdims=True)
 
 
 def are_drawn(found, points):
-    """Whether places that were read back, both (S, P, 3), are those of points."""
+    """Whether positions that were read back (S, P, 3) equal points (S, P, 3) within the tolerance."""
     return bool((np.abs(found - points) <= tolerance(points)).all())

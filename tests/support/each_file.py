@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def each_file(paths: Iterable[Path]) -> Callable:
-    """Make one test of a function that asserts a rule of one `path`: a test a file and rule would be thousands."""
+    """Turn a function that checks one `path` into one test of all files: one test per file would be thousands."""
     paths = list(paths)
 
     def test_of(rule):
@@ -23,7 +23,7 @@ def each_file(paths: Iterable[Path]) -> Callable:
                     broken.append(f"{path.relative_to(ROOT).as_posix()}: {error}")
             assert paths and not broken, "\n".join(broken)
 
-        del test.__wrapped__  # whose argument pytest would take for a fixture
+        del test.__wrapped__  # pytest would take its argument for a fixture
         return test
 
     return test_of

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How Hypothesis runs examples: no test is timed, as processors are shared. Imported by conftest.py of its tests."""
+"""Settings of Hypothesis: no deadlines, as processors are shared. Imported by conftest.py of its tests."""
 
 import hypothesis
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the open file holds, to be compared before and after something that should have left it alone."""
+"""Description of the open file, to check that an operation does not change it."""
 
 import hashlib
 
 import bpy
 import numpy as np
 
-# Of Blender's windows, and what it makes by itself.
+# Data of Blender's windows, and data that Blender creates itself.
 _NOT_COMPARED = {"all_ids", "libraries", "screens", "window_managers", "workspaces", "brushes", "palettes"}
 
 
@@ -24,7 +24,7 @@ def of_file():
 
 
 def changes(before, after):
-    """{path of keys: (before, after)} of what differs, in words for an assertion."""
+    """Return the differences {path of keys: (before, after)} as text for an assertion."""
     found = {}
     for key in {*before, *after}:
         pair = before.get(key), after.get(key)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a folder holds, to be compared before and after something that should have left it alone."""
+"""Contents of a folder, to check that an operation does not change it."""
 
 import os
 
 
 def of_folder(folder):
-    """{path: bytes, or where a link leads} of all files in a folder; of a link to one, nothing but that."""
+    """Return {path: bytes, or target of a link} of all files in a folder; links to folders are not followed."""
     if folder.is_symlink():
         return {folder: os.readlink(folder)}
     paths = [path for path in sorted(folder.rglob("*")) if path.is_symlink() or path.is_file()]

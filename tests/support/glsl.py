@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GLSL functions called from Python: every row of the inputs is one texel of a small picture."""
+"""Evaluation of GLSL functions from Python: every row of the inputs is one texel of a small picture."""
 
 import gpu
 import numpy as np
@@ -41,9 +41,9 @@ def evaluate(text, returns, expression, *, textures=None, volumes=(), structs=""
     """Values of a GLSL expression, (N,) or (N, components) float32.
 
     text: GLSL before the expression, such as `source("fibre/fibre.glsl")`; returns: the expression's type;
-    inputs: (N,) or (N, 2..4) arrays that the expression knows by their names, integers as int and the rest as float or
-    vec; textures: {sampler: GPUTexture}; volumes: samplers that are three-dimensional; structs: the text that declares
-    the types of blocks; blocks: uniform blocks, {instance: (type, record)}.
+    inputs: (N,) or (N, 2..4) arrays with their names in the expression, integers as int and others as float or vec;
+    textures: {sampler: GPUTexture}; volumes: samplers that are three-dimensional; structs: declarations of the types of
+    blocks; blocks: uniform blocks, {instance: (type, record)}.
     """
     textures, blocks = textures or {}, blocks or {}
     inputs = {name: np.asarray(values) for name, values in inputs.items()}
@@ -62,7 +62,7 @@ def evaluate(text, returns, expression, *, textures=None, volumes=(), structs=""
         for name, buffer in buffers.items():
             program.uniform_block(name, buffer)
         triangle.draw(program)
-        # A program freed while it is bound is taken for bound when another one comes to lie where it lay.
+        # If a program is freed while bound, Blender takes the next one at the same address for bound.
         gpu.shader.unbind()
         pixels = np.array(framebuffer.read_color(0, 0, *size, 4, 0, "FLOAT"), np.float32)
     values = pixels.reshape(-1, 4)[:count, : _COMPONENTS[returns]]

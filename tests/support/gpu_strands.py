@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair whose strands the GPU makes and carries, as in a window on a graphics card: fixtures, and what is drawn."""
+"""Hair whose strands the GPU generates and deforms, as in a window on a graphics card: fixtures and drawn points."""
 
 import bpy
 import numpy as np
@@ -18,7 +18,7 @@ CLOSE = 1e-5  # [m] of strands of half a metre on a ball of one
 
 @pytest.fixture
 def window(monkeypatch):
-    """Act as in a window on a graphics card, where hair is written when an interaction is over."""
+    """Simulate a window on a graphics card, where hair is written after an interaction."""
     monkeypatch.setattr(running, "has_window", lambda: True)
     monkeypatch.setattr(device_choice, "times", lambda: (0.0, 1.0))
     yield
@@ -28,7 +28,7 @@ def window(monkeypatch):
 
 @pytest.fixture
 def watched(hair, window):
-    """Hair that is drawn, and bound, as one of its guides was combed already."""
+    """Drawn and bound hair, one of whose guides was combed."""
     drawn(hair)
     comb(1)
     drawn(hair)
@@ -54,11 +54,11 @@ def drawn(hair):
 
 
 def prepare():
-    """Compile what a viewport at rest does."""
+    """Compile programs as a viewport at rest does."""
     while hair_cache.prepare_makers():
         pass
 
 
 def grown(hair):
-    """(S, P, 3) that interpolation makes of the guides as they are now, from nothing."""
+    """Return (S, P, 3) interpolated from the present guides, without caches."""
     return pipeline.bind_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get()).points

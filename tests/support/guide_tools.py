@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guide tools as tests call them, and what hair and guides are afterwards."""
+"""Calls of guide tools, and the resulting hair and guides."""
 
 import bpy
 import numpy as np
@@ -9,7 +9,7 @@ from hair_addon.blender.groom import pipeline
 from tests.support.dynamics.following import update
 from tests.support.reading import points, write_points
 
-# Tools that move points and add none, each with values that change every guide.
+# Tools that move points without adding any, each with values that change every guide.
 SHAPING = {
     "guide_length": {"factor": 0.5},
     "trim_guides": {"cutter": "Cutter"},
@@ -20,7 +20,7 @@ SHAPING = {
     "copy_guide_shape": {"source": "top"},
 }
 TOOLS = SHAPING | {"change_guide_count": {"factor": 1.5}, "mirror_guides": {}}
-CHOSEN = sorted(TOOLS.keys() - {"copy_guide_shape"})  # that selection and mask choose the guides of
+CHOSEN = sorted(TOOLS.keys() - {"copy_guide_shape"})  # tools whose guides are chosen by selection and mask
 
 
 def wave(guides):
@@ -38,7 +38,7 @@ def use_tool(name, **values):
 
 
 def said_by(name, **values):
-    """What a tool says that does nothing."""
+    """Return the message of a tool that refuses to run."""
     with pytest.raises(RuntimeError) as error:
         getattr(bpy.ops.vellus, name)(**TOOLS[name] | values)
     assert "Traceback" not in str(error.value)
@@ -46,7 +46,7 @@ def said_by(name, **values):
 
 
 def select_guides(guides, chosen, domain="CURVE", kind="BOOLEAN"):
-    """As Sculpt Mode stores a selection."""
+    """Store a selection as Sculpt Mode does."""
     attributes = guides.data.attributes
     if ".selection" in attributes:
         attributes.remove(attributes[".selection"])
@@ -56,7 +56,7 @@ def select_guides(guides, chosen, domain="CURVE", kind="BOOLEAN"):
 
 
 def grown_from_nothing(hair):
-    """(S, P, 3) that interpolation makes of the guides as they are now."""
+    """Return (S, P, 3) interpolated from the present guides, without caches."""
     return pipeline.bind_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get()).points
 
 

@@ -12,7 +12,7 @@ HEAD = Path(__file__).resolve().parents[2] / "blend_samples" / "head.obj"
 
 
 def read_obj(path):
-    """A Wavefront file's faces as a `TriMesh`, Z up; polygons become fans."""
+    """Read a Wavefront file as a `TriMesh`, Z up; polygons become fans."""
     vertices, triangles = [], []
     for line in path.read_text().splitlines():
         kind, *words = line.split() or [""]
@@ -26,7 +26,7 @@ def read_obj(path):
 
 
 def subdivided_sphere(levels, radius=1.0):
-    """An icosahedron whose triangles are split in four, `levels` times, and pushed out to a sphere."""
+    """Return an icosahedron whose triangles are split in four, `levels` times, and projected to a sphere."""
     golden = (1.0 + 5.0**0.5) / 2.0
     vertices = [(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0)]
     vertices = np.array(vertices + [(z, x, y) for x, y, z in vertices] + [(y, z, x) for x, y, z in vertices])
@@ -61,7 +61,7 @@ def split_in_four(mesh):
 
 
 def flat_grid(side_count, size=1.0):
-    """A square in the XY plane, its normal up, of side_count² pairs of triangles."""
+    """Return a square in the XY plane with normals up, of side_count² pairs of triangles."""
     x, y = np.meshgrid(*[np.linspace(0.0, size, side_count + 1)] * 2)
     vertices = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
     corner = (np.arange(side_count)[:, None] * (side_count + 1) + np.arange(side_count)).ravel()

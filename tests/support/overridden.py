@@ -5,7 +5,7 @@ import bpy
 
 
 def override(hair, folder):
-    """Put hair with its sphere and guides in a file, and link and override it in a new one, which is open then.
+    """Save hair with its sphere and guides to a file, and link and override it in a new file, which stays open.
 
     Returns the overridden collection; the new file is "shot.blend" in the folder.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests of long lists, and of all pairs of two, of which `make test` runs a share and `pytest -m long` the rest."""
+"""Parameters of tests of long lists and of all pairs: `make test` runs a share of them, `pytest -m long` the rest."""
 
 from collections.abc import Iterable
 
@@ -14,8 +14,8 @@ def share_of(values: Iterable, share: int = 3) -> list:
 def pairs(rows: Iterable, columns: Iterable, share: int = 3) -> list:
     """Parameters for `pytest.mark.parametrize` with two names: every pair of a row and a column.
 
-    One in `share` is not marked `long`. These lie on diagonals, so each row meets every `share`-th column, and each
-    column every `share`-th row.
+    One in `share` is not marked `long`. These are on diagonals, so each row is paired with every `share`-th column, and
+    each column with every `share`-th row.
     """
     columns = list(columns)
     return [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on surfaces that stand anywhere, and the law of its place: hair goes wherever its surface goes."""
+"""Hair on surfaces with any transform, and the law of its place: hair moves with its surface."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,9 +15,9 @@ GUIDES, STRANDS = 8, 24
 
 
 def files_in(folder, add=lambda _body: None):
-    """A function of one of `PLACES`: the path of a file of hair on a surface there, made once in a folder.
+    """Return a function from a name in `PLACES` to the path of a file with hair on such a surface, saved once.
 
-    add: adds to the scene what else the file is to hold.
+    add: adds other data to the scene before it is saved.
     """
     files = {}
 
@@ -82,7 +82,7 @@ def _subdivided(levels, place):
 
 _FAR, _TURNED = (3.0, 1.0, -2.0), (0.4, -0.3, 1.2)
 
-# Where a surface may stand: {kind: function of the body}.
+# Transforms of a surface: {kind: function of the body}.
 PLACES = {
     "moved": placed(_FAR),
     "turned": placed((0.2, 0.0, 0.1), _TURNED),
@@ -98,13 +98,13 @@ PLACES = {
     "in a scene of centimetres": _in_centimetres,
 }
 
-# The same where a modifier subdivides the surface.
+# The same with a modifier that subdivides the surface.
 SUBDIVIDED = {f"mirrored, subdivided {levels}": _subdivided(levels, PLACES["mirrored"]) for levels in (1, 2)}
 SUBDIVIDED["uneven, subdivided 2"] = _subdivided(2, PLACES["uneven"])
 
 
 def bend(body):
-    """Deform a surface by a shape key, which turns its faces by up to half a right angle."""
+    """Deform a surface by a shape key that rotates its faces by up to 45°."""
     body.shape_key_add(name="Basis")
     key = body.shape_key_add(name="Bent")
     for point in key.data:
@@ -143,7 +143,7 @@ def grow(place):
 
 
 def outward(body, count):
-    """Lines (P, 3) in the world that stand on a mesh object, of unlike point counts."""
+    """Return outward lines (P, 3) in the world on a mesh object, with unequal point counts."""
     matrix, size = body.matrix_world, world_scale(body)
     middle = sum((matrix @ v.co for v in body.data.vertices), matrix.translation * 0.0) / len(body.data.vertices)
     chosen = list(body.data.vertices)[:: len(body.data.vertices) // count][:count]
@@ -178,7 +178,7 @@ def world_scale(an_object):
 
 @dataclass
 class Placed:
-    """All that is seen of a surface and its hair, in the world.
+    """A surface and its hair in the world, as evaluated.
 
     vertices: (V, 3); strands: {name of a Curves object: ((N, 3) points, (N,) radii, (S,) lengths)} as evaluated.
     """
@@ -222,7 +222,7 @@ def _in_world(points, matrix):
 
 
 def went(before, after):
-    """(4, 4) by which the vertices of a `Placed` went to those of another. Fails where they did not go together."""
+    """Return the (4, 4) map from the vertices of a `Placed` to those of another; fails if it is not affine."""
     ones = np.ones((len(before.vertices), 1))
     found, *_ = np.linalg.lstsq(np.hstack([before.vertices, ones]), after.vertices, rcond=None)
     moved = np.hstack([before.vertices, ones]) @ found
@@ -233,9 +233,9 @@ def went(before, after):
 
 
 def require_carried(before, after, points=2e-5, names=None, lengths=1e-3):
-    """The law: all points of strands went as the surface did, and their widths and lengths as its size.
+    """Check the law: points of strands moved with the surface, and widths and lengths scaled with its size.
 
-    points: tolerance in parts of the surface's size; names: of objects, None for all; lengths: tolerance in parts.
+    points: tolerance as a fraction of the surface's size; names: of objects, None for all; lengths: relative tolerance.
     """
     matrix = went(before, after)
     factor = abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0)
@@ -253,13 +253,13 @@ def require_carried(before, after, points=2e-5, names=None, lengths=1e-3):
 
 
 def _tolerance(before, after, part):
-    """Parts of the size, and what single precision leaves of coordinates."""
+    """Return a tolerance: a fraction of the size plus the rounding of single precision."""
     farthest = max(abs(before.vertices).max(), abs(after.vertices).max())
     return part * after.size + 1e-6 * farthest
 
 
 def move_elsewhere(an_object):
-    """An object of the same mesh as seen, whose own transform is another."""
+    """Return a new object that has the same mesh in the world, but another transform."""
     matrix = Matrix.Translation((0.5, -1.0, 2.0)) @ Matrix.Rotation(1.0, 4, "X") @ Matrix.Scale(0.01, 4)
     mesh = an_object.data.copy()
     mesh.transform(matrix.inverted() @ an_object.matrix_world)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tests look at and move: Blender's data as arrays, read here without the add-on's help."""
+"""Reading and writing of Blender's data as arrays, independent of the add-on's code."""
 
 import bpy
 import numpy as np
@@ -21,7 +21,7 @@ def points(curves_object):
 
 
 def evaluated_points(curves_object, depsgraph=None):
-    """(S, P, 3) float32 in local coordinates of what Blender renders: after the object's modifiers."""
+    """Return (S, P, 3) float32 in local coordinates, as rendered: after the object's modifiers."""
     curves = curves_object.evaluated_get(depsgraph or bpy.context.evaluated_depsgraph_get()).data
     positions = np.empty((len(curves.points), 3), np.float32)
     curves.attributes["position"].data.foreach_get("vector", positions.ravel())
@@ -29,7 +29,7 @@ def evaluated_points(curves_object, depsgraph=None):
 
 
 def write_points(curves_object, positions):
-    """Move the points of Curves as a brush does, and let Blender notice."""
+    """Move the points of Curves as a brush does, and update."""
     flat = np.ascontiguousarray(positions, np.float32).ravel()
     curves_object.data.attributes["position"].data.foreach_set("vector", flat)
     curves_object.data.update_tag()
@@ -46,7 +46,7 @@ def attribute(curves_object, name, width=1):
 
 
 def snapshot():
-    """Names of all that an operator could leave behind in the file."""
+    """Return the names of all data that an operator could leave behind in the file."""
     return {
         "objects": sorted(bpy.data.objects.keys()),
         "curves": sorted(bpy.data.hair_curves.keys()),
@@ -57,7 +57,7 @@ def snapshot():
 
 
 def everything():
-    """{collection: names} of all datablocks in the file but the interface's, and the image of Blender's last render."""
+    """Return {collection: names} of all datablocks except the interface's and the image of Blender's last render."""
     names = (p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION")
     left_out = {"screens", "window_managers", "workspaces", "brushes", "libraries", "all_ids"}
     found = {name: sorted(getattr(bpy.data, name).keys()) for name in names if name not in left_out}
@@ -66,7 +66,7 @@ def everything():
 
 
 def guide_map(datablock):
-    """(S, k) indices and (S, k) weights of the guides that strands follow, as Blender's nodes see them; or None."""
+    """Return (S, k) indices and (S, k) weights of strands' guides from their attributes; None without them."""
     slots = sum(a.name.startswith("guide_index_") for a in datablock.attributes)
     if not slots:
         return None

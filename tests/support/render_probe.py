@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a renderer is handed of hair and its surface."""
+"""Hair and its surface as passed to a render engine."""
 
 import contextlib
 
@@ -42,7 +42,7 @@ def read_mesh(mesh):
 
 @contextlib.contextmanager
 def probing():
-    """A function of names of hair and surface: (strands, largest distance of a root from the surface) as rendered."""
+    """Context with a function of names of hair and surface: (strands, largest distance of a root), as rendered."""
 
     def render(hair, surface):
         scene = bpy.context.scene

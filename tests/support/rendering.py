@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scenes rendered to files, and what is in these."""
+"""Rendering of scenes to files, and reading of these."""
 
 import math
 
@@ -9,7 +9,7 @@ import OpenEXR
 
 
 def add_orthographic_camera(scene):
-    """Let a scene be seen along Y, at two metres."""
+    """Add an orthographic camera along Y at two metres."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
     camera.location, camera.rotation_euler = (0.0, -4.0, 0.0), (math.pi / 2, 0.0, 0.0)
@@ -27,7 +27,7 @@ def rendered(folder, **settings):
 
 
 def layers_of(folder, **settings):
-    """The same of every view layer: {view layer: {pass: array}}."""
+    """Render and return {view layer: {pass: array}} of every view layer."""
     configure(**settings)
     render, path = bpy.context.scene.render, folder / "rendered.exr"
     render.image_settings.media_type = "MULTI_LAYER_IMAGE"
@@ -38,7 +38,7 @@ def layers_of(folder, **settings):
 
 
 def configure(**settings):
-    """A small picture by our engine, and what else is asked for."""
+    """Set up a small picture by our engine, with other settings as given."""
     scene = bpy.context.scene
     settings = {
         "engine": "VELLUS",
@@ -69,7 +69,7 @@ def _stacked(channels):
 
 
 def light_up(color=(0.2, 0.3, 0.4)):
-    """A world of this colour."""
+    """Set a world of this colour."""
     world = bpy.context.scene.world or bpy.data.worlds.new("World")
     bpy.context.scene.world = world
     world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)

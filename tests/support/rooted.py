@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far strands begin from the surface that they grow on, as Blender evaluates it; without the add-on's help.
+"""Distances of roots from the evaluated surface, computed independently of the add-on.
 
-Where a folded quad is bent further, Blender may cut it along its other diagonal. Roots stay on the triangle that they
-grow on at rest: else they would jump from frame to frame. So a surface is what either cut makes of it.
+If a folded quad is bent further, Blender may split it along its other diagonal. Roots stay on the triangle on which
+they grow at rest, as they would jump between frames otherwise. So the surface consists of both triangulations.
 """
 
 import bpy
@@ -10,15 +10,15 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-NEAR = 2e-3  # of a surface's size: a face of more than four corners has other cuts than the two of a quad
+NEAR = 2e-3  # fraction of a surface's size: faces with more than four corners have more triangulations than quads
 
 
 def should_be_rooted(curves_object):
-    """Whether an object is hair that is up to date, without a complaint, on a surface that is not being edited.
+    """Whether an object is up-to-date hair without errors, on a surface that is not being edited.
 
-    Hair that follows guides of another surface grows on that one, and its panel says so. Curves that became hair begin
-    as far from the surface as they did, which they store. A linked duplicate stands on that of the surface. Of points
-    that were deleted in Edit Mode some may be roots.
+    Hair with guides of another surface grows on that surface, and its panel reports it. Curves that became hair keep
+    their distance from the surface, which they store. A linked duplicate is on a duplicate of the surface. Points
+    deleted in Edit Mode may be roots.
     """
     hair = curves_object.data
     guides, surface = hair.vellus.guide_curves, hair.surface
@@ -45,9 +45,9 @@ def _are_equal(curves):
 
 
 def far_root(curves_object, strands, depsgraph):
-    """What to say of the root that is furthest from the surface; "" where all are on it.
+    """Return a message about the root farthest from the surface; "" if all are on it.
 
-    strands: (S, P, 3) in the object's coordinates; a few of them are looked at.
+    strands: (S, P, 3) in the object's coordinates; only some of them are checked.
     """
     surface = curves_object.data.surface.evaluated_get(depsgraph)
     to_world, place = surface.matrix_world, curves_object.evaluated_get(depsgraph).matrix_world
@@ -70,7 +70,7 @@ def far_root(curves_object, strands, depsgraph):
 
 
 def _cut_both_ways(mesh, to_world):
-    """The tree of a mesh's triangles, with both cuts of each quad, in the world."""
+    """Return the tree of a mesh's triangles in the world, with both triangulations of each quad."""
     mesh.calc_loop_triangles()
     triangles = [tuple(triangle.vertices) for triangle in mesh.loop_triangles]
     for a, b, c, d in (face.vertices for face in mesh.polygons if len(face.vertices) == 4):

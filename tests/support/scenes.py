@@ -25,7 +25,7 @@ from tests.support.reading import vertex_positions
 
 @pytest.fixture(scope="session", autouse=True)
 def blender():
-    """The add-on in Blender, with graphics: once in a process, whichever folders of tests it runs."""
+    """Register the add-on in Blender, with a GPU context: once per process."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     if not hasattr(bpy.types.Curves, "vellus"):
         hair_addon.register()
@@ -35,7 +35,7 @@ def blender():
         hair_addon.unregister()
 
 
-# Functions of their arguments alone: {(module, name): the same, which remembers its results}.
+# Pure functions: {(module, name): the function with cached results}.
 REMEMBERED = {
     (module, name): lru_cache(64)(getattr(module, name))
     for module, name in ((lookup_tables, "bake"), (dual_scattering, "bake"), (albedo, "azimuthal_moments"))
@@ -44,12 +44,12 @@ REMEMBERED = {
 
 @pytest.fixture(autouse=True)
 def tables_are_remembered(monkeypatch):
-    """Tables are baked once in a process for each of their settings: with every file the add-on forgets its own."""
+    """Bake tables once per process for equal settings: the add-on clears its own cache with every file."""
     for (module, name), remembered in REMEMBERED.items():
         monkeypatch.setattr(module, name, remembered)
 
 
-# What most tests begin with; each stands on those before it.
+# The initial scenes of most tests; each builds on the previous ones.
 STAGES = ("sphere", "guides", "hair")
 
 
@@ -75,10 +75,10 @@ def add_hair():
 
 @pytest.fixture(scope="session")
 def scene_files(blender, tmp_path_factory):
-    """{stage or "empty": a file}: to be read in 8 ms, where Blender and the add-on take up to 40 ms to make it.
+    """{stage or "empty": a file}, which loads in 8 ms; creating the scene takes up to 40 ms.
 
-    All have the nodes that carry hair, which take Blender 0.1 s. Their pictures are drawn with dual scattering, which
-    takes less time: tests of the light grid ask for it.
+    All contain the nodes that deform hair, which take 0.1 s to create. Their pictures are drawn with dual scattering,
+    which is faster; tests of the light grid select it.
     """
     folder, files = tmp_path_factory.mktemp("scenes"), {}
 
@@ -103,24 +103,23 @@ def scene_files(blender, tmp_path_factory):
     return files
 
 
-# Texels along a side of the maps that the world's light is measured with, and of how many strands they are drawn at
-# least: coarse ones resolve fewer.
+# Side of the maps of world light in texels, and the least number of strands drawn into them: coarse maps resolve fewer.
 FINE_WORLD, COARSE_WORLD = (ambient_visibility._SIZE, ambient_visibility._LEAST_STRANDS), (64, 600)
 
 
 def set_world_maps(patch, size, least_strands):
-    """Draw these maps so; patch: a `pytest.MonkeyPatch`."""
+    """Set the size of these maps; patch: a `pytest.MonkeyPatch`."""
     patch.setattr(ambient_visibility, "_SIZE", size)
     patch.setattr(ambient_visibility, "_LEAST_STRANDS", least_strands)
 
 
 @pytest.fixture
 def scene(scene_files, request, monkeypatch):
-    """An empty scene, undo ready; of Blender's settings, which take longer to read, those of the process stay.
+    """An empty scene with undo; preferences, which take longer to load, are those of the process.
 
-    The nodes that carry hair are in memory, as where hair was deleted: `read_homefile` is for a scene without them.
-    What the test's other fixtures of this file would make is there already, as in a file that was opened. The maps that
-    the world's light is measured with are as small as the pictures of tests, which take as long to draw as all else.
+    The nodes that deform hair are in memory, as after deleting hair; use `read_homefile` for a scene without them. The
+    data of the test's other fixtures of this file is loaded already, as in an opened file. The maps of world light are
+    as small as the pictures of tests, as larger ones would take most of the time.
     """
     set_world_maps(monkeypatch, *COARSE_WORLD)
     wanted = [*takewhile(request.fixturenames.__contains__, STAGES)]
@@ -137,7 +136,7 @@ def scene(scene_files, request, monkeypatch):
 
 @pytest.fixture
 def made_anew():
-    """For what Blender and the add-on remember of what they have just made: nothing of the scene is from a file."""
+    """Create the scene instead of loading it, for tests of caches of newly created data."""
 
 
 @pytest.fixture
@@ -152,11 +151,11 @@ def sphere(scene):
 
 @pytest.fixture
 def relax_iterations():
-    """How often the roots of `guides` are relaxed: never, as it would be half of the time of most tests."""
+    """Number of relaxation steps of `guides`: zero, as they would take half of the time of most tests."""
     return 0
 
 
-# For tests of what guides that are spread evenly do.
+# For tests that need evenly spaced guides.
 even_guides = pytest.mark.parametrize("relax_iterations", [GuideSettings().relax_iterations])
 
 
@@ -180,7 +179,7 @@ def hair(guides):
 
 @pytest.fixture
 def arm(scene):
-    """A cylinder along X, 4 m long, whose second bone bends it from straight in frame 1 to a right angle in 11."""
+    """A cylinder of 4 m along X, bent by its second bone from straight in frame 1 to a right angle in frame 11."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=24, size=2.0)
     arm = bpy.context.object
     for vertex in arm.data.vertices:
@@ -210,32 +209,32 @@ def arm(scene):
 
 @pytest.fixture
 def coarse_shadows(monkeypatch):
-    """Shadow maps of lamps that are as small, too."""
+    """Small shadow maps of lamps."""
     shrink_shadows(monkeypatch)
 
 
 def shrink_shadows(patch):
-    """Small maps of both kinds, also for pictures that several tests share; patch: a `pytest.MonkeyPatch`."""
+    """Set small maps of both kinds, also for pictures that several tests share; patch: a `pytest.MonkeyPatch`."""
     set_world_maps(patch, *COARSE_WORLD)
     patch.setattr(scene_lights, "_MAP_SIZE", 128)
 
 
 @pytest.fixture
 def fine_shadows(lit, monkeypatch):
-    """For laws of shadows themselves: maps as artists have them."""
+    """Shadow maps of normal size, for laws of shadows."""
     set_world_maps(monkeypatch, *FINE_WORLD)
     monkeypatch.setattr(scene_lights, "_MAP_SIZE", 512)
 
 
 @pytest.fixture
 def fine_world(scene, monkeypatch):
-    """The same for laws of what hides the world."""
+    """Maps of world light of normal size, for laws of ambient visibility."""
     set_world_maps(monkeypatch, *FINE_WORLD)
 
 
 @pytest.fixture
 def lit(hair, coarse_shadows):
-    """The hairy sphere with a camera in front of it and a sun over the camera's shoulder."""
+    """The sphere with hair, a camera in front of it and a sun behind the camera."""
     blender_scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = (0.0, -8.0, 0.0), (math.pi / 2, 0.0, 0.0)
@@ -249,13 +248,13 @@ def lit(hair, coarse_shadows):
 
 @pytest.fixture
 def blender_scene(scene):
-    """The empty scene, where a module is called `scene`."""
+    """The empty scene, for tests that import a module named `scene`."""
     return scene
 
 
 @pytest.fixture
 def thin(lit):
-    """Hair of which a strand covers a fifth of a pixel."""
+    """Hair whose strands are a fifth of a pixel wide."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
     bpy.data.objects["Hair"].data.vellus.hair.strand_count = 4000
     bpy.data.objects["Hair"].data.vellus.hair.radius = 0.003
@@ -275,7 +274,7 @@ def head(sphere):
 def imported(head, rng):
     """60 curves of 2 to 12 points around the head, with an attribute, an object transform and no surface."""
     made = curves_object(list(lines_on(head, rng)))
-    made.location = (0.3, -0.2, 0.1)  # nothing of it is left afterwards
+    made.location = (0.3, -0.2, 0.1)  # cleared afterwards
     made.data.attributes["position"].data.foreach_set(
         "vector", (curves.read_points(made.data) - np.float32(made.location)).ravel()
     )

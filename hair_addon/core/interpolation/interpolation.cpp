@@ -3,8 +3,8 @@
 // A strand as the weighted sum of its guides (interpolation.py), SEGMENTS segments at once: in the lanes of a vector on
 // a CPU, in neighboring threads on a GPU.
 //
-// The body of `_sum_guides` in interpolation.py. Parameters, for S strands of P points, K slots of guides per strand and
-// G guides:
+// The body of `_sum_guides` in interpolation.py. Parameters, for S strands of P points, K slots of guides per strand
+// and G guides:
 //
 //   int strand                              index of the strand
 //   vec3 root                               its root [m]

@@ -2,8 +2,8 @@
 //
 // A program of styles on LANES strands at once: the lanes of a processor's vectors, or one strand per thread of a GPU.
 //
-// The body of `_apply_steps` in steps.py. Parameters, for S strands in total of which M are styled, P points per strand,
-// N steps and K clump centres of all levels:
+// The body of `_apply_steps` in steps.py. Parameters, for S strands of which M are styled, P points per strand, N steps
+// and K clump centres of all levels:
 //
 //   int block                           index of a group of LANES of the M strands
 //   array_t<vec3> points                (M, P) [m], styled in place

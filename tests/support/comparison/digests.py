@@ -4,14 +4,14 @@
     .venv/bin/python tests/support/comparison/digests.py --out before.json
     .venv/bin/python tests/support/comparison/digests.py --compare before.json     prints what differs, and exits with 1
 
-Strands, attributes, settings, materials, tables, pictures and files are SHA-256 each, under a name such as
-`head/strands/attribute/radius`. The first part of it is a groom of grooms.py or of outputs.py, or `commands`; those
-that --case names are computed and compared alone.
+Strands, attributes, settings, materials, tables, pictures and files have an SHA-256 each, under a name such as
+`head/strands/attribute/radius`. The first part of the name is a groom of grooms.py or of outputs.py, or `commands`;
+--case selects some of them.
 
-Only names that users know are used: `register`, `hair_addon.api`, operators, properties, the command line. So files of
-the add-on may move while this one stays. Computed on the processor; a reference holds for one machine with one version
-of Blender, Warp and the graphics driver, which the file names. Half a minute of work where kernels and shaders are
-compiled already; a module that has moved compiles its kernels again.
+Only public names are used: `register`, `hair_addon.api`, operators, properties, the command line. So files of the
+add-on can move without changes here. Digests are computed on the processor; a reference is valid for one machine with
+one version of Blender, Warp and the graphics driver, which the file states. It takes half a minute if kernels and
+shaders are compiled; the kernels of a moved module are compiled again.
 """
 
 import argparse
@@ -60,7 +60,7 @@ class Digests:
         self._found, self._prefix = found, prefix
 
     def add(self, name, value):
-        """Bytes, arrays (with type and shape), or what JSON can write."""
+        """Add bytes, arrays (with type and shape), or values that JSON supports."""
         if isinstance(value, np.ndarray):
             value = f"{value.dtype.str} {value.shape} ".encode() + np.ascontiguousarray(value).tobytes()
         elif not isinstance(value, bytes):
@@ -71,7 +71,7 @@ class Digests:
         self._found[name] = hashlib.sha256(value).hexdigest()
 
     def add_strands(self, name, curves_object):
-        """Attributes, stored and as Blender evaluates them, points for scripts, settings, and what is shaded by."""
+        """Add stored and evaluated attributes, points for scripts, settings and shading."""
         curves = curves_object.data
         self._add_attributes(f"{name}/attribute", curves)
         evaluated = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -86,7 +86,7 @@ class Digests:
             self.add_tree(f"{name}/material/{material.name}", material.node_tree)
 
     def add_mesh(self, name, mesh):
-        """Vertices and corners of a mesh: where these differ, it is not we who changed."""
+        """Add vertices and corners of a mesh: if these differ, the change is not in the add-on."""
         places, corners = np.empty((len(mesh.vertices), 3), np.float32), np.empty(len(mesh.loops), np.int32)
         mesh.vertices.foreach_get("co", places.ravel())
         mesh.loops.foreach_get("vertex_index", corners)
@@ -112,11 +112,11 @@ class Digests:
         self.add(name, tree_values(tree))
 
     def add_picture(self, name="picture", **settings):
-        """A small picture as the viewport draws it."""
+        """Add a small picture drawn by the viewport's code."""
         self.add(name, api.draw(**grooms.SIZE, samples_per_side=2, **settings))
 
     def add_file(self, name, path):
-        """The bytes of a file, and the pixels of an .exr beside them, as its header may change alone."""
+        """Add the bytes of a file, and separately the pixels of an .exr, whose header may change alone."""
         self.add(f"{name}/bytes", Path(path).read_bytes())
         if Path(path).suffix == ".exr":
             self.add_pixels(name, path)
@@ -152,7 +152,7 @@ def values_of(owner):
 
 
 def plain(value):
-    """A property's value as JSON knows it."""
+    """Return a property's value as a JSON value."""
     if isinstance(value, set):
         return sorted(value)
     if isinstance(value, bpy.types.ID):
@@ -189,7 +189,7 @@ def end(node, socket):
 
 
 def take(wanted):
-    """{name: digest} of the grooms that are wanted, all for none."""
+    """Return {name: digest} of the selected grooms, of all if none is selected."""
     found = {}
     cases = {case.__name__: case for case in (*grooms.GROOMS, *outputs.OUTPUTS)}
     unknown = set(wanted) - {*cases, "commands"}
@@ -213,13 +213,13 @@ def take(wanted):
 
 
 def machine():
-    """What else than our code digests follow from."""
+    """Return the versions that digests depend on, apart from our code."""
     versions = {"Blender": bpy.app.version_string, "Warp": warp.config.version, "NumPy": np.__version__}
     return versions | {"graphics": f"{gpu.platform.renderer_get()}, {gpu.platform.version_get()}"}
 
 
 def differences(before, now, wanted):
-    """Lines that tell how digests differ from those of a reference."""
+    """Return lines that describe differences from the digests of a reference."""
     known = {n: d for n, d in before["digests"].items() if not wanted or n.split("/")[0] in wanted}
     digests = now["digests"]
     lines = [f"changed  {name}" for name in known if name in digests and digests[name] != known[name]]
@@ -228,7 +228,7 @@ def differences(before, now, wanted):
 
 
 def main():
-    """Write digests, or compare them with what was written; returns the exit status."""
+    """Write digests, or compare them with a written reference; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, metavar="FILE.json", help="where to write digests")
     parser.add_argument("--compare", type=Path, metavar="FILE.json", help="what to compare digests with")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms of many kinds, small ones, for digests.py: made by names alone that users know."""
+"""Small grooms of many kinds for digests.py, created by public names only."""
 
 import math
 from pathlib import Path
@@ -68,14 +68,14 @@ def weigh(mesh_object, name, weights):
 
 
 def sphere():
-    """A mesh object of radius 1 with a UV map. Of Blender's UV sphere the order of corners differs from run to run."""
+    """Return a mesh object of radius 1 with a UV map. In Blender's UV sphere the order of corners varies by run."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
     bpy.context.object.name = "Sphere"
     return bpy.context.object
 
 
 def comb(guides, chosen, offset):
-    """Move the tips of some guides as a brush does, and let Blender notice."""
+    """Move the tips of some guides as a brush does, and tag the update."""
     points = np.empty((len(guides.data.points), 3), np.float32)
     guides.data.attributes["position"].data.foreach_get("vector", points.ravel())
     strands = points.reshape(len(guides.data.curves), -1, 3)
@@ -111,7 +111,7 @@ def grown(surface, guides=None, hair=None, look=None):
 
 
 def cube(found, _folder):
-    """Kajiya-Kay; few neighbours; everything at its default that follows from the surface."""
+    """Kajiya-Kay; few neighbours; all settings that are fitted to the surface at their defaults."""
     bpy.ops.mesh.primitive_cube_add()
     guides = api.distribute_guides(bpy.context.object, guide_count=50)
     hair = api.interpolate_hair(guides, strand_count=800, neighbour_limit=2, keep_length=0.3, guide_map=False)
@@ -168,7 +168,7 @@ def masked_by_image(found, _folder):
     pixels = np.ones((32, 32, 4), np.float32)
     pixels[..., :3] = (side[:, None] * side[None, :])[..., None]
     mask = image("Mask", pixels)
-    material = bpy.data.materials.new("Painted")  # without a user nobody is told of what is painted
+    material = bpy.data.materials.new("Painted")  # without users Blender does not report painting
     material.node_tree.nodes.new("ShaderNodeTexImage").image = mask
     surface.data.materials.append(material)
     guides, hair = grown(surface, {"density_image": "Mask"})
@@ -182,7 +182,7 @@ def masked_by_image(found, _folder):
 
 
 def parted(found, _folder):
-    """A part line and regions of faces, on guides combed apart; what deletes, restores and selects."""
+    """A part line and regions of faces, on guides combed apart; deleting, restoring and selecting."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=20, y_subdivisions=20, size=1.0)
     surface = bpy.context.object
     regions = surface.data.attributes.new("region", "INT", "FACE")
@@ -210,7 +210,7 @@ def parted(found, _folder):
 
 
 def head(found, _folder):
-    """The sample head: the operator of the panel, steps of a stroke, the classic mode, guides shown and taken away."""
+    """The sample head: the operator of the panel, steps of a stroke, the classic mode, shown and removed guides."""
     bpy.ops.wm.obj_import(filepath=str(HEAD))
     surface = activate(bpy.context.selected_objects[0])
     surface.data.transform(surface.matrix_world)
@@ -243,7 +243,7 @@ def head(found, _folder):
 
 
 def carried(found, folder):
-    """A surface that a shape key and a modifier deform: strands in other frames, with motion blur."""
+    """A surface deformed by a shape key and a modifier: strands in other frames, with motion blur."""
     surface = sphere()
     guides, hair = grown(surface, {"length": 0.4}, {"radius": 0.004})
     rest = vertices(surface)
@@ -274,7 +274,7 @@ def carried(found, folder):
 
 
 def hand_made(found, _folder):
-    """Curves of other point counts that nobody attached to anything, some upside down, with a modifier, as guides."""
+    """Unattached curves with unequal point counts and a modifier, some reversed, used as guides."""
     surface = sphere()
     rng = np.random.Generator(np.random.PCG64(20260101))
     lines = []

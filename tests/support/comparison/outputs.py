@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What comes of grooms beside the scene, for digests.py: arrays, tables, settings, commands, and the interface."""
+"""Outputs of grooms outside the scene, for digests.py: arrays, tables, settings, commands and the interface."""
 
 import inspect
 import os
@@ -76,7 +76,7 @@ def rendered(found, folder):
 
 
 def interface(found, _folder):
-    """Classes that Blender knows of us: names, tooltips, properties with defaults and ranges; functions for scripts."""
+    """Registered classes: names, tooltips, properties with defaults and ranges; functions for scripts."""
     ours = [name for name in dir(bpy.types) if name.upper().startswith("VELLUS")]
     found.add("names", ours)
     for name in ours:
@@ -94,7 +94,7 @@ def interface(found, _folder):
 
 
 def described(details):
-    """A property as its class declares it, with type and limits where it has them."""
+    """Return a property as declared by its class, with type and limits."""
     parts = ("identifier", "name", "description", "type", "subtype", "unit", "default", "hard_min", "hard_max")
     parts += ("soft_min", "soft_max", "precision", "array_length", "translation_context", "is_hidden", "is_animatable")
     found = {part: getattr(details, part) for part in parts if hasattr(details, part)}
@@ -108,7 +108,7 @@ def described(details):
     return found
 
 
-# Commands, in processes of their own: (name, words, files that they write).
+# Commands, in separate processes: (name, arguments, files that they write).
 _COMMANDS = (
     ("groom arrays", "groom head.obj --up Y --out head.npz --guides 60 --strands 700 --seed 3 --json", ["head.npz"]),
     (
@@ -135,7 +135,7 @@ OUTPUTS = (plain_arrays, tables_and_settings, rendered, interface)
 
 
 def run_commands(folder):
-    """[(name, exit status, what it said on both streams, {file: bytes})] of all commands, one after the other."""
+    """Run all commands in turn; returns [(name, exit status, output of both streams, {file: bytes})]."""
     (folder / HEAD.name).write_bytes(HEAD.read_bytes())
     ran = []
     for name, words, files in _COMMANDS:
@@ -145,9 +145,9 @@ def run_commands(folder):
 
 
 def run_command(words, folder):
-    """(exit status, what it said on both streams) of a command in a folder.
+    """Run a command in a folder; returns (exit status, output of both streams).
 
-    Without how long it took, how large its file is, a number in JSON or in a sentence, and the name of the folder.
+    Times, file sizes and the name of the folder are removed from the output.
     """
     command = [sys.executable, "-m", "hair_addon", *words.split()]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -162,5 +162,5 @@ def add_commands(found, ran):
     for name, status, said, files in ran:
         found.add(f"{name}/said", [status, *said])
         for file, data in files.items():
-            # Which of two siblings Blender's exporter of USD writes first differs from run to run.
+            # The order in which Blender's USD exporter writes siblings varies between runs.
             found.add(f"{name}/{file}", sorted(data.decode().splitlines()) if file.endswith(".usda") else data)

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long users wait, of one checkout or of several in turns: so a change of the code is timed beside what it changed.
+"""Waiting times of users, for one checkout or alternating between several, to compare a change with its base.
 
     .venv/bin/python tests/support/comparison/timings.py
     .venv/bin/python tests/support/comparison/timings.py --checkouts ../before . --rounds 7
 
-start         importing the add-on and registering it, Blender being there: what its start takes longer
+start         importing and registering the add-on in a running Blender: the additional time of its start
 stroke        a few of 200 guides move, and Blender updates: 30,000 strands follow, and their Curves are written
 regenerate    another random seed: 100,000 strands are placed, bound, grown and written
 draw          one picture of 30,000 strands as scripts draw it, with its shadows
 
-Printed are medians [ms] over all rounds, on the clock and of the work of all cores, which other programs change less,
-and for each further checkout the median of its parts of the first one's time, round by round. A round is a process for
-each checkout, one after the other, every other time from the last, and two that only start; one before all rounds
-compiles what is new, and does not count. Only names that users know are used, so this file can time any checkout.
+Prints medians [ms] over all rounds, of wall time and of the CPU time of all cores, which other programs affect less,
+and for each further checkout the median ratio to the first one, round by round. A round runs a process for each
+checkout in turn, in alternating order, and two that only start; a first round, which compiles kernels, does not
+count. Only public names are used, so this file can time any checkout.
 """
 
 import argparse
@@ -32,13 +32,13 @@ _STARTS = 2  # processes of a round that start and end, beside the one that meas
 
 
 class Clock:
-    """{what: [(seconds on the clock, seconds of work of all cores)]}."""
+    """{name: [(wall time [s], CPU time of all cores [s])]}."""
 
     def __init__(self):
         self.found = {}
 
     def time(self, what, call, repetitions=1, spare=0):
-        """Time calls one by one, but for the first `spare` of them."""
+        """Time calls one by one, except the first `spare` of them."""
         for repetition in range(spare + repetitions):
             started = time.perf_counter(), time.process_time()
             call()
@@ -94,7 +94,7 @@ def groom(api, surface):
 
 
 def comb(guides):
-    """One step of a brush: eight guides that stand together move."""
+    """Move eight neighboring guides, as one step of a brush."""
     points = np.empty((len(guides.points), 3), np.float32)
     guides.attributes["position"].data.foreach_get("vector", points.ravel())
     strands = points.reshape(len(guides.curves), -1, 3)
@@ -106,7 +106,7 @@ def comb(guides):
 
 
 def regenerate(hair):
-    """Make all strands again in other places."""
+    """Regenerate all strands with other roots."""
     hair.vellus.hair.seed += 1
     bpy.context.view_layer.update()
 
@@ -115,7 +115,7 @@ def regenerate(hair):
 
 
 def measured(checkout, *words):
-    """What `measure` found in a process of its own."""
+    """Run `measure` in a separate process; returns its result."""
     command = [sys.executable, __file__, "--measure", str(checkout), *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     lines = done.stdout.splitlines()
@@ -146,7 +146,7 @@ def report(checkouts, rounds):
 
 
 def main():
-    """Time checkouts in turns."""
+    """Time checkouts, alternating between them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     own = Path(__file__).resolve().parents[3]
     parser.add_argument("--checkouts", type=Path, nargs="+", default=[own], metavar="FOLDER", help="[this one]")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points and strands that ask colliders for planes of contact, and shapes to ask."""
+"""Queries of contact planes for points and strands, and colliders to query."""
 
 import numpy as np
 import warp as wp
@@ -21,7 +21,7 @@ def lanes_of(strands, device):
 
 
 def planes_of(found, vertex_count):
-    """Planes (S, N, 8) of what `find` returned, by strand."""
+    """Return planes (S, N, 8) of the result of `find`, by strand."""
     return found.numpy().reshape(-1, vertex_count, PLANE, LANES).transpose(0, 3, 1, 2).reshape(-1, vertex_count, PLANE)
 
 
@@ -34,7 +34,7 @@ def strands_of(points):
 
 
 class Asked:
-    """Tips that ask colliders for planes, without segments."""
+    """Queries of contact planes at tips, without segments."""
 
     def __init__(self, colliders, count, groom=None):
         self.count, self.device = count, colliders.device
@@ -50,7 +50,7 @@ class Asked:
 
 
 def gaps_of(planes, points):
-    """How far points are in front of their planes."""
+    """Return the distances of points in front of their planes."""
     return np.einsum("ni,ni->n", planes[:, :3], points) - planes[:, 3]
 
 
@@ -93,7 +93,7 @@ def slab(rng):
 
 
 def groom_of(rng, mesh, count, segment):
-    """Strands around a mesh, partly inside, with segments of a length."""
+    """Return strands around a mesh, partly inside, with segments of a given length."""
     roots = around(rng, mesh, count, 1e-4)
     steps = rng.normal(size=(count, 7, 3))
     steps *= segment / np.linalg.norm(steps, axis=2, keepdims=True)

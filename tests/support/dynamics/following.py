@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on surfaces that deform: grown, and compared with where its surface is."""
+"""Hair on deforming surfaces: generation, and comparison with the surface."""
 
 import bpy
 import numpy as np
@@ -16,7 +16,7 @@ def grow(surface, guide_count=40, strand_count=200, **settings):
     """Guides and hair on a surface: (guides, hair) objects."""
     before = set(bpy.data.objects)
     bpy.context.view_layer.objects.active = surface
-    # What is left open follows from the surface as it stands, which may be bent.
+    # Unset values are fitted to the surface in its present pose, which may be bent.
     settings = {"length": 0.3, "gravity": 0.4} | settings
     bpy.ops.vellus.distribute_guides(guide_count=guide_count, **settings)
     guides = next(iter(set(bpy.data.objects) - before))
@@ -26,7 +26,7 @@ def grow(surface, guide_count=40, strand_count=200, **settings):
 
 
 def surface_points(curves_object, surface=None):
-    """(S, 3) where the evaluated surface is at the stored roots, in its local coordinates."""
+    """Return the (S, 3) positions of the evaluated surface at the stored roots, in its local coordinates."""
     surface = (surface or curves_object.data.surface).evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = surface.to_mesh()
     mesh.calc_loop_triangles()
@@ -38,12 +38,12 @@ def surface_points(curves_object, surface=None):
 
 
 def drawn_points(curves_object):
-    """(S, P, 3) that the viewport draws, in local coordinates."""
+    """Return the (S, P, 3) points that the viewport draws, in local coordinates."""
     return hair_cache.strands_on_gpu(curves_object.data).points
 
 
 def assert_follows(*curves_objects):
-    """Roots are where the surface is, strands as long as ever; Cycles and the viewport agree."""
+    """Check that roots are on the surface, strands keep their lengths, and Cycles and the viewport agree."""
     for curves_object in curves_objects:
         found = evaluated_points(curves_object)
         np.testing.assert_allclose(found[:, 0], surface_points(curves_object), atol=1e-5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces with equations that strands touch: planes of contact between the stages of substeps."""
+"""Analytic surfaces that strands touch: contact planes between the stages of substeps."""
 
 from dataclasses import dataclass
 
@@ -18,13 +18,13 @@ class Plane:
     normal: tuple = (0.0, 0.0, 1.0)
 
     def heights_and_normals(self, points):
-        """(…,) [m] above it, and (…, 3) where it rises."""
+        """Return the heights (…,) [m] above the surface, and its normals (…, 3)."""
         return points @ np.array(self.normal), np.broadcast_to(self.normal, points.shape)
 
 
 @dataclass(frozen=True)
 class Ball:
-    """A sphere; where entries of axes are zero, a cylinder along those."""
+    """A sphere, or a cylinder along axes whose entries are zero."""
 
     radius: float
     axes: tuple = (1.0, 1.0, 1.0)
@@ -49,7 +49,7 @@ def planes_of(surface, points, keep, friction, slide=(0.0, 0.0, 0.0)):
 
 
 def advance_touching(simulation, surface, frames=1, friction=0.3, keep=5e-4, root_speed=(0.0, 0.0, 0.0), each=None):
-    """Frames in which strands touch a surface; each(): called after every substep."""
+    """Simulate frames in which strands touch a surface; each(): called after every substep."""
     rods, step = simulation.rods, simulation.step
     for _ in range(frames):
         simulation.roots = simulation.roots + np.multiply(root_speed, step.size * step.count)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulated strands that tests begin with, and steps through time."""
+"""Simulated strands for tests, and their time steps."""
 
 from dataclasses import replace
 
@@ -53,7 +53,7 @@ class Simulation:
         self.roots, self.turns = self.groom[:, 0], None
 
     def advance(self, frames=1, **details):
-        """Frames with still roots, or at last moved to `self.roots` and `self.turns`."""
+        """Simulate frames with fixed roots, or roots that end at `self.roots` and `self.turns`."""
         for _ in range(frames):
             self.rods.move_roots(self.roots, self.turns)
             self.rods.advance(self.step, **details)
@@ -69,7 +69,7 @@ class Simulation:
         return np.array(found)
 
     def place(self, points, velocities=None):
-        """Put strands (S, N, 3) where they are not at rest, frames turned without twist."""
+        """Place strands (S, N, 3) out of rest, with frames rotated without twist."""
         state = self.rods.save()
         now = rotations.unit(np.diff(points, axis=1))
         then = rotations.unit(np.diff(self.groom, axis=1))

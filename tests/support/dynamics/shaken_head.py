@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that grow on the sample head and lie upon it, and a shake of it."""
+"""Guides that lie on the sample head, and a shake of the head."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands for many values of one setting of a style, and how they move from value to value."""
+"""Strands for many values of one setting of a style, and their displacement between values."""
 
 from dataclasses import replace
 
@@ -12,9 +12,9 @@ from tests.support.dynamics.stepped import largest_move
 
 
 class Slid:
-    """`at(value)`: points (S, P, 3) of hair in a `Groom` with one style, of which one setting has that value.
+    """`at(value)`: points (S, P, 3) of hair in a `Groom` with a style one of whose settings has that value.
 
-    What the setting does not change is computed once, so that many values take little time.
+    Results that do not depend on the setting are computed once, so many values take little time.
     """
 
     def __init__(self, hair, settings, name):
@@ -46,9 +46,9 @@ class Slid:
 
 
 def steepest_moves(points_at, values, chosen=4):
-    """Largest moves [m] between values, then of ever shorter steps: the steepest ones are halved again and again.
+    """Yield the largest displacements [m] between values, then of repeatedly halved steps, the steepest ones.
 
-    points_at(value): strands; values: rising; chosen: how many steps are halved each time.
+    points_at(value): strands; values: rising; chosen: number of steps that are halved each time.
     """
     made = [points_at(value) for value in values]
     steps = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles on strands that are given as arrays, without a surface or guides."""
+"""Styles on strands given as arrays, without a surface or guides."""
 
 import numpy as np
 import warp as wp
@@ -26,12 +26,11 @@ def stepped(
     device=DEVICE,
     **launch,
 ):
-    """(S, P, 3) float32: strands (S, P, 3) with styles.
+    """Return (S, P, 3) float32: strands (S, P, 3) with styles.
 
-    weights: (S,) of styles with a mask; members: (S,) locks of which all strands are in the first unless given;
-    centres: (K, P, 3) centre strands of every level of every style that gathers, the mean of a lock's strands
-    unless given; without such a style locks are those of guides, whose points are not known; launch: other arguments
-    of `steps.apply_steps`.
+    weights: (S,) of styles with a mask; members: (S,) locks of strands, by default all in the first; centres: (K, P, 3)
+    centre strands for every level of every gathering style, by default the mean of a lock's strands; without such a
+    style locks are those of guides, without points; launch: other arguments of `steps.apply_steps`.
     """
     count, point_count = points.shape[:2]
     identities = np.arange(count) if identities is None else identities

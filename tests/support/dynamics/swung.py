@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on a surface that swings: what dynamics tests bake and play."""
+"""Hair on a swinging surface, for tests that bake and play dynamics."""
 
 import bpy
 
@@ -7,7 +7,7 @@ SWINGS = ((1, 0.0), (6, 0.6), (11, -0.6), (16, 0.0))  # (frame, angle about Y)
 
 
 def swing(surface):
-    """Let an object turn to and fro in the first 16 frames."""
+    """Animate an object that swings in the first 16 frames."""
     for frame, angle in SWINGS:
         surface.rotation_euler.y = angle
         surface.keyframe_insert("rotation_euler", frame=frame)
@@ -15,7 +15,7 @@ def swing(surface):
 
 
 def simulate(guides, folder, **settings):
-    """Make guides simulate, with some settings, and frames in a folder: coarsely, where nothing else is asked for."""
+    """Switch simulation of guides on, with frames in a folder and coarse settings unless given."""
     state = guides.data.vellus
     state.cache_folder = str(folder)
     coarse = {"vertex_count": 9, "substeps": 2, "automatic_substeps": False}

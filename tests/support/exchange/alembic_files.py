@@ -13,7 +13,7 @@ BEZIER, BSPLINE, CATMULL_ROM, HERMITE = 1, 2, 3, 4
 
 
 class File:
-    """An archive that is being written by hand."""
+    """An archive written object by object."""
 
     def __init__(self, application="Maya 2026"):
         self.bytes = io.BytesIO()
@@ -60,7 +60,7 @@ class File:
 
 
 def of_maya(path, lines):
-    """A file in centimetres with Y up, with an object for each curve, and diameters of a tenth of a millimetre."""
+    """Write a file in centimetres with Y up, an object for each curve, and diameters of a tenth of a millimetre."""
     file, children = File("Maya 2026"), []
     for number, line in enumerate(100.0 * lines[..., [0, 2, 1]] * [1.0, 1.0, -1.0]):
         width = file.writer.array("width", "float32", np.float32([0.01]))

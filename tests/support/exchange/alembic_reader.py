@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A reader of Alembic files in Ogawa, written from the format alone: it shares no code with the writer.
+"""An independent reader of Alembic files in Ogawa, which shares no code with the writer.
 
-Everything is asserted that a file has to keep to; positions, sizes and counts first.
+It asserts all rules of the format; positions, sizes and counts first.
 """
 
 import struct
@@ -174,7 +174,7 @@ class _Reader:
                 return value
 
             count = sampling = 0
-            changes = None  # first and last sample that is another than the one before
+            changes = None  # first and last sample that differs from the previous one
             if bits & 3:
                 count = take()
                 changes = (take(), take()) if bits & 0x200 else (0, 0) if bits & 0x800 else (1, count - 1)

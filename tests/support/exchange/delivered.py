@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Delivered hair as a Blender without the add-on has it, and as its exporter writes it, in a process of its own."""
+"""Delivered hair in Blender without the add-on, and as exported by Blender, in a separate process."""
 
 import os
 import subprocess
@@ -32,9 +32,9 @@ bpy.ops.wm.usd_export(filepath=out + ".usdc", export_animation=True)
 
 
 def without_addon(path, folder, times):
-    """What another process finds of the object Hair of a .blend.
+    """Read the object Hair of a .blend in another process.
 
-    ({time: (N, 3) float32}, a picture at the last time, {frame: (N, 3)} as exported of those times that are frames).
+    Returns ({time: (N, 3) float32}, a picture at the last time, {frame: (N, 3)} as exported at whole frames).
     """
     out = folder / "elsewhere.npz"
     words = [sys.executable, "-c", PROGRAM, str(path), str(out), *map(str, times)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exported grooms, and the hair that they are compared with."""
+"""Exported grooms, and the hair to compare them with."""
 
 import bpy
 import numpy as np
@@ -24,13 +24,13 @@ def export(path, **settings):
 
 
 def world(curves_object):
-    """(S, P, 3) [m] where Blender renders strands."""
+    """Return the (S, P, 3) [m] points of strands as rendered by Blender."""
     matrix = np.array(curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
     return evaluated_points(curves_object) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def widths(curves_object):
-    """(N,) [m] diameters as Blender renders them."""
+    """Return the (N,) [m] diameters as rendered by Blender."""
     scale = abs(np.linalg.det(np.array(curves_object.matrix_world)[:3, :3])) ** (1.0 / 3.0)
     return 2.0 * scale * attribute(curves_object, "radius")
 

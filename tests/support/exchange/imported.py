@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves that Vellus did not make, for tests: made, looked at, and used as guides."""
+"""Curves not created by Vellus, for tests: creating, reading and using them as guides."""
 
 import bpy
 import numpy as np
@@ -16,7 +16,7 @@ def select(*chosen):
 
 
 def use(*chosen, **options):
-    """Select objects and click."""
+    """Select objects and use them as guides, as with a click."""
     select(*chosen)
     return bpy.ops.vellus.use_as_guides(**{"strand_count": 200, **options})
 
@@ -32,7 +32,7 @@ def world(curves_object):
 
 
 def stored(curves_object):
-    """(N, 3) of the points that the datablock holds, of any point counts."""
+    """Return the (N, 3) stored points, with any point counts."""
     return curves.read_points(curves_object.data)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A farm on this machine: a `blender` for its workers, the steps of docs/farm, and frames that are read whole."""
+"""A render farm on this machine: a `blender` for its workers, the steps of docs/farm, and checks of frames."""
 
 import contextlib
 import os
@@ -24,7 +24,7 @@ FRAMES = [f"shot_{number:04}.exr" for number in range(1, COUNT + 1)]
 
 
 def save_shot(path, samples=4):
-    """A .blend of hair on a sphere that swings, whose guides simulate and are not baked; it needs the fixture `lit`."""
+    """Save a .blend with simulated, unbaked hair on a swinging sphere; needs the fixture `lit`."""
     scene = bpy.context.scene
     swing(bpy.data.objects["Sphere"])
     simulate(bpy.data.objects["Guides"], "//baked")
@@ -35,7 +35,7 @@ def save_shot(path, samples=4):
 
 
 def write_blender(folder):
-    """The path of a program `blender` in a folder, which has the command line of Vellus and nothing else."""
+    """Write a program `blender` to a folder, which only runs the command line of Vellus; returns its path."""
     path = folder / "blender"
     words = ["exec", sys.executable, "-m", "hair_addon"]
     lines = ["#!/bin/sh", '[ "$1 $2" = "--command vellus" ] || exit 64', "shift 2"]
@@ -46,7 +46,7 @@ def write_blender(folder):
 
 
 def documented(heading, replaced, kind="sh"):
-    """The first block of code under a heading of docs/farm, with {words of an example: words of a test} replaced."""
+    """Return the first code block under a heading of docs/farm; replaced: {words of the example: words of the test}."""
     section = (DOCS / "README.md").read_text(encoding="utf-8").split(f"\n## {heading}\n")[1].split("\n## ")[0]
     block = re.search(rf"```{kind}\n(.*?)```", section, re.DOTALL)[1]
     for example, here in replaced.items():
@@ -67,12 +67,12 @@ def require_whole(folder, names):
 
 
 def frames_told(text):
-    """Numbers of the frames that commands say to have rendered."""
+    """Return the numbers of frames that commands report as rendered."""
     return sorted(int(number) for number in re.findall(r"\bFrame (\d+) in \d", text))
 
 
 def wait_for(found, seconds, pause=0.2):
-    """What `found()` returns once it is true of it."""
+    """Wait until `found()` returns a true value; returns it."""
     end = time.monotonic() + seconds
     while not (what := found()):
         assert time.monotonic() < end, f"waited {seconds} s for {found}"
@@ -111,8 +111,8 @@ def parents_up_to(process, program):
 
 
 def stopped_in_mid_frame(process):
-    """The picture that a process was rendering when it was stopped here, or None, and it runs on."""
-    with contextlib.suppress(OSError):  # it has ended, or has closed a file
+    """Stop a process while it renders and return the path of its picture; None if it does not, and it continues."""
+    with contextlib.suppress(OSError):  # it has ended, or closed a file
         os.kill(process, signal.SIGSTOP)
         for number in os.listdir(f"/proc/{process}/fd"):
             claim = re.fullmatch(r"(.*)/\.(\w+\.exr)\.claim", os.readlink(f"/proc/{process}/fd/{number}"))
@@ -124,7 +124,7 @@ def stopped_in_mid_frame(process):
 
 
 def free_ports(count):
-    """Numbers of some ports in a row that nobody listens to."""
+    """Return the numbers of consecutive free ports."""
     for first in range(20000 + os.getpid() % 10000, 32000, count):
         with contextlib.ExitStack() as held, contextlib.suppress(OSError):
             for port in range(first, first + count):
@@ -134,7 +134,7 @@ def free_ports(count):
 
 
 def kill(processes):
-    """End processes at once, none of which hears of the others' end."""
+    """Kill processes simultaneously, so that none can react to the end of another."""
     for number in (signal.SIGSTOP, signal.SIGKILL):
         for process in processes:
             with contextlib.suppress(ProcessLookupError):
@@ -142,7 +142,7 @@ def kill(processes):
 
 
 def shell(text, folder, **variables):
-    """Run lines of a shell in a folder; returns what they print."""
+    """Run shell commands in a folder; returns their output."""
     given = {"cwd": folder, "env": os.environ | variables, "timeout": 300}
     done = subprocess.run(["/bin/sh", "-eu", "-c", text], capture_output=True, text=True, check=False, **given)
     assert done.returncode == 0, done.stderr

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flamenco on this machine [Flamenco26]: what its manager makes of a job, by our mock or by itself; and its workers."""
+"""Flamenco on this machine [Flamenco26]: jobs compiled by a mock or by its manager, and its workers."""
 
 import contextlib
 import datetime
@@ -32,7 +32,7 @@ variables:
 
 
 def compiled(*jobs, created="2026-01-02T03:04:05", identity="abcd"):
-    """What the mock of a manager answers to submitted jobs: {status, message} or {status, tasks, settings} for each."""
+    """Return the mock manager's answer to each submitted job: {status, message} or {status, tasks, settings}."""
     jobs = [{"settings": job, "created": created, "jobID": f"{identity}0000"} for job in jobs]
     words = ["node", str(MANAGER), str(SCRIPT)]
     given = {"input": json.dumps(jobs), "capture_output": True, "text": True, "timeout": 60}
@@ -40,13 +40,13 @@ def compiled(*jobs, created="2026-01-02T03:04:05", identity="abcd"):
 
 
 class Manager:
-    """A real manager and what it is asked."""
+    """A running manager and requests to it."""
 
     def __init__(self, address, local):
         self._address, self._local = address, local
 
     def ask(self, path, values=None):
-        """(status, answer) of a request; values: posted as JSON."""
+        """Send a request; returns (status, answer). values: posted as JSON."""
         body = None if values is None else json.dumps(values).encode()
         request = urllib.request.Request(f"{self._address}/api/v3/{path}", body, {"Content-Type": "application/json"})
         try:
@@ -57,7 +57,7 @@ class Manager:
                 return error.code, json.loads(error.read())
 
     def submit(self, settings, **more):
-        """(status, job or error) of a job, as Blender's add-on submits it."""
+        """Submit a job as Flamenco's add-on does; returns (status, job or error)."""
         job = {"name": "a job", "type": "vellus-render", "submitter_platform": "linux", "settings": settings}
         return self.ask("jobs", job | more)
 
@@ -76,7 +76,7 @@ class Manager:
         return self.status(job)
 
     def log(self, job):
-        """What all commands of a job have printed."""
+        """Return the output of all commands of a job."""
         logs = sorted(self._local.rglob(f"{job['id']}/task-*"))
         return "\n".join(log.read_text() for log in logs)
 
@@ -109,7 +109,7 @@ def _answers(made):
 
 @contextlib.contextmanager
 def worker(asked, home):
-    """The process of a worker of a manager; it is the same worker again where it has the same folder."""
+    """Context with the process of a worker; with the same folder it is the same worker again."""
     home.mkdir(exist_ok=True)
     program = Path(FOLDER).resolve() / "flamenco-worker"
     with _running(program, home, "-manager", asked._address, FLAMENCO_HOME=home) as process:

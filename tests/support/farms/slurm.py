@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Slurm on this machine: a controller and nodes on loopback, of which a test may crash one."""
+"""Slurm on this machine: a controller and nodes on loopback; tests may crash a node."""
 
 import contextlib
 import getpass
@@ -41,7 +41,7 @@ PartitionName=farm Nodes=ALL Default=YES State=UP MaxTime=INFINITE
 
 @contextlib.contextmanager
 def cluster(folder):
-    """Two nodes; entered it gives {node: process of its daemon} and the variables that commands of Slurm need."""
+    """Context with two nodes: {node: process of its daemon} and the environment for Slurm's commands."""
     (folder / "munge").mkdir(mode=0o700)
     for name in ("state", *NODES):
         (folder / name).mkdir()
@@ -93,6 +93,6 @@ def _idle_count(variables):
 
 
 def _end_all(variables):
-    """End what is left: the daemons' own processes, which they do not take with them."""
+    """End the remaining child processes of the daemons."""
     for name, value in variables.items():
         farm.kill([*farm.processes_with(name, value)])

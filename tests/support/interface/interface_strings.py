@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every string of the add-on that an artist reads: of its registered classes, and of its sources."""
+"""All strings of the interface: of registered classes and of sources."""
 
 import ast
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from hair_addon import blender
 
 ADDON = Path(blender.__file__).resolve().parents[1]
 
-# Functions whose first argument, or progress's step, is read by an artist.
+# Functions whose first argument, or progress step, is shown to the user.
 _SHOWING = {
     "interface_text",
     "report_text",
@@ -28,14 +28,14 @@ _WITHOUT_LABEL = (bpy.types.PropertyGroup, bpy.types.AddonPreferences, bpy.types
 
 
 def strings_of_classes():
-    """{string: where it stands} of labels, tooltips and choices of all registered classes."""
+    """Return {string: location} of labels, tooltips and choices of all registered classes."""
     found = {}
     for cls in blender.CLASSES:
         where = cls.__name__
         if not issubclass(cls, _WITHOUT_LABEL):
             found[cls.bl_label] = found[cls.__doc__] = where
         for entry in properties_of(cls):
-            if entry.is_hidden or entry.name == entry.identifier:  # of the latter, no name was given
+            if entry.is_hidden or entry.name == entry.identifier:  # the latter has no explicit name
                 continue
             for shown in (entry, *(entry.enum_items if entry.type == "ENUM" else ())):
                 found[shown.name] = found[shown.description] = f"{where}.{entry.identifier}"
@@ -50,12 +50,12 @@ def properties_of(cls):
         category, name = cls.bl_idname.split(".")
         rna = getattr(getattr(bpy.ops, category), name).get_rna_type()
     own = getattr(cls, "__annotations__", {})
-    # A property of Blender's own base, such as the name of an item, comes before the one that replaces it.
+    # A property of Blender's own base, such as the name of an item, precedes the one that replaces it.
     return list({entry.identifier: entry for entry in rna.properties if entry.identifier in own}.values())
 
 
 def strings_of_sources():
-    """{string: where it stands} of literals that are reported, drawn as labels or raised."""
+    """Return {string: location} of literals that are reported, drawn as labels or raised."""
     found = {}
     for path in sorted((ADDON / "blender").rglob("*.py")) + sorted((ADDON / "core").rglob("*.py")):
         found |= {text: f"{path.relative_to(ADDON)}:{line}" for text, line in _read()[path].shown}
@@ -64,7 +64,7 @@ def strings_of_sources():
 
 
 def parts_of_errors():
-    """The fixed parts of all sentences of `HairError`, those with values in f-strings too."""
+    """Return the fixed parts of all messages of `HairError`, including those of f-strings."""
     return {text for read in _read().values() for text in read.errors}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A stand-in for Blender's UILayout that notes what was drawn and refuses what does not exist."""
+"""A mock of Blender's UILayout that records what was drawn and refuses names that do not exist."""
 
 from collections import Counter
 from types import SimpleNamespace
@@ -12,7 +12,7 @@ SIDEBAR_WIDTH = 260  # pixels of the N-panel as Blender opens it
 
 
 class Layout:
-    """Every property must exist on its owner, every operator, menu and panel be registered."""
+    """Records drawing calls; properties must exist on their owner, operators, menus and panels be registered."""
 
     def __init__(self, whole=None):
         self.drawn = Counter() if whole is None else whole.drawn
@@ -49,7 +49,7 @@ class Layout:
         self.texts.append(text)
 
     def template_list(self, list_type, list_id, owner, name, active_owner, active_name, rows):
-        """Every row that its filter shows."""
+        """Draw every row that the filter shows."""
         assert active_name in active_owner.bl_rna.properties
         self.drawn["template_list"] += 1
         drawing = SimpleNamespace(bitflag_filter_item=1)
@@ -107,7 +107,7 @@ class Layout:
 
 
 class Context:
-    """The present context, with a sidebar of Blender's own width."""
+    """The present context, with a sidebar of Blender's default width."""
 
     region = SimpleNamespace(width=SIDEBAR_WIDTH)
     preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
@@ -117,7 +117,7 @@ class Context:
 
 
 def draw(panel):
-    """The `Layout` that a panel or menu fills in the present context; None where it is not shown."""
+    """Return the `Layout` drawn by a panel or menu in the present context; None if it is not shown."""
     context = Context()
     if hasattr(panel, "poll") and not panel.poll(context):
         return None
@@ -133,17 +133,17 @@ def draw(panel):
 
 
 def draw_all(panels):
-    """Counter of all that some panels draw together."""
+    """Return the Counter of everything that panels draw."""
     layouts = [draw(panel) for panel in panels]
     return sum((layout.drawn for layout in layouts if layout is not None), Counter())
 
 
 def redo_panel(name, **values):
-    """The `Layout` of an operator's redo panel while its properties have some values, the others their defaults."""
+    """Return the `Layout` of an operator's redo panel for given property values; others have their defaults."""
     operator = getattr(bpy.types, f"VELLUS_OT_{name}")
     rna = getattr(bpy.ops.vellus, name).get_rna_type()
     values = {key: entry.default for key, entry in rna.properties.items() if hasattr(entry, "default")} | values
-    # An operator's own RNA has none of its settings: `properties` has them.
+    # An operator's own RNA lacks its settings, which are in `properties`.
     own = {"bl_rna": operator.bl_rna, "properties": SimpleNamespace(bl_rna=rna, **values), "layout": Layout()}
     bases = tuple(base for base in operator.__bases__ if base is not bpy.types.Operator)
     shown = type("Shown", bases, {**vars(operator), **own, **values})()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long operators in a window that is not there: the events that they get."""
+"""Modal operators without a window: simulated events."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ ESC = SimpleNamespace(type="ESC", value="PRESS")
 
 
 class Operator(LongOperator):
-    """Stands in for a registered operator, which only Blender can make."""
+    """Mock of a registered operator, which only Blender can create."""
 
     def __init__(self, work):
         self._given, self.reported = work, []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files changed as accidents, and people who want to know, change them."""
+"""Random changes of files, as by accidents or attackers."""
 
 import re
 
@@ -13,7 +13,7 @@ _NUMBERS = (0, 1, 2**15, 2**16 - 1, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**6
 
 
 def mutated(data, source, is_text=False):
-    """Bytes with one to eight changes; source: a `random.Random`; is_text: words are exchanged too."""
+    """Return bytes with one to eight changes; source: a `random.Random`; is_text: whether to swap words too."""
     data = bytearray(data)
     for _ in range(source.choice((1, 1, 1, 2, 3, 8))):
         if not data:

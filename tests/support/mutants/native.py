@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Damaged files for readers in native code, which may end their process: USD, OpenEXR, Blender's importers.
+"""Damaged files for readers in native code, which may crash: USD, OpenEXR, Blender's importers.
 
     python -m tests.support.mutants.native COUNT SEED [--only ending, or name of a reader] [--share K/N] [--seconds S]
 
-COUNT is that of each reader. Share K of N, from 0 on, is that of one of N processes, which together read all; its
-seconds are those of all its readers.
+COUNT is per reader. Share K of N, from 0 on, is the part of one of N processes that together read all mutants; its
+seconds are the total for all its readers.
 
-Each reader has a process of its own, and a new one after its end. The command line gives some readers a process of
-their own too (`command_line/import_mesh.py`), which may end, or come to no end; no other may.
+Each reader has its own process, restarted after a crash. The command line also runs some readers in separate processes
+(`command_line/import_mesh.py`); only these may crash or hang.
 """
 
 import math
@@ -24,8 +24,8 @@ from pathlib import Path
 from tests.support.mutants.shares import given, numbers
 
 ROOT = Path(__file__).resolve().parents[3]
-PATIENCE = 60.0  # [s] without a word of a process
-_MEMORY = 4 * 2**30  # [bytes] beside what the process has
+PATIENCE = 60.0  # [s] without output of a process
+_MEMORY = 4 * 2**30  # [bytes] in addition to the memory of the process
 
 CURVES, TABLES = "curves", "tables"
 MESHES = (".ply", ".usdc", ".usda", ".usdz", ".abc", ".obj", ".stl", ".glb", ".gltf")
@@ -33,7 +33,7 @@ NAMES = (CURVES, TABLES, *MESHES)
 
 
 def _samples(name, folder):
-    """Paths of whole files of a kind; the first is the one to be read."""
+    """Return paths of intact files of a kind; the first is the one to read."""
     import bpy
 
     if name == TABLES:
@@ -66,7 +66,7 @@ def _samples(name, folder):
 
 
 def _reader(name, path):
-    """(read, check of what it returns beside what the whole file gives)."""
+    """Return (read function, check of its result against that of the intact file)."""
     import bpy
 
     from hair_addon.blender.io import mesh_files, usd_curves
@@ -91,7 +91,7 @@ def _reader(name, path):
 
 
 def _child(name, first, last):
-    """Read mutants, telling of each on standard output: its number before, and how it was read after."""
+    """Read mutants and report on standard output: the number before each, and its result after it."""
     import resource
 
     out = os.fdopen(os.dup(1), "w")
@@ -130,7 +130,7 @@ def _child(name, first, last):
 
 
 def faults(name, count, seed, share=(0, 1), seconds=math.inf):
-    """(Counter of how mutants were read, [what went wrong]) of one reader."""
+    """Return (Counter of results, [faults]) of one reader's mutants."""
     end = time.monotonic() + seconds
     may_end = name == CURVES or (name in MESHES and _may_crash_blender(name))
     told, found = Counter(), []
@@ -168,7 +168,7 @@ class _Watched:
 
 
 def _watch(process, end):
-    """What a process says until its end, which is brought about where it says nothing for long, or time is over."""
+    """Yield the output of a process; kills it after a long silence or at the time limit."""
     seen, rest = _Watched(), b""
     with selectors.DefaultSelector() as selector:
         selector.register(process.stdout, selectors.EVENT_READ)
@@ -194,7 +194,7 @@ def _may_crash_blender(ending):
 
 
 def main(words=None):
-    """Print how mutants of each reader were read, and what went wrong."""
+    """Print the results and faults of each reader's mutants."""
     asked = given(words)
     names = [asked.only] if asked.only else NAMES
     wrong, end = 0, time.monotonic() + asked.seconds

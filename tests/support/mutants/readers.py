@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every reader of the add-on that computes in Python alone, with a file to damage and what must hold of what is read.
+"""All readers of the add-on in pure Python, each with a file to damage and a check of the values read.
 
-A reader takes a damaged file in a sentence, a `HairError`, or in values that could have been written: nothing else. A
-new reader is one more `Reader` here, or `tests/crossings/test_mutants.py` fails.
+For a damaged file, a reader must raise a `HairError` or return values that could have been written. Every new reader
+needs a `Reader` here, or `tests/crossings/test_mutants.py` fails.
 """
 
 import argparse
@@ -44,9 +44,9 @@ Check = Callable[[object, object], None]
 
 @dataclass(frozen=True)
 class Reader:
-    """A reader: data is what it reads whole; read(path) returns its value; check(found, whole) asserts what must hold.
+    """A reader: data: the intact file; read(path) returns its value; check(found, whole) asserts its validity.
 
-    module: of the add-on, where it reads; path: of the file in its folder, whose other files are there.
+    module: of the add-on; path: of the file in its folder, which contains other files that it needs.
     """
 
     module: str
@@ -59,12 +59,12 @@ class Reader:
 
 
 def is_equal(found, whole):
-    """Of files with a digest or a checksum: damage is seen."""
+    """Check for files with a digest or checksum: damage is detected."""
     assert _plain(found) == _plain(whole)
 
 
 def anything(_found, _whole):
-    """Of answers that are a choice of few."""
+    """Accept any value, for readers with few possible results."""
 
 
 def _plain(value):
@@ -124,7 +124,7 @@ def _alembic():
 
 
 def are_curves(found, _whole):
-    """Counts fit points, and whoever draws them is told of every number that is none."""
+    """Check that counts match points, and that non-finite numbers are reported for drawing."""
     for one in found.sets:
         assert one.points.shape == (one.counts.sum(), 3) and one.counts.min(initial=2) >= 1
         assert len(one.is_smooth) == len(one) and (one.radii is None or len(one.radii) == len(one.points))

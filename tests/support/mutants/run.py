@@ -3,8 +3,8 @@
 
     python -m tests.support.mutants.run COUNT SEED [--only NAME of a reader] [--share K/N] [--seconds S]
 
-A mutant of a seed is the same each time: what goes wrong is printed with the number that makes it again. Share K of N,
-from 0 on, is that of one of N processes, which together read all; one whose seconds are over says how many it read.
+A seed always gives the same mutants: faults are printed with the number that reproduces them. Share K of N, from 0 on,
+is the part of one of N processes that together read all; at its time limit a process prints how many it read.
 """
 
 import contextlib
@@ -23,16 +23,16 @@ from tests.support.mutants.readers import readers
 from tests.support.mutants.shares import given, numbers
 
 PATIENCE = 10.0  # [s] for a reader of a small file
-MEMORY = 4 * 2**30  # [bytes] beside what the process has
+MEMORY = 4 * 2**30  # [bytes] in addition to the memory of the process
 
 
 class Hangs(BaseException):
-    """A reader did not come to an end."""
+    """A reader hangs."""
 
 
 @contextlib.contextmanager
 def patience(seconds):
-    """Raise `Hangs` after a while, where the system has alarms."""
+    """Context that raises `Hangs` after some seconds, on systems with alarms."""
 
     def ring(_number, _frame):
         raise Hangs
@@ -47,7 +47,7 @@ def patience(seconds):
 
 
 class Bench:
-    """A reader's folder, in which its file is damaged again and again."""
+    """A reader's folder, in which its file is damaged repeatedly."""
 
     def __init__(self, name, reader, folder):
         self.name, self.reader, self.folder = name, reader, folder
@@ -60,7 +60,7 @@ class Bench:
         reader.check(self.whole, self.whole)
 
     def fault(self, number):
-        """What is wrong with how a mutant is read; "" where nothing is, and whether it was refused."""
+        """Read a mutant; returns (fault or "", whether it was refused)."""
         self.path.write_bytes(mutated(self.reader.data, random.Random(number), self.reader.is_text))
         try:
             with patience(PATIENCE):
@@ -78,7 +78,7 @@ class Bench:
 
 
 def faults(count, seed, only="", share=(0, 1), seconds=math.inf):
-    """(how many were read, {name: how many were refused}, [what went wrong]) of mutants, each reader's in turn."""
+    """Read mutants of all readers; returns (number read, {name: number refused}, [faults])."""
     refused, found, read = Counter(), [], 0
     end = time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as folder:
@@ -101,7 +101,7 @@ def faults(count, seed, only="", share=(0, 1), seconds=math.inf):
 
 
 def main(words=None):
-    """Print what goes wrong, each kind once, and how many mutants were refused."""
+    """Print each kind of fault once, and the number of refused mutants."""
     import resource
 
     own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()

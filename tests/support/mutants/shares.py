@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A campaign of mutants that several processes share."""
+"""Division of a campaign of mutants among processes."""
 
 import argparse
 import math
 
 
 def given(words=None):
-    """The words of a campaign's command line: count, seed, only, share, seconds."""
+    """Parse a campaign's command line: count, seed, only, share, seconds."""
     parser = argparse.ArgumentParser()
     parser.add_argument("count", type=int)
     parser.add_argument("seed", type=int)
@@ -24,7 +24,7 @@ def _share(text):
 
 
 def numbers(count, seed, share=(0, 1)):
-    """Numbers of the mutants of a share."""
+    """Return the numbers of the mutants of a share."""
     place, of = share
     first = seed * 10**9
     return range(first + count * place // of, first + count * (place + 1) // of)

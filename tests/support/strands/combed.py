@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides as a comb leaves them: polylines of many shapes, their roots on a surface or anywhere."""
+"""Combed guides: polylines of many shapes, with roots on a surface or anywhere."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def wavy(rng, count=30, point_count=17):
 
 
 def standing(mesh, count, rng, length=0.3, point_count=21, spread=0.4):
-    """(S, P, 3) float32 points, `SurfacePoints` and normals (S, 3): bent strands that grow out of a mesh."""
+    """Return bent strands that grow from a mesh: (S, P, 3) float32 points, `SurfacePoints` and normals (S, 3)."""
     roots = sampling.sample_surface(mesh, count, 3)
     up = normals(mesh, roots).astype(np.float64)
     side = np.cross(up, rng.normal(size=(count, 3)))
@@ -39,7 +39,7 @@ def lengths(points):
 
 
 def distance_to_polylines(places, points):
-    """(S, Q) float64: from places (S, Q, 3) to the nearest segments of polylines (S, P, 3), brute force."""
+    """Return (S, Q) float64 distances of positions (S, Q, 3) from polylines (S, P, 3), by brute force."""
     places, points = np.asarray(places, np.float64)[:, :, None], np.asarray(points, np.float64)[:, None]
     start, step = points[:, :, :-1], np.diff(points, axis=2)
     share = np.sum((places - start) * step, axis=3) / np.maximum(np.sum(step * step, axis=3), 1e-30)

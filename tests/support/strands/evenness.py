@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Relaxation of given sites, and how even sites are."""
+"""Relaxation of given sites, and measures of their evenness."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ from hair_addon.core.placement.domain import Domain
 from hair_addon.core.placement.exact_cells import CutCells
 from hair_addon.core.placement.voronoi import sites_on
 
-# Second moment of a regular hexagon about its centre by its area squared: no tessellation of the plane has less.
+# Second moment of a regular hexagon about its centre divided by its squared area: the minimum of plane tessellations.
 HEXAGON_MOMENT = 5.0 / (18.0 * np.sqrt(3.0))
 
 
 @dataclass(frozen=True)
 class Relaxation:
-    """sites: `SurfacePoints`; energies [m⁴]: before the first iteration and after each, until they rest."""
+    """sites: `SurfacePoints`; energies [m⁴]: before the first iteration and after each, until convergence."""
 
     sites: SurfacePoints
     energies: np.ndarray
@@ -25,10 +25,10 @@ class Relaxation:
 
 @dataclass(frozen=True)
 class Quality:
-    """How even a distribution is: 1 and 0 for an endless flat honeycomb.
+    """Evenness of a distribution: 1 and 0 for an infinite flat honeycomb.
 
-    relative_energy: E by that of n regular hexagons with equal shares of ∫ D dA, HEXAGON_MOMENT (∫ D dA)² / n;
-    share_variation: standard deviation by mean of the cells' shares of ∫ D dA.
+    relative_energy: E divided by that of n regular hexagons with equal shares of ∫ D dA, HEXAGON_MOMENT (∫ D dA)² / n;
+    share_variation: standard deviation divided by mean of the cells' shares of ∫ D dA.
     """
 
     relative_energy: float

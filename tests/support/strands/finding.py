@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guides that strands follow, and how much of each, in one step."""
+"""Guides and weights of strands in one call."""
 
 from hair_addon.core.interpolation import guide_weights
 

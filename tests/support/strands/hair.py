@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands between guides in one call, of arrays alone: no interface, no attributes."""
+"""Strands between guides in one call, from arrays: without interface and attributes."""
 
 from hair_addon.core.grooming import following, groom
 

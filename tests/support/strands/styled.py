@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands with styles, as arrays: on a head, and straight ones on a plane."""
+"""Strands with styles as arrays: on a head, on a ball, and straight ones on a plane."""
 
 from copy import copy
 from dataclasses import replace

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Any operator and any setting of the add-on with any value, as Blender's registered classes list them.
+"""All operators and settings of the add-on with random values, from Blender's registered classes.
 
-Whatever is registered later is in these lists by itself.
+New classes are included automatically.
 """
 
 import math
 
 import bpy
 
-# What takes minutes by default, or plays on for good.
+# Operators that take minutes by default, or play endlessly.
 LEFT_OUT = {"play_dynamics"}
 
-# Counts stay small enough to walk on.
+# Limits of counts, so that steps stay fast.
 _MOST = {
     "guide_count": 20,
     "strand_count": 60,
@@ -40,24 +40,24 @@ _MOST |= {
     "seconds": 0.1,
 }
 _MOST |= {"sample_count": 2, "neighbour_limit": 8, "thickness": 20.0}
-NEEDED = {*_MOST, "filepath", "directory", "folder"}  # what is always given: the default is too large, or elsewhere
+NEEDED = {*_MOST, "filepath", "directory", "folder"}  # always given: the defaults are too large, or outside the folder
 _LEAST = {"size": 0.1, "lock": 0.1, "strand_count": 1, "guide_count": 1}
 _ODD = (math.nan, math.inf, -math.inf, 1e30, -1.0, 0.0)
 
 
 def operators():
-    """Names of all operators that are called."""
+    """Return the names of all operators to call."""
     return sorted({*dir(bpy.ops.vellus)} - LEFT_OUT)
 
 
 def properties(name):
-    """Properties of an operator that people set."""
+    """Return the properties of an operator that users set."""
     declared = getattr(bpy.ops.vellus, name).get_rna_type().properties
     return [p for p in declared if p.identifier not in {"rna_type", "shown_sizes"} and p.type != "POINTER"]
 
 
 def groups(owner):
-    """All property groups of the add-on in a datablock, groups of groups and of lists too."""
+    """Return all property groups of the add-on in a datablock, including nested ones and items of lists."""
     found, pending = [], [owner.vellus] if hasattr(owner, "vellus") else []
     while pending:
         group = pending.pop()
@@ -77,14 +77,14 @@ def plain(group, declared):
 
 
 def settings(group):
-    """Properties of a group that people set."""
+    """Return the properties of a group that users set."""
     hidden = {"rna_type", "name", "kind"}
     declared = [p for p in group.bl_rna.properties if p.identifier not in hidden and not p.is_readonly]
     return [p for p in declared if p.type not in {"POINTER", "COLLECTION"} and not p.is_hidden]
 
 
 def value(declared, source, folder, odd=0.0):
-    """A value of a property; source: a `random.Random`; folder: of files; odd: how often a number is an odd one."""
+    """Return a random value of a property; source: a `random.Random`; folder: of files; odd: rate of odd numbers."""
     name = declared.identifier
     if declared.type == "STRING":
         return _text(name, source, folder)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The walk of `walk_operations.py` with all operators and settings, on surfaces that move, and more that must hold.
+"""The random walk of `walk_operations.py` with all operators and settings, on moving surfaces, with more invariants.
 
 python -m tests.support.walk.walk_everything RUNS OPERATIONS SEED
 """
@@ -37,9 +37,9 @@ _MORE_BLOCKS = 40  # datablocks that come with the first use of a function: mate
 
 
 class Everyone(Artist):
-    """An artist who uses all that there is."""
+    """An artist who uses all operators and settings."""
 
-    most_alive = None  # after the first run of the process: what Python held then
+    most_alive = None  # number of Python's objects after the first run of the process
 
     def law_of(self, name, values):
         return walk_lengths.law_of(name, values)
@@ -47,7 +47,7 @@ class Everyone(Artist):
     @step(is_grid=st.booleans())
     @needs_room
     def add_surface(self, is_grid):
-        """One that hair grows on: `Artist` has others, on which nothing happens for most of a walk."""
+        """Add a surface on which hair can grow; `Artist` also adds unusable ones, on which most steps do nothing."""
         if bpy.context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         if is_grid:
@@ -58,7 +58,7 @@ class Everyone(Artist):
 
     @step(number=pick, amount=st.sampled_from([0.0, 0.1, 5.0]))
     def comb(self, number, amount):
-        """Roots stay, as with brushes."""
+        """Comb guides without moving roots, as brushes do."""
         seen = sorted({o.data.name for o in bpy.context.view_layer.objects if o.type == "CURVES"})
         if seen:
             curves = bpy.data.hair_curves[chosen(seen, number)]
@@ -85,7 +85,7 @@ class Everyone(Artist):
     @step(number=pick, place=pick, seed=seeds)
     @needs_room
     def any_operator(self, number, place, seed):
-        """Any operator of the add-on, with any of its settings, on any object with another one selected."""
+        """Call any operator of the add-on with any settings, on any object with another one selected."""
         source, names = random.Random(seed), any_values.operators()
         name = chosen(names, number)
         there = objects("MESH") + objects("CURVES")
@@ -101,13 +101,13 @@ class Everyone(Artist):
         print(" ", name, wanted, flush=True)
         try:
             operate(getattr(bpy.ops.vellus, name), **wanted)
-        except TypeError as error:  # a choice that is offered for other hair: Blender refuses the call
+        except TypeError as error:  # a choice that exists only for other hair: Blender refuses the call
             assert "enum" in str(error), error
         bpy.context.view_layer.update()
 
     @step(number=pick, seed=seeds, is_odd=st.booleans())
     def any_setting(self, number, seed, is_odd):
-        """Any property that the add-on stores in any datablock."""
+        """Set any property of the add-on in any datablock."""
         source = random.Random(seed)
         owners = [*sorted(ours(), key=lambda c: c.name), *bpy.data.objects, *bpy.data.scenes]
         owner = chosen(owners, number)
@@ -141,7 +141,7 @@ class Everyone(Artist):
 
     @step(steps=st.integers(1, 3))
     def undo_and_redo(self, steps):
-        """As before."""
+        """Check that undo and redo restore the state."""
         before = state()
         bpy.ops.ed.undo_push(message="here")
         for _ in range(steps):
@@ -157,20 +157,20 @@ class Everyone(Artist):
 
     @step()
     def save_and_load_all(self):
-        """As before, but for what nobody uses."""
+        """Check that saving and loading keep the state, except unused datablocks."""
         before = state()
         self._save_and_load()
         is_as(before)
 
     @invariant()
     def more_is_well(self):
-        """Roots are on their surface, strands have lengths, and the file does not fill up."""
+        """Check that roots are on their surface, strands have lengths, and the file does not grow."""
         roots_are_on_surfaces()
         assert len(bpy.data.all_ids) < 20 * (len(bpy.data.objects) + 4) + _MORE_BLOCKS
         assert running.job() is None
 
 
-# All steps are taken as often as each other, but for these.
+# All steps are equally frequent, except these.
 for _number in range(2, 17):
     setattr(Everyone, f"any_operator_{_number}", Everyone.any_operator)
 for _number in range(2, 9):
@@ -180,9 +180,9 @@ for _number in range(2, 4):
 
 
 def state():
-    """{name: what hair is} of all that somebody uses, once each has had an update.
+    """Return {name: state of hair} of all used datablocks, after an update of each.
 
-    What a script removes, as guides of hair, is not told to what uses it; undo and loading update everything.
+    Blender does not report data removed by scripts, such as guides of hair; undo and loading update everything.
     """
     for one in ours():
         one.update_tag()
@@ -198,7 +198,7 @@ def _state_of(datablock):
         for declared in any_values.settings(group):
             values[f"{group.path_from_id()}.{declared.identifier}"] = any_values.plain(group, declared)
     counts = np.diff(curve_data.curve_offsets(datablock))
-    # Where a script removes the guides of hair, its status says so once the file is loaded, or something undone.
+    # If a script removes the guides of hair, its status reports this after loading or undo.
     is_said = datablock.vellus.kind != "HAIR" or datablock.vellus.guide_curves is not None
     return points, counts, roots, values, is_said and bool(datablock.vellus.status)
 
@@ -211,7 +211,7 @@ def _values(attribute):
 
 
 def is_as(before):
-    """Assert that `state` is what it was, name by name, so that a failure says what is other."""
+    """Assert that `state` has not changed, name by name, so that a failure shows the difference."""
     after = state()
     assert after.keys() == before.keys()
     for name, (points, counts, roots, values, status) in before.items():
@@ -224,7 +224,7 @@ def is_as(before):
 
 
 def roots_are_on_surfaces():
-    """Of hair that is drawn, live and without a complaint."""
+    """Check the roots of hair that is drawn, live and without errors."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for one in (o for o in bpy.context.view_layer.objects if o.type == "CURVES" and rooted.should_be_rooted(o)):
         try:
@@ -237,7 +237,7 @@ def roots_are_on_surfaces():
 
 
 def things_alive():
-    """How many of our objects and of Warp's arrays Python holds."""
+    """Return the number of our objects and of Warp's arrays in Python's memory."""
     gc.collect()
     kinds = [type(each) for each in gc.get_objects()]
     of_ours = [k for k in kinds if k is wp.array or str(getattr(k, "__module__", "")).startswith("hair_addon")]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handlers of another add-on that delete what Blender reports, before ours and after: a program, as it may crash."""
+"""Handlers of another add-on that delete reported objects, before or after our handlers: a program, as it may crash."""
 
 import itertools
 
@@ -24,7 +24,7 @@ EVENTS = ("depsgraph_update_post", "frame_change_post")
 
 
 def walk(event, names, is_before):
-    """One deletion, in a scene with two systems, of which the other goes on."""
+    """Delete one of two hair systems in a scene, and check that the other one still works."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     systems = []
     for place in (0.0, 3.0):
@@ -67,7 +67,7 @@ def walk(event, names, is_before):
 
 
 def main():
-    """All deletions at both events."""
+    """Run all deletions at both events."""
     use_compiled_kernels()
     hair_addon.register()
     for event, (names, is_before) in itertools.product(EVENTS, DELETED):

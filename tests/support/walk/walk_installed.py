@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an artist does with the installed extension; run by a Python that has nothing but the bpy wheel.
+"""Use of the installed extension as an artist does, in a Python with only the bpy wheel.
 
     python -I walk_installed.py install|operators|scripts|twice ZIP FOLDER
 
-Prints one line of JSON at the end; test_install.py says what must stand in it.
+Prints one line of JSON at the end, which test_install.py checks.
 """
 
 import doctest
@@ -43,7 +43,7 @@ def install(zip_path, _folder):
 
 
 def operators(_zip_path, folder):
-    """Mesh to pixels by every operator."""
+    """Call operators for everything from mesh to pixels."""
     gpu.init()
     bpy.ops.preferences.addon_enable(module=MODULE)
     bpy.data.objects.remove(bpy.data.objects["Cube"])
@@ -59,7 +59,7 @@ def operators(_zip_path, folder):
     ]
     picture = bpy.data.images.load(str(folder / "picture.png"))
     pixels = np.array(picture.pixels[:]).reshape(-1, 4)
-    import OpenEXR  # both are there only once Blender has unpacked the extension's wheels
+    import OpenEXR  # both exist only after Blender has unpacked the extension's wheels
     import warp
 
     return {
@@ -92,7 +92,7 @@ def _positions(curves):
 
 
 def scripts(_zip_path, folder):
-    """The code of docs/scripts.md and of the docstrings, with the import that is given there for the extension."""
+    """Run the code of docs/scripts.md and of docstrings, with the import documented for the extension."""
     bpy.ops.preferences.addon_enable(module=MODULE)
     api = importlib.import_module(f"{MODULE}.hair_addon.api")
     import warp  # there since the extension was enabled
@@ -132,7 +132,7 @@ def _examples(api):
 
 
 def twice(_zip_path, _folder):
-    """What Blender holds before the add-on is ever enabled, and enabled and disabled, twice each."""
+    """Compare Blender's state before the add-on is first enabled, and after enabling and disabling it twice."""
     draw_handlers = _count_draw_handlers()
     states = [_state(draw_handlers)]
     for _ in range(2):
@@ -144,7 +144,7 @@ def twice(_zip_path, _folder):
 
 
 def _state(draw_handlers):
-    """Everything that an add-on can add to, by name."""
+    """Return everything that an add-on can extend, by name."""
     types = {name: dir(getattr(bpy.types, name)) for name in dir(bpy.types)}
     handlers = {
         name: value for name in dir(bpy.app.handlers) if isinstance(value := getattr(bpy.app.handlers, name), list)

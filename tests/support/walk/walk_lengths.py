@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The law of lengths: what does not change lengths leaves each guide and strand as long as it is drawn."""
+"""The law of lengths: steps that should keep lengths keep the drawn length of each guide and strand."""
 
 import contextlib
 
@@ -10,19 +10,19 @@ from hair_addon.blender.render import hair_cache
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import strands
 
-# Steps that change nothing of hair, or carry it: strands stand rigidly, in local coordinates, on a surface that bends.
+# Steps that do not change hair, or deform it: strands move rigidly, in local coordinates, with a bending surface.
 _KEEPING = {
     *("apply_preset", "deform_surface", "duplicate", "look", "other_scene", "remove_material", "rename"),
     *("sculpt", "use_button"),
 }
-# Tools that keep the lengths of guides in the world; those of the hair between them change with their shapes.
+# Tools that keep the lengths of guides in the world; lengths of the hair between them change with the guides' shapes.
 _KEEPING_TOOLS = {"smooth_guides", "lift_guides", "attract_guides"}
 
-_ROUNDING = 2e-4  # of how far from the origin hair is: its points have seven digits, and its segments add up
+_ROUNDING = 2e-4  # fraction of the distance from the origin: points have seven digits, and errors of segments add up
 
 
 def law_of(name, values):
-    """The context in which a step of the walk is taken."""
+    """Return the context for a step of the walk."""
     if name in _KEEPING:
         return are_kept(("GUIDES", "HAIR"))
     is_keeping = values.get("tool") in _KEEPING_TOOLS
@@ -31,7 +31,7 @@ def law_of(name, values):
 
 @contextlib.contextmanager
 def are_kept(kinds, is_in_world=False):
-    """Assert that what is drawn before and after, up to date and without a complaint, is as long as it was."""
+    """Assert that drawn hair that is up to date and without errors, before and after, keeps its lengths."""
     before = _drawn(kinds, is_in_world)
     yield
     bpy.context.view_layer.update()
@@ -44,7 +44,7 @@ def are_kept(kinds, is_in_world=False):
 
 
 def _drawn(kinds, is_in_world):
-    """{object's name: ((S,) lengths, how far from the origin the furthest point is)}."""
+    """Return {object's name: ((S,) lengths, largest distance of a point from the origin)}."""
     found = {}
     for one in bpy.context.view_layer.objects:
         if one.type != "CURVES" or one.data.vellus.kind not in kinds or not len(one.data.curves):

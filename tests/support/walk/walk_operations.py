@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An artist who does anything at any time: random operations on hair, and what must hold after each of them.
+"""Random walk: random operations on hair, with invariants checked after each.
 
     python -m tests.support.walk.walk_operations RUNS OPERATIONS SEED
 
-Runs in a process of its own, so that a crash of Blender is a failure and not the end of the tests. The same arguments
-walk the same ways; a run that fails prints how to walk it again.
+It runs in a separate process, so that a crash of Blender is a failure and not the end of the tests. The same arguments
+give the same walk; a failed run prints the command that repeats it.
 """
 
 import contextlib
@@ -55,7 +55,7 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
         self.folder.cleanup()
 
     def law_of(self, name, values):
-        """What must hold of a step, beside the invariants, as a context in which it is taken."""
+        """Return the context for a step, which may check more than the invariants."""
         return contextlib.nullcontext()
 
     # ------------------------------------------------------------------------------------------------- making
@@ -320,7 +320,7 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
 
     @step(meanwhile=st.sampled_from(["nothing", "undo", "load", "delete"]), number=pick)
     def switch_addon(self, meanwhile, number):
-        """Off and on again; what happens meanwhile is not ours to see."""
+        """Disable and enable the add-on, with a change in between."""
         hair_addon.unregister()
         handlers_are_registered(is_on=False)
         if meanwhile == "undo" and bpy.ops.ed.undo.poll():
@@ -349,7 +349,7 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
 
     @step()
     def look(self):
-        """Draw all that is visible as a picture does."""
+        """Draw everything visible, as for a picture."""
         context = bpy.context
         if context.scene.camera is None:
             camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -361,7 +361,7 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
         try:
             pixels = offscreen.draw_picture(small)
         except HairError:
-            return  # it says what cannot be drawn
+            return  # the error is expected
         assert np.isfinite(pixels).all()
 
     @invariant()
@@ -370,13 +370,13 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
 
 
 def walk(run_count, operation_count, number, artist=Artist):
-    """Raises what goes wrong first."""
+    """Run walks; raises the first failure."""
     limits = settings(
         max_examples=run_count,
         stateful_step_count=operation_count,
         database=None,
         deadline=None,
-        phases=[Phase.generate],  # a shorter way to the same failure would take minutes to find
+        phases=[Phase.generate],  # shrinking a failure would take minutes
         suppress_health_check=list(HealthCheck),
     )
     seed(number)(get_state_machine_test(artist, settings=limits))()

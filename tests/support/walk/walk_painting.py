@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Steps of a random walk with a brush: masks that are painted while hair follows, selections, images, flow lines."""
+"""Painting steps of the random walk: masks that hair follows, selections, images, flow lines."""
 
 import bpy
 import numpy as np
@@ -50,7 +50,7 @@ class PaintingSteps:
     def paint_image(self, number, of, brightness):
         image = bpy.data.images.get("Painted") or bpy.data.images.new("Painted", 4, 4)
         image.pixels.foreach_set(np.full(64, brightness, np.float32))
-        image.pack()  # else Blender brings it back black, where its first step is undone and redone
+        image.pack()  # else Blender restores it black after undo and redo of its first step
         image.update_tag()
         if ours():
             state = chosen(sorted(ours(), key=lambda c: c.name), number).vellus

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Steps of a random walk: how each is said before it is taken, and what it is given."""
+"""Decorators for steps of the random walk: each step is printed before it runs."""
 
 import functools
 import math
@@ -15,9 +15,9 @@ odd_numbers = st.sampled_from([math.nan, math.inf, -math.inf, 0.0, -1.0, 1e30, 0
 
 
 def step(**arguments):
-    """A `rule` that is said before it is taken: after a crash the last lines tell the way.
+    """Return a `rule` that prints its step before running it: after a crash the last lines show the walk.
 
-    It is taken within the `law_of` the artist, a context that may compare before and after.
+    It runs within the artist's `law_of`, a context that may compare the states before and after.
     """
 
     def said(function):
@@ -35,7 +35,7 @@ def step(**arguments):
 
 
 def needs_room(function):
-    """A step left out once there are many objects. No precondition: what is drawn must not follow from Blender."""
+    """Skip a step if there are many objects; not a precondition, as random draws must not depend on Blender."""
 
     @functools.wraps(function)
     def in_room(self, **values):

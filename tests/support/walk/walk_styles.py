@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Steps of a random walk with styles: their operators, settings, keys, and frames."""
+"""Style steps of the random walk: operators, settings, keyframes and frames."""
 
 import bpy
 from hypothesis import strategies as st

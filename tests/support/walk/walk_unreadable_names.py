@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A file whose names are not UTF-8 is used by test_unreadable_names.py in a process of its own.
+"""Use of a file whose names are not UTF-8, for test_unreadable_names.py, in a separate process.
 
-Blender ends where such a datablock is printed, as a failed assertion of pytest's does.
+Blender crashes when such a datablock is printed, as by a failed assertion of pytest.
 """
 
 import sys
@@ -22,7 +22,7 @@ SMALL = {"width": 16, "height": 12}
 
 
 def refused(call):
-    """The sentence of what is refused."""
+    """Return the message of a refused call."""
     try:
         call()
     except api.HairError as error:
@@ -31,7 +31,7 @@ def refused(call):
 
 
 def make(path):
-    """Save the file: mesh, groups, objects, guides and hair have names with bytes that no text has."""
+    """Save the file: mesh, groups, objects, guides and hair have names with bytes that are not UTF-8."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
     sphere = bpy.context.object
@@ -50,13 +50,13 @@ def make(path):
 
 
 def damage(path):
-    """Save the open file, and write bytes that no text has into its names."""
+    """Save the open file, and write bytes that are not UTF-8 to its names."""
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
     path.write_bytes(path.read_bytes().replace(b"QQQQ", b"\xff\xfe\xff\xfe"))
 
 
 def make_styled(path):
-    """Save a file with two hairs: what the styles of both name is unreadable, and what settings of the first name."""
+    """Save a file with two hair objects: names in the styles of both, and in settings of the first, are unreadable."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
     sphere = bpy.context.object
@@ -92,7 +92,7 @@ def make_styled(path):
 
 
 def style(hair):
-    """Give hair styles that name an object, a vertex group and an image."""
+    """Add styles that refer to an object, a vertex group and an image."""
     styles = [
         api.Trim(factor=0.8, cutter="QQQQcutter", mask="QQQQtop"),
         api.Lean(direction="OBJECT", target="QQQQcutter", mask_image="QQQQimage"),
@@ -113,7 +113,7 @@ def drawn_line():
 
 
 def use_styled(path):
-    """Whatever Blender reports, handlers and panels go on."""
+    """Check that handlers and panels work, whatever Blender reports."""
     bpy.ops.wm.open_mainfile(filepath=str(path))
     sphere, view_layer = bpy.data.hair_curves[0].surface, bpy.context.view_layer
     cutter, lines = (next(o for o in bpy.data.objects if o.type == kind) for kind in ("EMPTY", "CURVE"))
@@ -163,7 +163,7 @@ def see(active):
 
 
 def use(folder):
-    """Everything works but what needs the names, and that is said."""
+    """Check that everything works except functions that need the names, which raise `HairError`."""
     bpy.ops.wm.open_mainfile(filepath=str(folder / "damaged.blend"))
     hair, guides = (next(c for c in bpy.data.hair_curves if c.vellus.kind == kind) for kind in ("HAIR", "GUIDES"))
     assert np.isfinite(api.draw(samples_per_side=1, **SMALL)).all()
