@@ -7,9 +7,14 @@ Its types and functions are those of the Metal Shading Language, its functions a
 import re
 from pathlib import Path
 
+from hair_addon.core.kernels import glsl_text
+from hair_addon.core.shading.light_paths import gather, seen_rays, start_places
+
 SHADERS = Path(__file__).resolve().parents[1] / "shaders"
 SOURCES = sorted([*SHADERS.rglob("*.*"), *(SHADERS.parent / "hair_addon" / "core").rglob("*.strand")])
 GLSL = [path for path in SOURCES if path.suffix != ".md"]
+KERNELS = gather._gather, gather._even, start_places._count, start_places._see, seen_rays._find, seen_rays._place
+TRANSLATED = {kernel.key: glsl_text.kernel_text(kernel).source for kernel in KERNELS}
 
 # Keywords of C++ and of the language that GLSL lets be names, and what Blender's backend defines as macros.
 _CPP = """
@@ -43,12 +48,13 @@ def code(path):
     return re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))
 
 
-STRUCTS = {name for path in GLSL for name in _STRUCT.findall(code(path))}
+CODE = {path.name: code(path) for path in GLSL} | TRANSLATED
+STRUCTS = {name for text in CODE.values() for name in _STRUCT.findall(text)}
 
 
 def where(found):
-    """{file: what was found in its code} where that is anything."""
-    every = {path.name: found(code(path)) for path in GLSL}
+    """{file, or Warp's kernel: what was found in its code} where that is anything."""
+    every = {name: found(text) for name, text in CODE.items()}
     return {name: bad for name, bad in every.items() if bad}
 
 
@@ -72,6 +78,6 @@ def test_structs_and_arrays_are_filled_by_their_members():
 
 
 def test_the_laws_see_declarations():
-    assert len(GLSL) > 80 and {"Segment", "FibreLobes"} <= STRUCTS
-    names = {name for path in GLSL for name in _DECLARED.findall(code(path))}
-    assert {"strand_texel", "half_width", "along", "row"} <= names
+    assert len(GLSL) > 80 and {"Segment", "FibreLobes", "Surface"} <= STRUCTS
+    names = {name for text in CODE.values() for name in _DECLARED.findall(text)}
+    assert {"strand_texel", "half_width", "along", "row", "trace_cell", "half_"} <= names

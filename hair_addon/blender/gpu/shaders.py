@@ -74,7 +74,7 @@ def are_compiled(makers):
 
 
 COLOR = (("color", "VEC4"),)  # default (output, type) of fragment shaders
-error_cache = Cache()  # files of a program → their compile error
+error_cache = Cache()  # files of a program, and texts that are generated for it → their compile error
 
 
 def compile_drawing(info, vertex, fragment, targets=COLOR, replaced=None):
@@ -95,12 +95,12 @@ def compile_compute(info, file, replaced=None, texts=None):
     """The compute program of a file; replaced, texts: as for `expand`. Raises `HairError`."""
     text, lines = expand(file, replaced, texts)
     info.compute_source(text)
-    return _create(info, (file,), [], lines)
+    return _create(info, (file,), [], lines, tuple((texts or {}).values()))
 
 
-def _create(info, files, vertex_lines, lines):
+def _create(info, files, vertex_lines, lines, texts=()):
     """Create a program. Raises `HairError` from the driver's log; a failed program is not compiled again."""
-    known = error_cache.get(files)
+    known = error_cache.get((files, texts))
     if known is not None:
         raise HairError(known)
     try:
@@ -108,7 +108,7 @@ def _create(info, files, vertex_lines, lines):
     except Exception as error:
         where = complaint(_console_of(gpu.shader.create_from_info, info), vertex_lines, lines) or str(error)
         sentence = f"The shader {files[-1]} does not compile on this graphics driver: {where}"
-        raise HairError(error_cache.keep(files, sentence)) from error
+        raise HairError(error_cache.keep((files, texts), sentence)) from error
 
 
 def _console_of(failing, *arguments):

@@ -17,6 +17,7 @@ _TYPES = {
     "int": ("<i4", (), 4),
     "float": ("<f4", (), 4),
     "vec3": ("<f4", (3,), 16),
+    "ivec3": ("<i4", (3,), 16),
     "vec4": ("<f4", (4,), 16),
     "mat4": ("<f4", (4, 4), 16),
 }
@@ -32,7 +33,7 @@ class Block:
         """members: {name: GLSL type}, or {name: (Block, count)} and {name: ("vec4", count)} for arrays."""
         fields, lines, end = [], [], 0
         # A float after a vec3 is in the vec3's fourth word in std140, but after it in the Metal Shading Language.
-        for name, kind in sorted(members.items(), key=lambda member: member[1] == "vec3"):
+        for name, kind in sorted(members.items(), key=lambda member: member[1] in ("vec3", "ivec3")):
             if isinstance(kind, tuple):
                 element, count = kind
                 is_block = isinstance(element, Block)

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         strands,
         surface_deform,
         transform,
+        triangle_tree,
         uv_maps,
         vertex_turns,
     )

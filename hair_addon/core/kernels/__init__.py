@@ -10,6 +10,7 @@ if TYPE_CHECKING:
         checks,
         compiled_kernels,
         foreign_memory,
+        glsl_text,
         kernel_cache,
         kernel_entries,
         kernel_setup,
