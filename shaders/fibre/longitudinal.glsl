@@ -2,37 +2,15 @@
 // Longitudinal scattering of a rough fibre: [DEon11] with the roughness of [Chiang16].
 
 #include "fibre/fibre.glsl"
-#include "surfaces/principled.glsl"
+#include "fibre/scattering_kernel.glsl"
 
-// exp(-x) I0(x) for x >= 0 [Abramowitz64, 9.8.1-2].
-float i0e(float x)
+// M of a path, by sines and cosines of both inclinations; widening: added to the variance.
+float m_lobe(int path, vec4 inclinations, float tilt, float tilt_trt, float roughness, float coat, float widening)
 {
-  float t = x / 3.75;
-  if (t <= 1.0) {
-    float s = t * t;
-    float series = 0.2659732 + s * (0.0360768 + s * 0.0045813);
-    return exp(-x) * (1.0 + s * (3.5156229 + s * (3.0899424 + s * (1.2067492 + s * series))));
-  }
-  float r = 1.0 / t;
-  float series = 0.00916281 + r * (-0.02057706 + r * (0.02635537 + r * (-0.01647633 + r * 0.00392377)));
-  return (0.39894228 + r * (0.01328592 + r * (0.00225319 + r * (-0.00157565 + r * series)))) / sqrt(x);
-}
-
-// M_v; v: variance in theta_i + theta_o.
-float d_eon_lobe(float sin_i, float cos_i, float sin_o, float cos_o, float v)
-{
-  float along = sin_i + sin_o;
-  float across = cos_i - cos_o;
-  float beside_cone = -0.5 * (along * along + across * across);
-  return i0e(cos_i * cos_o / v) * exp(beside_cone / v) / (v * (1.0 - exp(-2.0 / v)));
-}
-
-// One lobe of m_lobes(): the view's inclination shifted back by the lobe's tilt.
-float shifted_lobe(float sin_i, float cos_i, float sin_o, float cos_o, float shift, float v)
-{
-  float sin_turned = sin_o * cos(shift) - cos_o * sin(shift);
-  float cos_turned = abs(cos_o * cos(shift) + sin_o * sin(shift));
-  return d_eon_lobe(sin_i, cos_i, sin_turned, cos_turned, v);
+  float shift, variance;
+  lobe_of(path, tilt, tilt_trt, roughness, coat, shift, variance);
+  variance += widening;
+  return shifted_lobe(inclinations.x, inclinations.y, inclinations.z, inclinations.w, shift, variance);
 }
 
 // M_R, M_TT, M_TRT and M of the residual; tilt_trt: shift of TRT per tilt, in theta_i + theta_o; widening: added
@@ -45,12 +23,9 @@ vec4 m_lobes(float sin_theta_i,
              float coat,
              float widening)
 {
-  float cos_i = sin_from_cos(sin_theta_i);
-  float cos_o = sin_from_cos(sin_theta_o);
-  float v = variance_from_roughness(roughness);
-  float v_r = variance_from_roughness((1.0 - coat) * roughness);
-  return vec4(shifted_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, -2.0 * tilt, v_r + widening),
-              shifted_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, tilt, max(0.25 * v, 1e-4) + widening),
-              shifted_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, tilt_trt * tilt, 4.0 * v + widening),
-              d_eon_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, 4.0 * v + widening));
+  vec4 inclinations = vec4(sin_theta_i, sin_from_cos(sin_theta_i), sin_theta_o, sin_from_cos(sin_theta_o));
+  return vec4(m_lobe(0, inclinations, tilt, tilt_trt, roughness, coat, widening),
+              m_lobe(1, inclinations, tilt, tilt_trt, roughness, coat, widening),
+              m_lobe(2, inclinations, tilt, tilt_trt, roughness, coat, widening),
+              m_lobe(3, inclinations, tilt, tilt_trt, roughness, coat, widening));
 }

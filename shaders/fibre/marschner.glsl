@@ -37,8 +37,8 @@ float beta_r_of(float roughness)
 vec3 gaussian_lobes(float theta_h, float tilt, float tilt_trt, float beta_r, float blur)
 {
   vec3 beta = sqrt(beta_r * beta_r * vec3(1.0, 0.25, 4.0) + vec3(0.25 * blur));
-  vec3 x = (vec3(theta_h) - tilt * vec3(-1.0, 0.5, tilt_trt)) / beta;
-  return 0.5 * exp(-0.5 * x * x) / (beta * sqrt(2.0 * PI));
+  vec3 x = vec3(theta_h) - tilt * vec3(-1.0, 0.5, tilt_trt);
+  return 0.5 * vec3(gaussian(x.r, beta.r), gaussian(x.g, beta.g), gaussian(x.b, beta.b));
 }
 
 // S = sum over p of M_p N_p / cos²(theta_d), from texels m = (M_R, M_TT, M_TRT), n = (N_TT rgb, N_R), n_trt.

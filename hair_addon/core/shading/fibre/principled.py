@@ -6,7 +6,7 @@ import numpy as np
 from .angles import Values
 
 # Standard deviation of the R lobe in theta_i + theta_o = a b + c b² + d b^20 for the roughness b.
-_LINEAR, _QUADRATIC, _STEEP = 0.726, 0.812, 3.7
+LINEAR, QUADRATIC, STEEP = 0.726, 0.812, 3.7
 
 # A narrower lobe (0.6 degrees) is about as narrow as the sun's disk, and beyond single precision.
 LEAST_VARIANCE = 1e-4
@@ -16,7 +16,7 @@ LEAST_SCALE = 0.006
 
 def deviation_from_roughness(roughness: Values) -> Values:
     """Longitudinal roughness in [0, 1] → standard deviation [rad] of the R lobe in theta_i + theta_o."""
-    return _LINEAR * roughness + _QUADRATIC * np.square(roughness) + _STEEP * np.power(roughness, 20.0)
+    return LINEAR * roughness + QUADRATIC * np.square(roughness) + STEEP * np.power(roughness, 20.0)
 
 
 def variance_from_roughness(roughness: Values) -> np.ndarray:

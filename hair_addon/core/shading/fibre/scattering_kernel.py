@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scattering by one fibre as Warp functions in any precision: tables are baked in double precision, paths take floats.
 
-The reference is NumPy: `longitudinal`, `fresnel` and `paths`. Here a ray is named by h, its offset from the axis in
+Shaders that evaluate lobes include the same text, in single precision (`core/kernels/glsl_text.py`). The reference is
+NumPy: `principled`, `longitudinal`, `fresnel` and `paths`. Here a ray is named by h, its offset from the axis in
 radii, and by sine and cosine of the fibre's inclination to it, theta_o. With theta_d in place of theta_o the equations
 are those of the classic mode: Bravais' indices follow from both alike.
 """
@@ -13,13 +14,48 @@ import warp as wp
 
 from .longitudinal import BESSEL_FAR, BESSEL_NEAR
 from .paths import RESIDUAL, TRT, TT, R
-from .principled import LEAST_VARIANCE
+from .principled import LEAST_VARIANCE, LINEAR, QUADRATIC, STEEP
 
 _NEAR = wp.constant(wp.types.vector(7, wp.float64)(*BESSEL_NEAR))
 _FAR = wp.constant(wp.types.vector(9, wp.float64)(*BESSEL_FAR))
 _PI = wp.constant(wp.float64(np.pi))
+_ROOT_OF_TWO_PI = wp.constant(wp.float64(np.sqrt(2.0 * np.pi)))
+_LINEAR, _QUADRATIC, _STEEP = (wp.constant(factor) for factor in (LINEAR, QUADRATIC, STEEP))
 _LEAST_VARIANCE = wp.constant(LEAST_VARIANCE)
 _R, _TT, _TRT, _RESIDUAL = (wp.constant(path) for path in (R, TT, TRT, RESIDUAL))
+
+
+@wp.func
+def deviation_from_roughness(roughness: Any):
+    """Return `principled.deviation_from_roughness`."""
+    wide = type(roughness)(_LINEAR) + type(roughness)(_QUADRATIC) * roughness
+    return roughness * wide + type(roughness)(_STEEP) * wp.pow(roughness, type(roughness)(20.0))
+
+
+@wp.func
+def variance_from_roughness(roughness: Any):
+    """Return `principled.variance_from_roughness`."""
+    deviation = deviation_from_roughness(roughness)
+    return wp.max(deviation * deviation, type(roughness)(_LEAST_VARIANCE))
+
+
+@wp.func
+def lobe_of(path: int, tilt: Any, tilt_trt: Any, roughness: Any, coat: Any):
+    """Return (shift, variance) of a lobe: `energy_conserving.lobes`; tilt_trt: shift of TRT per tilt."""
+    v = variance_from_roughness(roughness)
+    if path == _R:
+        return type(tilt)(-2.0) * tilt, variance_from_roughness((type(coat)(1.0) - coat) * roughness)
+    if path == _TT:
+        return tilt, wp.max(type(v)(0.25) * v, type(v)(_LEAST_VARIANCE))
+    if path == _TRT:
+        return tilt_trt * tilt, type(v)(4.0) * v
+    return type(tilt)(0.0), type(v)(4.0) * v
+
+
+@wp.func
+def gaussian(x: Any, sigma: Any):
+    """Return `marschner.gaussian`."""
+    return wp.exp(type(x)(-0.5) * x * x / (sigma * sigma)) / (sigma * type(x)(_ROOT_OF_TWO_PI))
 
 
 @wp.func

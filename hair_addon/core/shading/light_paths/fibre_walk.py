@@ -6,7 +6,13 @@ sampling, for one offset h of the ray in the fibre's width. The mean over h is t
 import warp as wp
 
 from ..fibre.scattering_kernel import attenuation as attenuation_of
-from ..fibre.scattering_kernel import crossing_length, exit_angle, reflectance, shifted_lobe
+from ..fibre.scattering_kernel import (
+    crossing_length,
+    exit_angle,
+    lobe_of,
+    reflectance,
+    shifted_lobe,
+)
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -30,13 +36,6 @@ class Fibre:
 
 
 @wp.func
-def variance_of(roughness: float):
-    """`principled.variance_from_roughness`."""
-    deviation = roughness * (0.726 + 0.812 * roughness) + 3.7 * wp.pow(roughness, 20.0)
-    return wp.max(deviation * deviation, 1e-4)
-
-
-@wp.func
 def transmittance(h: float, sin_o: float, cos_o: float, eta: float, sigma_a: wp.vec3):
     """Light left after one crossing of the fibre."""
     length = crossing_length(h, sin_o, cos_o, eta)
@@ -55,15 +54,9 @@ def attenuation(path: int, fresnel: float, crossing: wp.vec3):
 
 @wp.func
 def lobe(path: int, fibre: Fibre):
-    """(shift, variance) of a lobe: `energy_conserving.lobes`."""
-    v = variance_of(fibre.roughness)
-    if path == 0:
-        return -2.0 * fibre.tilt, variance_of((1.0 - fibre.coat) * fibre.roughness)
-    if path == 1:
-        return fibre.tilt, wp.max(0.25 * v, 1e-4)
-    if path == 2:
-        return fibre.tilt_trt * fibre.tilt, 4.0 * v
-    return 0.0, 4.0 * v
+    """(shift, variance) of a lobe."""
+    shift, v = lobe_of(path, fibre.tilt, fibre.tilt_trt, fibre.roughness, fibre.coat)
+    return shift, v
 
 
 @wp.func

@@ -12,7 +12,7 @@ from ...kernels import kernel_cache
 from ..fibre import energy_conserving
 from ..fibre.marschner import Caustic, longitudinal_lobes
 from ..fibre.paths import TRT, TT, R
-from ..fibre.scattering_kernel import attenuation, crossing_length, exit_angle, reflectance, shifted_lobe
+from ..fibre.scattering_kernel import attenuation, crossing_length, exit_angle, gaussian, reflectance, shifted_lobe
 from .cell_means import NODES, WEIGHTS, Absorptions
 from .lookup_tables import Settings
 
@@ -36,11 +36,6 @@ class _Inclination:
     cosine: F
     eta: F
     eta_prime: F
-
-
-@wp.func
-def _gaussian(x: F, sigma: F):
-    return wp.exp(F(-0.5) * x * x / (sigma * sigma)) / (sigma * wp.sqrt(F(2.0) * _PI))
 
 
 @wp.func
@@ -76,9 +71,9 @@ def _trt_gamma(phi: F, low: F, high: F, slope_sign: F, row: _Inclination):
 @wp.func
 def _kept(phi: F, phi_c: F, fade: F, width: F):
     """What the caustic treatment keeps of N_TRT: `Caustic.kept`."""
-    peak = _gaussian(F(0.0), width)
-    left = F(1.0) - fade * _gaussian(phi - phi_c, width) / peak
-    return left * (F(1.0) - fade * _gaussian(phi + phi_c, width) / peak)
+    peak = gaussian(F(0.0), width)
+    left = F(1.0) - fade * gaussian(phi - phi_c, width) / peak
+    return left * (F(1.0) - fade * gaussian(phi + phi_c, width) / peak)
 
 
 @wp.func
@@ -170,7 +165,7 @@ def _smooth_texels(
         glint = F(0.0)
         for node in range(4):
             phi = F(0.5) * (first + last) + F(0.5) * (last - first) * _NODES[node]
-            both = _gaussian(phi - phi_c[row], glint_width) + _gaussian(phi + phi_c[row], glint_width)
+            both = gaussian(phi - phi_c[row], glint_width) + gaussian(phi + phi_c[row], glint_width)
             glint += F(0.5) * _WEIGHTS[node] * both
         for channel in range(sigma_a.shape[0]):
             added = float(glint * glint_area[row, channel])
@@ -219,7 +214,7 @@ def _gaussian_texels(
         out_m[row, column, lobe] = float(wp.cos(F(0.5) * (theta[row] - theta[column])))
     else:
         theta_h = F(0.5) * (theta[row] + theta[column])
-        out_m[row, column, lobe] = float(F(0.5) * _gaussian(theta_h - lobes[lobe, 0], lobes[lobe, 1]))
+        out_m[row, column, lobe] = float(F(0.5) * gaussian(theta_h - lobes[lobe, 0], lobes[lobe, 1]))
 
 
 def azimuthal_means(
