@@ -91,7 +91,7 @@ def keep_copy(curves_object: Object) -> None:
         _open[0].keep_copy(curves_object)
 
 
-def kept_copies() -> set[int]:
+def backup_copies() -> set[int]:
     """Session UIDs of the copies of objects and their data by `keep_copy`, which other code must ignore."""
     return {uid for change in _open for uid in change.copies()}
 

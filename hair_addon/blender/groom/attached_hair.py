@@ -35,14 +35,14 @@ def attach(
     if not to_world.is_valid:
         raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(surface_object))
     changes = {part: to_world.inverse @ _place(part, place_before) for part in moved}
-    kept = {part for part in moved if len(part.curves) and _stays(part)}
+    staying = {part for part in moved if len(part.curves) and _stays(part)}
     carried, surface = {}, None
-    if kept:
+    if staying:
         curves.require_overridable(surface_object)
         usable_surfaces.require_evaluated(surface_object)
         curves_objects.store_rest_positions(surface_object)
         surface = scene.read_surface(surface_object, depsgraph)
-        carried = {part: _Carried(part, changes[part], surface, depsgraph) for part in kept}
+        carried = {part: _Carried(part, changes[part], surface, depsgraph) for part in staying}
     followed = {part for part in parts if part.vellus.followed == staleness.guides_digest(part.vellus.guide_curves)}
     for part in parts:
         part.surface = surface_object
@@ -51,11 +51,11 @@ def attach(
         if part in changes:
             surface_space.note_applied(part, changes[part])
             bindings.invalidate(part)
-        if part in kept and surface is not None:
+        if part in staying and surface is not None:
             carried[part].write(surface)
         if part in changes:
-            part.vellus.is_stale = part not in kept
-        if part in kept and part in followed and curves.is_hand_made(part):
+            part.vellus.is_stale = part not in staying
+        if part in staying and part in followed and curves.is_hand_made(part):
             part.vellus.followed = staleness.guides_digest(part.vellus.guide_curves)
         part.update_tag()
 

@@ -52,16 +52,16 @@ def follow() -> None:
 
 
 def _ours() -> list[Curves]:
-    kept = whole_changes.kept_copies()
+    backups = whole_changes.backup_copies()
     ours = (one for one in bpy.data.hair_curves if one.vellus.kind != "NONE" and one.library is None)
-    return [one for one in ours if one.session_uid not in kept]
+    return [one for one in ours if one.session_uid not in backups]
 
 
 def _users() -> dict[Curves, list[Object]]:
     found: dict[Curves, list[Object]] = {}
-    kept = whole_changes.kept_copies()
+    backups = whole_changes.backup_copies()
     for user in bpy.data.objects:
-        if user.type == "CURVES" and user.session_uid not in kept:
+        if user.type == "CURVES" and user.session_uid not in backups:
             found.setdefault(user.data, []).append(user)
     return found
 

@@ -51,7 +51,7 @@ def follow() -> None:
 
 
 def _follow(datablock: Curves) -> None:
-    kept = _kept(datablock)
+    pointers = _pointers(datablock)
     now: dict[str, dict[str, Any]] = {}
     for key, group, field, source in _named(datablock):
         name = text_of(group, field)
@@ -59,7 +59,7 @@ def _follow(datablock: Curves) -> None:
         if source == "objects":
             to = _object(datablock, key, name, found)
         else:
-            before = kept.get(key, {})
+            before = pointers.get(key, {})
             to = before.get("to") if before.get("name") == name else None
         if to is None:
             to = found
@@ -70,14 +70,14 @@ def _follow(datablock: Curves) -> None:
             object_cache.keep((datablock.session_uid, key), (name, to.session_uid))
         elif to is not None:
             now[key] = {"name": name, "to": to}
-    if now != kept:
+    if now != pointers:
         if _POINTERS in datablock:
             del datablock[_POINTERS]
         if now:
             datablock[_POINTERS] = now
 
 
-def _kept(datablock):
+def _pointers(datablock):
     """Return {setting: {"name": str, "to": ID}}; empty if a damaged file has text that is not UTF-8.
 
     It reads entry by entry, as `to_dict` would leave the error set for the code that runs next.

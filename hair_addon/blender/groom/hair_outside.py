@@ -42,6 +42,6 @@ def keep_outside(hair: Curves, bound: BoundHair) -> None:
         notices.say(str(error))
         return
     if is_moved.any():
-        kept = bound.points.copy()
-        kept[is_moved, 1:] = pose.to_rest(moved)[is_moved, 1:]
-        bound.override_points(kept)
+        corrected = bound.points.copy()
+        corrected[is_moved, 1:] = pose.to_rest(moved)[is_moved, 1:]
+        bound.override_points(corrected)

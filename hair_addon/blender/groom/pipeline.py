@@ -27,7 +27,7 @@ from ..data.surfaces import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items
-from . import bindings, grown_guides, hair_memory, kept_roots, read_surfaces, size_fitting, styled_hair, writing
+from . import bindings, grown_guides, hair_memory, read_surfaces, reused_roots, size_fitting, styled_hair, writing
 from .bindings import BoundHair
 from .styled_hair import ReadStyles, StyledHair
 
@@ -62,7 +62,7 @@ def distributing_guides(
     sized = size_fitting.of_guides(settings, surface, mask, target if keeps_roots else None, may_drape)
     settings, key = sized.settings, sized.root_key
     hair_memory.require_guides(settings, len(surface.mesh.triangles))
-    roots = kept_roots.of(target, surface, key, settings.guide_count) if keeps_roots else None
+    roots = reused_roots.of(target, surface, key, settings.guide_count) if keeps_roots else None
     flow = drawn_lines.read(surface_object, surface, settings.flow_lines, depsgraph)
     place, target, device = Remembered(surface_object), Remembered(target), preferences.device()
     shown = scene.shown_surface(surface_object, surface)
@@ -126,7 +126,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     styles = new_styles if target is None else style_items.styles_of(target.vellus)
     read = styled_hair.read_styles(styles, guide_curves.surface, surface, guide_curves, depsgraph, target)
     known = _known_binding(target, settings, key, parting.key, guides, surface)
-    roots = kept_roots.of(target, surface, key, settings.strand_count) if known is None else None
+    roots = reused_roots.of(target, surface, key, settings.strand_count) if known is None else None
     device, guide_uid = preferences.device(), guide_curves.session_uid
 
     ground = _ground(surface, scene.shown_surface(guide_curves.surface, surface), mask, parting, device)

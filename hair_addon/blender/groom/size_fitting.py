@@ -48,14 +48,14 @@ def of_guides(
     may_drape: let `grown_guides.draped_if_new` choose draping.
     """
     key = root_key(given, surface, mask)
-    kept = _kept(target and target.vellus.guides, given)
+    unchanged = _unchanged_sizes(target and target.vellus.guides, given)
     is_refitted = target is not None and target.vellus.fit_key != key
-    opened = fitted_sizes.opened(given, kept) if is_refitted else given
+    opened = fitted_sizes.opened(given, unchanged) if is_refitted else given
     completed = groom_defaults.complete(opened, surface.posed_mesh, *mask)
-    names = kept | fitted_sizes.open_names(given) | ({"drape"} if may_drape else set())
+    names = unchanged | fitted_sizes.open_names(given) | ({"drape"} if may_drape else set())
     if may_drape:
         completed = grown_guides.draped_if_new(opened, completed, surface, mask[0])
-    elif is_refitted and "drape" in kept and opened.gravity is None and not opened.flow_lines:
+    elif is_refitted and "drape" in unchanged and opened.gravity is None and not opened.flow_lines:
         draped = grown_guides.draped_if_new(opened, completed, surface, mask[0]).drape
         is_hanging = groom_defaults.known(completed.gravity) >= grown_guides.HANGING
         completed = replace(completed, drape=draped or (given.drape and is_hanging))
@@ -68,11 +68,11 @@ def of_hair(
     """Return `HairSettings` with unset sizes fitted; target: as for `of_guides`."""
     key = root_key(given, surface, mask)
     fit_key = f"{key} {guide_count}"
-    kept = _kept(target and target.vellus.hair, given)
+    unchanged = _unchanged_sizes(target and target.vellus.hair, given)
     is_refitted = target is not None and target.vellus.fit_key != fit_key
-    opened = fitted_sizes.opened(given, kept) if is_refitted else given
+    opened = fitted_sizes.opened(given, unchanged) if is_refitted else given
     completed = groom_defaults.complete(opened, surface.posed_mesh, *mask, guide_count)
-    return Sized(completed, key, Fits(frozenset(kept | fitted_sizes.open_names(given)), fit_key))
+    return Sized(completed, key, Fits(frozenset(unchanged | fitted_sizes.open_names(given)), fit_key))
 
 
 def root_key(settings: Settings, surface: Surface, mask: Mask) -> str:
@@ -94,7 +94,7 @@ def show(hair: Curves, settings: HairSettings, fits: Fits) -> None:
     hair.vellus.fit_key = fits.key
 
 
-def _kept(group, given):
+def _unchanged_sizes(group, given):
     """Return the fitted sizes of a property group that `given` settings do not change."""
     if group is None:
         return set()

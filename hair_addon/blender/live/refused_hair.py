@@ -21,20 +21,20 @@ def begin():
 
 def note(blender_scene, error):
     """Say that a frame does not show some hair as it should: now in the console, afterwards in the window."""
-    told = noted_cache.get(blender_scene.session_uid, list)
+    sentences = noted_cache.get(blender_scene.session_uid, list)
     sentence = error_text(error)
-    told += [] if sentence in told else [sentence]
+    sentences += [] if sentence in sentences else [sentence]
     say(sentence)
 
 
-def told_of(blender_scene):
+def sentences_of(blender_scene):
     """Sentences on the last render of a scene."""
     return [*composite.refusals(blender_scene), *(noted_cache.get(blender_scene.session_uid) or ())]
 
 
 def end(blender_scene):
     """Report missing hair when a render has ended. Called in the render's thread."""
-    if told_of(blender_scene) and not bpy.app.timers.is_registered(offer):
+    if sentences_of(blender_scene) and not bpy.app.timers.is_registered(offer):
         bpy.app.timers.register(offer)
 
 

@@ -21,7 +21,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
     is_mesh_edited: whether the mesh itself has changed, not only modifiers, so that its weights may have changed too.
     """
     carried = set()  # guides that are not live, and have followed
-    kept = set()  # hair that an applied transform has left in place
+    in_place = set()  # hair that an applied transform has left in place
     for guides in bpy.data.hair_curves:
         state = guides.vellus
         if guides.surface != surface_object or not _is_carried(guides):
@@ -45,7 +45,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
             events.strands_made(guides)
             gone_along = set(applied_transforms.followed_by(guides)) if followed is Followed.APPLIED else set()
             mark_followers(guides, gone_along)
-            kept |= gone_along
+            in_place |= gone_along
     edited_surfaces.follow_alone(surface_object, depsgraph, reported.place_before)
     for hair in bpy.data.hair_curves if is_mesh_edited else ():
         state = hair.vellus
@@ -59,7 +59,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         with _refusal_as_status(state):
             if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):
                 _mark(hair)
-            elif has_masks(state) and hair not in kept:
+            elif has_masks(state) and hair not in in_place:
                 state.is_stale = True
 
 

@@ -20,8 +20,8 @@ class Rearrangement:
     @property
     def is_empty(self):
         """Whether all styles kept place and name."""
-        kept = [place is not None and place == before for before, place in enumerate(self._places)]
-        return all(kept) and self._names == self._new_names[: len(self._names)]
+        unmoved = [place is not None and place == before for before, place in enumerate(self._places)]
+        return all(unmoved) and self._names == self._new_names[: len(self._names)]
 
     def path(self, path):
         """Return the new data path: unchanged if it is not of a style, None if its style was removed."""

@@ -70,11 +70,11 @@ class VELLUS_MT_refused_hair(bpy.types.Menu):
     bl_translation_context = CONTEXT
 
     def draw(self, context):
-        told = refused_hair.told_of(context.scene)
-        for sentence in told[:_MOST_REFUSALS]:
+        sentences = refused_hair.sentences_of(context.scene)
+        for sentence in sentences[:_MOST_REFUSALS]:
             self.layout.label(text=sentence, icon="ERROR", translate=False)
-        if len(told) > _MOST_REFUSALS:
-            more = interface_text("{count} more", count=len(told) - _MOST_REFUSALS)
+        if len(sentences) > _MOST_REFUSALS:
+            more = interface_text("{count} more", count=len(sentences) - _MOST_REFUSALS)
             self.layout.label(text=more, icon="BLANK1", translate=False)
 
 

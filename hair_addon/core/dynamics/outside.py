@@ -59,9 +59,9 @@ def moved_outside(
         return points, is_moved
     before, after = original.numpy()[is_moved], out.numpy()[is_moved]
     is_same = (after == before).all(axis=2)[..., None]
-    kept = points.copy()
-    kept[is_moved] = np.where(is_same, points[is_moved], after + origin)
-    return kept, is_moved
+    corrected = points.copy()
+    corrected[is_moved] = np.where(is_same, points[is_moved], after + origin)
+    return corrected, is_moved
 
 
 def _grid_of(colliders, point_count):

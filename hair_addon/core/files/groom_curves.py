@@ -85,9 +85,9 @@ def _closest(indices, weights):
     kept_weights = np.where(indices >= 0, np.maximum(weights, 0.0), 0.0).astype(np.float64)
     order = np.argsort(-kept_weights, axis=1, kind="stable")[:, :GUIDE_SLOTS]
     ids, shares = np.zeros((len(indices), GUIDE_SLOTS), np.int32), np.zeros((len(indices), GUIDE_SLOTS))
-    kept = order.shape[1]
-    ids[:, :kept] = np.take_along_axis(indices, order, axis=1)
-    shares[:, :kept] = np.take_along_axis(kept_weights, order, axis=1)
+    slot_count = order.shape[1]
+    ids[:, :slot_count] = np.take_along_axis(indices, order, axis=1)
+    shares[:, :slot_count] = np.take_along_axis(kept_weights, order, axis=1)
     ids = np.where(shares > 0.0, ids, np.maximum(ids[:, :1], 0))
     total = shares.sum(axis=1, keepdims=True)
     return ids, shares / np.where(total > 0.0, total, 1.0)

@@ -58,5 +58,5 @@ def fit(preset: PartialSettings, factor: float, strand_spacing: float) -> Partia
 def to_object(settings: GroomSettings) -> dict[str, Any]:
     """Convert the styles of `GroomSettings`, and the hair settings of `_OF_HAIR`, to the JSON object of a preset."""
     found = settings_file.to_object(settings)
-    kept = {name: value for name, value in found["hair"].items() if name in _OF_HAIR}
-    return {"format": found["format"], "version": found["version"], "hair": kept, "styles": found["styles"]}
+    hair_values = {name: value for name, value in found["hair"].items() if name in _OF_HAIR}
+    return {"format": found["format"], "version": found["version"], "hair": hair_values, "styles": found["styles"]}

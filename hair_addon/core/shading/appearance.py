@@ -29,7 +29,7 @@ from .tables import lookup_tables
 
 _WHITE = (1.0, 1.0, 1.0)
 
-_KEPT = 64  # cached results of functions of looks, which are called in every step of a stroke
+_CACHE_SIZE = 64  # cached results of functions of looks, which are called in every step of a stroke
 
 # The fields of `lookup_tables.Settings` that `table_settings` derives from the appearance.
 TABLE_FIELDS = ("mode", "eta", "sigma_a", "tilt", "roughness", "radial_roughness", "coat", "beta_r")
@@ -131,7 +131,7 @@ def shown_changes(changes: dict[str, Any], name_of: Callable[[str], str] = str) 
     return changes | ({"parametrization": kinds.pop()} if kinds else {})
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def wetted(look: Appearance, wetness: float) -> Appearance:
     """Return the dry look that shows a look at a wetness from 0 to 1, linear between dry and soaked hair."""
     if wetness == 0.0:
@@ -178,7 +178,7 @@ def mean_color(appearance: Appearance) -> np.ndarray:
     return color_of_scattering(color, max(scattering, _LEAST_SCATTERING))
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def strand_settings(appearance: Appearance) -> strand_variation.Settings:
     """Convert to `strand_variation.Settings`: variation of the absorption between strands and along them."""
     pigment, dye, melanin = _absorption(appearance)
@@ -212,7 +212,7 @@ def _dye(tint, radial_roughness):
     )
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def table_settings(appearance: Appearance, base: lookup_tables.Settings | None = None) -> lookup_tables.Settings:
     """Convert to `lookup_tables.Settings` of an average strand at its root.
 
@@ -252,7 +252,7 @@ def kajiya_kay_strand_settings(appearance: Appearance) -> kajiya_kay.StrandSetti
     )
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _mean_reflectance(eta):
     """Return the directional albedo of a fibre's surface under uniform light."""
     nodes, weights = np.polynomial.legendre.leggauss(32)

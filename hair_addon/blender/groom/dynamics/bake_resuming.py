@@ -55,18 +55,18 @@ def digest_of(guides: Curves, scene: Scene, settings: "guide_simulation.Dynamics
 
 def resuming(tasks: list[Task], its_scene: Remembered) -> Work[None]:
     """Advance tasks from their first frames to the last valid states, as work in steps."""
-    kept = {id(task): task.done for task in tasks if task.last_number > task.done}
-    frame, said = min(kept.values(), default=0), time.perf_counter()
-    while kept:
+    resumable = {id(task): task.done for task in tasks if task.last_number > task.done}
+    frame, said = min(resumable.values(), default=0), time.perf_counter()
+    while resumable:
         frame += 1
-        due, scene = [task for task in tasks if kept.get(id(task)) == frame - 1], its_scene.find()
+        due, scene = [task for task in tasks if resumable.get(id(task)) == frame - 1], its_scene.find()
         if due:
             scene_time.go_to(scene, frame)
         for task in due:
             if _may_stay(task, frame, scene) and frame < task.last_number:
-                kept[id(task)] = frame
+                resumable[id(task)] = frame
             else:
-                del kept[id(task)]
+                del resumable[id(task)]
         if time.perf_counter() - said > _PAUSE:
             yield Stage(f"Checking frame {frame}", 0.0)
             said = time.perf_counter()

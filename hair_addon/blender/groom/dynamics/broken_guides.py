@@ -50,5 +50,5 @@ def noted(manifest: Manifest | None) -> Broken:
 
 def baked(guides: Curves) -> Broken:
     """Return the `Broken` of the baked frames of guides. Reads no file: panels call this on every redraw."""
-    kept = frame_folders.folder_cache.get(guides.session_uid)
-    return noted(None if kept is None or kept[1] is None else kept[1].manifest)
+    cached = frame_folders.folder_cache.get(guides.session_uid)
+    return noted(None if cached is None or cached[1] is None else cached[1].manifest)

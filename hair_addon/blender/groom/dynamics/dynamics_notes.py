@@ -77,8 +77,8 @@ def size_note(guides: Curves, blender_scene: Scene) -> str:
 
 def is_delivery_outdated(hair: Curves) -> bool:
     """Whether guides were baked again since their hair was delivered, as far as is known without reading files."""
-    kept = frame_folders.folder_cache.get(hair.vellus.guide_curves.session_uid)
-    manifest = None if kept is None or kept[1] is None else kept[1].manifest
+    cached = frame_folders.folder_cache.get(hair.vellus.guide_curves.session_uid)
+    manifest = None if cached is None or cached[1] is None else cached[1].manifest
     return manifest is not None and hair.vellus.delivered_key != manifest.key
 
 

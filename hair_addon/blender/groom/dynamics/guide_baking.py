@@ -229,8 +229,8 @@ def _begin(guides, last, scene):
     parted_by = _parted_by(guides)
     space = tuple(surface_space.applied(guides).matrix.ravel().tolist())
     spaces = () if space == frame_manifest.UNMOVED else (space,)
-    told = {"parted_by": parted_by, "spaces": spaces}
-    manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout, **told)
+    details = {"parted_by": parted_by, "spaces": spaces}
+    manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout, **details)
     digest = bake_resuming.digest_of(guides, scene, properties.dynamics_of(guides.vellus))
     return Remembered(guides), simulated, manifest, digest, combed
 

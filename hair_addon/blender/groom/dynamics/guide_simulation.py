@@ -237,10 +237,10 @@ def needed_stiffness(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> np.n
 
 def known_stiffness(guides: Curves, settings: DynamicsSettings) -> np.ndarray | None:
     """Return `needed_stiffness` from the start of the simulation, for the present settings; None if never simulated."""
-    kept = stiffness_cache.get(guides.session_uid)
-    if kept is None or len(kept[0]) != len(guides.curves):
+    cached = stiffness_cache.get(guides.session_uid)
+    if cached is None or len(cached[0]) != len(guides.curves):
         return None
-    stiffness, ratio = kept
+    stiffness, ratio = cached
     return stiffness * (_load(settings) / ratio)
 
 
