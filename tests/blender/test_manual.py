@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""F1 and *Online Manual*: every property and operator of ours has its place in a page that is there."""
+"""F1 and *Online Manual*: every property and operator leads to an existing heading of the manual."""
 
 import re
 import urllib.parse

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The nodes that carry strands with their surface, after an artist has changed them."""
+"""The nodes that deform strands with their surface, after an artist has changed them."""
 
 import bpy
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flow lines in Blender: guides begin along curves that are drawn on the surface, and follow when these are edited."""
+"""Flow lines in Blender: guides start along curves drawn on the surface, and follow edits of the curves."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders do not depend on the level of subdivision that viewports showed when hair was made, or made again."""
+"""Renders do not depend on the viewport's level of subdivision when hair was generated or regenerated."""
 
 import bmesh
 import bpy
@@ -46,7 +46,7 @@ def make_surface():
 
 
 def show(levels):
-    """Show a level in viewports: none by the modifier's eye, the first by Simplify."""
+    """Show a level in viewports: level 0 by disabling the modifier, level 1 by Simplify."""
     render, modifier = bpy.context.scene.render, bpy.data.objects["Cube"].modifiers["Subdivision"]
     render.use_simplify, render.simplify_subdivision, render.simplify_subdivision_render = levels == 1, 1, 6
     modifier.levels, modifier.show_viewport = 3 if levels == 1 else levels, levels > 0
@@ -76,7 +76,7 @@ def rendered(render, at_levels):
 
 
 def made_of(render, at_levels=RENDERED):
-    """What is stored of hair that does not depend on where it is shown, and renders of it."""
+    """Return stored data of hair that do not depend on the viewport's level, and renders."""
     guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
     state = guides.data.vellus.guides.length, hair.data.vellus.hair.radius, guides.data.vellus.status
     stored = points(guides), points(hair), attribute(hair, "id"), attribute(hair, "strand_random")
@@ -156,7 +156,7 @@ def test_cages_are_the_same_at_every_level(scene):
 
 
 def test_guides_begin_on_the_surface_wherever_they_are_simulated_or_attached(scene):
-    """On it as it is subdivided now, and not on the cage that they were placed on, whose faces are bent."""
+    """On the subdivided surface, not on the cage where they were placed, whose faces are bent."""
     make_hair(2)
     guides, surface = bpy.data.objects["Guides"], bpy.data.objects["Cube"]
     pose = guide_poses.read(guides.data, bpy.context.evaluated_depsgraph_get(), 1.0)

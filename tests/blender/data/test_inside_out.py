@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Closed meshes whose normals point inward: warned of, and flipped; no others are."""
+"""Closed meshes with inward normals cause a warning and can be flipped; other meshes do not."""
 
 import bpy
 import numpy as np

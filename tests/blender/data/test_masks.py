@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands grow where their guides do, unless they have a vertex group of their own; changes are followed live."""
+"""Strands use the mask of their guides unless they have their own; changes are followed live."""
 
 import hashlib
 
@@ -242,7 +242,7 @@ def test_hand_made_guides_take_the_image_of_their_strands(imported, image):
 
 
 def test_keys_of_roots_tell_settings_from_what_is_painted():
-    """Files are read by their keys: an image that is not there is no part of them."""
+    """Keys of files without an image do not change."""
     settings = groom.HairSettings(strand_count=7)
     placing = repr([1, None, None, None, None, None, 7])
     assert staleness.root_key(settings, None) == "".join(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on surfaces whose modifiers copy faces stands as on the same mesh with these modifiers applied."""
+"""Hair on surfaces whose modifiers copy faces equals hair on the mesh with these modifiers applied."""
 
 import bmesh
 import bpy
@@ -42,7 +42,7 @@ def grow_upright(surface):
 
 
 def into_surface(curves_object, surface):
-    """How many strands begin towards the inside of an evaluated surface; the rest of both have no transform."""
+    """Return the number of strands that start inward on an evaluated surface; neither object has a transform."""
     evaluated = surface.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = evaluated.to_mesh()
     tree = BVHTree.FromPolygons([v.co.copy() for v in mesh.vertices], [tuple(p.vertices) for p in mesh.polygons])

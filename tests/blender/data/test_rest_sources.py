@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on a surface that shows another object's geometry, as proxies do: it follows, or a panel says why not."""
+"""Hair on a surface that shows another object's geometry, as proxies do, follows it or reports why not."""
 
 import bpy
 import numpy as np

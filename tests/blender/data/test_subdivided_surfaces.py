@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on surfaces that a modifier subdivides: neighbouring strands stay together, at every level, in every file."""
+"""Hair on subdivided surfaces: neighbouring strands stay together at every level."""
 
 import bpy
 import numpy as np
@@ -87,7 +87,7 @@ def test_a_rigid_motion_of_the_cage_moves_hair_rigidly(cube):
 
 
 def test_a_finer_subdivision_turns_no_strands_either(cube):
-    """As renders have it: hair stays rooted on the viewport's mesh. The estimates of a cube differ between levels."""
+    """As in renders, hair stays rooted on the viewport's mesh. The smooth estimates of a cube differ between levels."""
     guides, hair = grow_straight(cube)
     guides.data.vellus.is_live = hair.data.vellus.is_live = False
     before = evaluated_points(hair)
@@ -139,7 +139,7 @@ def bulge(cube):
 
 @pytest.mark.parametrize("kind", ["SUBSURF", "MULTIRES"])
 def test_renders_do_not_depend_on_the_levels_of_viewports(cube, rendered, kind):
-    """Nothing that is stored changes, and neither does what is computed again meanwhile."""
+    """Neither stored nor recomputed data change."""
     if kind == "MULTIRES":
         cube.modifiers.clear()
         cube.modifiers.new("Multires", "MULTIRES")
@@ -188,7 +188,7 @@ def evaluated_mesh(surface):
 
 
 def test_strands_follow_what_is_moved_at_another_level(cube):
-    """The cage is edited with the modifier's eye off, and shown again: they are where they are on the faces."""
+    """After editing the cage with the modifier disabled and enabling it, hair keeps its place on the faces."""
     guides, hair = grow(cube, guide_count=40, strand_count=200)
     before = points(hair)[:, 0]
     set_eye(cube, 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""New hair and meshes are seen where their surface is, whichever collections list it besides."""
+"""New hair and meshes are visible with their surface, whatever other collections contain it."""
 
 import bpy
 import numpy as np

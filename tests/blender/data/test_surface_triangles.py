@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The triangles of a surface are the same in every pose, though Blender cuts a concave polygon elsewhere."""
+"""A surface has the same triangles in every pose, although Blender splits concave polygons differently."""
 
 import bpy
 import numpy as np

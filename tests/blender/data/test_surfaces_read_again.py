@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces and meshes that are read again keep what is as it was, and are as if they were read for the first time."""
+"""Surfaces and meshes that are read again reuse unchanged data, with the same result as a first reading."""
 
 import bmesh
 import bpy
@@ -82,7 +82,7 @@ def paint_faces(ball):
 
 
 def cut_otherwise(ball):
-    """As many polygons with as many corners: of two triangles a quad, and of a quad two triangles."""
+    """The same numbers of polygons and corners: two triangles become a quad, and a quad two triangles."""
     edited = bmesh.new()
     edited.from_mesh(ball.data)
     shared = next(e for e in edited.edges if [len(face.verts) for face in e.link_faces] == [3, 3])
@@ -119,7 +119,7 @@ def test_surfaces_are_as_if_read_for_the_first_time(ball):
 
 
 def test_meshes_that_move_are_drawn_as_if_read_for_the_first_time(ball):
-    """But for the diagonals of quads: each polygon covers the same corners, with the same material."""
+    """Except for the diagonals of quads: each polygon has the same corners and material."""
     for change in CHANGES:
         drawn_meshes.read_drawn_meshes(depsgraph_of(ball))
         change(ball)

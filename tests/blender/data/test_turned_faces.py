@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What subdivided faces were before Blender turned those of their cage, applying a scale that mirrors."""
+"""Former subdivided faces, after Blender flipped those of the cage by applying a mirroring scale."""
 
 import bpy
 import numpy as np

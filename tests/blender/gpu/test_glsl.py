@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shaders' functions equal their twins in Python, and keep the laws that have no twin."""
+"""The shaders' functions equal their references in Python, and satisfy the laws that have no reference."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def fibres(rng):
 
 
 def doubles(vectors):
-    """The same directions for the twin, their rounding to float32 included."""
+    """Return the same directions for the reference, including their rounding to float32."""
     return (vectors[name].astype(np.float64) for name in "TLV")
 
 
@@ -192,7 +192,7 @@ def test_lobes_are_put_together(rng):
 
 @pytest.mark.parametrize("axes", AXES)
 def test_marschner_reflection_is_read_from_the_tables(fibres, axes):
-    """The whole of hair_bsdf() on real textures equals the tables' own sampling times cos(theta_i)."""
+    """The complete hair_bsdf() on real textures equals the tables' own sampling times cos(theta_i)."""
     tables = lookup_tables.bake(lookup_tables.Settings(size=64, axes=axes))
     textures = hair_shading.marschner_shading(tables).samplers
     shader = shading_model(
@@ -265,7 +265,7 @@ def test_dual_scattering_is_read_from_the_tables(fibres, rng):
 
 
 def texels(table):
-    """A table as half floats keep it."""
+    """Return a table rounded to half floats."""
     return table.astype(np.float16).astype(np.float64)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the highlight of a strand lies in a picture: on the mirror cone, and beside it by the cuticle's tilt."""
+"""Position of a strand's highlight in a picture: on the mirror cone, shifted by the cuticle's tilt."""
 
 import math
 
@@ -60,7 +60,7 @@ def brightness(strand, shading, shadow_maps, to_light, to_view):
 
 
 def brightest_theta_o(strand, shading, shadow_maps, theta_i, phi=2.0):
-    """Inclination from which the strand looks brightest, the light staying where it is."""
+    """Return the viewing inclination at which the strand is brightest, for a fixed light."""
     theta_o = np.arange(-1.3, 1.3, STEP)
     to_light = towards(theta_i, phi)
     seen = [brightness(strand, shading, shadow_maps, to_light, towards(theta)).sum() for theta in theta_o]
@@ -92,7 +92,7 @@ def test_the_first_highlight_of_marschner_is_shifted_towards_the_root_by_twice_t
 
 
 def test_marschner_reads_its_tables_as_bright_as_they_are(strand, no_shadow_maps):
-    """The whole way to the picture, from any side, against the tables' own sampling."""
+    """The picture from any direction equals the tables' own sampling."""
     tables = lookup_tables.bake(lookup_tables.Settings())
     shading = hair_shading.marschner_shading(tables)
     for theta_i, theta_o, phi in [(0.3, -0.2, 0.4), (-0.6, 0.5, 2.9), (0.1, 0.3, -1.5), (0.0, 0.0, 0.0)]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair from afar: some strands, spread over all of them, in place of all."""
+"""Level of detail: distant hair is drawn with a subset of strands, spread over all of them."""
 
 from types import SimpleNamespace
 
@@ -47,7 +47,7 @@ def test_further_hair_has_fewer_strands_and_points_one_by_one(many):
 
 
 def drawn_strands(strand_count, steps):
-    """Which strands a shader draws, turn after turn."""
+    """Return the strands that a shader draws in each pass."""
     record = drawing.strand_record(
         SimpleNamespace(strand_count=strand_count, point_count=2, row_strands=1, radius_strands=1, radius_unit=1.0),
         uniforms.VIEW.record(),

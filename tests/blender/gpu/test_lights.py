@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's lights in the shaders are as bright as in Cycles, which renders a white wall beside them."""
+"""Blender's lights in the shaders are as bright as in Cycles, measured on a white wall."""
 
 import math
 

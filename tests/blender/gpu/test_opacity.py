@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Counts of strands in deep opacity maps, and the light that they leave: shadows/opacity.glsl."""
+"""Counts of strands in deep opacity maps, and the light that they transmit: shadows/opacity.glsl."""
 
 import numpy as np
 import pytest

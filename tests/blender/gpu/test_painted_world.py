@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair is lit by the world's image as it is now, however its pixels were changed."""
+"""Hair is lit by the present pixels of the world's image, however they were changed."""
 
 import bpy
 import numpy as np
@@ -125,7 +125,7 @@ def test_viewports_are_lit_by_the_image_of_now(dark, tmp_path, make, change):
 
 
 def test_an_image_that_could_not_be_read_is_read_again(dark, tmp_path, monkeypatch):
-    """Light of before does not stay where reading the new image has failed once."""
+    """Former light does not remain after reading the new image has failed once."""
     image = packed(tmp_path)
     environment_node(dark, image)
     _lobes, before = world_texture.light_of(lights.read_world(dark))
@@ -183,7 +183,7 @@ def test_a_sequence_shows_the_frame_of_the_scene(dark, tmp_path):
 
 
 def test_an_unloaded_world_image_lights_hair(dark, tmp_path):
-    """As in a file that was just opened in background."""
+    """As in a file that was just opened in background mode."""
     environment_node(dark, loaded(tmp_path))
     before = drawn()
     assert np.abs(before[..., :3]).max() > 0.1

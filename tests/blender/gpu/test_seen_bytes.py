@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What strands see of the world, in a byte for each number: shaders/light/visibility_bytes.glsl."""
+"""Ambient visibility of strands in one byte per number: shaders/light/visibility_bytes.glsl."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shadows of hair and of surfaces: soft with the light's size, and quiet while a light turns."""
+"""Shadows of hair and of surfaces: soft by the light's size, and without flicker while a light rotates."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drawn meshes on the GPU: what a change of them uploads, and that an object's matrix acts as on its vertices."""
+"""Drawn meshes on the GPU: uploads after changes, and the effect of an object's matrix."""
 
 import bpy
 import gpu

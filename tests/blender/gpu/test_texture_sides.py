@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Textures of data have no side that is a power of two, whatever they hold."""
+"""Data textures never have a side that is a power of two."""
 
 import numpy as np
 import pytest

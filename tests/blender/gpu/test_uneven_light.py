@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light that is not the same all around a fibre, by the functions of shaders/fibre/zonal_light.glsl."""
+"""Light that varies around a fibre, by the functions of shaders/fibre/zonal_light.glsl."""
 
 import numpy as np
 

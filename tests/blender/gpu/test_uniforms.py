@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What fills a uniform block in Python is what the shader reads."""
+"""Values written to a uniform block in Python arrive in the shader."""
 
 from itertools import pairwise
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that differ: the shaders' functions equal their twins, and the models what the twins read from the tables."""
+"""Varied strands: the shaders' functions equal their references in Python, and so do the models."""
 
 from dataclasses import replace
 

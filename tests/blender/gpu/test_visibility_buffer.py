@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which strand a sample of a picture shows: where it lies by hand, and the same from triangles as from the computed."""
+"""The strand that each sample shows: compared with analytic positions, and between triangles and compute program."""
 
 import gpu
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light of the world on strands, channel by channel, by the functions of shaders/light/world.glsl."""
+"""World light on strands, channel by channel, by the functions of shaders/light/world.glsl."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ vec3 one_side(int side, vec4 x_y, vec2 z, float opacity, vec3 forward, vec3 chan
 
 
 def test_strands_color_light_and_surfaces_do_not(scene, rng):
-    """What only surfaces hide is hidden of all channels; what only strands hide of each by its own opacity."""
+    """Surfaces block all channels equally; strands block each channel by its own opacity."""
     forward = rng.uniform(0.1, 0.95, (COUNT, 3))
     opacity = 1.0 - forward.mean(axis=1)
     open_parts = rng.uniform(0.0, 1.0, (COUNT, 6))
@@ -58,7 +58,7 @@ def test_strands_color_light_and_surfaces_do_not(scene, rng):
 
 
 def test_a_floor_hides_half_of_the_world_of_every_channel(scene, rng):
-    """Single strands right above a floor without hair around them, whatever they let through."""
+    """Single strands just above a floor without other hair, with any transmittance."""
     roots = np.append(rng.uniform(-1.0, 1.0, (50, 2)), np.zeros((50, 1)), axis=1)
     points = roots[:, None] + np.linspace(0.0, 0.3, 5)[:, None] * np.array([0.3, 0.0, 1.0])
     hair = strand_textures.upload_strands(points.astype(np.float32), np.full((50, 5), 1e-7, np.float32))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world's light: its picture as Cycles sees it, and what of it arrives among strands and on surfaces."""
+"""World light: the image as in Cycles, and the light that arrives among strands and on surfaces."""
 
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""While guides are baked without a window hair is not evaluated, and it is afterwards, however baking ended."""
+"""Hair is not evaluated while guides are baked without a window, and is again after any end of baking."""
 
 import bpy
 import pytest

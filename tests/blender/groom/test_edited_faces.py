@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on a surface whose faces have changed: it stays wherever its own face has."""
+"""Hair on a surface with changed faces: it keeps its place if its own face still exists."""
 
 import re
 from contextlib import contextmanager

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair as a whole: added in one step, found, taken away, mended where its surface is at fault; with undo."""
+"""Hair systems: adding in one step, finding, deleting, and repairing the surface; with undo."""
 
 import bpy
 import numpy as np

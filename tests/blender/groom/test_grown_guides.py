@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which new guides are draped: those of the panel's operators on a dome such as a scalp, unless somebody says how."""
+"""New guides are draped by the panel's operators on a dome such as a scalp, unless growth settings are given."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that take much of the free memory: refused, asked for or said, and none is lost where there is not enough."""
+"""Strands that need much of the free memory are refused or confirmed, and no hair is lost if memory is short."""
 
 import ctypes
 import gc

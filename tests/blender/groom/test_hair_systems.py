@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of a mesh's hair systems: what it shows, which row is edited, and what its buttons change."""
+"""The list of a mesh's hair systems: its rows, the edited row, and its buttons."""
 
 import bpy
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Use as Guides asks where it cannot know, refuses with a sentence and changes nothing, and can be undone."""
+"""Use as Guides refuses ambiguous or unusable input with a message and without changes, and can be undone."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw Parting, Draw Flow, Stop Drawing, Stop Combing, and guides that are named after their hair."""
+"""Draw Parting, Draw Flow, Stop Drawing, Stop Combing, and guides named after their hair."""
 
 import bpy
 import numpy as np

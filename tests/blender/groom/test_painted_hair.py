@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Of several hair systems on a surface in a paint mode, panels and operators are of the one whose mask is painted."""
+"""With several hair systems on a surface in a paint mode, panels and operators use the one whose mask is painted."""
 
 import bpy
 import pytest

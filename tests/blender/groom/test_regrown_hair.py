@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is generated again takes the memory of the strands that it replaces, and nothing else of them."""
+"""Regenerated hair reuses the memory of the strands that it replaces, and nothing else."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Caches: what is made once, what gives way, what is made again."""
+"""Caches: values are computed once, evicted, and computed again."""
 
 from hair_addon.blender.host.caches import Cache
 

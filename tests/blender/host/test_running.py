@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that hold on to a window."""
+"""Modal operators of a window."""
 
 from types import SimpleNamespace
 

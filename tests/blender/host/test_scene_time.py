@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Going to another moment, and back."""
+"""Going to another time, and back."""
 
 import bpy
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Free memory of Windows and macOS, asked of a library in their place, which writes bytes where the system would."""
+"""Free memory of Windows and macOS, with mock system libraries that write the bytes of the system."""
 
 import ctypes
 import struct

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Alembic files of others as guides and hair: Blender's own exporter, and one object a curve, as Maya has it."""
+"""Alembic files of other programs as guides and hair: by Blender's exporter, and with one object per curve."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards in files that engines read, read back: faces, UV coordinates, pictures and armature."""
+"""Cards in exported files, read back: faces, UV coordinates, pictures and armature."""
 
 import bpy
 import numpy as np

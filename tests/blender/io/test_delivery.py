@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Delivered hair: where live hair is, in a Blender without the add-on; taken off again, all is as before."""
+"""Delivered hair equals live hair in Blender without the add-on; removing the delivery restores everything."""
 
 import resource
 import shutil

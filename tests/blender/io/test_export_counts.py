@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of any numbers of points in exported files: each keeps its own."""
+"""Exported curves keep their numbers of points."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Alembic for Unreal: hair is where it was seen, as Blender and an independent reader find it; refusals and notes."""
+"""Alembic for Unreal: hair has its posed positions in Blender and in an independent reader; refusals and notes."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exports of grooms that are refused or stopped leave the file that was there; what importers do is said."""
+"""Refused or canceled exports of grooms keep an existing file; messages report what importers do."""
 
 import resource
 

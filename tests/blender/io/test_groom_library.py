@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms as assets: what is saved comes back, on the same surface and on copies; what is no groom is refused."""
+"""Grooms as assets: saved grooms are restored on the same surface and on copies; other files are refused."""
 
 import bpy
 import numpy as np

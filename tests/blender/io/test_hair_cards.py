@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards and tubes in the scene: what was promised is made, textures show the strands, undo takes all of it away."""
+"""Cards and tubes in the scene: counts are as announced, textures show the strands, undo removes everything."""
 
 import itertools
 

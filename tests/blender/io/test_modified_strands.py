@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An artist's modifiers in files and meshes of hair: as renders show them, or a sentence says that they are not."""
+"""An artist's modifiers in files and meshes of hair: as rendered, or left out with a message."""
 
 import itertools
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sequences of frames, stopped and gone on with, and shared by processes: no frame is made twice, none is broken."""
+"""Sequences of frames, stopped, resumed and shared by processes: no frame is rendered twice, none is broken."""
 
 import contextlib
 import errno

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands as exports have them: on the curve that Blender draws, with the widths that it has there."""
+"""Exported strands: on the curve that Blender draws, with its widths."""
 
 import bpy
 import numpy as np

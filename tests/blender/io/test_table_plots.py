@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of tables: each table has one, with its texels where its axes say."""
+"""Plots of tables: one for each table, with texels at the positions of its axes."""
 
 import numpy as np
 import pytest

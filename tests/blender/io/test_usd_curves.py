@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of USD files that pxr makes, read as they are drawn."""
+"""Curves of USD files created by pxr are read as they are drawn."""
 
 from itertools import pairwise
 from types import SimpleNamespace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of stereoscopic scenes: a file for each view, or one for all, whole or not at all."""
+"""Frames of stereoscopic scenes: a file per view or one for all, written completely or not at all."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that the GPU carries with an animated surface: where Warp carries them, and none of them is uploaded."""
+"""Strands deformed on the GPU with an animated surface equal those of Warp, without uploads of strands."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Combing: the picture follows at once, and Blender's data when the stroke is over; counted, not timed."""
+"""Combing: the picture follows immediately, Blender's data after the stroke; counted, not timed."""
 
 import threading
 from dataclasses import replace

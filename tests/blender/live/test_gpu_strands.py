@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that the GPU makes while guides are combed: what is written afterwards is what was shown; counted."""
+"""Strands generated on the GPU during combing equal the strands written afterwards; with counts of uploads."""
 
 from itertools import cycle
 

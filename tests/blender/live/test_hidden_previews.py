@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair is hidden from Blender's own drawing in Material Preview and while its sliders are dragged, and only then."""
+"""Hair is hidden from Blender's own drawing only in Material Preview and while its sliders are dragged."""
 
 import bpy
 import numpy as np

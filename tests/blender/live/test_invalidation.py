@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Caches: nothing is drawn that is older than an event, and nothing is kept beyond another file or the add-on's end."""
+"""Caches: drawing never uses data older than an event, and nothing remains after another file or disabling."""
 
 import importlib
 import inspect

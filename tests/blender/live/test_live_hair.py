@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair follows what it was made from: settings, guides, surface; and is kept where somebody's hand was in it."""
+"""Hair follows its settings, guides and surface; hand-edited hair is kept."""
 
 import math
 from dataclasses import replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styled hair that the GPU makes: strokes, sliders and painted masks compute and upload no strands on this side."""
+"""Styled hair on the GPU: strokes, sliders and painted masks compute and upload no strands on the processor."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender does not evaluate hair that Vellus draws while its surface moves, and does before anybody may read it."""
+"""Blender's evaluation of hair is paused while its surface moves, and resumes before other code may read it."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that are simulated while the timeline plays in a window: what is kept, and what ends it."""
+"""Guides simulated during playback in a window: frames in memory, and events that restart the simulation."""
 
 import bpy
 import numpy as np

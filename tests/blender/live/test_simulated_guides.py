@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that are shown where dynamics has moved them: hair follows as if they were combed there, and they are not."""
+"""Simulated guides are shown in their simulated shape, which hair follows, without changing the combed guides."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that viewports show without its styles while its guides are combed; all else has them."""
+"""Comb Styled off: viewports show hair without styles during combing; all other uses have the styles."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles that change: what is held in memory is that of the present ones."""
+"""Changing styles do not accumulate memory."""
 
 import gc
 import resource

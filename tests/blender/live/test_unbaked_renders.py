@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked frames that other engines lack: Blender's command line ends before them, a window says so."""
+"""Missing baked frames in other engines: Blender's command line ends before them, a window reports them."""
 
 import sys
 from types import SimpleNamespace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair in EEVEE: thin, lit about as by Cycles, and left to the artist who makes its nodes."""
+"""Hair in EEVEE: thin, lit approximately as in Cycles; materials of artists are not changed."""
 
 import bpy
 import numpy as np

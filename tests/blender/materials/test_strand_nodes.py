@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cycles gives each strand, and each part of it, the absorption that the viewport gives it."""
+"""In Cycles each strand has the same absorption along its length as in the viewport."""
 
 import bpy
 import numpy as np

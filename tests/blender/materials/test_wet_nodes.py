@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The material of hair that is wet in places mixes two looks by the wetness of each strand; other hair has one."""
+"""The material of partly wet hair mixes two looks by each strand's wetness; other hair has one look."""
 
 import bpy
 import numpy as np
@@ -118,7 +118,7 @@ def test_hair_that_shares_a_material_gets_its_own_where_it_is_wet(hair):
 
 
 def test_the_wet_side_is_darker_in_cycles(lit, tmp_path):
-    """The dry side is as without water, the wet side as where all of it is soaked."""
+    """The dry side equals dry hair, the wet side equals completely soaked hair."""
     soak(lit, {"mask": "top"})
     scene = bpy.context.scene
     scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 24, False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wet hair is shaded with the wetter of its look and its styles, in all places; its settings stay as they are."""
+"""Wet hair is shaded with the larger wetness of look and styles; its settings do not change."""
 
 from dataclasses import replace
 

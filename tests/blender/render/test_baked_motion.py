@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked hair in renders: its blur by Cycles, and what the engine's motion vectors are made of."""
+"""Baked hair in renders: motion blur in Cycles, and the engine's motion vectors."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A strand with a coordinate that is no place: it is left out and said once, and all other hair is drawn."""
+"""Strands with non-finite coordinates are left out and reported once; all other hair is drawn."""
 
 import bpy
 import numpy as np

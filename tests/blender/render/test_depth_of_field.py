@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Depth of field: how far a small bright square spreads, beside the thin lens formula and beside Cycles."""
+"""Depth of field: the spread of a small bright square, compared with the thin lens formula and with Cycles."""
 
 import math
 from types import SimpleNamespace

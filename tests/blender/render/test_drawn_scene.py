@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is read again when something changes: hair alone while it is combed, all of the scene otherwise."""
+"""Data read again after changes: only hair while it is combed, otherwise the whole scene."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The passes of the render engine: light in parts, how deep things lie, and how they move."""
+"""The passes of the render engine: parts of the light, depth, and motion vectors."""
 
 import math
 

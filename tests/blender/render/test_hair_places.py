@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair of instances: drawn wherever its collection or object is instanced, uploaded once."""
+"""Instanced hair is drawn at every instance of its collection or object, and uploaded once."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light that a surface sends to hair above it, against the integral over the directions below, and light it stops."""
+"""Light that a surface reflects to hair above it, compared with an integral, and light that it blocks."""
 
 from dataclasses import replace
 

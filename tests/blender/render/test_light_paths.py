@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among strands by paths: pictures with it, where their colors are known."""
+"""Path-traced light among strands: pictures with known colors."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light on a surface below hair and by wide lights: what strands pass on is spread, and a wide light sets slowly."""
+"""Light on a surface below hair and from large lights: transmitted light is spread, and large lights fade gradually."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light linking: hair and its surface are lit each by the lights that are linked to it."""
+"""Light linking: hair and its surface are each lit by the lights linked to them."""
 
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""More lights than are drawn one by one: none is lost."""
+"""More lights than are drawn individually: no light is lost."""
 
 import math
 

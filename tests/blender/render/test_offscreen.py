@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The offscreen picture: hair is where it should be, surfaces hide it, and light is lost on the way through it."""
+"""The offscreen picture: hair is at its position, surfaces hide it, and it absorbs light."""
 
 import math
 

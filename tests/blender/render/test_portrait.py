@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face of the sample head: eyes behind their lids that look at a point, hair of brows and lashes at the skin."""
+"""The face of the sample head: eyes behind their lids that look at a point, brows and lashes on the skin."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that a graphics driver has no room for: one sentence, in the panel too, and no further try."""
+"""Strands that do not fit the graphics driver's memory: one message, also in the panel, and no retry."""
 
 import bpy
 import gpu

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which surfaces a render shows, and whose light they stop: by visibility, materials, instances and view layers."""
+"""Surfaces in renders and their shadows, by visibility, materials, instances and view layers."""
 
 import math
 

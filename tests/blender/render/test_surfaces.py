@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces look as in Cycles: rough and shiny, dielectric and metal, in their images' colors, part by part."""
+"""Surfaces match Cycles: rough and glossy, dielectric and metal, with image textures, region by region."""
 
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is wet in places: each strand is drawn dry, wet or between them, by its own wetness."""
+"""Partly wet hair: each strand is drawn by its own wetness."""
 
 import bpy
 import numpy as np

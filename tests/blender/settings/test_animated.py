@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keyed settings: hair in a frame is what its settings say there, in the viewport and in a render."""
+"""Animated settings: hair matches the settings of each frame, in viewports and renders."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dynamics as properties: what is assigned comes back, marks the guides, follows keys, and regrows nothing."""
+"""Dynamics as properties: values are stored exactly, mark the guides, follow keyframes, and regenerate nothing."""
 
 import math
 import subprocess

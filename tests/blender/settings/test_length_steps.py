@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lengths are dragged in steps that fit the surface: what a window of Blender 5.2 moved by, and what rows show."""
+"""Lengths are dragged in steps that fit the surface: steps measured in a window of Blender 5.2, and the rows shown."""
 
 import bpy
 import pytest

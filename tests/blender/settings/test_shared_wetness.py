@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One wetness of hair and guides: the largest of look, Wet styles and dynamics, in shading and in motion."""
+"""Shared wetness of hair and guides: the largest of look, Wet styles and dynamics, in shading and motion."""
 
 import bpy
 import numpy as np

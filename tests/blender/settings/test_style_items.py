@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles as properties: what is assigned comes back, names differ, and keys follow their style."""
+"""Styles as properties: values are stored exactly, names are unique, and keyframes follow their style."""
 
 import math
 

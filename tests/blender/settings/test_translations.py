@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every string that an artist reads is in every dictionary, with the same values in it, and nothing else is."""
+"""Every string of the interface is in every dictionary, with the same placeholders, and nothing else."""
 
 import itertools
 import random
@@ -79,7 +79,7 @@ def german(monkeypatch):
 
 
 def test_a_stored_sentence_is_translated_as_it_was_raised(german):
-    """Hair keeps what is wrong with it in English, with the values in it, as files of any language do."""
+    """Hair stores its errors in English with their values, so files do not depend on the language."""
     said = {}  # sentence → translations: some sentences differ in the names of their values alone
     for msgid, msgstr in german.items():
         values = {name: 7 if form else f"Head {i}" for i, (name, form) in enumerate(fields(msgid))}

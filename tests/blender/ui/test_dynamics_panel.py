@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Dynamics panel: a row for each setting that matters, and what the settings mean in a sentence."""
+"""The Dynamics panel: a row for each setting in effect, and notes on the effect of settings."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""*Comb Guides* where guides are hidden: they are shown first, and where that cannot be a sentence says so."""
+"""*Comb Guides* with hidden guides: they are shown first; if that is impossible, a message says why."""
 
 import bpy
 import pytest

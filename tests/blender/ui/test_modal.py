@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work in a window: events that come while it runs, Esc, and ends of every kind leave nothing half-made."""
+"""Long work in a window: events during it, Esc and any other end leave no partial results."""
 
 import threading
 from types import SimpleNamespace

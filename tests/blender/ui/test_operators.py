@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every operator: what it makes, its undo, its refusals, and that a refusal leaves nothing behind."""
+"""Every operator: its result, its undo, and refusals without changes."""
 
 import math
 

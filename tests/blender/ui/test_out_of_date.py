@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What panels say of hair that is out of date, and of baked frames of guides that were combed since."""
+"""Notes in panels on outdated hair, and on baked frames of guides that were combed since."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In a context without a window there is no active object: nothing raises."""
+"""Without a window there is no active object: nothing raises an exception."""
 
 import bpy
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light linking: what a light's rules say, beside Cycles."""
+"""Light linking: a light's rules, compared with Cycles."""
 
 import bpy
 import numpy as np
@@ -13,7 +13,7 @@ PLACES = ("plain", "inner", "instanced", "other")
 
 @pytest.fixture
 def tiles(scene):
-    """White tiles side by side under a sun, seen by Cycles from above: the third is instanced by an empty."""
+    """White tiles side by side under a sun, rendered by Cycles from above; an empty instances the third."""
     mesh = bpy.data.meshes.new("Tile")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [], [(0, 1, 2, 3)])
     held = bpy.data.collections.new("Held")

@@ -73,7 +73,7 @@ def whole_in_two_groups(image):
 
 
 def shader_in_a_group(image):
-    """Its color is linked to the group from outside, its numbers are set on the group."""
+    """The color is linked to the group from outside; numbers are set on the group."""
     material, tree, shown = new_material()
     sockets = [("Color", "NodeSocketColor"), ("Rough", "NodeSocketFloat"), ("Metal", "NodeSocketFloat")]
     inside, start, end = new_group("Shader", sockets, [("BSDF", "NodeSocketShader")])
@@ -91,7 +91,7 @@ def shader_in_a_group(image):
 
 
 def picture_in_a_group(image):
-    """And a gamma node between, which is muted, and a reroute."""
+    """With a muted gamma node and a reroute in between."""
     material, tree, shown = new_material()
     inside, _start, end = new_group("Picture", outputs=[("Value", "NodeSocketFloat"), ("Color", "NodeSocketColor")])
     skin = add_skin(inside, image)
@@ -134,7 +134,7 @@ def test_one_group_with_two_settings_is_two_materials(scene):
 
 
 def test_groups_that_lead_nowhere_leave_the_color_of_the_viewport(scene):
-    """A group without nodes, one that was deleted, and one without an output."""
+    """Groups without nodes, deleted groups, and groups without an output."""
     empty, _start, _end = new_group("Empty", outputs=[("BSDF", "NodeSocketShader")])
     lost, _start, _end = new_group("Lost", outputs=[("BSDF", "NodeSocketShader")])
     endless, _start, end = new_group("Endless", outputs=[("BSDF", "NodeSocketShader")])
@@ -165,7 +165,7 @@ def test_what_nothing_leads_to_sets_nothing(scene, kind):
 
 
 def test_nodes_in_a_circle_end(scene):
-    """Blender keeps links that lead around, in red, and draws without them."""
+    """Blender keeps cyclic links, shown in red, and ignores them."""
     material, tree, shown = new_material()
     shader, gamma, way = (
         tree.nodes.new(kind) for kind in ("ShaderNodeBsdfPrincipled", "ShaderNodeGamma", "NodeReroute")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands as Blender's Curves: what is read is what was written, and Blender's own tools find what they expect."""
+"""Strands as Blender's Curves: reading returns what was written, and Blender's own tools work on them."""
 
 import bpy
 import numpy as np
@@ -42,7 +42,7 @@ def test_curves_carry_what_blender_expects(kind, request, sphere):
 
 
 def test_written_points_reach_what_is_evaluated_and_no_copy(hair):
-    """Blender shares arrays among copies of a datablock, its evaluated ones and those of undo."""
+    """Blender shares arrays between a datablock, its evaluated copies and undo steps."""
     copy, before = hair.data.copy(), points(hair)
     evaluated = hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert np.array_equal(attribute(evaluated, "position", 3), before.reshape(-1, 3))

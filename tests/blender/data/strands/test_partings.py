@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two sides combed apart: no strand points in between, by limits alone, by regions, and by a part line."""
+"""Hair combed to two sides: no strand points in between, with limits, regions or a part line."""
 
 import math
 import os
@@ -55,7 +55,7 @@ def refusal(**settings):
 
 
 def in_between(strands):
-    """The part of the strands near the part line that lean to neither side by three quarters of what guides do."""
+    """Return the fraction of strands near the part line that lean less than three quarters as far as guides."""
     near = np.abs(strands[:, 0, 0]) < 0.05
     arms = strands[near, -1] - strands[near, 0]
     lean = np.arcsin(np.clip(np.abs(arms[:, 0]) / np.linalg.norm(arms, axis=1), 0.0, 1.0))
@@ -109,7 +109,7 @@ def test_blenders_own_interpolation_points_in_between(guides, ground):
 
 
 def test_limits_alone_part_hair(guides):
-    """Where a strand's nearest guide leans, it leans as far."""
+    """Strands lean as far as their nearest guide."""
     strands = grown()
     assert in_between(strands) == 0.0
     arms = strands[:, -1] - strands[:, 0]
@@ -190,7 +190,7 @@ def test_a_part_line_parts_hair(guides, kind):
 
 
 def test_a_part_line_is_where_it_is_in_the_world(guides, ground):
-    """On a surface that was moved, turned, scaled and mirrored, a line drawn there, its object elsewhere."""
+    """A surface that was moved, rotated, scaled and mirrored, with a line whose object has another transform."""
     ground.location, ground.rotation_euler, ground.scale = (3.0, -2.0, 5.0), (0.3, 0.2, 1.0), (-2.0, 2.0, 2.0)
     bpy.context.view_layer.update()
     ends = [ground.matrix_world @ (ground.data.vertices[0].co * 0 + type(ground.location)(end)) for end in ENDS]
@@ -205,7 +205,7 @@ ENDS = [(0.0, -0.5, 0.0), (0.0, 0.5, 0.0)]
 
 
 def test_a_part_line_on_a_posed_surface_parts_it_at_rest(guides, ground):
-    """Drawn where a shape key has brought the surface to, a metre aside."""
+    """A line drawn on a surface that a shape key has moved by one metre."""
     ground.shape_key_add(name="Basis")
     key = ground.shape_key_add(name="Key")
     for point in key.data:
@@ -217,7 +217,7 @@ def test_a_part_line_on_a_posed_surface_parts_it_at_rest(guides, ground):
 
 
 def test_hair_follows_its_part_line(guides):
-    """Moved aside, the line parts elsewhere; moved by nothing, nothing is computed."""
+    """A moved line changes the parting; an update without movement computes nothing."""
     line = LINES["poly"]()
     grown(part_lines="Line", **FREE)
     hair = bpy.data.objects["Hair"]

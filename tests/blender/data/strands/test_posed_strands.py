@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that a surface carries: there and back, all or some, of any point counts, drawn as they are exported."""
+"""Deformation of strands with a surface, and its inverse, for all or some strands with any point counts."""
 
 import bpy
 import numpy as np

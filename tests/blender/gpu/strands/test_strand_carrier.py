@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that the GPU carries with their surface are where Warp carries them, and a pose uploads vertices alone."""
+"""Strands deformed on the GPU equal those deformed by Warp, and a pose uploads only vertices."""
 
 import gpu
 import numpy as np

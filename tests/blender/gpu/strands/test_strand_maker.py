@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that the GPU makes where they are drawn are those that Warp makes, and cost one upload of their guides."""
+"""Strands generated on the GPU equal those of Warp, and need only an upload of their guides."""
 
 from dataclasses import replace
 from types import SimpleNamespace

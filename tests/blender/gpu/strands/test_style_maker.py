@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles that the GPU applies where strands are drawn are those that Warp applies; a slider uploads numbers alone."""
+"""Styles applied on the GPU equal those of Warp; a slider uploads only numbers."""
 
 from dataclasses import replace
 
@@ -51,7 +51,7 @@ def hair(blender):
 
 @pytest.fixture
 def one_program(monkeypatch):
-    """One program for all stacks: compiling takes longer than all else."""
+    """One program for all stacks, as compiling takes longest."""
     monkeypatch.setattr(style_maker, "_kinds_of", lambda _program: tuple(kinds.STEPS))
 
 
@@ -76,7 +76,7 @@ def errors(hair, points, wanted):
 
 
 def shaken(hair, rng, wanted, *styles, **given):
-    """(S,) errors in order that follow from other last digits of the guides' coordinates: the greatest of some."""
+    """Return (S,) sorted errors caused by rounding of the guides' coordinates: the largest of several trials."""
     found = np.zeros(STRANDS)
     for _ in range(3):
         points = hair.guides.numpy()

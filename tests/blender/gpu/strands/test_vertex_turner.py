@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vertices that the GPU turns have the turns that double precision finds, but for single precision."""
+"""Rotations of vertices on the GPU equal those in double precision within single precision."""
 
 import numpy as np
 import pytest

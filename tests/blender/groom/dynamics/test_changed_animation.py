@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked frames whose animation was changed afterwards: noticed where it is shown, and simulated again from there."""
+"""Baked frames whose animation changed: the change is detected when shown, and simulated again from there."""
 
 import bpy
 import numpy as np

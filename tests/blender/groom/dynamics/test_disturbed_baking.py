@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What happens to guides, the scene and settings while frames are baked: baking goes on, or ends with one sentence."""
+"""Changes of guides, the scene and settings while frames are baked: baking continues, or ends with one message."""
 
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked guides: the groom first, the same bits from any state on, and hair that follows them in every frame."""
+"""Baked guides: the groom comes first, resuming gives the same bits, and hair follows in every frame."""
 
 import shutil
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drape Guides as work in steps: all or nothing, and the same at once as in a thread."""
+"""Drape Guides as work in steps: all or nothing, with the same result immediately and in a thread."""
 
 import bpy
 import numpy as np

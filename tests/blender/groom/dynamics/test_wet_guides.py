@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides are as wet as the Wet style's mask says at their roots."""
+"""Guides have the wetness of the Wet style's mask at their roots."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves from anywhere become guides in one click: no point moves in the world, and nothing makes them again."""
+"""Curves of any origin become guides in one click: no point moves in the world, and they are never regenerated."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves from anywhere become hair that is kept to the last bit, with guides that reproduce it where that is wanted."""
+"""Curves of any origin become hair with the same bits, and guides that reproduce it."""
 
 import bpy
 import numpy as np

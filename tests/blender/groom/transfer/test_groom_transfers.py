@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A hair system on another mesh: the same guides and hair there, with all that belongs to them."""
+"""Transfer of a hair system to another mesh: the same guides and hair, with all their settings."""
 
 import bpy
 import numpy as np

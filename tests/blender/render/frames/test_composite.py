@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces by Cycles or EEVEE and hair by Vellus in one picture, and everything as before without it."""
+"""Surfaces by Cycles or EEVEE and hair by Vellus in one picture; turning it off restores the scene."""
 
 import bpy
 import numpy as np

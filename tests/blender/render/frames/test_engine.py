@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The render engine: its picture is the offscreen picture, of any size, in tiles, in parts, over any backdrop."""
+"""The render engine's picture equals the offscreen picture, at any size, in tiles and over any backdrop."""
 
 import math
 import subprocess

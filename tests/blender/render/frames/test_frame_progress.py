@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bar of a render rises through all stages, over all view layers and moments, without jumps, and Esc is heard."""
+"""The progress bar of a render rises through all stages, view layers and motion steps without jumps; Esc cancels."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panoramic cameras: silhouettes and distances beside Cycles, of a part of a picture and in stereo too."""
+"""Panoramic cameras: silhouettes and distances compared with Cycles, also for regions and in stereo."""
 
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stereo pictures: both eyes as Blender places them, beside Cycles, in the files that Blender writes."""
+"""Stereo pictures: both eyes as in Cycles, in the files that Blender writes."""
 
 import bpy
 import numpy as np

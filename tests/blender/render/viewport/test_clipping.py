@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's Clipping Region: what it cuts off of hair, its outline, its guides and of what is clicked, and where."""
+"""Blender's Clipping Region clips hair, its outline, its guides and picking."""
 
 from types import SimpleNamespace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Viewports in which something moves: steady pictures, without what is no longer there."""
+"""Viewports with motion: steady pictures without ghosts."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The outline of selected hair: where its line is, in which colour, when it is drawn and what it costs."""
+"""The outline of selected hair: its position, color, visibility and cost."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair in Blender's shading modes: as bright as surfaces beside it, by the same lights, each viewport for itself."""
+"""Hair in Blender's shading modes: as bright as surfaces in the same lights, separately for each viewport."""
 
 import math
 

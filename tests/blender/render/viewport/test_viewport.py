@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a viewport shows of hair: the scene's colours, strands of any width at their brightness, no work for nothing."""
+"""Hair in viewports: the scene's color management, brightness of thin strands, and no unnecessary work."""
 
 import re
 import shutil

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that a camera goes away from: as bright and as dense as it was, from the first pass on."""
+"""Hair seen from increasing distances keeps its brightness and density from the first pass on."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes copied between regions in Blender: from a selection or a group, to a group, a selection or all others."""
+"""Copy Guide Shape in Blender: from a selection or a group, to a group, a selection or all others."""
 
 import bpy
 import numpy as np

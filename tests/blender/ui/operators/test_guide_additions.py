@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""More and fewer guides, and mirrored ones, in Blender: guides that stay keep all their bits and attributes."""
+"""Adding, removing and mirroring guides in Blender: other guides keep all their bits and attributes."""
 
 import bpy
 import numpy as np

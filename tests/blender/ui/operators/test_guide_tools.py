@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guide tools in Blender: combing is kept, hair follows, and selection, masks, undo and redo do what artists expect."""
+"""Guide tools in Blender: combing is kept, hair follows, and selection, masks, undo and redo work."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guide tools on surfaces that are scaled, turned or deformed, on curves of any kind, and where nothing can be done."""
+"""Guide tools on scaled, rotated or deformed surfaces, on curves of any kind, and their refusals."""
 
 import bpy
 import numpy as np

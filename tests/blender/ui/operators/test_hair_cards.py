@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The dialogs of cards and tubes: the polygons that they name are those that are made."""
+"""The dialogs of cards and tubes show the numbers of polygons that are created."""
 
 import bpy
 import pytest

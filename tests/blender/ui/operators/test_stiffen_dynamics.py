@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stiffen: the least bend stiffness at which guides hold their shape, and the panel's note of those that cannot."""
+"""Stiffen: the lowest bend stiffness at which guides hold their shape, and the panel's note on guides that do not."""
 
 import bpy
 import numpy as np
