@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Any value for any argument of the functions for scripts, and for any property: it works, or is a `HairError`.
+"""Any value for any argument of the functions for scripts, and for any property, works or raises `HairError`.
 
 Afterwards the file has nothing that was half made; it is saved, drawn, and an undo works. VELLUS_TEST_STEPS sets the
 number of calls.

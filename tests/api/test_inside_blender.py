@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions that are called where Blender forbids it: in a driver, and while it renders. One sentence each."""
+"""Functions called where Blender forbids it, in a driver or during a render, raise one message each."""
 
 import bpy
 import pytest

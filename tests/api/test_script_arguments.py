@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arguments of wrong types given to the functions for scripts: one sentence, and the file is as it was."""
+"""Arguments of wrong types to the functions for scripts raise one message and do not change the file."""
 
 import math
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What drawing hair costs: milliseconds for upload, shadow maps and a frame, on the sample head.
+"""Times for drawing hair on the sample head: milliseconds for upload, shadow maps and a frame.
 
 .venv/bin/python tests/benchmarks/draw_frames.py --strands 10000 100000
 """

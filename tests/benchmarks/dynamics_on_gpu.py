@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long a GPU takes to simulate a frame of guides, free and on a body that deforms.
+"""Times of a GPU for simulating a frame of guides, free and on a deforming body.
 
     .venv/bin/python tests/benchmarks/dynamics_on_gpu.py
     .venv/bin/python tests/benchmarks/dynamics_on_gpu.py --strands 1000 --device cpu

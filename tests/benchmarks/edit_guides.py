@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a change of hair costs until the picture is finished: milliseconds of its parts, on the sample head.
+"""Times from a change of hair to the finished picture, by stage, on the sample head: milliseconds.
 
 .venv/bin/python tests/benchmarks/edit_guides.py --strands 30000 100000
 

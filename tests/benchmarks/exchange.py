@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The table of docs/manual/output.md: what grooms become in files, how large, how fast, and how exactly they come back.
+"""The table of docs/manual/output.md: sizes of groom files, times, and errors of reading them back.
 
     .venv/bin/python tests/benchmarks/exchange.py [STRANDS]
 

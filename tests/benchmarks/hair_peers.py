@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair between the same guides, by Vellus and by Blender's own nodes, to be timed beside each other.
+"""Hair between the same guides by Vellus and by Blender's own nodes, for comparing times.
 
 Each way is a `Way`: `remake` grows other strands (another seed), `edit` moves every guide a little; both end with
 Blender's own update, after which renderers and other modifiers can read the hair. Peers' guides carry what their nodes

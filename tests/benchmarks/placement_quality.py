@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How even sites on a surface are, measured by samples and a k-d tree: nothing here is shared with what places them."""
+"""Evenness of sites on a surface, by samples and a k-d tree, independent of the placement code."""
 
 from dataclasses import dataclass
 

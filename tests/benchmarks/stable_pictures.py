@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How steady a viewport's hair is while something moves, on the sample head: differences between frames.
+"""Flicker of hair in viewports during motion, on the sample head: differences between frames.
 
 Each movement begins at rest and is drawn with one pass a frame, as a viewport does while it lasts, alone and with what
 was shown before, and as pictures that have come to rest. Printed are display levels of 255, where hair is: the 99th

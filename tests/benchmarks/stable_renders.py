@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How steady rendered hair is while the scene turns under fixed lights, by dual scattering and by Light Grid.
+"""Flicker of rendered hair while the scene rotates under fixed lights, by dual scattering and by Light Grid.
 
 Scenes of `random_scene` turn by a quarter of a degree with each frame. Printed are display levels of 255, where hair
 is: how far pixels change from one frame to the next, at the 99th percentile; how far means of 12 × 12 pixels do, in

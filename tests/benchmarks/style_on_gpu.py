@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long a GPU takes to style strands, and whether it agrees with the processor.
+"""Times of a GPU for styling strands, and its agreement with the processor.
 
     .venv/bin/python tests/benchmarks/style_on_gpu.py
     .venv/bin/python tests/benchmarks/style_on_gpu.py --strands 100000 --device cuda:0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long the GPU that draws takes to make strands with their styles, and whether it agrees with Warp.
+"""Times of the drawing GPU for generating styled strands, and its agreement with Warp.
 
 .venv/bin/python tests/benchmarks/styles_where_drawn.py --strands 30000 100000
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What work is said to take beside what it takes: as ratios between sizes, in one run."""
+"""Estimated times of work compared with measured ones, as ratios between sizes, in one run."""
 
 import json
 import subprocess

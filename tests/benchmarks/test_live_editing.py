@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a guide's edit to points on the GPU, and what a surface costs that deforms: printed.
+"""Times from editing a guide to points on the GPU, and for a deforming surface; printed.
 
 Asserted: while guides are combed nothing is searched, nothing is written, and not all of the hair is uploaded.
 """

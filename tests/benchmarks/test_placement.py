@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How evenly, and how quickly, guides are placed: ours beside geogram, pyacvd and Blender's Poisson disks, in one run.
+"""Evenness and speed of guide placement compared with geogram, pyacvd and Blender's Poisson disks, in one run.
 
 Prints a table and a line of JSON for each row. Peers that are not installed are left out; `make bench` installs them.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What registering takes beside Blender's own start, for which an artist waits."""
+"""Time of registering the add-on compared with Blender's own start."""
 
 import os
 import subprocess

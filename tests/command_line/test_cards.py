@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""cards and tubes: hair of a .blend as meshes in files; what is wrong is one sentence."""
+"""cards and tubes: hair of a .blend as meshes in files; errors are one message."""
 
 import json
 import struct

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: files in, files out, results for people or for programs, one sentence when it cannot."""
+"""The command line: input and output files, results as text or JSON, one message per error."""
 
 import itertools
 import json

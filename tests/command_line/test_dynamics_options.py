@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dynamics on the command line: one option for all settings, which are in no other option's way."""
+"""Dynamics on the command line: one option for all settings, without conflicts with other options."""
 
 import argparse
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""export: hair of a .blend in files for other programs; what is wrong is one sentence."""
+"""export: hair of a .blend in files for other programs; errors are one message."""
 
 import bpy
 import pytest

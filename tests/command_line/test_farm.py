@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The job type for Flamenco: what it refuses, its tasks, and that their commands make the frames."""
+"""The job type for Flamenco: its refusals, its tasks, and the frames of their commands."""
 
 import argparse
 import shutil

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A .blend that was sent by a stranger runs nothing of its own, unless the user asked for it."""
+"""An untrusted .blend does not run scripts unless the user allows it."""
 
 import bpy
 import pytest

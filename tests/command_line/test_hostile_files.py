@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are not what they seem, and places that cannot be written: one sentence, status 1, nothing lost."""
+"""Invalid files and unwritable folders: one message, status 1, no loss of data."""
 
 import json
 import os

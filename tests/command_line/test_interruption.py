@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ctrl-C and a request to end, in the middle of work: one sentence, a status of its own, and whole files only."""
+"""Ctrl-C and SIGTERM during work: one message, a status of its own, and only complete files."""
 
 import json
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that are imported by a process of its own: the same scene, and one sentence where that process is ended."""
+"""Meshes imported by a separate process: the same scene, and one message if that process crashes."""
 
 import signal
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames whose linked libraries, images or caches are missing are refused in a sentence, and are another sequence."""
+"""Frames with missing libraries, images or caches are refused with a message, and form another sequence."""
 
 import os
 import subprocess

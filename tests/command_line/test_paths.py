@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths that begin with // are beside the .blend, on the command line and for scripts; without one, one sentence."""
+"""Paths that begin with // are relative to the .blend, on the command line and in scripts."""
 
 import shutil
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the command line and scripts refuse in one sentence before it costs anything: names, faces, frames, output."""
+"""Early refusals of the command line and scripts, with one message: names, faces, frames, output."""
 
 import math
 import os

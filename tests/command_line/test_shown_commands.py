@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands that the documentation shows: they are understood, and those of docs/command_line.md work."""
+"""Commands in the documentation are valid, and those of docs/command_line.md work."""
 
 import re
 import shlex

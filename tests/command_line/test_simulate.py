@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""simulate: frames baked from the command line, gone on with, and rendered; what is wrong is one sentence."""
+"""simulate: frames baked on the command line, resumed and rendered; errors are one message."""
 
 import itertools
 import subprocess

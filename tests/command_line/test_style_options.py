@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles as words of a command line: what is wrong with one is one sentence, before anything is read."""
+"""Styles on the command line: errors are one message, before anything is read."""
 
 import argparse
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""transfer, and groom --hair-from: hair that comes to a mesh; what is wrong is one sentence."""
+"""transfer, and groom --hair-from: hair on another mesh; errors are one message."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work in steps is the same in one go and in a thread, ends early when asked to, and hands its errors over."""
+"""Work in steps is the same immediately and in a thread, can be canceled, and passes on errors."""
 
 import threading
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Values of settings: numbers of any kind become plain Python values, and everything else is refused in a sentence."""
+"""Values of settings: numbers of any kind become plain Python values; everything else is refused with a message."""
 
 import math
 from dataclasses import dataclass

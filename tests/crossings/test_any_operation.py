@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair survives any operations in any order: walk_operations.py, in a process whose crash is a failure, not an end."""
+"""Hair survives any operations in any order: walk_operations.py, in a separate process whose crash is a failure."""
 
 import subprocess
 import sys

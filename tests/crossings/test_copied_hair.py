@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copies of hair by each of Blender's commands: with guides of their own, or with a sentence and a button."""
+"""Copies of hair by each of Blender's commands: with guides of their own, or with a message and a button."""
 
 import bpy
 import numpy as np

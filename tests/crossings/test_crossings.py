@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where two parts meet that each hold alone: a window and deformed surfaces, Edit Mode and settings.
+"""Combinations of features that work alone: a window and deformed surfaces, Edit Mode and settings.
 
 Each of these ended Blender: a kernel read past the end of an array.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Attributes of ours that were removed, retyped or filled with other values count as missing or stale."""
+"""Our attributes that were removed, retyped or overwritten count as missing or stale."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""USD and Alembic: guides and hair go out as they are on the surface that carries them, and come back the same."""
+"""USD and Alembic: guides and hair are exported in their posed positions, and read back the same."""
 
 import bpy
 import numpy as np

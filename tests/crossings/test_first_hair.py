@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""New hair without a setting: it covers its surface, follows its size, and every way of making it makes the same."""
+"""New hair with default settings: it covers its surface, follows its size, and is the same by every interface."""
 
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair follows its surface where others evaluate it: in renders, exports, and files that link it."""
+"""Hair follows its surface in Blender's own evaluation: in renders, exports, and files that link it."""
 
 import bpy
 import numpy as np

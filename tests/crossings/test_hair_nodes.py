@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's hair node groups take our guides and our hair: each does to them what its name says."""
+"""Blender's hair node groups work on our guides and hair."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes, numbers and curves that nobody models on purpose: hair grows as it should, or one sentence says why not."""
+"""Degenerate meshes, numbers and curves: hair grows correctly, or one message says why not."""
 
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulated characters that a shot links: baked in the shot, and moved there as in their own file."""
+"""Simulated characters linked by a shot: baked in the shot, with the same motion as in their own file."""
 
 import shutil
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Damaged files: every reader takes them in a sentence or in valid values; no traceback, no end, no crash."""
+"""Damaged files: every reader raises one message or returns valid values; no traceback, no hang, no crash."""
 
 import re
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lights, cameras, objects and worlds whose numbers are infinite or no numbers: left out of pictures, and said once."""
+"""Lights, cameras, objects and worlds with non-finite numbers are left out of pictures and reported once."""
 
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that cannot be written or drawn keeps no other hair from it."""
+"""Hair that cannot be written or drawn does not affect other hair."""
 
 from concurrent.futures import Future
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves that are put on a surface with coordinates of its own: places, widths and lengths in the world stay."""
+"""Curves attached to another surface keep their positions, widths and lengths in the world."""
 
 import bpy
 import numpy as np

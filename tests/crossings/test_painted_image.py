@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides follow an image that is painted on, when the painting is finished."""
+"""Guides follow a painted image when painting is finished."""
 
 import bpy
 import numpy as np

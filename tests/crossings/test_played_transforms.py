@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transforms that are applied while guides are played: they go on from where they are, as fast as they were."""
+"""Transforms applied during playback of guides: the simulation continues with the same positions and velocities."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What settings name, renamed, deleted, unlinked and appended: followed, or said."""
+"""Data that settings refer to, renamed, deleted, unlinked or appended: followed, or reported."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel, scripts and command line: the same settings make the same strands, to the last bit."""
+"""Panel, scripts and command line: the same settings give the same strands, bit by bit."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guide tools on surfaces that stand anywhere do in the world what they do where the transform was applied first."""
+"""Guide tools on transformed surfaces have the same result in the world as after applying the transform."""
 
 import bmesh
 import bpy

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces that stand anywhere × whatever Blender does to their transform: hair goes wherever its surface goes.
+"""Surfaces with any transform × operations on the transform: hair moves with its surface.
 
 Each cell has combed guides with styled hair, kept hair with guides of its own, and hand-made guides. Where nothing
 moves in the world, no strand does; where the surface moves, each strand goes with it. Widths and lengths do so, too.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names that are not UTF-8, as in damaged .blend files, and very long ones: Python cannot read the former at all."""
+"""Names that are not UTF-8, as in damaged .blend files, which Python cannot read, and very long names."""
 
 import subprocess
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms that come to meshes that cannot take them, and curves that cannot come: one sentence, and nothing is left."""
+"""Grooms on unusable meshes, and unusable curves: one message, and nothing is left behind."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is made of hair whose surface stands anywhere: files, cards, tubes, copies on other meshes, moving guides.
+"""Results from hair on surfaces with any transform: files, cards, tubes, transfers, simulated guides.
 
 Files have points and widths where Blender shows them. The rest is in the world what it is where the transform was
 applied first.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the random walks hold hair to: each law lets pass what is right, and tells what is not."""
+"""The laws of the random walks: each accepts valid hair, and detects faults."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that fail half way, or refuse, leave the file, and its folder, as they were."""
+"""Operators that fail halfway, or refuse, do not change the file and its folder."""
 
 import contextlib
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The width that EEVEE draws strands with, a setting of scenes, in each scene that hair comes to from another one."""
+"""The scene setting for EEVEE's strand width, in each scene to which hair is added."""
 
 import bpy
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What becomes of a groom, in a window: tubes by the dialog and the redo panel, and an asset that the shelf applies.
+"""A groom in a window: tubes by the dialog and the redo panel, and an asset applied from the shelf.
 
 Steps of a walk in which there is hair.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the script of a walk is made of: its words, what it notes for the tests, and Blender's life between its steps.
+"""Helpers for scripts of walks: arguments, results for the tests, and pauses between steps.
 
 Run by a desktop Blender: SCRIPT -- PART ZIP OUT [MORE …]. Each part of a walk has a Blender of its own and goes on with
 what the part before left in OUT: a hundred redraws in a row crash Blender 5.2.2 on Mesa's software Vulkan, with or

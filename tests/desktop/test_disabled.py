@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on that is disabled while a window renders says so and waits for the end; Blender does not hang."""
+"""Disabling the add-on while a window renders waits for the end with a message; Blender does not hang."""
 
 import bpy
 import numpy as np

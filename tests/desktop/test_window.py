@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A window of Blender, OpenGL and Vulkan: hair is where it should be, looks as it should, and follows the hand."""
+"""A window of Blender with OpenGL and Vulkan: position, look and interactive updates of hair."""
 
 import re
 import sysconfig

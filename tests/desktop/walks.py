@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A walk through the add-on in a window of Blender: a script of this folder that is run there, and what came of it."""
+"""A walk through the add-on in a window of Blender: runs a script of this folder and returns its results."""
 
 import json
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's window as the walk handles it: its 3-D view, pictures of the screen, the mouse."""
+"""Blender's window for walks: its 3-D view, screenshots, the mouse."""
 
 import subprocess
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures in the texture: apart from each other, all of one scale, and UV coordinates inside them."""
+"""Atlas of card pictures: no overlaps, one scale, and UV coordinates inside the pictures."""
 
 import numpy as np
 import pytest

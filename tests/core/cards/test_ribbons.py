@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ribbons: frames, what faces where, and that no strand leaves the ribbon onto which it is laid flat."""
+"""Ribbons: frames, orientation, and strands that stay inside the ribbon onto which they are laid flat."""
 
 import itertools
 

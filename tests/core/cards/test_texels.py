@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Textures: what samples show becomes color, normal, depth and the rest; empty texels are as what is near."""
+"""Textures of cards: color, normal, depth and others from samples; empty texels are filled from neighbors."""
 
 import numpy as np
 import pytest

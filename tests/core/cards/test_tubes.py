@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tubes: closed, turned outwards, with the polygons that were promised and the volume of their strands."""
+"""Tubes: closed, oriented outwards, with the announced polygons and the volume of their strands."""
 
 import itertools
 from collections import Counter

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Force fields: where they act as strongly as Blender's do, what they stand for, and smooth noise."""
+"""Force fields: the strength and falloff of Blender's, air velocity, and smooth noise."""
 
 import math
 

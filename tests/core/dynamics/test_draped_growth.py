@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that are draped as they grow: outside the surface, lower, as long as they were, alike at any size."""
+"""Draped growth of guides: outside the surface, lower, with the same length, independent of size."""
 
 from dataclasses import replace
 

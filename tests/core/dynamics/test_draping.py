@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that settle: outside the surface, lower than before, as long as they were, and at rest."""
+"""Draped guides: outside the surface, lower than before, with the same length, and at rest."""
 
 from dataclasses import replace
 

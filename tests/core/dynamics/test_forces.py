@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What acts on strands beside their weight: air, hold, pinned points, roots that turn, resets; and what is refused."""
+"""Influences on strands besides weight: air, hold, pinned points, rotating roots, resets; and refusals."""
 
 from dataclasses import replace
 

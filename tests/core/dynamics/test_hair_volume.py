@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""V20: friction keeps momentum and takes energy; nothing pushes at the groom; sums have no order."""
+"""V20: friction conserves momentum and dissipates energy; the groom has no pressure; sums do not depend on order."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Brows and lashes: short stiff hair that lies upon its surface does not break, whichever way that is turned."""
+"""Brows and lashes: short stiff hair lying on its surface does not break, in any orientation."""
 
 from dataclasses import replace
 

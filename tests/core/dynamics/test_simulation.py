@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulation from frame to frame: what it begins with, what is not felt, what it keeps, and what it follows from."""
+"""A simulation over frames: its initial state, ignored motion, stored state, and inputs."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Alembic files: what is written is what an independent reader finds, in any number of parts and samples."""
+"""Alembic files: an independent reader finds what was written, with any number of parts and samples."""
 
 import io
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of Alembic files: where transforms put them, what is said of them, and files that are damaged or hostile."""
+"""Curves of Alembic files: transforms, metadata, and damaged or hostile files."""
 
 import struct
 

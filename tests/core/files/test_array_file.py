@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays come back bit by bit, programs for .npz files read them, and nothing else is read."""
+"""Arrays are restored bit by bit, other .npz readers can read them, and other files are refused."""
 
 import io
 import math

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Unit and axis of curves: what people say, what the file says, where roots would lie on the surface; refusals."""
+"""Unit and axis of curves: given, from the file, or by the distance of roots from the surface; refusals."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that several processes make: each is made once, and nobody waits for what was killed."""
+"""Files created by several processes: each is created once, and killed processes block no others."""
 
 import errno
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames come back bit by bit, between frames hair moves smoothly, and what is written is whole or not there."""
+"""Frames are restored bit by bit, motion between frames is smooth, and files are written atomically."""
 
 import dataclasses
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What other programs take of guides and strands: three guides of each, names of groups, limits."""
+"""Data for other programs: three guides of each strand, names of groups, limits."""
 
 import numpy as np
 import pytest

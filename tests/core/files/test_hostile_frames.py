@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Damaged, foreign and hostile files in a folder of frames are missing frames, told once, and never anything else."""
+"""Damaged, foreign and hostile files in a folder of frames count as missing frames, reported once."""
 
 import dataclasses
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Groom settings as a file: they come back as they went, and what is wrong with a file is said in one sentence."""
+"""Groom settings in files: exact round trip, and one message for each error in a file."""
 
 import json
 import math

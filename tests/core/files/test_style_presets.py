@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Named styles: each has its file, says nothing that is not needed, and fits surfaces of any size."""
+"""Style presets: each has its file, stores only necessary settings, and fits surfaces of any size."""
 
 import json
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cached tables are those asked for, or are made again."""
+"""Cached tables match the request, or are baked again."""
 
 import os
 

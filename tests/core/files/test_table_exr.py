@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables on disk: what is read is what was written, and nothing else is read."""
+"""Tables on disk: reading returns what was written, and other files are refused."""
 
 import io
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files appear whole or not at all, several of them together, and nothing is left beside them."""
+"""Files are written atomically, several of them together, without leftovers."""
 
 import os
 

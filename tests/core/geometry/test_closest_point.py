@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The nearest point of a surface against brute force."""
+"""The nearest point of a surface, compared with brute force."""
 
 import numpy as np
 import pytest

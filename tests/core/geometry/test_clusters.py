@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clusters: none is empty, each row is in the nearest, groups that stand apart are found."""
+"""Clusters: none is empty, each row is in the nearest one, and separate groups are found."""
 
 import numpy as np
 import pytest

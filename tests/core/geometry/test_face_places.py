@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Places in polygons: kept when these are cut otherwise, and found again when vertices have other numbers."""
+"""Places in polygons are kept under another triangulation, and found again after renumbering of vertices."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fingerprints tell points that were moved from those that were not."""
+"""Fingerprints detect moved points."""
 
 import os
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Neighbours found by the grid are those found by looking at all points."""
+"""Neighbours found by the grid equal those by brute force."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of packed strands: how far points are from their places, of strands of any size; bits that textures keep."""
+"""Laws of packed strands: rounding of points for strands of any size, and bits that textures preserve."""
 
 import numpy as np
 import pytest

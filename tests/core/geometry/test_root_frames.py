@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Roots on a device are where NumPy says they are."""
+"""Roots on a device equal those computed by NumPy."""
 
 import numpy as np
 import pytest

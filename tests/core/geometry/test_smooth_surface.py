@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The smooth surface of a subdivided cage: beside bicubic splines, and what it leaves as it is."""
+"""The smooth surface of a subdivided cage: compared with bicubic splines, and unchanged surfaces."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands on a surface that deforms: rooted, rigid under rigid motion, and never jumping between neighbours."""
+"""Strands on a deforming surface: rooted, rigid under rigid motion, and continuous between neighbours."""
 
 import numpy as np
 import pytest

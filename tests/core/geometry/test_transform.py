@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands in other coordinates are where NumPy says, whichever are asked for."""
+"""Transformed strands equal those computed by NumPy, for all or some."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""UVs lead astray just where two faces share a place of the layout."""
+"""UVs are ambiguous exactly where two faces overlap in the layout."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides derived from hair: strands that are there, fitted by least squares, with errors that are what they say."""
+"""Guides derived from hair: existing strands, fitted by least squares, with correct error estimates."""
 
 import numpy as np
 import pytest

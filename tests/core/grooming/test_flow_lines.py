@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of flow lines: guides begin along them, at an angle to the surface, and without a step between them."""
+"""Laws of flow lines: guides start along them, at an angle to the surface, and vary continuously between them."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that follow guides: whatever joins the weighted sum is in all of them, however they are updated."""
+"""Strands that follow guides: every stage after the weighted sum applies to all kinds of updates."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The size of new hair follows from its surface: by its size alone where shapes are alike, as on a head on a head."""
+"""The size of new hair is fitted to its surface: similar shapes of different sizes get similar hair."""
 
 from dataclasses import replace
 

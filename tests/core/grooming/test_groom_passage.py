@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A saved groom finds its way to a surface: exactly to a copy, by UV maps that agree, else by the nearest surface."""
+"""Placement of a saved groom: exactly on a copy, by matching UV maps, or by the nearest surface."""
 
 import numpy as np
 import pytest

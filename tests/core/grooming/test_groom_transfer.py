@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A groom on another mesh: copies carry it exactly, other meshes and back nearly, and nothing is lost unsaid."""
+"""Transfer of a groom: exact on copies, nearly reversible on other meshes, and losses are reported."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copied shapes: what a guide is on its surface, its copy is on its own."""
+"""Copied shapes: a copy has the shape of its source relative to its own surface."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""More guides take the shape of those around; fewer leave the rest even."""
+"""Added guides take the shape of the guides around them; after removal the rest is even."""
 
 import numpy as np
 import pytest

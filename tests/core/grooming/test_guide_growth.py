@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of grown guides: rooted, as long as asked for, tilted no further than asked for, and outside the surface."""
+"""Laws of grown guides: rooted, with the requested length and maximum tilt, and outside the surface."""
 
 import numpy as np
 import pytest

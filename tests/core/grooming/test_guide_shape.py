@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smoothing, lifting and attraction turn segments: roots do not move, and lengths are kept."""
+"""Smoothing, lifting and attraction rotate segments: roots do not move, and lengths are kept."""
 
 import numpy as np
 import pytest

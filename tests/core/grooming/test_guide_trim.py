@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trimmed guides end on the cutter, and what is left of them is what it was."""
+"""Trimmed guides end on the cutter, and the rest of them does not change."""
 
 import numpy as np
 import pytest

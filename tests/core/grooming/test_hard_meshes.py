@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that nobody models on purpose: as many guides as asked for, on them, shared out by area; or one sentence."""
+"""Degenerate meshes: the requested number of guides, distributed by area; or one message."""
 
 import warnings
 

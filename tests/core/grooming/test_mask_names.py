@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vertex groups that are named like hair."""
+"""Vertex groups named after hair."""
 
 import pytest
 

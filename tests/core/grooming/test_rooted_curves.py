@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of curves that become guides: the root is the end at the surface, and what cannot be a guide is left out."""
+"""Laws of curves that become guides: the root is the end at the surface, and unusable curves are left out."""
 
 import itertools
 

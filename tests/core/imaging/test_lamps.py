@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps by importance: nothing is lost, and nothing jumps."""
+"""Lamps by importance: no light is lost, and changes are continuous."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures that were cut short are told from whole ones, wherever they were cut, without decoding them."""
+"""Truncated pictures are detected without decoding, wherever they were cut."""
 
 import io
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Apertures, and what a thin lens leaves in focus."""
+"""Apertures, and the focus of a thin lens."""
 
 import math
 

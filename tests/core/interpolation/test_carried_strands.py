@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that keep their shape beside a course that moves."""
+"""Strands that keep their shape relative to a moving course."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that stand for guides: against looking at all of them."""
+"""The strand nearest to each guide, compared with brute force."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of weights: they are shares, without a step wherever the root moves, and of no guide that is kept out."""
+"""Laws of weights: they sum to one, are continuous in the root, and exclude separated guides."""
 
 import math
 

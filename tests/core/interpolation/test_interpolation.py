@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of interpolation: weighted means of turned offsets, as long as the guides', whatever way it is computed."""
+"""Laws of interpolation: weighted means of rotated offsets with the guides' lengths, in all implementations."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of part lines: the way to a guide goes round them, is as long as it must be, and changes without a step."""
+"""Laws of part lines: paths to guides go around them, have the shortest length, and change continuously."""
 
 import heapq
 from itertools import pairwise

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of regions: a place is of the region that most of it is of, and kept apart is what differs anywhere."""
+"""Laws of regions: a point belongs to the region with the largest weight, and any difference separates."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kernels that come compiled: the same hair as from kernels compiled here, and none where they do not fit."""
+"""Shipped kernels: the same hair as from kernels compiled here, and none if they do not fit."""
 
 import json
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kernels run whatever became of Warp's cache: damaged entries, folders that cannot be written, full disks."""
+"""Kernels run with any state of Warp's cache: damaged entries, unwritable folders, full disks."""
 
 import os
 import shutil

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modules loaded by several threads: each of them once, stopped in between, and failures told."""
+"""Modules loaded by several threads: each once, with cancellation and reported failures."""
 
 import threading
 import time

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Launches that are replayed do what they would do again, with what arrays hold by then."""
+"""Replayed launches equal new launches with the present contents of arrays."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of coverage: full among guides, nothing far away, whatever the mesh is made of."""
+"""Laws of coverage: full among guides, zero far away, independent of the mesh."""
 
 import numpy as np
 import pytest

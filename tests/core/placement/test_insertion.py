@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""New sites stand evenly between those that are there, where they may."""
+"""New sites are placed evenly between existing ones, where density allows."""
 
 import numpy as np
 import pytest

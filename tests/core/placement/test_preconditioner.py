@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of what placement is made of: springs between sites, farthest points, moves along the surface."""
+"""Laws of the parts of placement: springs between sites, farthest points, moves along the surface."""
 
 import numpy as np
 import pytest

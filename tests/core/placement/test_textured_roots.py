@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Roots by an image: none where it is black, as many as it is bright elsewhere, the same for the same seed."""
+"""Roots by an image: none where it is black, density by brightness elsewhere, the same for the same seed."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One set of settings for every model, and the looks that are named."""
+"""One set of settings for all models, and named looks."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Lean: guides turn where they are told, and none goes through the surface."""
+"""Laws of Lean: guides turn in the given direction, and none penetrates the surface."""
 
 from functools import cache
 

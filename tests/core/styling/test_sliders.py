@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A slider moves hair by degrees, over its whole range, on five grooms, so a keyed setting does not jump.
+"""Sliders move hair continuously over their whole range, on five grooms, so animated settings do not jump.
 
 The largest move m(h) of any point over steps h of a slider obeys m(h) ≤ 2 m(h/2), by the triangle inequality. As h
 falls, m(h)/h rises to the slider's steepest slope: m(h)/m(h/2) tends to 2 where strands move by degrees, and to 1 where

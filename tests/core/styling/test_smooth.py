@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Smooth: what is left of a wave, and what stays as it is."""
+"""Laws of Smooth: attenuation of waves, and unchanged strands."""
 
 import numpy as np
 import pytest

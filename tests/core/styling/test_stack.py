@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of styles bound to hair: what a stroke reaches, what a slider costs, and what is kept apart."""
+"""Laws of styles bound to hair: strands reached by a stroke, work of a slider, and separate regions."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wetness of each strand is what the kernel makes of a Wet style's amount there."""
+"""The wetness of each strand equals the kernel's amount of its Wet style."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Trim: lengths, and what a cutter leaves."""
+"""Laws of Trim: lengths, and cutters."""
 
 import numpy as np
 import pytest

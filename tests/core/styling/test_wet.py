@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Wet: dry at zero, and the wetter the more it clings, joins and swells."""
+"""Laws of Wet: no effect at zero; wetter hair clings, joins and swells more."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The manual's ten steps to curly hair, done word for word in a window with a clean profile."""
+"""The manual's ten steps to curly hair, in a window with a clean profile."""
 
 import pytest
 

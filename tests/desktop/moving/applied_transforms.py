@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sample's head with hair in a window, to which transforms are applied: pictures before and after.
+"""Applied transforms on the sample head with hair in a window: pictures before and after.
 
 Run by a desktop Blender as steps.py says. Writes pictures of the screen.
 """

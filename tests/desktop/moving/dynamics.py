@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is simulated in a window: played, undone, baked, stopped, and taken away while it plays.
+"""Simulated hair in a window: played, undone, baked, stopped, and deleted during playback.
 
 Run by a desktop Blender as steps.py says, with one of `PARTS`. Writes pictures of the screen.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transforms that are applied to a head in a window leave the picture of its hair as it is."""
+"""Transforms applied to a head in a window do not change the picture of its hair."""
 
 import pytest
 

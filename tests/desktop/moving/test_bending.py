@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on a surface that bends in a window: Blender leaves out what Vellus draws until the surface rests."""
+"""Hair on a bending surface in a window: Blender's evaluation is paused until the surface rests."""
 
 import pytest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is simulated in a window: played, undone, baked, stopped, and taken away."""
+"""Simulated hair in a window: played, undone, baked, stopped, and deleted."""
 
 import pytest
 

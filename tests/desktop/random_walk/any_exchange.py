@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Steps of any_setting.py that bring hair from elsewhere or to elsewhere: libraries, meshes, curves, particles."""
+"""Steps of any_setting.py that import or export hair: libraries, meshes, curves, particles."""
 
 import bpy
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings in random order in a window with a clean profile: Blender comes to the end, and nothing raises."""
+"""Settings in random order in a window with a clean profile: Blender does not crash, and nothing raises."""
 
 import pytest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Closed meshes are wound outwards however they were given, and rims are the edges with one triangle."""
+"""Closed meshes are oriented outwards, and rims are the edges with one triangle."""
 
 import numpy as np
 import pytest

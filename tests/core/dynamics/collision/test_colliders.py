@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colliders between two poses; what cannot collide is left out and named, and the others go on."""
+"""Colliders between two poses; unusable colliders are left out and named."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact with planes, spheres and cylinders: it lets go, holds by Coulomb's law, and keeps points outside."""
+"""Contact with planes, spheres and cylinders: release, Coulomb friction, and points kept outside."""
 
 from dataclasses import replace
 

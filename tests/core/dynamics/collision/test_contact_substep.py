@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that touch a moving mesh: a group of them at once as stage by stage, on any number of threads."""
+"""Strands touching a moving mesh: the fused substep equals separate stages, on any number of threads."""
 
 import os
 

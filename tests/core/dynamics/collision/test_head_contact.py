@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""V12 on the sample head, with its ears: hair that is shaken stays outside, and as long as it is."""
+"""V12 on the sample head with its ears: shaken hair stays outside and keeps its length."""
 
 import numpy as np
 import pytest

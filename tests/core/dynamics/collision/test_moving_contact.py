@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact with what moves: its displacement, the side of a sheet, nothing passes through, and nothing is missed."""
+"""Contact with moving colliders: displacement, sides of sheets, no tunnelling and no missed contacts."""
 
 from itertools import pairwise
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What turns as a whole moves not otherwise, and the rest is never more than what is said."""
+"""Rigid rotations leave no residual motion, and the residual of other motion is bounded."""
 
 from itertools import pairwise
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands of any size and material, thrown about: all stay finite, and have their length again when they rest."""
+"""Strands of any size and material in violent motion stay finite, and regain their length at rest."""
 
 from dataclasses import replace
 

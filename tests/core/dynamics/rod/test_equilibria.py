@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands at rest: where elastica and Kirchhoff's equations say, to second order in the number of vertices."""
+"""Equilibria of strands agree with elastica and Kirchhoff's equations to second order in the number of vertices."""
 
 from dataclasses import replace
 

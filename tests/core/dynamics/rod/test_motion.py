@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that move: periods, damping, momentum, energy, length, and the order of errors in time."""
+"""Moving strands: periods, damping, momentum, energy, length, and the order of errors in time."""
 
 from dataclasses import replace
 

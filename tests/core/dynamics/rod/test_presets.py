@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Presets of dynamics: what they set, what they leave alone, and how they compare."""
+"""Presets of dynamics: settings that they set, settings that they keep, and comparisons."""
 
 from dataclasses import asdict, replace
 from itertools import pairwise

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The same strands move alike, bit by bit: again, resumed, in another order, on other numbers of threads."""
+"""Simulations are reproducible bit by bit: repeated, resumed, in another order, with other numbers of threads."""
 
 import os
 from dataclasses import replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far guides bend under their weight: the elastica, and beams of linear theory."""
+"""Bending of guides under their weight, compared with the elastica and linear beam theory."""
 
 from dataclasses import replace
 

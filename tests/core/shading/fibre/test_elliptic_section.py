@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Elliptic sections: what [Marschner03] says of the index, and what a circle must give."""
+"""Elliptic sections: the index of [Marschner03], and the limit of a circle."""
 
 from dataclasses import replace
 

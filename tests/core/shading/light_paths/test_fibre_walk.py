@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path's turn at a fibre, against the mathematics of `energy_conserving`."""
+"""Scattering of a path at a fibre, compared with `energy_conserving`."""
 
 import numpy as np
 import pytest

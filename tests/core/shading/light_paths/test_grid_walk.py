@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path's way through cells of segments finds what looking at every segment finds."""
+"""Tracing through cells of segments finds the same hits as brute force."""
 
 import numpy as np
 import pytest

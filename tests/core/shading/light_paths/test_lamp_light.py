@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps as paths see them: as bright as the world where they fill a part of it, and found by few paths."""
+"""Lamps in path tracing: as bright as an equal part of the world, and found by few paths."""
 
 from dataclasses import replace
 from itertools import pairwise

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path's turn at a surface: its sampling against its value, its energy, and Cycles' Principled BSDF."""
+"""Scattering of a path at a surface: sampling against evaluation, energy, and Cycles' Principled BSDF."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rays through a part of a picture, by matrices as a graphics card has them."""
+"""Rays through a part of a picture, from matrices of a graphics API."""
 
 import numpy as np
 import pytest

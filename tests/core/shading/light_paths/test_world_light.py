@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world as paths see it: directions are as dense as its light, and small bright places are no noise."""
+"""The world in path tracing: directions sampled in proportion to its light, without noise from small bright spots."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dual scattering: what one fibre passes on and sends back, and what many do."""
+"""Dual scattering: forward and backward scattering of one fibre and of many."""
 
 from dataclasses import replace
 

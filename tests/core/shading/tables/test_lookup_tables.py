@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables against the model that they stand for: axes, means over cells, lookups, half floats."""
+"""The tables compared with their model: axes, means over cells, lookups, half floats."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of strands that differ against tables that are baked for one absorption."""
+"""Tables of varied strands compared with tables baked for one absorption."""
 
 from dataclasses import replace
 
