@@ -47,13 +47,15 @@ class KernelOnGPU:
     def _buffer(self):
         return uniforms.uniform_buffer(self.record)
 
-    def run(self, count: int, **numbers: float) -> dict[str, np.ndarray]:
-        """Run `count` threads and return what they write, {array: (count,) or (count, 3)}.
+    def run(self, count: int, first: int = 0) -> dict[str, np.ndarray]:
+        """Run `count` threads and return what they write, {array: (count,) or (count, 3)}; zero where they do not.
 
-        numbers: others than before of the kernel's own. Each thread writes at its own index, or nowhere: zero.
+        first: the kernel's parameter of this name, to which it adds the thread's index: the first element that is
+        written and returned.
         """
-        for name, value in numbers.items():
-            self.record[name] = value
+        if first and "first" not in self.program.text.members:
+            raise ValueError(f"the kernel has no parameter `first` to begin at {first}")
+        self.record["first"] = first
         self.record["thread_count"] = count
         self._buffer.update(uniforms.bytes_of(self.record))
         shader, written = self.program.shader, self.program.text.written
@@ -70,7 +72,7 @@ class KernelOnGPU:
 
 
 def prepare(kernel: wp.Kernel, given: Mapping[str, Any], triangles: np.ndarray | None = None) -> KernelOnGPU:
-    """Upload what a kernel is given, {parameter: value} as for `wp.launch`, without arrays that it writes.
+    """Upload what a kernel is given, {parameter: value} as for `wp.launch`, without `first` and arrays that it writes.
 
     triangles: (F, 3, 3) corners of the mesh that it traces rays through. Raises `HairError` where the driver does not
     compile it, or has no memory.
@@ -78,6 +80,8 @@ def prepare(kernel: wp.Kernel, given: Mapping[str, Any], triangles: np.ndarray |
     program = _program(kernel)
     record = program.block.record()
     for name, one in program.text.members.items():
+        if name == "first":  # of `run`
+            continue
         record[name] = _numbers(_value_of(given, one))
     parts: dict[str, list[np.ndarray]] = {texture: [] for texture in _FORMATS}
     for name, one in program.text.arrays.items():
@@ -154,7 +158,8 @@ def _program(kernel: wp.Kernel) -> _Program:
     sides = {f"{name}_side_{axis}": "int" for name, one in text.arrays.items() for axis in range(one.kind.ndim)}
     places = {f"{name}_first": "int" for name in (*text.arrays, "boxes", "corners")}
     members = {name: one.kind for name, one in text.members.items()}
-    block = uniforms.Block("Given", {**members, **sides, **places, "leaf_count": "int", "thread_count": "int"})
+    own = dict.fromkeys(("first", "leaf_count", "thread_count"), "int")
+    block = uniforms.Block("Given", {**members, **sides, **places, **own})
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_GROUP_SIZE)
     info.typedef_source(block.source)

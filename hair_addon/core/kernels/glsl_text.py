@@ -19,7 +19,7 @@ import numpy as np
 import warp as wp
 
 _KINDS = dict.fromkeys((float, wp.float32, wp.float64), "float") | dict.fromkeys((int, wp.int32, wp.uint8), "int")
-_KINDS |= {wp.uint32: "uint", bool: "bool", wp.bool: "bool"}
+_KINDS |= {wp.uint32: "uint", bool: "bool", wp.bool: "bool", wp.uint64: "int"}  # the last: a mesh, which is not read
 _KINDS |= {wp.vec2: "vec2", wp.vec3: "vec3", wp.vec4: "vec4", wp.vec3i: "ivec3"}
 _ELEMENTS = {"vec2": "float", "vec3": "float", "vec4": "float", "ivec3": "int"}
 _ZERO = {"float": "0.0", "int": "0", "uint": "0u", "bool": "false"}
@@ -113,8 +113,8 @@ def function_text(*functions: wp.Function) -> str:
 
 
 def _writing(name, kind):
-    """The function that writes an element of an array."""
-    store = f"imageStore({name}, element_texel(index), texel_of_{kind}(value));"
+    """The function that writes an element of an array, of which an image has those from the first thread's on."""
+    store = f"imageStore({name}, element_texel(index - given.first), texel_of_{kind}(value));"
     return f"void write_{name}(int index, {kind} value)\n{{\n  {store}\n}}\n"
 
 

@@ -209,16 +209,16 @@ def test_paths_of_light_are_those_of_the_processor(rng):
     assert np.sqrt((off**2).mean()) < 1.3  # in standard deviations of the paths that part
     np.testing.assert_array_less(np.abs(difference.sum(axis=0)), 4.0 * np.sqrt((difference**2).sum(axis=0)))
     # In parts, as a viewport follows them: the same bits.
-    half = prepared.run(count - 1000, first=1000)["out_light"]
-    np.testing.assert_array_equal(half[1000:], found["out_light"][1000 : count - 1000])
+    np.testing.assert_array_equal(prepared.run(700, first=1000)["out_light"], found["out_light"][1000:1700])
 
 
 def test_light_of_one_event_is_the_same_to_rounding(rng):
-    """On black hair next to nothing is left for further events."""
+    """On black hair, without surfaces, next to nothing is left for further events."""
     grid, light = lit_scene(rng, (1e4, 1e4, 1e4))
-    given, count, _mesh = paths_of(grid, replace(light, world=np.full((1, 1, 3), 0.0)), 1000)
+    light = surroundings(lamps=light.lamps)
+    given, count, _mesh = paths_of(grid, light, 1000)
     expected = run_in_warp(gather._gather, count, given, GATHERED)["out_light"]
-    found = kernel_programs.prepare(gather._gather, given, light.corners.reshape(-1, 3, 3)).run(count)["out_light"]
+    found = kernel_programs.prepare(gather._gather, given).run(count)["out_light"]
     assert expected.mean() > 0.001
     off = np.abs(found - expected).max(axis=1) / np.maximum(expected.max(axis=1), expected.mean())
     assert (off < 1e-3).mean() > 0.97
