@@ -26,8 +26,9 @@ _CLASSES = {
     "systems": (hair_systems.VellusSystem, hair_systems.VellusNewHair),
 }
 
-_PROPERTIES = {"model": "shading", "is_drawn": "shading", "viewport_percentage": "shading", "show_guides": "systems"}
+_PROPERTIES = {"model": "shading", "is_drawn": "shading", "viewport_percentage": "shading"}
 _PROPERTIES |= {"table_folder": "lookup_tables", "simulates": "dynamics", "cache_folder": "dynamics"}
+_PROPERTIES |= {"show_guides": "systems", "guide_colors": "systems", "guide_opacity": "systems"}
 _PROPERTIES |= {"shows_styles_while_combing": "surface", "style": "styles"}
 
 # Page → the operators that it explains, a heading each.

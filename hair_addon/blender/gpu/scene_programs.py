@@ -46,17 +46,27 @@ def has_image_atomics():
 
 
 @cached
-def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=(), is_clipped=False):
+def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=()):
     """The program that draws strips of strands with a .frag; targets: its (output, type), ...
 
-    shadow_samplers, samplers: of shadow maps and of other textures; is_clipped: apply clipping planes, as in
-    strands/guides.frag.
+    shadow_samplers, samplers: of shadow maps and of other textures.
     """
     info = gpu.types.GPUShaderCreateInfo()
-    replaced = _strip(info, shadow_samplers, is_clipped)
+    replaced = _strip(info, shadow_samplers, is_clipped=False)
     for slot, name in enumerate(samplers, start=len(SHADOW_SAMPLERS) + len(STRAND_SAMPLERS)):
         info.sampler(slot, "FLOAT_2D", name)
     return compile_drawing(info, "strands/strip.vert", fragment, targets, replaced)
+
+
+@cached
+def guide_program(is_clipped=False):
+    """The program that draws guides as lines: see strands/guides.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    replaced = _strip(info, (), is_clipped)
+    info.push_constant("VEC4", "line_color")
+    info.push_constant("FLOAT", "strip_width")
+    info.push_constant("INT", "is_own_color")
+    return compile_drawing(info, "strands/strip.vert", "strands/guides.frag", COLOR, replaced)
 
 
 @cached

@@ -217,6 +217,28 @@ class VellusCurves(bpy.types.PropertyGroup):
         default=False,
         update=mark_shading,
     )
+    guide_colors: bpy.props.EnumProperty(
+        name="Guide Colors",
+        description="Colors of guides in viewports",
+        translation_context=CONTEXT,
+        items=[
+            ("PLAIN", "Plain", "One calm color"),
+            ("SYSTEM", "Hair System", "One color for the guides of each hair system"),
+            ("GUIDE", "Guide", "Another color for each guide"),
+        ],
+        default="PLAIN",
+        update=mark_shown,
+    )
+    guide_opacity: bpy.props.FloatProperty(
+        name="Guide Opacity",
+        description="Opacity of guides in viewports: decrease it to see the hair behind them",
+        translation_context=CONTEXT,
+        subtype="FACTOR",
+        min=0.0,
+        max=1.0,
+        default=0.8,
+        update=mark_shown,
+    )
     shows_styles_while_combing: bpy.props.BoolProperty(
         name="Comb Styled",
         description="Show hair with its styles while its guides are combed. When off, viewports show it straight and "

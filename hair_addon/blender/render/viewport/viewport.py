@@ -12,23 +12,20 @@ import bpy
 import numpy as np
 
 from ....core.errors import HairError
-from ...data import scene
 from ...data.pictures import viewport_shading
 from ...data.strands import curves_objects
-from ...gpu import drawing, scene_programs
+from ...gpu import drawing
 from ...gpu.display_transform import DisplayTransform
 from ...groom import bindings, hidden_hair
 from ...host import scene_time
 from ...host.caches import Cache
 from ...host.engines import ENGINE
 from ...host.notices import say
-from ...materials import looks
 from .. import drawn_scene, hair_cache
-from . import hair_picture, region_pictures, selected_hair
+from . import guide_lines, hair_picture, region_pictures, selected_hair
 from .outline import HairOutline
 
 _PICK_REACH = 5  # maximum distance [pixels] of a click from hair, as strands are thinner than a pixel
-_GUIDE_WIDTH = 2.0  # [pixels]: guides are lines of constant width
 
 _handles = []  # of draw handlers
 
@@ -285,27 +282,8 @@ def _display_table(transform):
 
 
 def _draw_guides(context):
-    viewport = context.space_data
-    guide_objects = [o for o in scene.curves_objects(context.view_layer, "GUIDES", viewport) if _is_guide_shown(o)]
-    if guide_objects:
+    if guide_objects := guide_lines.shown(context):
         lights = drawn_scene_of(context).lights
-        view = drawing.view_record(*matrices_of(context.region_data), context.region.height, _GUIDE_WIDTH)
+        view = drawing.view_record(*matrices_of(context.region_data), context.region.height, guide_lines.strip_width())
         for guide_object in guide_objects:
-            _draw_guide_object(guide_object, view, lights, _clip_planes(context))
-
-
-def _is_guide_shown(guide_object):
-    return guide_object.select_get() or guide_object.mode != "OBJECT" or looks.are_guides_shown(guide_object.data)
-
-
-def _draw_guide_object(guide_object, view, lights, clip_planes):
-    try:
-        guides = hair_cache.strands_on_gpu(guide_object.data)
-    except HairError as error:
-        hair_cache.refuse(guide_object.data, error)
-        return
-    if guides is not None:
-        program = scene_programs.strip_program("strands/guides.frag", is_clipped=clip_planes is not None)
-        place = np.array(guide_object.matrix_world, np.float64)
-        with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-            drawing.draw_strands(guides, program, view, lights, place, clip_planes=clip_planes)
+            guide_lines.draw(guide_object, view, lights, _clip_planes(context))

@@ -66,6 +66,16 @@ class VELLUS_PT_systems(HairTab, bpy.types.Panel):
             draw_combing(layout, context)
         if guides is not None and guides != system:
             layout.prop(guides.vellus, "show_guides")
+            if _are_shown(guides, context.view_layer):
+                row = layout.row(align=True)
+                row.prop(guides.vellus, "guide_colors", text="")
+                row.prop(guides.vellus, "guide_opacity")
+
+
+def _are_shown(guides, view_layer):
+    """Whether viewports show guides: as set, selected, or in an edit mode."""
+    shown = object_of(guides, view_layer)
+    return guides.vellus.show_guides or (shown is not None and (shown.select_get() or shown.mode != "OBJECT"))
 
 
 LISTS = (VELLUS_UL_systems,)

@@ -11,7 +11,7 @@ import pytest
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import drawing
 from hair_addon.blender.render import drawn_scene
-from hair_addon.blender.render.viewport import region_pictures, selected_hair, viewport
+from hair_addon.blender.render.viewport import guide_lines, region_pictures, selected_hair, viewport
 
 SIZE = 96
 NONE = (0.0, 0.0, 0.0, 0.0)
@@ -92,7 +92,7 @@ def test_guides_are_cut_off(lit):
     for planes in (None, RIGHT):
         with target.bind():
             target.clear(color=NONE, depth=1.0)
-            viewport._draw_guide_object(guides, view, lights, planes)
+            guide_lines.draw(guides, view, lights, planes)
             drawn.append(np.array(target.read_color(0, 0, SIZE, SIZE, 4, 0, "FLOAT"))[..., 3] > 0.0)
     first, last = (int(column) for column in columns_of_plane())
     assert drawn[0][:, : first - 2].any() and not drawn[1][:, : first - 2].any()

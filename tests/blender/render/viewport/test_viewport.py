@@ -293,7 +293,7 @@ def test_meshes_that_are_no_surface_in_the_viewport_hide_nothing(sphere):
 
 
 PROGRAMS = {
-    "strands/guides.frag": lambda: scene_programs.strip_program.__wrapped__("strands/guides.frag"),
+    "strands/guides.frag": lambda: scene_programs.guide_program.__wrapped__(),
     "visibility/strand_segments.comp": lambda: scene_programs.segments_program.__wrapped__(
         is_depth=True, is_round=True
     ),

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides in viewports: lines of constant width over the hair, thin and faded so that the hair is seen behind them."""
+
+import zlib
+
+import bpy
+import numpy as np
+
+from ....core.errors import HairError
+from ...data import scene
+from ...gpu import drawing, scene_programs, uniforms
+from ...host.notices import name_of
+from ...materials import looks
+from .. import hair_cache
+
+_LINE_WIDTH = 1.25  # [pixels]
+_FRINGE = 3.0  # [pixels]: antialiasing and a dark edge on both sides, as in strands/guides.frag
+_PLAIN = (0.72, 0.86, 1.0)
+
+
+def shown(context) -> list:
+    """Objects of guides that are drawn in the context's viewport: selected, edited, or set to be shown."""
+    found = scene.curves_objects(context.view_layer, "GUIDES", context.space_data)
+    return [o for o in found if o.select_get() or o.mode != "OBJECT" or looks.are_guides_shown(o.data)]
+
+
+def strip_width() -> float:
+    """Width of a line with its fringe [pixels], in the resolution of the interface."""
+    return _LINE_WIDTH * bpy.context.preferences.system.ui_scale + _FRINGE
+
+
+def draw(guide_object, view, lights, clip_planes):
+    """Draw guides into the bound framebuffer; view, lights: records of `uniforms`; clip_planes: (6, 4) or None."""
+    try:
+        guides = hair_cache.strands_on_gpu(guide_object.data)
+    except HairError as error:
+        hair_cache.refuse(guide_object.data, error)
+        return
+    state = guide_object.data.vellus
+    if guides is None or state.guide_opacity == 0.0:
+        return
+    program = scene_programs.guide_program(is_clipped=clip_planes is not None)
+    program.bind()
+    program.uniform_float("line_color", (*_color_of(guide_object.data), state.guide_opacity))
+    program.uniform_float("strip_width", strip_width())
+    program.uniform_int("is_own_color", int(state.guide_colors == "GUIDE"))
+    record = drawing.strand_record(guides, view, np.array(guide_object.matrix_world, np.float64))
+    record["thickness"] = 0.0  # lines of constant width
+    with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA"):
+        drawing.draw_strip(guides, program, record, uniforms.uniform_buffer(lights), clip_planes=clip_planes)
+
+
+def _color_of(guides):
+    """The color of all guides of an object: plain, or a hue of its own for each hair system."""
+    if guides.vellus.guide_colors != "SYSTEM":
+        return _PLAIN
+    turn = zlib.crc32(name_of(guides).encode()) / 2**32
+    hue = np.clip(np.abs((turn + np.array([0.0, 2 / 3, 1 / 3])) % 1.0 * 6.0 - 3.0) - 1.0, 0.0, 1.0)
+    return tuple(0.35 + 0.65 * hue)

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides in viewports are antialiased lines of constant width, in the chosen colors, and as opaque as set."""
+
+import bpy
+import gpu
+import numpy as np
+import pytest
+
+from hair_addon.blender.data import scene
+from hair_addon.blender.gpu import drawing
+from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render.viewport import guide_lines
+
+SIZE = 128
+LEVEL = 2.0  # of the background
+
+
+def read(guides, distance=1.0):
+    """(SIZE, SIZE, 3) over an even background."""
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    world_to_view, view_to_clip = scene.read_camera(bpy.context.scene, depsgraph, SIZE, SIZE)
+    world_to_view = world_to_view.copy()
+    world_to_view[2, 3] *= distance
+    lights = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph).lights
+    texture = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
+    depth = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=depth)
+    view = drawing.view_record(world_to_view, view_to_clip, SIZE, guide_lines.strip_width())
+    with target.bind():
+        target.clear(color=(LEVEL, LEVEL, LEVEL, 1.0), depth=1.0)
+        guide_lines.draw(guides, view, lights, None)
+        return np.array(target.read_color(0, 0, SIZE, SIZE, 4, 0, "FLOAT"))[..., :3]
+
+
+@pytest.fixture
+def guides(lit):
+    return bpy.data.objects["Guides"]
+
+
+@pytest.fixture
+def upright(guides):
+    """One guide, straight up beside the camera's axis."""
+    points = np.zeros((len(guides.data.points), 3), np.float32)
+    count = len(guides.data.points) // len(guides.data.curves)
+    points[:count, 2] = np.linspace(-0.4, 0.4, count)
+    points[count:] = points[0]  # others have no length
+    points[:, 0] += 0.3
+    guides.data.attributes["position"].data.foreach_set("vector", points.ravel())
+    guides.data.update_tag()
+    return guides
+
+
+def row(picture):
+    return LEVEL - picture[SIZE // 2].min(axis=0), picture[SIZE // 2]
+
+
+@pytest.mark.parametrize("distance", [1.0, 2.0])
+def test_a_line_is_as_wide_at_any_distance(upright, distance):
+    """Its opacity, summed across, is its width and that of the dark edges; the width is that of the settings."""
+    upright.data.vellus.guide_opacity = 1.0
+    found = read(upright, distance)[SIZE // 2]
+    line = guide_lines.strip_width() - guide_lines._FRINGE
+    edges = 2.0 * 0.35 * 1.0  # two dark pixels; the ramps of both sides overlap within the line
+    lost = LEVEL * SIZE - found.sum(axis=0)
+    plain = np.array(guide_lines._PLAIN)
+    np.testing.assert_allclose(lost, (LEVEL - plain) * line + LEVEL * edges, atol=0.35 * LEVEL)
+
+
+def test_opacity_scales_all_of_it(upright):
+    lost = []
+    for opacity in (1.0, 0.5, 0.0):
+        upright.data.vellus.guide_opacity = opacity
+        lost.append(LEVEL - read(upright))
+    assert lost[0].max() > 0.5
+    np.testing.assert_allclose(lost[1], 0.5 * lost[0], atol=1e-3)
+    assert not lost[2].any()
+
+
+def hues(picture):
+    """The distinct directions of color of pixels that differ from the background."""
+    seen = picture[np.ptp(picture, axis=-1) > 0.02]
+    return np.unique(np.round(seen / np.linalg.norm(seen, axis=-1, keepdims=True), 1), axis=0)
+
+
+def test_guides_share_a_color_or_have_their_own(guides):
+    guides.data.vellus.guide_opacity = 1.0
+    found = {}
+    for colors in ("PLAIN", "SYSTEM", "GUIDE"):
+        guides.data.vellus.guide_colors = colors
+        found[colors] = read(guides)
+    assert len(hues(found["GUIDE"])) > 4 * len(hues(found["PLAIN"]))
+    assert abs(found["SYSTEM"] - found["PLAIN"]).max() > 0.05
+    guides.data.vellus.guide_colors = "SYSTEM"
+    guides.data.name = "Beard Guides"
+    assert abs(read(guides) - found["SYSTEM"]).max() > 0.05
