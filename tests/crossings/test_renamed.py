@@ -63,11 +63,11 @@ def test_a_bake_without_its_colliders_is_refused(guides, collider, lose, sentenc
     lose(collider)
     with pytest.raises(HairError, match=sentence):
         api.bake_dynamics(guides, LAST)
-    assert simulated_world.collider_problem(guides.data.vellus.dynamics) is not None  # as the panel says
+    assert simulated_world.collider_problem(guides.data.vellus.dynamics) is not None  # the panel reports it
 
 
-def test_so_is_one_whose_collider_is_not_evaluated(guides, collider, monkeypatch):
-    """Where nothing but a name leads to it, as from a library override: it would stand still, or at the origin."""
+def test_a_bake_whose_collider_is_not_evaluated_is_refused(guides, collider, monkeypatch):
+    """If only a name refers to it, as from a library override; it would stand still, or be at the origin."""
     del guides.data["vellus_named"]
     for module in (file_changes, guide_baking):
         monkeypatch.setattr(module.followed_names, "follow", lambda: None)

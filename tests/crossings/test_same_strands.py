@@ -68,7 +68,7 @@ def test_all_ways_make_the_same_strands(surface, tmp_path):
 
     out, files = tmp_path / "groom.blend", tmp_path / "groom.npz"
     api.save_settings(tmp_path / "groom.json", settings)
-    other = run if surface.matrix_world.is_identity else run_here  # where it stands does not matter to a process
+    other = run if surface.matrix_world.is_identity else run_here  # a separate process once is enough
     for target, call in ((out, run_here), (files, other)):
         groom = ("groom", blend, "--settings", tmp_path / "groom.json", "--out", target)
         assert call(*groom).status == 0

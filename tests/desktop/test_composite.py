@@ -8,7 +8,7 @@ from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
 
-# Of display colors: 8 bits of each, and what nodes that add nothing round.
+# Of display colors: 8 bits per channel, and the rounding of nodes that add zero.
 ROUNDING = 0.5 / 255.0
 
 

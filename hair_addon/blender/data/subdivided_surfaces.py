@@ -27,7 +27,7 @@ def cage_corners(surface_object, depsgraph, faces):
 
 
 def undivided_corners(surface_object, depsgraph, faces):
-    """The same for modifiers that subdivide in any way; 0 if none does in this depsgraph."""
+    """Return `cage_corners` for modifiers that subdivide in any way; 0 if none does in this depsgraph."""
     return _corners_before(filter(_is_dividing, surface_object.modifiers), depsgraph, faces)
 
 

@@ -47,8 +47,8 @@ def choose(file: CurveFile, sets: Sequence[CurveSet], given: Convention, mesh: T
     taken, notes = usual, []
     if known.metres is None or known.up is None:
         taken = next((one for one in _conventions(known, usual) if ends.lie_on_surface(one)), usual)
-        sentence = "{file} does not say its unit and axis: it is read in {unit} with {up} up"
-        sentence += ", with which roots lie on the surface." if ends.lie_on_surface(taken) else ", the usual ones."
+        sentence = "{file} does not state its unit and axis: it is read in {unit} with {up} up"
+        sentence += ", which puts roots on the surface." if ends.lie_on_surface(taken) else ", the most common ones."
         notes.append(HairError(sentence, file=name, unit=_named(taken.metres), up=taken.up))
     assert taken.metres is not None and taken.up is not None
     if not ends.lie_on_surface(taken):

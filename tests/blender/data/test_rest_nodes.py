@@ -157,8 +157,8 @@ def test_copies_of_deformed_faces_are_named(half):
 
 
 @pytest.mark.parametrize("copying", [mirror, solidify])
-def test_a_modifier_that_is_added_to_hair_has_it_grow_on_the_copies_at_once(copying, half):
-    """As it grows on the mesh with the modifier; without it again, hair is as before. No other update is needed."""
+def test_hair_grows_on_the_copies_of_an_added_modifier_immediately(copying, half):
+    """The result equals new hair on the mesh with the modifier; undo restores the hair. No other update is needed."""
     bpy.ops.ed.undo_push(message="before")
     grow_upright(half)
     bpy.ops.ed.undo_push(message="grown")

@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is exported."""
+"""Fixtures of exported hair."""
 
 from tests.support.exchange.exported import baked, twisted  # noqa: F401 (fixtures)

@@ -55,7 +55,7 @@ def test_one_object_a_curve_is_hair_of_all_of_them(scene, sphere, lines, tmp_pat
     assert not (tmp_path / "out.npz").exists()
     for more, notes in (((), 1), (("--unit", "0.01"), 1)):
         ended = run_here(*words, *more)
-        assert ended.status == 0 and ended.errors.count("does not say its unit") == notes, ended
+        assert ended.status == 0 and ended.errors.count("does not state its unit") == notes, ended
         arrays = load(tmp_path / "out.npz")
         np.testing.assert_allclose(arrays["strand_points"], lines, atol=1e-6)
         np.testing.assert_allclose(arrays["strand_widths"], 1e-4, rtol=1e-5)

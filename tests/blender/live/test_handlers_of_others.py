@@ -20,7 +20,7 @@ def test_hair_that_another_handler_deletes_does_not_end_blender():
 
 
 def test_reports_are_the_same_whether_others_run_first(hair):
-    """Of what is still there; parts of other datablocks are reported by their type alone."""
+    """Only existing data are reported; parts of other datablocks only by their type."""
     found = {}
 
     def listen(_scene, depsgraph):

@@ -221,10 +221,10 @@ def test_weights_that_change_while_the_surface_is_dragged_count_at_rest(bent, mo
     bpy.context.view_layer.update()
     live_hair.write_all()
     assert read and not are_hidden()
-    assert points(bent)[:, 0, 2].max() < 0.25  # of a ball of one, whose faces are as high
+    assert points(bent)[:, 0, 2].max() < 0.25  # on a ball of radius one
 
 
-def test_strands_that_change_while_the_surface_is_dragged_are_drawn_so(bent):
+def test_strands_that_change_while_the_surface_is_dragged_are_drawn(bent):
     bent.data.surface.data.shape_keys.animation_data_clear()
     drag(bent, 0.2, 0.3, 0.4)
     moved = points(bent)

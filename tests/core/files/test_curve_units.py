@@ -33,12 +33,12 @@ def choose(head, curves, said=NOTHING, stated=NOTHING):
 
 @pytest.mark.parametrize("up", ["X", "Y", "Z"])
 @pytest.mark.parametrize("unit", ["m", "cm", "mm", "in", "ft"])
-def test_what_no_file_says_is_found_where_roots_lie_on_the_surface(head, unit, up):
+def test_unit_and_axis_are_found_that_put_roots_on_the_surface(head, unit, up):
     curves = curves_in(head, parsed_unit(unit), up)
     found = choose(head, curves)
     assert (found.metres, found.up) == (parsed_unit(unit), up)
     (note,) = found.notes
-    assert "does not say" in str(note) and f"with {up} up" in str(note)
+    assert "does not state" in str(note) and f"with {up} up" in str(note)
     points = curves.placed(found.metres, found.up).points
     assert abs(np.linalg.norm(points[::2] - CENTRE, axis=1) - 0.5 * SIZE).max() < 1e-4
 

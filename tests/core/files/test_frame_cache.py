@@ -325,8 +325,8 @@ def test_nothing_is_written_to_a_folder_that_others_have_prepared(tmp_path, prep
     assert folder_digest.of_folder(victim) == before[0][0]
 
 
-def test_a_folder_is_known_by_its_marker(folder):
-    """Also where its manifest is damaged, or frees all frames but is left for a file of others."""
+def test_a_folder_is_identified_by_its_marker(folder):
+    """Even if its manifest is damaged, or all frames are removed and a foreign file remains."""
     (folder / "manifest.json").write_bytes(b"damaged")
     bake(folder, [1])
     assert check_whole(folder)[0][:1] == [-2]

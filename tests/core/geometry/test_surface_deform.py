@@ -45,7 +45,7 @@ def test_a_surface_that_rests_moves_nothing(sphere, rng):
     np.testing.assert_array_equal(carried(sphere, sphere.vertices, strands), strands[0])
 
 
-def test_what_lies_away_from_what_moves_stays_to_the_last_bit(sphere, rng):
+def test_strands_away_from_moved_vertices_keep_their_bits(sphere, rng):
     strands = anywhere(strands_on(sphere, 300, rng), rng)
     after = sphere.vertices.copy()
     after[0] *= 1.1

@@ -45,8 +45,8 @@ def test_rows_are_computed_once_each_on_any_number_of_cores(rng, monkeypatch, ro
 
 
 @pytest.mark.parametrize("core_count", [1, 2, 5])
-def test_who_waits_for_kernels_to_begin_hears_of_it_once(rng, monkeypatch, core_count):
-    """While no row may be done yet, and with the same results."""
+def test_the_start_of_kernels_is_signaled_once(rng, monkeypatch, core_count):
+    """The signal comes before any row is done, and results are the same."""
     monkeypatch.setattr(os, "process_cpu_count", lambda: core_count)
     values = wp.array(rng.random((50_001, 3), np.float32), dtype=float, device=DEVICE, ndim=2)
     factors = wp.array(np.float32([1.0, 2.0, 4.0]), dtype=float, device=DEVICE)

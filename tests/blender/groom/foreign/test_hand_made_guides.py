@@ -166,7 +166,7 @@ def test_guides_follow_only_their_surface(imported, head, scene):
     np.testing.assert_allclose(world(imported), before, atol=2e-5)
 
 
-def test_curves_in_place_are_not_touched_to_the_last_bit(head, tmp_path):
+def test_curves_in_place_keep_their_bits(head, tmp_path):
     made = made_of_empty_hair(head, tmp_path)
     before = stored(made)
     made.modifiers.clear()

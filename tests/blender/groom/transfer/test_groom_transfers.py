@@ -117,8 +117,8 @@ def test_roots_are_on_the_new_surface_and_hair_follows_the_new_guides(hair):
     assert not np.array_equal(stored(made), before)
 
 
-def test_masks_that_the_mesh_lacks_are_painted_as_on_the_other_one(hair, sphere, capfd):
-    """Weights that are a function of place are the same function there, and mask the same strands."""
+def test_masks_that_the_mesh_lacks_are_transferred(hair, sphere, capfd):
+    """Weights that are a function of the position are transferred exactly, and mask the same strands."""
     group, weights = sphere.vertex_groups["top"], np.empty(3 * len(sphere.data.vertices))
     sphere.data.vertices.foreach_get("co", weights)
     weights = np.clip(weights[2::3], 0.0, 1.0)
