@@ -63,7 +63,8 @@ def modifier_notes(hair_object: Object | None) -> list[str]:
     """Return translated sentences about modifiers of a hair object (or None) that take effect only in renders."""
     if hair_object is None or not hair_object.data.vellus.is_drawn:
         return []
-    found = follow_nodes.modifiers_of_artist(hair_object)
+    shown = {name_of(m) for m in hair_object.modifiers if m.show_viewport}
+    found = [name for name in follow_nodes.modifiers_of_artist(hair_object) if name not in shown]
     if not found:
         return []
     if len(found) == 1:

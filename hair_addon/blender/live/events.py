@@ -6,7 +6,7 @@ After an event nothing is drawn or computed from values that were cached before 
 
 from ..gpu import world_texture
 from ..groom.guides import guide_states
-from ..render import hair_cache
+from ..render import hair_cache, modified_hair
 from ..render.viewport import viewport
 
 
@@ -18,7 +18,13 @@ def scene_changed(is_hair_only=False):
 def curves_reported(datablock):
     """Blender reports a Curves datablock, which may have changed: invalidate its strands and their guide states."""
     hair_cache.invalidate_unless_same(datablock)
+    modified_hair.invalidate_users(datablock)
     guide_states.state_cache.invalidate(datablock.session_uid)
+
+
+def hair_evaluated(hair_object):
+    """Blender has evaluated an object of hair again: its modifiers may have changed the strands."""
+    modified_hair.invalidate(hair_object)
 
 
 def strands_made(datablock):

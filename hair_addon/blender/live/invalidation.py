@@ -13,7 +13,7 @@ from ..groom import bindings, copied_hair, edited_faces, followed_names, frame_f
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..groom.guides import guide_states
 from ..host import notices
-from ..render import hair_cache
+from ..render import hair_cache, modified_hair
 from ..render.frames import composite
 from ..render.viewport import region_pictures, viewport
 from ..settings import animated
@@ -23,6 +23,7 @@ from . import dynamics_state, hidden_previews, moving_surfaces, refused_hair, re
 COPIES = (
     hair_cache.strand_cache,
     hair_cache.pose_cache,
+    modified_hair.modified_cache,
     viewport.view_cache,
     bindings.binding_cache,
     bindings.kept_cache,

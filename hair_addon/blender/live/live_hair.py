@@ -10,13 +10,13 @@ import sys
 import bpy
 
 from ...core.errors import HairError
-from ..data.strands import curves, simulated_guides
+from ..data.strands import curves, delivered_hair, simulated_guides
 from ..groom import bindings, changed_weights, hair_outside, pipeline, size_fitting, staleness, writing
 from ..groom.foreign import kept_following
 from ..groom.styles import painted_masks
 from ..host import running
 from ..host.notices import text_of
-from ..render import hair_cache
+from ..render import hair_cache, modified_hair
 from ..settings import style_items
 from . import events, stale_marks
 
@@ -238,6 +238,7 @@ def _write(hair):
     """Write hair that is newer than its datablock. An error becomes its status, so that other hair is written."""
     try:
         writing.write_hair(hair)
+        modified_hair.invalidate_users(hair)  # the next evaluation has them, which may come without a report
         bound = bindings.of(hair)
         if bound is not None and bound.free is not None:
             events.strands_made(hair)  # some strands were moved out of colliders
@@ -254,8 +255,8 @@ def cancel_writing():
 
 
 def write_soon(hair):
-    """Write hair after a pause in which nothing changes, without a window at once."""
-    if not running.has_window():
+    """Write hair after a pause in which nothing changes; at once without a window, or if modifiers take its strands."""
+    if not running.has_window() or any(map(modified_hair.is_modified, delivered_hair.objects_of(hair))):
         _write(hair)
         return
     cancel_writing()  # restarts the pause with every change: a stroke consists of many

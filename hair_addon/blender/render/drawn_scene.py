@@ -21,7 +21,7 @@ from ..gpu import (
 from ..gpu import lights as blender_lights
 from ..gpu.shadows import ShadowMaps
 from ..host.notices import can_be_drawn
-from . import gpu_strands, hair_cache, hair_places, read_strands
+from . import gpu_strands, hair_cache, hair_places, modified_hair, read_strands
 
 # The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke.
 _SHADOW_STEPS = drawing.Steps(strand_count=50_000)
@@ -93,7 +93,8 @@ def read(
     """
     # If only the geometry of hair has changed, instances are unchanged.
     instances = hair_places.read_instances(depsgraph, viewport) if before is None else before.instances
-    hair, places = _read_hair(hair_places.hair_places(view_layer, viewport, instances), viewport, refused, shown)
+    seen = hair_places.hair_places(view_layer, viewport, instances)
+    hair, places = _read_hair(seen, viewport, refused, shown, depsgraph)
     if viewport is not None and is_hair_only and not hair:
         # Scenes without hair cost nothing.
         return _EMPTY
@@ -369,7 +370,7 @@ def _read_rendered_hair(depsgraph, known, refused, noted):
         yield (strands, shading, to_world, 1.0), drawn_meshes.owner_of(instance)
 
 
-def _read_hair(places, viewport, refused, shown):
+def _read_hair(places, viewport, refused, shown, depsgraph):
     """(hair of a `DrawnScene`, the `HairPlace` of each) for all places whose hair can be drawn."""
     hair, drawn_places = [], []
     for place in places:
@@ -379,7 +380,7 @@ def _read_hair(places, viewport, refused, shown):
         if not can_be_drawn(place.hair_object, place.to_world):
             continue
         try:
-            strands, shading = hair_cache.hair_on_gpu(datablock, is_viewport=viewport is not None)
+            strands, shading = _drawn_hair(place.hair_object, depsgraph, is_viewport=viewport is not None)
         except HairError as error:
             if refused is None:
                 raise
@@ -390,6 +391,14 @@ def _read_hair(places, viewport, refused, shown):
             hair.append((strands, shading, place.to_world, part))
             drawn_places.append(place)
     return hair, drawn_places
+
+
+def _drawn_hair(hair_object, depsgraph, is_viewport):
+    """(`StrandsOnGPU`, shading) of an object, as Blender evaluates it if an artist has added modifiers."""
+    if not modified_hair.is_modified(hair_object):
+        return hair_cache.hair_on_gpu(hair_object.data, is_viewport)
+    strands = modified_hair.strands_on_gpu(hair_object, depsgraph)
+    return strands, hair_cache.shading_of(hair_object.data, strands)
 
 
 def _have_same_places(drawn, other):

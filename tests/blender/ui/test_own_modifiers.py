@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An artist's own modifiers on hair: Vellus does not draw them in viewports, and the panel says so."""
+"""An artist's own modifiers on hair: the panel names those that viewports do not show."""
 
 import bpy
 import pytest
@@ -30,31 +30,26 @@ def test_the_modifier_that_follows_the_surface_is_not_mentioned(hair):
 
 
 @pytest.mark.parametrize("active", ["Hair", "Guides", "Sphere"])
-def test_modifiers_are_counted_and_named(hair, active):
-    clump = add_asset(hair, "Clump Hair Curves")
+def test_modifiers_that_only_renders_show_are_counted_and_named(hair, active):
+    clump, curl = (add_asset(hair, f"{name} Hair Curves") for name in ("Clump", "Curl"))
+    assert not notes(active)
+    clump.show_viewport = False
     assert "1 modifier shows" in notes(active) and clump.name in notes(active)
-    curl = add_asset(hair, "Curl Hair Curves")
+    curl.show_viewport = False
     assert "2 modifiers show" in notes(active) and clump.name in notes(active) and curl.name in notes(active)
-
-
-def test_modifiers_without_effect_on_renders_are_not_counted(hair):
-    clump = add_asset(hair, "Clump Hair Curves")
-    hair.modifiers.new("Empty", "NODES")
     clump.show_render = False
-    assert not notes()
-    clump.show_render, clump.show_viewport = True, False
-    assert "1 modifier shows" in notes()
+    assert "1 modifier shows" in notes(active) and clump.name not in notes(active)
 
 
 def test_hair_that_blender_draws_shows_its_modifiers(hair):
-    add_asset(hair, "Clump Hair Curves")
+    add_asset(hair, "Clump Hair Curves").show_viewport = False
     assert notes()
     assert bpy.ops.vellus.toggle_drawing() == {"FINISHED"}
     assert not notes()
 
 
 def test_hair_without_an_object_has_no_panel(hair):
-    add_asset(hair, "Clump Hair Curves")
+    add_asset(hair, "Clump Hair Curves").show_viewport = False
     assert notes("Sphere")
     hair.data.use_fake_user = True
     bpy.data.objects.remove(hair)

@@ -21,6 +21,13 @@ def modifier_of(hair_object):
     return next(found, None)
 
 
+def modifiers_in_viewports(hair_object):
+    """Modifiers of the artist that viewports show: neither those that follow the surface nor delivered frames."""
+    following = follow_nodes.modifier_of(hair_object)
+    shown = [m for m in hair_object.modifiers if m.show_viewport and m != following and not is_ours(m)]
+    return [m for m in shown if m.type != "NODES" or m.node_group is not None]
+
+
 def is_ours(modifier):
     """Whether a modifier plays delivered frames."""
     return modifier.type == "MESH_SEQUENCE_CACHE" and modifier.object_path.startswith(f"/{ROOT}/")

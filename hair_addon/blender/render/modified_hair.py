@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair with modifiers of the artist in viewports: the strands of Blender's evaluation, as renders have them."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..data.strands import delivered_hair
+from ..gpu import strand_textures
+from ..gpu.strand_textures import StrandsOnGPU
+from ..host.caches import Cache
+from . import read_strands
+
+modified_cache = Cache()  # session_uid of an object → _Modified
+
+
+@dataclass
+class _Modified:
+    """The evaluated strands of an object; is_current: whether its evaluation has not been reported since."""
+
+    datablock: int  # session_uid of the Curves
+    arrays: tuple
+    on_gpu: StrandsOnGPU
+    is_current: bool = True
+
+
+def is_modified(hair_object: bpy.types.Object) -> bool:
+    """Whether viewports show an object of hair with modifiers other than those of Vellus."""
+    return hair_object.mode == "OBJECT" and bool(delivered_hair.modifiers_in_viewports(hair_object))
+
+
+def strands_on_gpu(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> StrandsOnGPU:
+    """The evaluated strands of an object; only changes are uploaded.
+
+    Raises `HairError` if modifiers leave no strands.
+    """
+    known = modified_cache.get(hair_object.session_uid)
+    if known is not None and known.is_current:
+        return known.on_gpu
+    read = read_strands.read(hair_object.evaluated_get(depsgraph).data)
+    if known is not None and all(map(np.array_equal, read.arrays, known.arrays)):
+        known.is_current = True
+        return known.on_gpu
+    made = _Modified(hair_object.data.session_uid, read.arrays, strand_textures.upload_strands(*read.arrays))
+    return modified_cache.keep(hair_object.session_uid, made).on_gpu
+
+
+def invalidate(hair_object: bpy.types.Object) -> None:
+    """Note that an object was evaluated again."""
+    known = modified_cache.get(hair_object.session_uid)
+    if known is not None:
+        known.is_current = False
+
+
+def invalidate_users(datablock: bpy.types.Curves) -> None:
+    """Note that Curves have changed, and all of their objects with them."""
+    for known in modified_cache.values():
+        if known.datablock == datablock.session_uid:
+            known.is_current = False

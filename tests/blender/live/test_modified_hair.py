@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Viewports draw hair with modifiers of the artist as Blender evaluates it, point for point."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.gpu import strand_textures
+from hair_addon.blender.render import drawn_scene
+from tests.blender.live.test_carried_strands import bend
+from tests.blender.ui.test_own_modifiers import add_asset
+from tests.support import drawn_strands
+from tests.support.gpu_strands import CLOSE
+from tests.support.reading import evaluated_points, points, write_points
+
+
+def drawn():
+    """(S, P, 3) of the hair that a viewport draws."""
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    ((strands, *_others),) = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph).hair
+    return drawn_strands.places(strands)
+
+
+@pytest.fixture
+def modified(watched):
+    """Hair with Blender's own curls, in a window."""
+    add_asset(watched, "Curl Hair Curves")
+    return watched
+
+
+def is_evaluated(hair):
+    found = drawn()
+    np.testing.assert_allclose(found, evaluated_points(hair), atol=CLOSE)
+    return found
+
+
+def test_viewports_draw_what_blender_evaluates_after_each_change(modified):
+    curled = is_evaluated(modified)
+    assert abs(curled[:, -1] - points(modified)[:, -1]).max() > 1e-3
+    modified.modifiers[-1].show_viewport = False
+    np.testing.assert_allclose(drawn(), points(modified), atol=CLOSE)
+    modified.modifiers[-1].show_viewport = True
+    bend(modified.data.surface, 0.5)
+    bent = is_evaluated(modified)
+    assert abs(bent - curled).max() > 0.01
+    guides = bpy.data.objects["Guides"]
+    combed = points(guides)
+    combed[:, 1:] += np.float32([0.0, 0.1, 0.0])
+    write_points(guides, combed)
+    moved = is_evaluated(modified)
+    assert abs(moved - bent).max() > 0.01
+    modified.data.vellus.hair.seed += 1
+    assert abs(is_evaluated(modified) - moved).max() > 0.01
+
+
+def test_modifiers_may_change_the_number_of_strands(modified):
+    add_asset(modified, "Duplicate Hair Curves")
+    found = is_evaluated(modified)
+    assert len(found) > len(modified.data.curves)
+
+
+def test_what_blender_did_not_evaluate_again_is_not_uploaded_again(modified, monkeypatch):
+    drawn()
+    uploads = []
+    real = strand_textures.upload_strands
+    monkeypatch.setattr(strand_textures, "upload_strands", lambda *given: uploads.append(1) or real(*given))
+    bpy.data.objects["Sphere"].name = "Ball"
+    drawn()
+    assert not uploads
+    bend(modified.data.surface, 0.3)
+    drawn()
+    assert uploads
