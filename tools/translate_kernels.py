@@ -13,6 +13,7 @@ sys.path.insert(0, str(ROOT))
 
 from hair_addon.core.kernels import glsl_text  # noqa: E402 (after the path)
 from hair_addon.core.shading.fibre import scattering_kernel  # noqa: E402
+from hair_addon.core.shading.light_paths import light_sources  # noqa: E402
 
 # File of shaders/ → functions in it, with all that they call.
 SHADERS = {
@@ -20,7 +21,8 @@ SHADERS = {
         scattering_kernel.lobe_of,
         scattering_kernel.shifted_lobe,
         scattering_kernel.gaussian,
-    )
+    ),
+    "light/lamp_falloff.glsl": (light_sources.spot_falloff, light_sources.area_falloff),
 }
 
 

@@ -2,6 +2,7 @@
 // Light from Blender's lights, in Blender's units: watts for point, spot and area lights, W/m² for the sun.
 
 #include "fibre/fibre.glsl"
+#include "light/lamp_falloff.glsl"
 
 const int LIGHT_SUN = 0;
 const int LIGHT_POINT = 1;
@@ -21,26 +22,6 @@ float light_blur(int kind, vec3 light_position, float radius, vec3 position)
   vec3 offset = position - light_position;
   float squared = radius * radius / ((kind == LIGHT_SUN) ? 1.0 : max(dot(offset, offset), 1e-8));
   return 0.25 * min(squared, 1.0);
-}
-
-// Attenuation of a spot light at an angle: one inside, zero outside the cone, smooth over the fraction `blend`, in cosines,
-// from the cone to the axis.
-float spot_falloff(float cos_angle, float cos_cone, float blend)
-{
-  float inner = mix(cos_cone, 1.0, clamp(blend, 1e-4, 1.0));
-  return smoothstep(cos_cone, inner, cos_angle);
-}
-
-// Radiance of an area light towards an angle, relative to a light without spread: linear in the tangent, zero outside the
-// cone, with the same total power. cos_cone: of half the spread, 0 for the half sphere.
-float area_falloff(float cos_angle, float cos_cone)
-{
-  if (cos_cone < 1e-3) {
-    return 1.0;
-  }
-  float tan_cone = sin_from_cos(cos_cone) / cos_cone;
-  float tan_angle = sin_from_cos(cos_angle) / max(cos_angle, 1e-6);
-  return max(0.0, tan_cone - tan_angle) / (tan_cone - atan(tan_cone));
 }
 
 // Irradiance of a small ball by a Lambertian disk that emits 1 W/sr along its axis; height: above the disk's plane, beside:

@@ -62,6 +62,9 @@ def on_disk(normal: wp.vec3, radius: float, first: float, second: float):
 
 @wp.func
 def spot_falloff(cosine: float, cos_cone: float, blend: float):
+    """Attenuation of a spot light at an angle: one inside, zero outside the cone, smooth over the fraction `blend`, in
+    cosines, from the cone to the axis.
+    """
     inner = cos_cone + (1.0 - cos_cone) * wp.clamp(blend, 1e-4, 1.0)
     part = wp.clamp((cosine - cos_cone) / wp.max(inner - cos_cone, 1e-6), 0.0, 1.0)
     return part * part * (3.0 - 2.0 * part)
@@ -69,11 +72,18 @@ def spot_falloff(cosine: float, cos_cone: float, blend: float):
 
 @wp.func
 def area_falloff(cosine: float, cos_cone: float):
+    """Radiance of an area light towards an angle, relative to a light without spread: linear in the tangent, zero
+    outside the cone, with the same total power. cos_cone: of half the spread, 0 for the half sphere.
+    """
     if cos_cone < 1e-3:
         return 1.0
-    tan_cone = wp.sqrt(1.0 - cos_cone * cos_cone) / cos_cone
-    tan_angle = wp.sqrt(wp.max(0.0, 1.0 - cosine * cosine)) / wp.max(cosine, 1e-6)
-    return wp.max(0.0, tan_cone - tan_angle) / wp.max(tan_cone - wp.atan(tan_cone), 1e-6)
+    tan_cone = wp.sqrt((1.0 - cos_cone) * (1.0 + cos_cone)) / cos_cone
+    tan_angle = wp.sqrt(wp.max(0.0, (1.0 - cosine) * (1.0 + cosine))) / wp.max(cosine, 1e-6)
+    excess = tan_cone - wp.atan(tan_cone)
+    if tan_cone < 0.2:  # where the difference is little more than rounding
+        squared = tan_cone * tan_cone
+        excess = tan_cone * squared * (1.0 / 3.0 - squared * (1.0 / 5.0 - squared / 7.0))
+    return wp.max(0.0, tan_cone - tan_angle) / wp.max(excess, 1e-12)
 
 
 @wp.func

@@ -6,8 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import warp as wp
 
 from hair_addon.core.imaging import lamps
+from hair_addon.core.shading.light_paths.light_sources import area_falloff
 from hair_addon.core.shading.tables import lookup_tables
 from tests.core.shading.light_paths.test_gather import (
     ALONG_Y,
@@ -19,6 +21,8 @@ from tests.core.shading.light_paths.test_gather import (
     strands_in_a_box,
     surroundings,
 )
+
+wp.set_module_options({"enable_backward": False})
 
 
 def lamp(kind, distance, radius, power=1.0):
@@ -97,6 +101,23 @@ def test_an_area_lamp_of_less_spread_gives_as_much_light():
         sums.append(total)
     wide, narrow = sums
     np.testing.assert_allclose(narrow * np.sin(edges[-1]) ** 2, wide, rtol=0.02)
+
+
+@wp.kernel
+def _falloffs(cos_cone: float, cosines: wp.array[float], out_falloffs: wp.array[float]):
+    out_falloffs[wp.tid()] = area_falloff(cosines[wp.tid()], cos_cone)
+
+
+@pytest.mark.parametrize("spread", [1.0, 2.0, 5.0, 20.0, 25.0, 90.0, 170.0, 180.0])
+def test_an_area_lamp_of_any_spread_sends_its_power(spread):
+    """Its radiance, by the cosine, summed over the cone: with the least spread of Blender too."""
+    cos_cone = np.cos(0.5 * np.radians(spread))
+    edges = np.linspace(cos_cone, 1.0, 501)
+    cosines = wp.array((0.5 * (edges[:-1] + edges[1:])).astype(np.float32), dtype=float)
+    found = wp.zeros_like(cosines)
+    wp.launch(_falloffs, dim=len(cosines), inputs=[np.float32(cos_cone), cosines, found], device="cpu")
+    power = 2.0 * np.mean(found.numpy() * cosines.numpy(), dtype=float) * (1.0 - cos_cone)
+    assert power == pytest.approx(1.0, rel=0.005)
 
 
 def test_a_lamp_among_hair_is_found_by_few_paths(rng):
