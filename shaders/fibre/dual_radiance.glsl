@@ -9,7 +9,6 @@
 
 #include "fibre/drawn_lobes.glsl"
 #include "fibre/dual_scattering.glsl"
-#include "fibre/light_highlight.glsl"
 #include "fibre/marschner.glsl"
 
 // Of a lobe [rad²]. White hair reflects so much that rounding may leave light from a point no spread at all.
@@ -18,9 +17,7 @@ const float LEAST_VARIANCE = 1e-4;
 vec4 fibre_m(float sin_i, float sin_o, float widening)
 {
   float tilt_trt = settings.shifts == 0 ? 4.0 : 3.0;
-  vec4 m = m_lobes(sin_i, sin_o, settings.tilt, tilt_trt, fibre_roughness(), settings.coat, widening);
-  m.x *= light_highlight;
-  return m;
+  return m_lobes(sin_i, sin_o, settings.tilt, tilt_trt, fibre_roughness(), settings.coat, widening);
 }
 
 vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)

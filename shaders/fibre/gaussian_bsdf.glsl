@@ -20,7 +20,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   float theta_h = 0.5 * (atan(sin_theta_i, cos_theta_i) + atan(sin_theta_o, sin_from_cos(sin_theta_o)));
   float tilt_trt = settings.shifts == 0 ? 2.0 : 1.5;
   vec3 m = gaussian_lobes(theta_h, settings.tilt, tilt_trt, beta_r_of(this_roughness()), blur);
-  m.x *= light_highlight;
+  m.x *= light_highlight.g;  // alike in all channels: only the energy-conserving model is tinted
   return marschner_scattering(drawn_lobes.xyz * m, lobes.n, inner_reflection(at, lobes, T, L, V), cosine) * cos_theta_i;
 }
 

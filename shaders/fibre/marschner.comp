@@ -15,7 +15,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   float cosine = cos_theta_d(sin_theta_i, sin_theta_o);
   vec2 n_at = n_coordinates(relative_azimuth(T, L, V), cosine, settings.axes);
   vec3 m = textureLod(m_table, m_coordinates(sin_theta_i, sin_theta_o, settings.axes), 0.0).rgb;
-  m.x *= light_highlight;
+  m.x *= light_highlight.g;  // alike in all channels: only the energy-conserving model is tinted
   vec4 n = textureLod(n_table, n_at, 0.0);
   vec3 n_trt = textureLod(n_trt_table, n_at, 0.0).rgb;
   return marschner_scattering(drawn_lobes.xyz * m, n, n_trt, cosine) * sin_from_cos(sin_theta_i);

@@ -15,6 +15,7 @@
 #include "fibre/drawn_lobes.glsl"
 #include "fibre/fibre.glsl"
 #include "fibre/light_highlight.glsl"
+#include "fibre/shown_light.glsl"
 #include "light/light_grid.glsl"
 #include "light/visibility_bytes.glsl"
 #include "visibility/strand_hit.glsl"
@@ -31,6 +32,9 @@ struct SeenStrand {
   vec3 zonal_1;
   vec3 zonal_2;
 };
+
+// Direction in which most of the world is visible from the strand: about that of a surface around the hair. Unnormalized.
+vec3 open_direction;
 
 // The strand at the result of `find_place`.
 SeenStrand seen_strand()
@@ -69,6 +73,7 @@ vec3 strand_light(SeenStrand strand)
   mat3 plus;
   mat3 minus;
   vec4 seen_channels = seen.channels;
+  open_direction = vec3(seen_x_y.x - seen_x_y.y, seen_x_y.z - seen_x_y.w, seen_z.x - seen_z.y);
   strand_sides(seen_x_y, seen_z.xy, view.seen_opacity, view.hair_forward.rgb, seen_channels.rgb, plus, minus);
   vec3 world = strand_radiance(plus, minus, T, V, strand.returned + back, with_back(strand.towards, back));
   vec3 all = max(strand.returned, vec3(1e-6));
@@ -101,7 +106,7 @@ vec3 strand_light(SeenStrand strand)
       }
       vec3 bounce = surface_bounce(lit_normal, lit_color, surface_part, lamp.L, T, lamp.front, lamp.behind);
       radiance += drawn_lobes.w * irradiance * bounce * of_surfaces;
-      light_highlight = 1.0 + light.highlight_excess;
+      light_highlight = (1.0 + light.highlight_excess) * shown_highlight();
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
       radiance += irradiance * hair_radiance(T, lamp.L, V, lamp.front, lamp.behind, blur);
     }
@@ -119,7 +124,8 @@ vec3 strand_light_on_grid(SeenStrand strand)
 vec4 sample_value()
 {
   SeenStrand strand = seen_strand();
-  return vec4(has_light_grid() ? strand_light_on_grid(strand) : strand_light(strand), 1.0);
+  vec3 light = has_light_grid() ? strand_light_on_grid(strand) : strand_light(strand);
+  return vec4(shown_light(light, strand.T, strand.V, strand.returned, open_direction), 1.0);
 }
 
 #include "visibility/strand_samples.glsl"

@@ -19,11 +19,15 @@ from .strand_textures import bare_vertices, run_for_each, vertex_count
 
 @dataclass(frozen=True)
 class Steps:
-    """Level of detail: the number of points drawn per strand, the number of strands drawn, and the first index."""
+    """Level of detail: the number of points drawn per strand, the number of strands drawn, and the first index.
+
+    thickness: factor of the strands' width.
+    """
 
     point_count: int | None = None
     strand_count: int | None = None
     first_strand: int = 0
+    thickness: float = 1.0
 
 
 _ALL = Steps()
@@ -121,7 +125,7 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
     record["drawn_points"] = min(strands.point_count, steps.point_count or strands.point_count)
     record["first_strand"] = steps.first_strand
     record["part_size"], record["part_stride"] = _parts(strands.strand_count)
-    record["thickness"] = strands.strand_count / record["drawn_strands"]
+    record["thickness"] = steps.thickness * strands.strand_count / record["drawn_strands"]
     record["row_strands"] = strands.row_strands
     record["radius_strands"], record["radius_unit"] = strands.radius_strands, strands.radius_unit
     return record

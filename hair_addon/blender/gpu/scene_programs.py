@@ -139,21 +139,26 @@ SAMPLES_OF_THREAD = 8  # SAMPLES_OF_THREAD of shaders/visibility/strand_samples.
 
 
 @cached
-def shading_program(file, blocks=(), tables=(), in_parts=False, is_mixed=False):
+def shading_program(file, blocks=(), tables=(), in_parts=False, is_mixed=False, is_solid=False):
     """The compute program that shades strands with a model's .comp.
 
     blocks: (instance, class of settings), ...; tables: (sampler, type), ...; in_parts: draw a part of the light,
     selected by the constants of fibre/drawn_lobes.glsl; is_mixed: draw the share of one of two looks, by the constants
-    of fibre/mixed_looks.glsl.
+    of fibre/mixed_looks.glsl; is_solid: for Solid shading, by the block of fibre/solid_light.glsl.
     """
     structs = [uniforms.settings_block(settings_class, instance) for instance, settings_class in blocks]
     structs_source = "".join(block.source for block in structs)
-    info = strand_samples_info(
-        structs_source, (*tables, ("strand_wetness", "FLOAT_2D")) if is_mixed else tables, is_mixed=is_mixed
-    )
+    samplers = (*tables, ("strand_wetness", "FLOAT_2D")) if is_mixed else tables
+    if is_solid:
+        samplers = (*samplers, ("strand_tints", "FLOAT_2D"), ("matcap", "FLOAT_2D"))
+        structs_source += uniforms.SOLID.source
+    info = strand_samples_info(structs_source, samplers, is_mixed=is_mixed)
     for slot, ((instance, _class), block) in enumerate(zip(blocks, structs, strict=True), start=2):
         info.uniform_buf(slot, block.type_name, instance)
     replaced = {}
+    if is_solid:
+        replaced["fibre/shown_light.glsl"] = "fibre/solid_light.glsl"
+        info.uniform_buf(2 + len(structs), uniforms.SOLID.type_name, "solid")
     if in_parts:
         replaced["fibre/drawn_lobes.glsl"] = None
         info.push_constant("VEC4", "drawn_lobes")

@@ -19,7 +19,7 @@ _DIMMED_BEHIND = 0.7  # hair lets light from behind through, which the opaque su
 _LEAST_DIFFUSE = 1e-3  # least diffuse color relative to the specular color, as highlights are relative to other light
 
 image_cache = Cache(capacity=8)  # StudioImage → {layer: (H, W, 3)}
-texture_cache = Cache(capacity=8)  # (StudioImage, names of layers) → texture
+texture_cache = Cache(capacity=8)  # (StudioImage, whether as a matcap) → texture
 
 
 def lamps_of(lights, has_highlights):
@@ -53,18 +53,22 @@ class StudioImage:
     is_dirty: bool = False
 
     @property
+    def layers(self):
+        """{name: (H, W, 3) scene-linear colors}."""
+        return image_cache.get(self, lambda: _read(self.path))
+
+    @property
     def size(self):
         """(width, height) [pixels]."""
-        return self.layer().shape[1::-1]
+        return next(iter(self.layers.values())).shape[1::-1]
 
-    def layer(self, *names):
-        """(H, W, 3) of the first layer of these names, or of any layer."""
-        layers = image_cache.get(self, lambda: _read(self.path))
-        return next((layers[name] for name in names if name in layers), next(iter(layers.values())))
+    def panorama(self):
+        """The texture of the first layer, which repeats."""
+        return texture_cache.get((self, False), lambda: _texture(next(iter(self.layers.values())), "REPEAT"))
 
-    def texture(self, *names):
-        """The texture of `layer`, which repeats."""
-        return texture_cache.get((self, names), lambda: _texture(self.layer(*names)))
+    def matcap(self):
+        """The texture of a matcap: its highlights above its diffuse light."""
+        return texture_cache.get((self, True), lambda: _texture(_stacked(self.layers), "EXTEND"))
 
 
 def image_of(path):
@@ -92,12 +96,20 @@ def _read(path):
     return {"": np.ascontiguousarray(pixels)}
 
 
-def _texture(pixels):
+def _stacked(layers):
+    diffuse = layers.get("diffuse", next(iter(layers.values())))
+    specular = layers.get("specular")
+    if specular is None or specular.shape != diffuse.shape:
+        specular = np.zeros_like(diffuse)
+    return np.concatenate([diffuse, specular])
+
+
+def _texture(pixels, extension):
     height, width = pixels.shape[:2]
     texels = np.ones((height, width, 4), np.float32)
     texels[..., :3] = pixels
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
     texture = gpu.types.GPUTexture((width, height), format="RGBA16F", data=data)
     texture.filter_mode(True)
-    texture.extend_mode("REPEAT")
+    texture.extend_mode(extension)
     return texture

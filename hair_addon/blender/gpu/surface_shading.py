@@ -66,7 +66,7 @@ def _of_material(blocks, material):
     """{sampler: texture} of a material; adds its block to `blocks`."""
     images = {name: _texture(getattr(material, name)) for name in surface_programs.SURFACE_IMAGES}
     blocks["surface"] = uniforms.uniform_buffer(_record(material, images))
-    images = {name: _white() if texture is None else texture for name, texture in images.items()}
+    images = {name: white() if texture is None else texture for name, texture in images.items()}
     return {"surface_albedo": _albedo_texture(), **images}
 
 
@@ -85,7 +85,7 @@ def _texture(image_map):
 
 
 @texture_cache.keeping
-def _white():
+def white():
     """A texture for samplers that are not read."""
     return gpu.types.GPUTexture((1, 1), format="RGBA8")
 

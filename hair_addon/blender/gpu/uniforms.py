@@ -232,6 +232,16 @@ HISTORY = Block(
     },
 )
 
+SOLID = Block(
+    "Solid",
+    {
+        "tint": "vec4",  # color of all strands, relative to that of their look
+        "highlights": "float",  # factor of the matcap's layer of highlights
+        "has_matcap": "int",
+        "has_strand_tints": "int",  # whether strands have tints of their own
+    },
+)
+
 CLIPPING = Block("Clipping", {"planes": ("vec4", 6)})  # world points p with dot(plane, (p, 1)) < 0 are clipped
 
 ENVIRONMENT = Block(

@@ -104,7 +104,7 @@ def _record(world, width, height):
 
 def _draw(fragment, world, record):
     if isinstance(world.image, StudioImage):
-        picture = world.image.texture()
+        picture = world.image.panorama()
     else:
         picture = _texture_of(world)
     drawing.draw_cover(scene_programs.environment_program(fragment), {"environment": record}, {"surroundings": picture})

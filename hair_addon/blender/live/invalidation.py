@@ -8,7 +8,16 @@ from ..data import guide_map_readers, scene, subdivided_surfaces, usable_surface
 from ..data.pictures import drawn_meshes
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
-from ..gpu import light_grid, lights, shaders, studio_lights, surface_shading, surface_textures, world_texture
+from ..gpu import (
+    light_grid,
+    lights,
+    shaders,
+    solid_shading,
+    studio_lights,
+    surface_shading,
+    surface_textures,
+    world_texture,
+)
 from ..groom import bindings, copied_hair, edited_faces, followed_names, frame_faces, hidden_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..groom.guides import guide_states
@@ -56,6 +65,7 @@ OTHERS = (
     subdivided_surfaces.smooth_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,
+    solid_shading.shading_cache,
     studio_lights.image_cache,
     studio_lights.texture_cache,
     world_texture.studio_cache,

@@ -21,7 +21,7 @@ from ..gpu import (
 from ..gpu import lights as blender_lights
 from ..gpu.shadows import ShadowMaps
 from ..host.notices import can_be_drawn
-from . import gpu_strands, hair_cache, hair_places, modified_hair, read_strands
+from . import gpu_strands, hair_cache, hair_places, modified_hair, read_strands, solid_hair
 
 # The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke.
 _SHADOW_STEPS = drawing.Steps(strand_count=50_000)
@@ -52,6 +52,7 @@ class DrawnScene:
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
     renewal: ambient_visibility.Renewal | None = None  # of the visibility textures, while hair moves
     light: viewport_shading.ViewportLight = viewport_shading.SCENE_LIGHT
+    is_wire: bool = False  # whether strands are thin lines
     hair_lights: np.ndarray | None = None  # uniforms.LIGHTS of each hair; None: `lights` for all
     surface_lights: np.ndarray | None = None  # the same for `surfaces`, then for `clear`
 
@@ -125,7 +126,7 @@ def read(
     if before is None and last is not None and _fit(last.shadow_maps, lamps, is_shaded):
         maps = last.shadow_maps
     renewal = None
-    drawn = replace(_EMPTY, hair=hair, world=world, light=shown.light, **surroundings)
+    drawn = replace(_EMPTY, hair=hair, world=world, light=shown.light, is_wire=shown.is_wire, **surroundings)
     if is_draft and last is not None and _have_same_places(last, drawn):
         seen = last.hair_visibility, last.surface_visibility
         if are_made:
@@ -380,7 +381,7 @@ def _read_hair(places, viewport, refused, shown, depsgraph):
         if not can_be_drawn(place.hair_object, place.to_world):
             continue
         try:
-            strands, shading = _drawn_hair(place.hair_object, depsgraph, is_viewport=viewport is not None)
+            strands, shading = _drawn_hair(place.hair_object, depsgraph, viewport is not None, shown)
         except HairError as error:
             if refused is None:
                 raise
@@ -393,12 +394,15 @@ def _read_hair(places, viewport, refused, shown, depsgraph):
     return hair, drawn_places
 
 
-def _drawn_hair(hair_object, depsgraph, is_viewport):
+def _drawn_hair(hair_object, depsgraph, is_viewport, shown):
     """(`StrandsOnGPU`, shading) of an object, as Blender evaluates it if an artist has added modifiers."""
-    if not modified_hair.is_modified(hair_object):
-        return hair_cache.hair_on_gpu(hair_object.data, is_viewport)
-    strands = modified_hair.strands_on_gpu(hair_object, depsgraph)
-    return strands, hair_cache.shading_of(hair_object.data, strands)
+    is_neutral = solid_hair.is_tinted(shown)
+    if modified_hair.is_modified(hair_object):
+        strands = modified_hair.strands_on_gpu(hair_object, depsgraph)
+        shading = hair_cache.shading_of(hair_object.data, strands, is_neutral)
+    else:
+        strands, shading = hair_cache.hair_on_gpu(hair_object.data, is_viewport, is_neutral)
+    return strands, strands and solid_hair.shown_as(shading, shown, hair_object)
 
 
 def _have_same_places(drawn, other):

@@ -61,7 +61,7 @@ shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
 
 
 @memory_as_sentence()
-def hair_on_gpu(datablock, is_viewport=True):
+def hair_on_gpu(datablock, is_viewport=True, is_neutral=False):
     """(`StrandsOnGPU`, `Shading`) of a hair Curves datablock. Raises `HairError`.
 
     is_viewport: whether hair may be drawn without its styles while it is combed.
@@ -71,7 +71,7 @@ def hair_on_gpu(datablock, is_viewport=True):
         strands_there = strands_on_gpu(datablock)
     else:
         strands_there = _upload_styled(datablock, bound)
-    return strands_there, strands_there and shading_of(datablock, strands_there)
+    return strands_there, strands_there and shading_of(datablock, strands_there, is_neutral)
 
 
 def _upload_styled(datablock, bound):
@@ -322,11 +322,13 @@ def _shown_strands(datablock):
     return replace(read, points=simulated, radii=even)
 
 
-def shading_of(datablock, strands=None):
+def shading_of(datablock, strands=None, is_neutral=False):
     """The `Shading` of a hair Curves datablock, or a `MixedShading` if strands differ in wetness. Raises `HairError`.
 
-    strands: its `StrandsOnGPU`.
+    strands: its `StrandsOnGPU`; is_neutral: of strands to be tinted, in place of the look's color.
     """
+    if is_neutral:
+        return _neutral_shading_of(datablock)
     state = datablock.vellus
     wettest = _shading_of_look(state, properties.look_of(state))
     least, most = shared_wetness.of_hair(state)
@@ -334,6 +336,12 @@ def shading_of(datablock, strands=None):
         return wettest
     driest = _shading_of_look(state, properties.dry_look_of(state))
     return hair_shading.mixed(driest, wettest, strands.wetness_here, (least, most))
+
+
+def _neutral_shading_of(datablock):
+    look = appearance.neutral(properties.look_of(datablock.vellus))
+    settings = appearance.table_settings(look)
+    return _cached_shading((settings,), lambda wanted: hair_shading.marschner_shading(_tables(wanted, "")))
 
 
 def _shading_of_look(state, look):

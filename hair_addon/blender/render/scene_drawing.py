@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawing of a `DrawnScene` into pictures: hair, surfaces, and the shadows of hair on them."""
 
+from dataclasses import replace
+
 from ..gpu import (
     ambient_visibility,
     drawing,
@@ -87,6 +89,9 @@ def find_hair(drawn, view, buffer, chosen=None, clip_planes=None):
     buffer.find_hair(hair, drawn.lights, view, clip_planes=clip_planes)
 
 
+_WIRE_THICKNESS = 0.4  # of strands in Wireframe shading
+
+
 def _hair_lights(drawn):
     """`uniforms.LIGHTS` for all hair, or for each hair."""
     return drawn.lights if drawn.hair_lights is None else drawn.hair_lights
@@ -96,6 +101,8 @@ def _hair_in_view(drawn, view, is_viewport):
     hair = []
     for (strands, shading, to_world, part), seen in zip(drawn.hair, drawn.hair_visibility, strict=True):
         steps = level_of_detail.steps_of(strands, view, to_world, part) if is_viewport else drawing.Steps()
+        if drawn.is_wire:
+            steps = replace(steps, thickness=_WIRE_THICKNESS)
         hair.append((strands, shading, to_world, drawn.shadow_maps.samplers | seen, steps))
     return hair
 

@@ -232,6 +232,16 @@ def table_settings(appearance: Appearance, base: lookup_tables.Settings | None =
     )
 
 
+_NEUTRAL_COLOR = (0.5, 0.5, 0.5)  # a ball of hair of this color is as bright as a white surface in even light
+
+
+@lru_cache(maxsize=_KEPT)
+def neutral(look: Appearance) -> Appearance:
+    """Return the look with bright gray strands that are all alike, to be tinted, and with its own highlights."""
+    shading = {name: getattr(look, name) for name in ("roughness", "radial_roughness", "coat", "ior", "cuticle_angle")}
+    return Appearance(parametrization="COLOR", color=_NEUTRAL_COLOR, **shading)
+
+
 def kajiya_kay_settings(appearance: Appearance) -> kajiya_kay.Settings:
     """Convert to `kajiya_kay.Settings`: the groom's colour, and a highlight with R's width and R's energy."""
     appearance = shaded(appearance)

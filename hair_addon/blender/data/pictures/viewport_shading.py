@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 SCENE, STUDIO, MATCAP, FLAT = "SCENE", "STUDIO", "MATCAP", "FLAT"  # kinds of light
+_EVEN = (1.0, 1.0, 1.0)  # ambient radiance without lights: surfaces have the radiance of their color
 
 # Parts of the scene's color management that Blender applies to a viewport.
 ALL, VIEW_TRANSFORM, NO_SETTINGS = "ALL", "VIEW_TRANSFORM", "NO_SETTINGS"
@@ -88,8 +89,7 @@ class ViewportShading:
     def strands(self):
         """A key of all but lights: of what strands are shaded by."""
         light = self.light
-        unlit = (light.kind, light.matcap, light.has_highlights) if light.kind in {MATCAP, FLAT} else None
-        return unlit, self.color, self.is_wire
+        return (light.matcap, light.has_highlights) if light.matcap else None, self.color, self.is_wire
 
 
 BY_SCENE = ViewportShading()  # by the look and the light of the scene
@@ -104,7 +104,7 @@ def read(viewport, scene, world_to_view):
         return _solid(shading, world_to_view, NO_SETTINGS)
     if shading.type == "WIREFRAME":
         color = _WIRE_COLORS.get(shading.wireframe_color_type) or _theme_color()
-        return ViewportShading(ViewportLight(FLAT), color, True, NO_SETTINGS)
+        return ViewportShading(ViewportLight(FLAT, ambient=_EVEN), color, True, NO_SETTINGS)
     light = _scene_light(shading)
     return ViewportShading(light, management=ALL if light.has_lights or light.has_world else VIEW_TRANSFORM)
 
@@ -138,9 +138,9 @@ def _solid_light(shading, world_to_view):
     """The `ViewportLight` of Solid shading."""
     has_highlights, studio = shading.show_specular_highlight, shading.selected_studio_light
     if shading.light == "MATCAP" and studio is not None and studio.type == "MATCAP":
-        return ViewportLight(MATCAP, matcap=studio.path, has_highlights=has_highlights)
+        return ViewportLight(MATCAP, ambient=_EVEN, matcap=studio.path, has_highlights=has_highlights)
     if shading.light == "FLAT":
-        return ViewportLight(FLAT)
+        return ViewportLight(FLAT, ambient=_EVEN)
     system = bpy.context.preferences.system
     source = system if system.use_studio_light_edit or studio is None else studio
     to_world = _to_world(shading, world_to_view)

@@ -26,6 +26,7 @@ from . import guide_lines, hair_picture, region_pictures, selected_hair
 from .outline import HairOutline
 
 _PICK_REACH = 5  # maximum distance [pixels] of a click from hair, as strands are thinner than a pixel
+_WIRE_OPACITY = 0.5  # minimum opacity of hair in Wireframe shading
 
 _handles = []  # of draw handlers
 
@@ -234,7 +235,12 @@ def _what_shows(viewport):
 def _xray(shading):
     """Opacity of the X-ray view, from 0 to 1; None if surfaces occlude."""
     if shading.type == "WIREFRAME":
-        return shading.xray_alpha_wireframe if shading.show_xray_wireframe else None
+        # The opacity of surfaces, whose wires are visible at 0 too.
+        return (
+            _WIRE_OPACITY + (1.0 - _WIRE_OPACITY) * shading.xray_alpha_wireframe
+            if shading.show_xray_wireframe
+            else None
+        )
     return shading.xray_alpha if shading.type == "SOLID" and shading.show_xray else None
 
 

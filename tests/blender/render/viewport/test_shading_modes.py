@@ -2,6 +2,7 @@
 """Hair in Blender's shading modes: as bright as surfaces in the same lights, separately for each viewport."""
 
 import math
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from hair_addon.blender.data.pictures import viewport_shading
 from hair_addon.blender.gpu import studio_lights
-from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render import drawn_scene, solid_hair
 from hair_addon.blender.render.viewport import hair_picture, viewport
 from tests.support.viewports import context_of, view3d
 
@@ -180,6 +181,84 @@ def test_hair_is_about_as_bright_as_a_ball_that_workbench_draws(ball):
             ratios[name, has_highlights] = ours / (workbench_ball(light, albedo) @ LUMINANCE)
     assert len(ratios) == 7
     assert 0.5 < min(ratios.values()) and max(ratios.values()) < 1.5, ratios
+
+
+def matcap_ball(layers, albedo):
+    """(3,) mean of a ball that Workbench draws by the (H, W, 3) layers of a matcap."""
+    diffuse, specular = layers["diffuse"], layers["specular"]
+    x, y = np.meshgrid(*[np.linspace(-1.0, 1.0, 100)] * 2)
+    inside = x**2 + y**2 < 1.0
+    row, column = ((0.496 * place[inside] + 0.5) * 511.0 for place in (y, x))
+    return (diffuse[row.astype(int), column.astype(int)] * albedo + specular[row.astype(int), column.astype(int)]).mean(
+        axis=0
+    )
+
+
+def test_matcaps_and_flat_shading_are_about_as_bright_as_on_a_ball(ball):
+    """Every third of the matcaps, and those that are bright at the rim or in stripes."""
+    camera = facing()
+    solid(ball, light="FLAT")
+    drawn, _shown = read(ball, camera)
+    flat = mean_of(picture_of(drawn, camera))
+    np.testing.assert_allclose(flat, albedo_of(drawn), rtol=1e-3)  # as in even light
+    matcaps = [light for light in bpy.context.preferences.studio_lights if light.type == "MATCAP"]
+    chosen = [light for light in matcaps if "rim" in light.name or "reflection" in light.name] + matcaps[::3]
+    ratios = {}
+    for matcap in chosen:
+        solid(ball, light="MATCAP", studio_light=matcap.name)
+        shown = viewport_shading.read(ball, bpy.context.scene, camera[0])
+        (strands, shading, *place), *_others = drawn.hair
+        hair = solid_hair.shown_as(shading, shown, bpy.data.objects["Hair"])
+        light = picture_of(replace(drawn, hair=[(strands, hair, *place)]), camera)
+        expected = matcap_ball(studio_lights.image_of(matcap.path).layers, flat) @ LUMINANCE
+        ratios[matcap.name] = mean_of(light) @ LUMINANCE / expected
+    assert len(ratios) > 10
+    assert 0.5 < min(ratios.values()) and max(ratios.values()) < 1.5, ratios
+
+
+def test_matcaps_are_seen_from_the_viewer(ball):
+    """The normal's directions on the screen are those of the image: red to the right, green up."""
+    camera = facing()
+    solid(ball, light="MATCAP", studio_light="check_normal+y.exr")
+    light = picture_of(read(ball, camera)[0], camera)
+    y, x = (np.indices((SIZE, SIZE)) - 0.5 * (SIZE - 1)) / SIZE
+    seen = light[..., 3] > 0.5
+    red, green = (light[..., channel][seen] / light[..., 3][seen] for channel in (0, 1))
+    assert np.corrcoef(red, x[seen])[0, 1] > 0.3 > np.corrcoef(red, y[seen])[0, 1]
+    assert np.corrcoef(green, y[seen])[0, 1] > 0.3 > np.corrcoef(green, x[seen])[0, 1]
+
+
+def test_hair_has_the_color_of_the_color_type_and_keeps_its_highlight(ball):
+    camera, hair = facing(), bpy.data.objects["Hair"]
+    solid(ball, light="STUDIO", studio_light="Default")
+    color = np.array([0.6, 0.3, 0.1])
+    ball.shading.color_type, ball.shading.single_color = "SINGLE", color
+    drawn, shown = read(ball, camera)
+    ratio = mean_of(picture_of(drawn, camera)) / workbench_ball(shown.light, color)
+    assert 0.5 < ratio.min() and ratio.max() < 1.5, ratio
+    assert read(ball, camera)[0].hair[0][1] is drawn.hair[0][1]  # pictures are carried on
+    ball.shading.single_color = (0.0, 0.0, 0.0)
+    black = picture_of(read(ball, camera)[0], camera)
+    ball.shading.show_specular_highlight = False
+    dull = picture_of(read(ball, camera)[0], camera)
+    assert mean_of(black) @ LUMINANCE > 10.0 * mean_of(dull) @ LUMINANCE
+    ball.shading.show_specular_highlight, ball.shading.color_type = True, "OBJECT"
+    hair.color = (*color, 1.0)
+    np.testing.assert_array_equal(picture_of(read(ball, camera)[0], camera), picture_of(drawn, camera))
+
+
+def test_wires_are_thin_and_in_the_color_of_the_theme(ball):
+    camera = facing()
+    solid(ball, light="FLAT")
+    whole = picture_of(read(ball, camera)[0], camera)
+    ball.shading.type = "WIREFRAME"
+    drawn, shown = read(ball, camera)
+    thin = picture_of(drawn, camera)
+    assert 0.2 * whole[..., 3].sum() < thin[..., 3].sum() < 0.8 * whole[..., 3].sum()
+    theme = bpy.context.preferences.themes[0].view_3d.wire
+    assert shown.color == viewport_shading.HairColor("SINGLE", tuple(theme))
+    ball.shading.wireframe_color_type = "RANDOM"
+    assert viewport_shading.read(ball, bpy.context.scene, camera[0]).color.kind == "RANDOM"
 
 
 def test_hair_turns_with_its_lights(ball):
