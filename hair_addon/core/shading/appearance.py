@@ -235,7 +235,7 @@ def table_settings(appearance: Appearance, base: lookup_tables.Settings | None =
 _NEUTRAL_COLOR = (0.5, 0.5, 0.5)  # a ball of hair of this color is as bright as a white surface in even light
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def neutral(look: Appearance) -> Appearance:
     """Return the look with bright gray strands that are all alike, to be tinted, and with its own highlights."""
     shading = {name: getattr(look, name) for name in ("roughness", "radial_roughness", "coat", "ior", "cuticle_angle")}
