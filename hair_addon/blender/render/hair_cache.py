@@ -64,7 +64,7 @@ shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
 def hair_on_gpu(datablock, is_viewport=True, is_neutral=False):
     """(`StrandsOnGPU`, `Shading`) of a hair Curves datablock. Raises `HairError`.
 
-    is_viewport: whether hair may be drawn without its styles while it is combed.
+    is_viewport: whether hair may be drawn without its styles while it is combed; is_neutral: as for `shading_of`.
     """
     bound = bindings.of(datablock)
     if is_viewport or bound is None or bound.straight is None:
