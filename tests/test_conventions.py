@@ -98,7 +98,7 @@ def test_a_package_imports_only_packages_above_it(path):
 
 @each_file(MODULES)
 def test_no_import_stands_in_a_function(path):
-    """What must be imported late is a file of a package that imports its files when they are first used."""
+    """Late imports belong in a package that imports its modules on first use."""
     tree = syntax(path)
     functions = [node for node in nodes(tree) if isinstance(node, ast.FunctionDef)]
     late = [node.lineno for function in functions for node in ast.walk(function) if isinstance(node, ast.ImportFrom)]
@@ -299,7 +299,7 @@ def test_no_test_but_benchmarks_holds_a_clock_to_a_limit(path):
 
 @each_file(BENCHMARKS)
 def test_every_benchmark_is_long(path):
-    """So that `make test` runs none but what is marked case by case: memory, which no other work changes."""
+    """Thus `make test` runs only cases marked one by one: of memory, which other work does not change."""
     tests = [node for node in syntax(path).body if getattr(node, "name", "").startswith("test_")]
     unmarked = [test.name for test in tests if not any("mark.long" in ast.unparse(d) for d in test.decorator_list)]
     assert tests and not unmarked, unmarked

@@ -69,7 +69,7 @@ def walk(extension, bare_python, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def used(walk):
-    """What the operators made."""
+    """Return what the operators made."""
     return walk("operators")
 
 
@@ -100,7 +100,7 @@ def test_zip_holds_what_blender_runs_and_nothing_else(extension):
 
 
 def test_bare_python_has_neither_warp_nor_openexr(bare_python):
-    """Or the next tests would pass without the zip's wheels."""
+    """Otherwise the next tests would pass without the zip's wheels."""
     for name in ("warp", "OpenEXR"):
         found = subprocess.run([bare_python, "-I", "-c", f"import {name}"], capture_output=True, text=True)
         assert "ModuleNotFoundError" in found.stderr
@@ -145,7 +145,7 @@ def test_enabling_and_disabling_twice_leaves_nothing_behind(walk):
 
 @pytest.mark.usefixtures("used")
 def test_nothing_is_written_outside_the_profile(walk):
-    """But for the kernel cache that Warp keeps for a user, and Blender's own thumbnails."""
+    """Exceptions are Warp's kernel cache of a user, and Blender's own thumbnails."""
     written = {path.relative_to(walk.home).parts[:2] for path in walk.home.rglob("*") if path.is_file()}
     assert written <= {(".cache", "warp"), (".cache", "thumbnails")}
     package = walk.profile / "extensions" / "user_default" / "vellus"

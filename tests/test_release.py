@@ -32,7 +32,7 @@ def version_of(package):
 
 @each_file(TEXTS)
 def test_no_registry_address(path):
-    """Where packages come from is each machine's own business."""
+    """Each machine chooses its own package sources."""
     text = path.read_text(encoding="utf-8")
     registries = r"https?://\S*(pypi|pythonhosted|/simple\b|artifact)"
     options = r"(?<!emit-)\b(extra-)?index-url\b|--find-links|--index\b|--trusted-host"

@@ -126,7 +126,7 @@ def test_functions_whose_results_are_kept_are_listed():
 
 
 def test_caches_stand_at_the_top_of_a_module():
-    """Where `invalidation.CACHES` can name them."""
+    """Caches are at module level, where `invalidation.CACHES` can name them."""
     for path in MODULES:
         tree = syntax(path)
         made = [node.lineno for node in nodes(tree) if called(node) == "Cache"]

@@ -327,8 +327,8 @@ def test_any_argument_works_or_is_refused(lit, tmp_path, monkeypatch, capfd):
             for shown in [o for o in bpy.data.objects if o.type == "CURVES" and o.name not in ("Hair", "Guides")]:
                 bpy.data.hair_curves.remove(shown.data)
             update()
-        said = capfd.readouterr()
-        assert "Traceback" not in said.err + said.out, (step, name, said)
+        reported = capfd.readouterr()
+        assert "Traceback" not in reported.err + reported.out, (step, name, reported)
     assert 0 < refusals < STEPS
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
     for hair in (c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR"):

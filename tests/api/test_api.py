@@ -85,7 +85,7 @@ def test_the_example_of_plain_arrays_runs_without_blender(tmp_path):
 
 
 def test_examples_of_the_documentation_run(tmp_path):
-    """As they stand: the add-on registers itself in a checkout."""
+    """Examples run unchanged: the add-on registers itself in a checkout."""
     in_blender, plain = shown_code()
     assert "import bpy" in in_blender and "bpy" not in plain
     run_python(in_blender, tmp_path)
@@ -102,7 +102,7 @@ def test_without_blender_functions_and_commands_say_so(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "reported"),
     [
         (lambda: api.distribute_guides(bpy.data.objects["Sphere"], guide_cuont=3), "Unknown setting"),
         (lambda: api.distribute_guides(bpy.data.objects["Sphere"], guide_count=0), "Guide count must be between"),
@@ -152,13 +152,13 @@ def test_without_blender_functions_and_commands_say_so(tmp_path):
         (lambda: api.save_settings("pyproject.toml/a.json", api.GroomSettings()), "cannot be written"),
     ],
 )
-def test_failures_are_one_sentence_and_change_nothing(hair, call, said, tmp_path, monkeypatch):
+def test_failures_are_one_sentence_and_change_nothing(hair, call, reported, tmp_path, monkeypatch):
     (tmp_path / "pyproject.toml").touch()
     monkeypatch.chdir(tmp_path)
     before = snapshot()
     with pytest.raises(api.HairError) as refused:
         call()
-    assert said in str(refused.value) and "\n" not in str(refused.value)
+    assert reported in str(refused.value) and "\n" not in str(refused.value)
     assert snapshot() == before
     assert [path.name for path in tmp_path.iterdir()] == ["pyproject.toml"]
 
@@ -201,7 +201,7 @@ def test_a_look_keeps_how_it_is_drawn(hair):
 
 
 def test_a_color_of_a_script_is_seen(hair):
-    """Whatever the color followed from before."""
+    """A script's color takes effect whichever way the color was given before."""
     api.shade(hair, color=(0.5, 0.1, 0.02))
     look = api.settings_of(hair).appearance
     assert appearance.mean_color(look) == pytest.approx((0.5, 0.1, 0.02), rel=0.01)
@@ -281,7 +281,7 @@ def test_placing_locks_tells_how_far_it_is_and_leaves_nothing_where_it_is_stoppe
 
 
 def test_new_hair_with_locks_tells_of_them_among_its_stages(sphere):
-    """As the command line's `groom` shows it."""
+    """The command line's `groom` shows these stages."""
     settings = api.GroomSettings(
         api.GuideSettings(guide_count=20), api.HairSettings(strand_count=100), styles=(api.Clump(size=0.1),)
     )

@@ -10,46 +10,46 @@ from tests.support.rendering import add_orthographic_camera, configure
 
 
 @pytest.fixture
-def heard():
-    """What calls of a function that it returns have raised."""
-    said = []
+def catching():
+    """Return a function that calls another and stores what it raises in `errors`."""
+    errors = []
 
     def attempt(call):
         try:
             call()
         except Exception as error:
-            said.append(error)
+            errors.append(error)
         return 1.0
 
-    attempt.said = said
+    attempt.errors = errors
     return attempt
 
 
-def test_a_driver_that_reads_points_hears_that_the_scene_is_evaluated(hair, heard):
-    bpy.app.driver_namespace["hair_reader"] = lambda: heard(lambda: api.points(hair.data))
+def test_a_driver_that_reads_points_hears_that_the_scene_is_evaluated(hair, catching):
+    bpy.app.driver_namespace["hair_reader"] = lambda: catching(lambda: api.points(hair.data))
     hair.driver_add("location", 0).driver.expression = "hair_reader()"
     try:
         bpy.context.view_layer.update()
     finally:
         hair.driver_remove("location")
         del bpy.app.driver_namespace["hair_reader"]
-    assert heard.said and all(isinstance(error, api.HairError) for error in heard.said)
-    assert "not from a driver" in str(heard.said[0])
+    assert catching.errors and all(isinstance(error, api.HairError) for error in catching.errors)
+    assert "not from a driver" in str(catching.errors[0])
 
 
-def test_a_handler_of_a_render_that_draws_hears_that_blender_has_the_graphics(hair, scene, heard):
+def test_a_handler_of_a_render_that_draws_hears_that_blender_has_the_graphics(hair, scene, catching):
     add_orthographic_camera(scene)
     configure(resolution_x=8, resolution_y=8, sample_count=1)
 
     def listen(*_args):
-        heard(lambda: api.draw(width=8, height=8))
+        catching(lambda: api.draw(width=8, height=8))
 
     bpy.app.handlers.render_post.append(listen)
     try:
         assert bpy.ops.render.render() == {"FINISHED"}
     finally:
         bpy.app.handlers.render_post.remove(listen)
-    (error,) = heard.said
+    (error,) = catching.errors
     assert isinstance(error, api.HairError) and "Drawing is not possible while Blender renders" in str(error)
     assert api.draw(width=8, height=8).shape == (8, 8, 4)
 

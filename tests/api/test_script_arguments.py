@@ -271,11 +271,11 @@ def test_wrong_arguments_are_one_sentence_and_change_nothing(lit, tmp_path, monk
     monkeypatch.chdir(tmp_path)
     elsewhere(), bpy.data.objects.new("Empty", None), foreign()
     model, before = lit.data.vellus.model, everything()
-    for name, (call, said) in REFUSED.items():
+    for name, (call, reported) in REFUSED.items():
         with pytest.raises(api.HairError) as refused:
             call()
         sentence = str(refused.value)
-        assert said in sentence and "\n" not in sentence and len(sentence) < 500, name
+        assert reported in sentence and "\n" not in sentence and len(sentence) < 500, name
         assert (everything(), lit.data.vellus.model, [*tmp_path.iterdir()]) == (before, model, []), name
     assert_all_goes_on(tmp_path)
 

@@ -48,7 +48,7 @@ def assert_proportional(cases):
     """cases: {what: (measured, estimated)}; the quotients of any two differ by at most the factor."""
     quotients = {what: measured / estimated for what, (measured, estimated) in cases.items()}
     for what, quotient in quotients.items():
-        print(f"{what}: {cases[what][0]:.3f} s, {quotient:.2f} of what is said")
+        print(f"{what}: {cases[what][0]:.3f} s, {quotient:.2f} of the estimate")
     assert max(quotients.values()) <= FACTOR * min(quotients.values())
 
 
@@ -100,15 +100,15 @@ def worked(*counts):
 
 def assert_memory_is_as_said(side_count, guide_count, strand_count):
     found, face_count = worked(side_count, guide_count, strand_count), 2 * side_count**2
-    said = cost.guide_work_bytes(GuideSettings(guide_count=guide_count), face_count)
-    said = max(said, cost.hair_work_bytes(HairSettings(strand_count=strand_count), face_count))
+    reported = cost.guide_work_bytes(GuideSettings(guide_count=guide_count), face_count)
+    reported = max(reported, cost.hair_work_bytes(HairSettings(strand_count=strand_count), face_count))
     took = found["bytes"][1]
     print(
-        f"{face_count} triangles, {guide_count} guides, {strand_count} strands: {took / 1e6:.0f} MB, said "
-        f"{said / 1e6:.0f} MB; {found['seconds'][0]:.1f} s and {found['seconds'][1]:.1f} s"
+        f"{face_count} triangles, {guide_count} guides, {strand_count} strands: {took / 1e6:.0f} MB, estimated "
+        f"{reported / 1e6:.0f} MB; {found['seconds'][0]:.1f} s and {found['seconds'][1]:.1f} s"
     )
     assert found["counts"] == [guide_count, strand_count]
-    assert said / FACTOR < took < said * FACTOR
+    assert reported / FACTOR < took < reported * FACTOR
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="no measure of a process's most memory")

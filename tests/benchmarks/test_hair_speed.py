@@ -43,7 +43,7 @@ MODIFIER = "asset, its modifier alone"
 
 @pytest.fixture(scope="module", autouse=True)
 def told():
-    """What was measured, on what, before the tables."""
+    """Return the lines before the tables: what was measured, and on which machine."""
     print("\n" + json.dumps(machine()))
 
 
@@ -58,7 +58,7 @@ def head_and_guides():
 
 
 def machine():
-    """What was measured, on what."""
+    """Return a description of the machine that was measured."""
     versions = {name: importlib.metadata.version(name) for name in ("bpy", "warp-lang", "numpy", "scipy")}
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
     model = next((line.split(": ")[1] for line in lines if line.startswith("model name")), platform.processor())
@@ -196,7 +196,7 @@ def test_search(count):
 @pytest.mark.long
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="the peak is measured on Linux")
 def test_peak_memory():
-    """What making 300,000 strands adds to a process at its peak, each way in a process of its own."""
+    """Making 300,000 strands: what each way adds to the peak memory of a process of its own."""
     peaks = {}
     for name in ("ours", AS_ADDED, POLY, LEAN):
         kind = {"ours": "ours", AS_ADDED: "asset", POLY: "poly", LEAN: "lean"}[name]

@@ -36,7 +36,7 @@ def documented():
 
 
 def address(doc_id):
-    """Where Blender's own lookup leads to."""
+    """Return the address that Blender's own lookup opens."""
     rna_id = wm._wm_doc_get_id(doc_id, do_url=False)
     return wm.WM_OT_doc_view_manual._lookup_rna_url(rna_id, verbose=False)
 
@@ -55,7 +55,7 @@ def heading_at(found):
 
 
 def test_every_property_and_operator_leads_to_its_heading():
-    """What has none gets its page in blender/manual.py, and its heading there."""
+    """A property that has none must get its page in blender/manual.py, and its heading there."""
     wanted = documented()
     assert len(wanted) > 100
     assert {doc_id: heading_at(address(doc_id)) for doc_id in wanted} == wanted
@@ -111,7 +111,7 @@ def test_the_installed_pages_have_the_same_anchors_and_their_links_lead_somewher
 
 
 def test_every_picture_has_one_script_that_draws_it():
-    """What no script of `make pictures` draws would show an earlier version for ever."""
+    """A picture that no script of `make pictures` draws would show an earlier version forever."""
     docs = manual_pages.SOURCE.parent
     drawn = {name: tuple(found.values()) for name, found in all_pictures.COPIED.items()} | all_pictures.OTHERS
     drawn["elsewhere"] = all_pictures.ELSEWHERE

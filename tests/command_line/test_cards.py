@@ -75,15 +75,15 @@ def test_tubes_go_into_a_file(shot):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "reported"),
     [
         (["cards", "--out", "a.abc"], "exported as .blend"),
         (["tubes", "--out", "a.obj", "--hair", "Nobody"], 'has no hair "Nobody"'),
         (["cards", "--out", "a.obj", "--cards", "0"], "must be"),
     ],
 )
-def test_what_is_wrong_is_one_sentence(shot, tmp_path, monkeypatch, words, said):
+def test_what_is_wrong_is_one_sentence(shot, tmp_path, monkeypatch, words, reported):
     monkeypatch.chdir(tmp_path)
     ended = run_here(words[0], shot, *words[1:])
-    assert ended.status == 1 and said in ended.errors and len(ended.errors.splitlines()) == 1
+    assert ended.status == 1 and reported in ended.errors and len(ended.errors.splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["shot.blend"]

@@ -197,8 +197,8 @@ def test_info_shows_the_content_of_a_file(lit, tmp_path):
         {"format": settings_file.FORMAT, "version": 1, "guides": guides["settings"], "hair": hair["settings"]}, blend
     ).hair == HairSettings(strand_count=500, radius=0.004, influence_distance=0.03)
     assert hair["bytes"] > 500 * 41 * 16
-    said = run_here("info", blend).out
-    assert "strands: 500" in said and f"melanin: {Appearance().melanin}" in said
+    reported = run_here("info", blend).out
+    assert "strands: 500" in reported and f"melanin: {Appearance().melanin}" in reported
 
 
 def test_info_warns_as_the_panel_does(lit, tmp_path):
@@ -271,7 +271,7 @@ def test_an_empty_background_is_empty(shot, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "reported"),
     [
         (["groom", "missing.obj", "--out", "x.npz"], "missing.obj does not exist"),
         (["groom", HEAD, "--out", "x.fbx"], ".blend, .npz, .usd"),
@@ -293,11 +293,11 @@ def test_an_empty_background_is_empty(shot, tmp_path):
         (["info", "missing.npz"], "missing.npz cannot be read"),
     ],
 )
-def test_failures_are_one_sentence_with_status_1(tmp_path, monkeypatch, arguments, said):
+def test_failures_are_one_sentence_with_status_1(tmp_path, monkeypatch, arguments, reported):
     monkeypatch.chdir(tmp_path)
     ended = run_here(*arguments)
     assert (ended.status, ended.out) == (1, "")
-    assert said in ended.errors and len(ended.errors.splitlines()) == 1
+    assert reported in ended.errors and len(ended.errors.splitlines()) == 1
     assert ended.errors.startswith("vellus: ")
     assert list(tmp_path.iterdir()) == []
 
@@ -305,7 +305,7 @@ def test_failures_are_one_sentence_with_status_1(tmp_path, monkeypatch, argument
 def test_rendering_needs_a_camera_an_extension_and_a_frame_number(shot, tmp_path):
     bpy.context.scene.camera = None
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "blind.blend"))
-    for blend, out, said, *options in (
+    for blend, out, reported, *options in (
         (tmp_path / "blind.blend", "a.png", "no camera"),
         (tmp_path / "blind.blend", "a.png", "no camera", "--engine", "cycles"),
         (shot, "a.gif", "saved as .png or .exr"),
@@ -314,12 +314,12 @@ def test_rendering_needs_a_camera_an_extension_and_a_frame_number(shot, tmp_path
         (shot, "a.png", "Width must be", "--width", 0),
     ):
         ended = run_here("render", blend, *options, "--out", tmp_path / out)
-        assert ended.status == 1 and said in ended.errors, ended.errors
+        assert ended.status == 1 and reported in ended.errors, ended.errors
     assert not list(tmp_path.glob("a*"))
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "reported"),
     [
         ([], "VERB"),
         (["comb"], "comb"),
@@ -335,11 +335,11 @@ def test_rendering_needs_a_camera_an_extension_and_a_frame_number(shot, tmp_path
         (["render", "a.blend", "--out", "b.png", "--engine", "pencil"], "pencil"),
     ],
 )
-def test_invalid_arguments_are_one_sentence_with_status_2(capfd, arguments, said):
+def test_invalid_arguments_are_one_sentence_with_status_2(capfd, arguments, reported):
     capfd.readouterr()
     assert run_here(*arguments).status == 2
     told = capfd.readouterr()
-    assert told.out == "" and said in told.err
+    assert told.out == "" and reported in told.err
     assert len(told.err.splitlines()) == 1 and told.err.startswith("vellus: ")
 
 

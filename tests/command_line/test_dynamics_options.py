@@ -46,7 +46,7 @@ def test_settings_that_share_a_name_are_apart():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reported"),
     [
         ("bend=1", "'bend' is not a setting of dynamics: choose from bend_stiffness"),
         ("hold", "hold of dynamics needs a value"),
@@ -57,8 +57,8 @@ def test_settings_that_share_a_name_are_apart():
         ("sag_free=maybe", "sag_free must be yes or no, not 'maybe'"),
     ],
 )
-def test_what_is_wrong_is_one_sentence(text, said):
-    with pytest.raises(argparse.ArgumentTypeError, match=re.escape(said)):
+def test_what_is_wrong_is_one_sentence(text, reported):
+    with pytest.raises(argparse.ArgumentTypeError, match=re.escape(reported)):
         dynamics_options.dynamics(text)
 
 

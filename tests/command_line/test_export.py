@@ -43,17 +43,17 @@ def test_animation_has_the_frames_of_the_scene(shot, ending):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "reported"),
     [
         (["--out", "a.fbx"], "exported as .abc"),
         (["--out", "a.abc", "--hair", "Nobody"], 'has no hair "Nobody"'),
         (["--out", "a.abc", "--no-strands", "--no-guides"], "choose one"),
     ],
 )
-def test_what_is_wrong_is_one_sentence(shot, tmp_path, monkeypatch, words, said):
+def test_what_is_wrong_is_one_sentence(shot, tmp_path, monkeypatch, words, reported):
     monkeypatch.chdir(tmp_path)
     ended = run_here("export", shot, *words)
-    assert ended.status == 1 and said in ended.errors and len(ended.errors.splitlines()) == 1
+    assert ended.status == 1 and reported in ended.errors and len(ended.errors.splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["shot.blend"]
 
 

@@ -31,7 +31,7 @@ def submitted(**settings):
 
 
 def sentence_of(job):
-    """What a job is refused with, None for one that is accepted."""
+    """Return the message that refuses a job, None for one that is accepted."""
     return None if job["status"] == 200 else job["message"].rpartition(" at refuse")[0]
 
 

@@ -35,7 +35,7 @@ def written(folder):
 
 @pytest.mark.parametrize(("verb", "run"), [*((verb, run_here) for verb in VERBS), ("info", run)])
 def test_nothing_of_its_own_runs(stranger, tmp_path, verb, run):
-    """Nor in a process of its own, which no test has told what to allow."""
+    """Nor do scripts run in a separate process, for which no test has set what is allowed."""
     ended = run(*VERBS[verb](stranger, tmp_path))
     assert ended.status == 0, ended.errors
     assert written(tmp_path) == set()

@@ -45,14 +45,14 @@ def mesh(scene, tmp_path):
     return make
 
 
-def refuse(path, said, *options, verb="groom"):
+def refuse(path, reported, *options, verb="groom"):
     """A command must refuse a file in one sentence, and leave nothing."""
     folder = path.parent
     before = {p: p.read_bytes() for p in folder.iterdir() if p.is_file()}
     words = (verb, path, *SMALL, "--out", folder / "out.npz") if verb == "groom" else (verb, path)
     ended = run_here(*words, *options)
     assert (ended.status, ended.out) == (1, "")
-    assert said in ended.errors and len(ended.errors.splitlines()) == 1, ended.errors
+    assert reported in ended.errors and len(ended.errors.splitlines()) == 1, ended.errors
     assert any(named in ended.errors for named in (str(path), "mesh", "The surface"))
     assert {p: p.read_bytes() for p in folder.iterdir() if p.is_file()} == before
 
@@ -73,7 +73,7 @@ ENDINGS = [".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".usdc", ".usda", 
 
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_a_whole_file_is_read(mesh, ending):
-    """Or the refusals below would mean nothing."""
+    """Otherwise the refusals below would prove nothing."""
     path = mesh(f"whole{ending}")
     assert run_here("groom", path, *SMALL, "--out", path.parent / "out.npz").status == 0
 
@@ -97,17 +97,17 @@ def test_files_of_another_format_are_refused(tmp_path, ending, rng):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "reported"),
     [
         ({"accessors": []}, "IndexError: list index out of range"),  # an error of the importer
         ({"buffers": [{"uri": "gone.bin", "byteLength": 36}]}, "gone.bin"),
     ],
 )
-def test_a_gltf_with_parts_missing(mesh, capsys, change, said):
+def test_a_gltf_with_parts_missing(mesh, capsys, change, reported):
     path = mesh("parts.gltf")
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
     capsys.readouterr()
-    refuse(path, said)
+    refuse(path, reported)
     assert capsys.readouterr().err == ""  # no traceback, no message of the importer's own
 
 

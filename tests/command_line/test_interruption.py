@@ -26,25 +26,25 @@ class Terminal:
 
     def __init__(self):
         self.reading, self.writing = pty.openpty()
-        self.said = ""
+        self.reported = ""
 
     def wait_for(self, words, seconds=60.0):
-        """Read until some words were said."""
+        """Read until some words were printed."""
         end = time.monotonic() + seconds
-        while words not in self.said:
-            assert time.monotonic() < end, self.said
-            self.said += os.read(self.reading, 4096).decode()
+        while words not in self.reported:
+            assert time.monotonic() < end, self.reported
+            self.reported += os.read(self.reading, 4096).decode()
 
     def rest(self):
-        """All that was said, once the command has ended."""
+        """Return all that was printed, once the command has ended."""
         os.close(self.writing)
         try:
             while part := os.read(self.reading, 4096).decode():
-                self.said += part
+                self.reported += part
         except OSError:  # Linux ends a terminal that nobody writes to any more with an error
             pass
         os.close(self.reading)
-        return self.said
+        return self.reported
 
 
 @pytest.mark.parametrize(
@@ -73,9 +73,9 @@ def test_progress_is_for_terminals_only(tmp_path):
         terminal = Terminal()
         with open(terminal.writing, "w", closefd=False) as writing:
             assert run_here(*words, *quiet, terminal=writing).status == 0
-        said = terminal.rest()
-        assert ("Spreading guides" in said) is expected
-        assert said.rpartition("\r\x1b[K")[2] == ""
+        reported = terminal.rest()
+        assert ("Spreading guides" in reported) is expected
+        assert reported.rpartition("\r\x1b[K")[2] == ""
 
 
 def test_finished_frames_are_complete(lit, tmp_path):
@@ -145,7 +145,7 @@ def test_a_second_ctrl_c_does_not_wait():
 
 
 def test_a_progress_callback_can_stop_a_script(sphere):
-    """The same for the functions that scripts call: nothing is left in the scene."""
+    """A stopped function of the API leaves nothing in the scene."""
 
     def stop(_step, part):
         if part > 0.3:

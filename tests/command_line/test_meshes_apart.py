@@ -33,7 +33,7 @@ def files(scene, tmp_path):
 
 
 def seen():
-    """What matters of the open file."""
+    """Return the state of the open file that must not change."""
     bpy.context.view_layer.update()
     meshes = {}
     for one in (o for o in bpy.context.view_layer.objects if o.type == "MESH"):
@@ -88,7 +88,7 @@ def test_curves_are_tried_apart(files, tmp_path, monkeypatch):
     )
 
 
-def test_what_the_other_process_says_is_said(files):
+def test_messages_of_the_other_process_are_reported(files):
     files[".usdc"].write_bytes(files[".usdc"].read_bytes()[:200])
     ended = run_here("info", files[".usdc"], reads_apart=True)
     assert (ended.status, ended.out) == (1, "")
@@ -96,7 +96,7 @@ def test_what_the_other_process_says_is_said(files):
 
 
 def test_faces_of_vertices_that_are_not_there_are_refused(scene):
-    """As an importer makes them of some damaged files."""
+    """Importers make such faces of some damaged files."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
     mesh_checks.require_imported("a.abc")
     for corner, vertex in ((3, 42), (5, -1)):

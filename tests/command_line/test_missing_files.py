@@ -227,7 +227,7 @@ def linked(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("file", "becomes", "said"),
+    ("file", "becomes", "reported"),
     [
         ("a", None, "//a.blend;"),
         ("b", None, "//b.blend;"),
@@ -236,7 +236,7 @@ def linked(tmp_path_factory):
     ],
     ids=["library", "indirect library", "datablock of an indirect library", "datablock"],
 )
-def test_a_missing_library_is_refused_and_named(linked, scene, tmp_path, file, becomes, said):
+def test_a_missing_library_is_refused_and_named(linked, scene, tmp_path, file, becomes, reported):
     for name in ("a", "b", "shot"):
         (tmp_path / f"{name}.blend").write_bytes((linked / f"{name}.blend").read_bytes())
     shot, out = tmp_path / "shot.blend", "f.png"
@@ -249,7 +249,7 @@ def test_a_missing_library_is_refused_and_named(linked, scene, tmp_path, file, b
     if becomes is not None:
         path.write_bytes((linked / f"{becomes}.blend").read_bytes())
     refused = render(shot, out="g.png")
-    assert refused.status == 1 and f"Files are missing: {said}" in refused.errors
+    assert refused.status == 1 and f"Files are missing: {reported}" in refused.errors
     assert not (tmp_path / "out" / "g.png").exists()
     allowed = render(shot, "--allow-missing", out="g.png")
     assert allowed.status == 0 and "warning: rendered without missing files: //" in allowed.errors

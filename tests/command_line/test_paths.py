@@ -37,11 +37,11 @@ def test_several_processes_write_there_too(shot, monkeypatch):
     """Their command has the whole path, and all that was asked for."""
     from hair_addon.command_line import helpers, parser
 
-    said = []
-    monkeypatch.setattr(helpers, "run", lambda commands, *_: said.extend(commands) or [])
+    reported = []
+    monkeypatch.setattr(helpers, "run", lambda commands, *_: reported.extend(commands) or [])
     words = ["render", shot, "--frames=-5--2", "--out", f"//{FOLDER}/f_#.exr", "--width", 16, "--jobs", 2, "--passes"]
     assert "Frame -5 was not rendered" in run_here(*words).errors  # as nobody has
-    given = parser("vellus").parse_args(said[0][said[0].index("render") :])
+    given = parser("vellus").parse_args(reported[0][reported[0].index("render") :])
     assert Path(given.out) == shot.parent / FOLDER / "f_#.exr" and Path(given.input) == shot
     assert (given.frames, given.width, given.passes) == (range(-5, -1), 16, True)
 

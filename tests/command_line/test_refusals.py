@@ -21,7 +21,7 @@ LONG = "x" * 300
 
 
 def sentence(*words):
-    """What a command that fails says: one sentence, and nothing is left."""
+    """Return the message of a command that fails: one sentence, and it leaves no files."""
     ended = run_here(*words)
     assert ended.status == 1 and ended.out == "" and len(ended.errors.splitlines()) == 1, ended.errors
     return ended.errors
@@ -63,8 +63,8 @@ def disk_file(scene, folder, corner_count):
 
 def test_a_face_that_would_take_minutes_is_refused(scene, tmp_path):
     words = ("groom", disk_file(scene, tmp_path, 100_001), *SMALL, "--out", tmp_path / "out.npz")
-    said = '"Disk" has a face with more than 100000 corners: split it into smaller faces.'
-    assert sentence(*words) == f"vellus: {said}\n"
+    reported = '"Disk" has a face with more than 100000 corners: split it into smaller faces.'
+    assert sentence(*words) == f"vellus: {reported}\n"
     assert [each.name for each in tmp_path.iterdir()] == ["disk.blend"]
     bpy.context.view_layer.objects.active = bpy.data.objects["Disk"]
     with pytest.raises(RuntimeError, match="face with more than 100000 corners"):

@@ -61,12 +61,12 @@ def test_halves_of_a_shot_that_two_processes_render_are_those_of_one(shot, tmp_p
 
 
 @pytest.mark.long
-def test_one_of_two_processes_that_bake_at_once_is_told(shot, tmp_path):
+def test_one_of_two_processes_that_bake_at_once_is_refused(shot, tmp_path):
     both = [subprocess.Popen(command("simulate", shot), cwd=ROOT, stderr=subprocess.PIPE, text=True) for _ in range(2)]
-    said = [process.communicate(timeout=300)[1] for process in both]
+    reported = [process.communicate(timeout=300)[1] for process in both]
     statuses = sorted(process.returncode for process in both)
     assert statuses in ([0, 0], [0, 1])  # the second may have come when the first was done
-    assert statuses == [0, 0] or any("is being baked by another process" in text for text in said)
+    assert statuses == [0, 0] or any("is being baked by another process" in text for text in reported)
     frames = [*(tmp_path / "frames").rglob("+*.npz")]
     assert len(frames) == 7 and run_here("simulate", shot, "--json").results == []
 
@@ -83,7 +83,7 @@ def test_frames_are_given_as_for_render(shot):
     assert refused.status == 1 and "leave out --frames" in refused.errors
 
 
-def test_the_time_of_all_guides_is_told(shot, monkeypatch):
+def test_the_time_of_all_guides_is_reported(shot, monkeypatch):
     """Of a clock that advances by a second with each look: reading, simulating, and half of the change of frame."""
     other = bpy.data.objects["Guides"].copy()
     other.data = other.data.copy()
@@ -97,25 +97,25 @@ def test_the_time_of_all_guides_is_told(shot, monkeypatch):
     assert [(line["frame"], line["seconds"]) for line in lines] == [(2, 2.5), (2, 2.5), (3, 2.5), (3, 2.5)]
 
 
-def test_guides_that_break_are_said_in_the_terminal_and_the_panel(shot, monkeypatch):
+def test_guides_that_break_are_reported_in_the_terminal_and_the_panel(shot, monkeypatch):
     counts = {3: 2, 5: 7}
 
     def broken(_simulation):
         return np.arange(counts.get(bpy.context.scene.frame_current, 0))
 
     monkeypatch.setattr(dynamics.simulation.Simulation, "broken", property(broken))
-    said = 'of 60 guides of "Guides" broke in frame {} and were reset: increase Substeps.'
+    reported = 'of 60 guides of "Guides" broke in frame {} and were reset: increase Substeps.'
     first = run_here("simulate", shot, "--frames", "1-3", "--json")
-    assert first.errors == f"vellus: warning: 2 {said.format(3)}\n"
+    assert first.errors == f"vellus: warning: 2 {reported.format(3)}\n"
     assert [line["broken"] for line in first.results] == [0, 2, 0]
     counts.pop(3)
     # Baking goes on, and another session opens the file.
     ended = run_here("simulate", shot)
-    assert (ended.status, ended.errors) == (0, f"vellus: warning: 7 {said.format(5)}\n")
+    assert (ended.status, ended.errors) == (0, f"vellus: warning: 7 {reported.format(5)}\n")
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     bpy.context.scene.frame_set(2)
     (note,) = simulated_hair.notes_of(bpy.data.hair_curves["Guides"])
-    assert str(note) == f"7 {said.format(5)}"
+    assert str(note) == f"7 {reported.format(5)}"
     counts.clear()
     assert run_here("simulate", shot, "--overwrite").errors == ""
     assert broken_guides.baked(bpy.data.hair_curves["Guides"]) == broken_guides.NONE
@@ -206,7 +206,7 @@ def test_only_what_is_rendered_is_simulated_if_needed(shot):
     assert run_here("simulate", out, "--if-needed", "--overwrite", "--json").results == []
 
 
-def test_what_is_baked_is_told(shot):
+def test_what_is_baked_is_shown(shot):
     def told():
         (guides,) = run_here("info", shot, "--json").results[0]["guides"]
         return guides["baked"]
@@ -250,7 +250,7 @@ def test_a_part_of_a_shot_is_not_delivered_and_not_simulated_for_it(shot, tmp_pa
     assert not frame_folders.has_frames(bpy.data.hair_curves["Guides"])
 
 
-def test_too_little_memory_is_told(shot, monkeypatch):
+def test_too_little_memory_is_reported(shot, monkeypatch):
     needed = guide_baking.memory_of([bpy.data.hair_curves["Guides"]])
     monkeypatch.setattr(memory, "free_bytes", lambda: needed * 2)
     warned = run_here("simulate", shot, "--last-frame", "1")

@@ -42,12 +42,12 @@ def test_a_lost_node_costs_one_frame(lit, tmp_path):
 
 
 def told(folder):
-    """What the commands of the job that bakes, and of each task of the other, have printed."""
+    """Return what the commands of the baking job, and of each task of the rendering job, have printed."""
     return [output.read_text() for output in sorted(folder.glob("slurm-*.out"))]
 
 
 def queued(folder, variables, *options):
-    """What squeue tells of jobs that have not ended."""
+    """Return what squeue prints about jobs that have not ended."""
     return farm.shell(f"squeue --noheader --array --format=%i {' '.join(options)}", folder, **variables)
 
 

@@ -26,7 +26,7 @@ def words(identifier, settings, names):
 
 
 @pytest.mark.parametrize("identifier", OFFERS)
-def test_any_style_can_be_said(identifier):
+def test_any_style_can_be_given(identifier):
     offer = OFFERS[identifier]
     assert style_options.style(identifier.lower()) == (offer.label, offer.settings, ())
     names = [name for name, *_ in declared(type(offer.settings))]
@@ -34,7 +34,7 @@ def test_any_style_can_be_said(identifier):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reported"),
     [
         ("", "'' is not a style: choose from trim, clump"),
         ("perm", "'perm' is not a style"),
@@ -50,21 +50,21 @@ def test_any_style_can_be_said(identifier):
         ("trim:method=burn", "Method must be one of CUT, SCALE, not 'BURN'."),
     ],
 )
-def test_what_is_wrong_is_one_sentence(text, said):
-    with pytest.raises(argparse.ArgumentTypeError, match=re.escape(said)):
+def test_what_is_wrong_is_one_sentence(text, reported):
+    with pytest.raises(argparse.ArgumentTypeError, match=re.escape(reported)):
         style_options.style(text)
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "reported"),
     [
         (("--style", "perm"), "argument --style: 'perm' is not a style"),
         (("--style-preset", "PERM"), "argument --style-preset: invalid choice: 'PERM'"),
     ],
 )
-def test_a_command_ends_with_the_sentence(options, said, tmp_path):
+def test_a_command_ends_with_the_sentence(options, reported, tmp_path):
     ended = run("groom", "missing.obj", "--out", tmp_path / "a.npz", *options)
-    assert ended.status == 2 and said in ended.errors and len(ended.errors.splitlines()) == 1
+    assert ended.status == 2 and reported in ended.errors and len(ended.errors.splitlines()) == 1
 
 
 def test_a_preset_that_is_not_given_cannot_be_fitted(tmp_path):

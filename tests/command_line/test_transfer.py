@@ -29,7 +29,7 @@ def test_a_groom_goes_to_another_mesh_of_the_file(shot):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "reported"),
     [
         (["--to", "Nobody"], "Nobody"),
         (["--to", "Sphere"], "another mesh"),
@@ -37,9 +37,9 @@ def test_a_groom_goes_to_another_mesh_of_the_file(shot):
         (["--to", "Other", "--method", "LANDMARKS"], "no landmarks"),
     ],
 )
-def test_what_is_wrong_is_one_sentence(shot, words, said):
+def test_what_is_wrong_is_one_sentence(shot, words, reported):
     ended = run_here("transfer", shot, "--out", "//moved.blend", *words)
-    assert ended.status == 1 and said in ended.errors and len(ended.errors.splitlines()) == 1
+    assert ended.status == 1 and reported in ended.errors and len(ended.errors.splitlines()) == 1
     assert not (shot.parent / "moved.blend").exists()
 
 

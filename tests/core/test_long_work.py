@@ -50,7 +50,7 @@ def test_a_job_says_how_far_it_is_and_stops_when_asked():
     assert job.is_done and job.step == "first"
 
 
-def test_a_stage_is_told_and_may_be_stopped_before_it_begins():
+def test_a_stage_is_reported_and_may_be_stopped_before_it_begins():
     done = []
 
     def work():
@@ -81,7 +81,7 @@ def square(side):
 
 
 def test_guides_of_a_thread_are_those_of_one_go(device):
-    """And progress never falls."""
+    """Progress never decreases."""
     settings, told = GuideSettings(guide_count=20, relax_iterations=5), []
     expected = groom.distribute_guides(square(1.0), settings, device=device)
 
@@ -113,7 +113,7 @@ def test_guides_can_be_stopped_in_every_step(device):
             groom.distribute_guides(square(1.0), settings, device=device, progress=stop)
 
 
-def test_what_is_wrong_is_said_before_anything_is_compiled():
+def test_errors_are_reported_before_anything_is_compiled():
     from hair_addon.core.geometry.mesh import TriMesh
 
     def never(_step, _part):

@@ -81,9 +81,9 @@ def test_values_of_other_types_are_refused_in_a_sentence_that_names_the_setting(
     for value in REFUSED[name]:
         with pytest.raises(HairError) as refused:
             Sample(**{name: value})
-        said = str(refused.value)
-        assert said.startswith(name.replace("_", " ").capitalize())
-        assert "\n" not in said and len(said) < 120 and said.isprintable()
+        reported = str(refused.value)
+        assert reported.startswith(name.replace("_", " ").capitalize())
+        assert "\n" not in reported and len(reported) < 120 and reported.isprintable()
 
 
 ANYTHING = st.one_of(

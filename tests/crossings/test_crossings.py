@@ -20,8 +20,8 @@ from tests.support.reading import points, write_points
 def no_traceback(capsys):
     """Blender prints what is raised in handlers, and goes on."""
     yield
-    said = capsys.readouterr().err
-    assert "Traceback" not in said, said
+    reported = capsys.readouterr().err
+    assert "Traceback" not in reported, reported
 
 
 def update():

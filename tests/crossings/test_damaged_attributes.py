@@ -93,8 +93,8 @@ def test_attributes_of_other_types_are_missing(lit, other, tmp_path, capfd):
                 retype(shown.data, name, OTHERS[other])
     invalidation.clear()
     use_all(tmp_path)
-    said = capfd.readouterr()
-    assert "Traceback" not in said.err + said.out
+    reported = capfd.readouterr()
+    assert "Traceback" not in reported.err + reported.out
 
 
 @pytest.mark.parametrize(("integer", "number"), [*zip([*INTEGERS, "negative"], FLOATS, strict=True)])
@@ -105,8 +105,8 @@ def test_attributes_of_impossible_values_are_stale(lit, integer, number, tmp_pat
                 fill(shown.data, name, INTEGERS[integer] if data_type == "INT" else FLOATS[number])
     invalidation.clear()
     use_all(tmp_path)
-    said = capfd.readouterr()
-    assert "Traceback" not in said.err + said.out
+    reported = capfd.readouterr()
+    assert "Traceback" not in reported.err + reported.out
 
 
 def test_damaged_roots_are_found_again_where_strands_begin(lit):

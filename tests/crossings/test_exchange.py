@@ -79,8 +79,8 @@ def test_strands_come_back_as_they_went(sphere, tmp_path, capfd, format, is_draw
     path = str(tmp_path / f"groom{format}")
     capfd.readouterr()
     write(path, False)
-    said = capfd.readouterr()
-    assert not any(word in said.out + said.err for word in ("WARNING", "ERROR"))
+    reported = capfd.readouterr()
+    assert not any(word in reported.out + reported.err for word in ("WARNING", "ERROR"))
     found = imported(path, read)
     assert sorted(found) == [GUIDE_COUNT, STRAND_COUNT]
     for count, (points, radii) in zip((GUIDE_COUNT, STRAND_COUNT), expected, strict=True):

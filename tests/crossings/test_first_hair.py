@@ -130,7 +130,7 @@ def test_hair_follows_the_size_in_the_world(sphere, scale):
 
 
 def test_hair_follows_modifiers(sphere):
-    """What an artist sees is as large as its modifiers make it."""
+    """Hair is rooted on the mesh after its modifiers, as an artist sees it."""
     expected = sizes(*hair_on(sphere, **FEW))
     displace = sphere.modifiers.new("Displace", "DISPLACE")
     displace.strength, displace.mid_level = 1.0, 0.0

@@ -40,7 +40,7 @@ def test_a_script_uses_curves_as_guides_and_grows_hair(sphere, lines):
 
 
 def test_arrays_become_strands_on_a_mesh_of_arrays(sphere, lines):
-    """The same strands in Blender and of arrays."""
+    """Lines that begin at their tips are reversed, and lines of one point are left out."""
     vertices = np.array([vertex.co for vertex in sphere.data.vertices], np.float32)
     triangles = np.array([polygon.vertices[:] for polygon in sphere.data.polygons], np.int32)
     turned = [line[::-1] for line in lines]
@@ -108,7 +108,7 @@ def test_guides_of_ours_keep_the_hair_that_follows_them(hair, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    ("name", "content", "reported"),
     [
         ("none.usdc", None, "is not a file"),
         ("curves.txt", b"", "curves cannot be read from"),
@@ -118,12 +118,12 @@ def test_guides_of_ours_keep_the_hair_that_follows_them(hair, tmp_path):
         ("cut.blend", b"BLENDER and no more", "cannot be read"),
     ],
 )
-def test_a_file_without_curves_is_one_sentence(scene, tmp_path, name, content, said):
+def test_a_file_without_curves_is_one_sentence(scene, tmp_path, name, content, reported):
     mesh = write_obj(tmp_path / "mesh.obj", *TETRAHEDRON)
     if content is not None:
         (tmp_path / name).write_bytes(content)
     ended = run_here("groom", mesh, "--guides-from", tmp_path / name, "--out", tmp_path / "out.npz")
-    assert ended.status != 0 and said in ended.errors and ended.errors.count("\n") == 1
+    assert ended.status != 0 and reported in ended.errors and ended.errors.count("\n") == 1
     assert not (tmp_path / "out.npz").exists()
 
 
@@ -157,7 +157,7 @@ def shipped():
 
 
 def test_blender_ships_brushes_as_we_take_them_to_be(scene):
-    """Else all would count as set by an artist."""
+    """Otherwise all brushes would count as set by an artist."""
     folder = Path(bpy.utils.system_resource("DATAFILES", path="assets/brushes"))
     with bpy.data.libraries.load(str(folder / "essentials_brushes-curve_sculpt.blend")) as (_there, wanted):
         wanted.brushes = ["Add", "Density"]

@@ -104,7 +104,7 @@ def keeps_roots(before, after):
 
 
 def keeps_lengths(before, after):
-    """But for the corners that other points cut."""
+    """Assert that lengths stay, but for the corners that new points cut."""
     keeps_roots(before, after)
     np.testing.assert_allclose(after.lengths, before.lengths, rtol=0.01)
 

@@ -111,13 +111,13 @@ REFUSED = {
 def test_an_unusable_surface_is_reported(scene, name, operator):
     vertices, faces, sentence = REFUSED[name]
     make(vertices, faces)
-    said = refusal(getattr(bpy.ops.vellus, operator))
-    assert sentence in said and said.count("\n") <= 1
+    reported = refusal(getattr(bpy.ops.vellus, operator))
+    assert sentence in reported and reported.count("\n") <= 1
 
 
 @pytest.mark.parametrize("scale", [1e6, 3.7, 1e-6])
 def test_hair_scales_with_its_surface(sphere, scale):
-    """The same head in nanometres or in thousands of kilometres has the same hair."""
+    """A head has the same hair if it is modeled in nanometres or in thousands of kilometres."""
     sphere.rotation_euler = (0.4, 0.0, 0.3)
     bpy.context.view_layer.update()
     expected = [points(curves_object) for curves_object in grow(length=0.3, gravity=0.0, angle_limit=math.pi)]
@@ -226,7 +226,7 @@ def test_hair_is_drawn_on_the_faces_that_a_modifier_makes(sphere, kind):
 
 
 def test_a_surface_that_becomes_non_finite_is_reported(sphere):
-    """Neither is hair carried there, nor does its drawing end Blender."""
+    """Hair is not carried to such positions, and drawing does not crash Blender."""
     guides, hair = grow()
     before = points(hair)
     sphere.data.vertices[0].co.x = math.nan
@@ -311,7 +311,7 @@ def test_unusual_property_values_grow_hair_or_are_reported(hair, group, settings
 
 @pytest.mark.parametrize("sizes", [(1, 1, 1), (2, 7, 41), (3, 300)])
 def test_guides_of_any_point_counts_are_followed(sphere, sizes):
-    """As the artist drew them, or another tool."""
+    """Guides may be drawn by the artist, or come from another tool."""
     guides, _hair = grow(guide_count=len(sizes))
     first = points(guides)[:, 0]
     guides.data.remove_curves()

@@ -283,7 +283,7 @@ def test_a_removed_material_comes_back(hair):
 
 
 def held(value, depth=3):
-    """What a value holds, itself first, through containers, caches and dataclasses."""
+    """Yield all that a value refers to, itself first, through containers, caches and dataclasses."""
     yield value
     if depth == 0:
         return

@@ -91,8 +91,8 @@ def test_non_finite_data_is_skipped_and_reported_once(lit, capfd):
     assert len(bad) == len(LEFT_OUT)
     for _time in range(2):
         np.testing.assert_array_equal(api.draw(samples_per_side=1, **SMALL), expected)
-    said = capfd.readouterr().err
-    assert [said.count(f"{name!r} is skipped") for name in bad] == [1] * len(bad) and "Traceback" not in said
+    reported = capfd.readouterr().err
+    assert [reported.count(f"{name!r} is skipped") for name in bad] == [1] * len(bad) and "Traceback" not in reported
 
 
 @pytest.mark.parametrize("name", ["energy", "rotation of a sun", "location of a mesh", "location of hair"])
@@ -101,8 +101,8 @@ def test_the_render_engine_leaves_it_out_too(lit, name, tmp_path, capfd):
     LEFT_OUT[name]()
     update()
     np.testing.assert_array_equal(rendered(tmp_path), expected)
-    said = capfd.readouterr()
-    assert "'Bad' is skipped" in said.err and "Traceback" not in said.err + said.out
+    reported = capfd.readouterr()
+    assert "'Bad' is skipped" in reported.err and "Traceback" not in reported.err + reported.out
 
 
 def test_a_point_light_that_is_scaled_to_nothing_shines(lit):
@@ -141,8 +141,8 @@ def test_a_non_finite_camera_is_reported(lit, owner, name, value, tmp_path, capf
     for draw in (lambda: api.draw(samples_per_side=1, **SMALL), lambda: api.render(tmp_path / "a.exr", **SMALL)):
         with pytest.raises(api.HairError, match='"Camera"'):
             draw()
-    said = capfd.readouterr()
-    assert "Traceback" not in said.err + said.out and not [*tmp_path.iterdir()]
+    reported = capfd.readouterr()
+    assert "Traceback" not in reported.err + reported.out and not [*tmp_path.iterdir()]
 
 
 def test_hair_that_was_scaled_to_a_point_leaves_a_picture(lit, tmp_path):

@@ -59,8 +59,8 @@ def test_other_hair_is_written(two, reader, tmp_path, capfd):
     }[reader]()
     np.testing.assert_array_equal(points(good), wanted)
     assert (bad.data.vellus.status, good.data.vellus.status) == ("This hair cannot grow.", "")
-    said = capfd.readouterr()
-    assert said.err.count("This hair cannot grow.") == 1 and "Traceback" not in said.err + said.out
+    reported = capfd.readouterr()
+    assert reported.err.count("This hair cannot grow.") == 1 and "Traceback" not in reported.err + reported.out
     live_hair.write_all()
     assert "cannot grow" not in capfd.readouterr().err
 

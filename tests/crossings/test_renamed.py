@@ -114,7 +114,7 @@ def test_renamed_objects_and_images_are_followed_and_nothing_becomes_stale(hair,
     np.testing.assert_array_equal(points(hair), before)
 
 
-def test_a_deleted_part_line_is_said_and_does_not_part_on(hair, line):
+def test_a_deleted_part_line_is_reported_and_does_not_part_on(hair, line):
     with bpy.context.temp_override(selected_objects=[line]):
         bpy.ops.object.delete()
     hair.data.vellus.hair.radius = 0.02

@@ -93,7 +93,7 @@ def _open(blend):
 
 
 def test_arrays_make_what_an_object_of_them_does(sphere):
-    """Where the object's own coordinates are the world's."""
+    """For an object whose local coordinates are the world's."""
     mesh = sphere.data
     mesh.calc_loop_triangles()
     triangles = np.array([triangle.vertices[:] for triangle in mesh.loop_triangles], np.int32)
@@ -106,7 +106,7 @@ def test_arrays_make_what_an_object_of_them_does(sphere):
 
 
 def test_settings_given_to_hair_that_is_there_make_the_same(surface):
-    """As if it had been grown with them."""
+    """The hair equals hair grown with these settings."""
     bpy.ops.vellus.add_hair(guide_count=25, strand_count=100)
     settings = api.GroomSettings(api.GuideSettings(**GUIDES), api.HairSettings(**HAIR, seed=SEED))
     hair = bpy.data.objects["Hair"]

@@ -109,7 +109,7 @@ def test_what_the_walk_paints_is_there_after_undo_and_redo(hair):
     assert list(bpy.data.images["Painted"].pixels) == [1.0] * 64
 
 
-def test_a_strand_that_is_longer_is_told(hair):
+def test_a_strand_that_is_longer_is_reported(hair):
     with walk_lengths.are_kept(("HAIR",)):
         hair.rotation_euler.z += 0.3
     combed = points(hair)

@@ -36,7 +36,7 @@ def results(done):
 
 
 def test_it_makes_the_arrays_that_python_does(vellus, tmp_path):
-    """The same code on another Python and another NumPy: equal to rounding."""
+    """The same code runs on another Python and NumPy: arrays are equal up to rounding."""
     out = vellus.folder / "head.npz"
     done = vellus("groom", HEAD, *SMALL, "--out", out, "--json")
     assert done.returncode == 0, done.stderr
@@ -106,9 +106,9 @@ def test_another_engine_ends_before_a_frame_that_is_not_baked(vellus, desktop):
     made = desktop.command("-b", shot, "--python-exit-code", 5, "--python-expr", BAKE, profile=vellus.folder)
     assert made.returncode == 0, made.stderr
     done = desktop.command("-b", shot, "-a", profile=vellus.folder)
-    said = [line for line in done.stderr.splitlines() if line.startswith("Vellus:")]
-    assert done.returncode == 1 and len(said) == 1, done.stderr
-    assert re.fullmatch(r'Vellus: Frame 4 of the guides ".+" is not baked: bake their dynamics first\.', said[0])
+    reported = [line for line in done.stderr.splitlines() if line.startswith("Vellus:")]
+    assert done.returncode == 1 and len(reported) == 1, done.stderr
+    assert re.fullmatch(r'Vellus: Frame 4 of the guides ".+" is not baked: bake their dynamics first\.', reported[0])
     assert sorted(path.name for path in folder.glob("f_*.png")) == [f"f_{frame:04}.png" for frame in (1, 2, 3)]
     baked = desktop.command("-b", shot, "-f", 3, profile=vellus.folder)
     assert baked.returncode == 0 and "Vellus:" not in baked.stderr

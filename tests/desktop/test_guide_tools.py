@@ -53,7 +53,7 @@ def test_hair_is_straight_while_it_is_combed(walk):
 
 
 def test_combing_shows_hidden_guides(walk):
-    """And the brush moves them: hair follows."""
+    """The brush moves the shown guides, and hair follows."""
     shown = [walk.facts[name] for name in ("were shown", "are shown", "combing mode")]
     assert shown == [False, True, "SCULPT_CURVES"] and min(walk.facts["combed"]) > 1e-3
 

@@ -77,7 +77,7 @@ def test_it_comes_to_its_end(walk):
     assert [line for line in walk.complaints() if "picture/display.frag" not in line] == []
 
 
-def test_a_broken_shader_is_told_once_and_the_viewport_goes_on(walk):
+def test_a_broken_shader_is_reported_once_and_the_viewport_goes_on(walk):
     told = [line for line in walk.complaints() if "picture/display.frag" in line]
     assert len(told) == 1
     assert re.search(r"picture/display_transform\.glsl:8: .*nonsense", told[0])

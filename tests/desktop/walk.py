@@ -341,7 +341,7 @@ def break_shader():
 
 
 def reopen():
-    """The file of the parts before, and the settings that are not in it."""
+    """Open the file that earlier parts saved, and set what it does not store."""
     bpy.context.preferences.system.viewport_aa = "OFF"
     with in_viewport():
         bpy.ops.wm.open_mainfile(filepath=str(OUT / "head.blend"))

@@ -45,7 +45,7 @@ def bake(folder, numbers, wanted=None):
         writer.complete()
 
 
-def said(cache):
+def reported(cache):
     return [str(error) for error in cache.take_errors()]
 
 
@@ -60,7 +60,7 @@ def check_whole(folder, most_complaints=0):
         assert state is not None and {name: array.tobytes() for name, array in state.items()} == {
             name: array.tobytes() for name, array in state_of(number).items()
         }
-    assert len(said(cache)) <= most_complaints
+    assert len(reported(cache)) <= most_complaints
     return cache.frame_numbers(), cache.state_numbers()
 
 

@@ -22,10 +22,10 @@ class Echo(io.TextIOBase):
     """Standard error that records its text: Blender prints exceptions of handlers and callbacks, and continues."""
 
     def __init__(self, stream):
-        self.stream, self.said = stream, []
+        self.stream, self.reported = stream, []
 
     def write(self, text):
-        self.said.append(text)
+        self.reported.append(text)
         return self.stream.write(text)
 
 
@@ -97,8 +97,8 @@ def changed(what):
 
 
 def no_exception_was_printed():
-    said = "".join(sys.stderr.said)
-    assert "Traceback" not in said and "Error in bpy" not in said, said
+    reported = "".join(sys.stderr.reported)
+    assert "Traceback" not in reported and "Error in bpy" not in reported, reported
 
 
 def counts_match_settings():

@@ -109,7 +109,7 @@ class Surface:
         return self.cage if 1.0 / _RESIZED < factor < _RESIZED else self.cage.posed_at(factor * self.cage.rest)
 
     def posed_at(self, posed):
-        """The same surface with its vertices at (V, 3) float32 local positions."""
+        """Return a copy of the surface with its vertices at (V, 3) float32 local positions."""
         other = replace(self, posed=posed)
         known = {name: self.__dict__[name] for name in _AT_REST if name in self.__dict__}
         other.__dict__.update(known, _turnings=self._turnings, _nearest=self._nearest)  # shared by all poses
@@ -303,7 +303,7 @@ class Surface:
         return found
 
     def swap_winding(self, points):
-        """The same points with barycentric coordinates in Blender's order of corners, or back."""
+        """Convert barycentric coordinates of points to Blender's order of corners, or back."""
         return points.with_flipped_winding() if self.is_mirrored else points
 
 

@@ -102,7 +102,7 @@ def require(byte_count: int) -> None:
 
 
 def require_for_hair(byte_count: int) -> None:
-    """The same for strands; raise `MuchMemory` within `asking` if they take much of the free memory."""
+    """Raise as `require` for strands, and `MuchMemory` within `asking` if they take much of the free memory."""
     if byte_count <= 0:
         return
     share = share_of_free(byte_count)

@@ -145,7 +145,7 @@ def _is_hair_only(reports):
 
 
 def _is_hair_only_in_frame(reports):
-    """The same for a change of the frame: Blender reports all evaluated datablocks, but no images."""
+    """Whether a change of the frame changed only Curves: Blender reports all evaluated datablocks, but no images."""
     if any(image.source in {"SEQUENCE", "MOVIE"} for image in bpy.data.images):
         return False
     others = [report for report in reports if not report.is_of(bpy.types.Action, bpy.types.Camera)]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders of other engines that lack baked frames: Blender would draw that hair as it is combed.
+"""Renders by other engines of frames that are not baked: Blender would draw the hair as it is combed.
 
-Our engine refuses such a frame. Blender lets nobody stop another engine. Where it was started to render and has no
-window it is ended before that frame, with a sentence and status 1; in a window the sentence is said.
+Vellus refuses to render such a frame, but an add-on cannot stop another engine. If Blender was started from the command
+line to render, it exits before the frame with a message and status 1; in a window the message is shown.
 """
 
 import sys
@@ -20,7 +20,7 @@ _RENDERS = {"-a", "--render-anim", "-f", "--render-frame"}  # words of Blender's
 
 
 def before_frame(blender_scene):
-    """A frame is about to be rendered. Called in the render's thread, where there is a window."""
+    """Refuse a frame that is about to be rendered unbaked. Called in the render's thread if there is a window."""
     is_other = blender_scene.render.engine != "VELLUS" and not composite.is_on(blender_scene)
     if not is_other or not (_is_by_command() or _is_animation()):
         return
@@ -35,12 +35,12 @@ def before_frame(blender_scene):
 
 
 def _is_by_command():
-    """Whether Blender, and no Python with Blender in it, was started without a window to render."""
+    """Whether Blender, not Python with the bpy module, was started without a window to render."""
     words = sys.argv[: sys.argv.index("--")] if "--" in sys.argv else sys.argv
     return not running.has_window() and bool(bpy.app.binary_path) and not _RENDERS.isdisjoint(words)
 
 
 def _is_animation():
-    """Whether a window renders an animation: a still picture may be of a frame that is not baked."""
+    """Whether a window renders an animation: still pictures of frames that are not baked are allowed."""
     rendering = (one for one in running.found() if one.bl_idname == "RENDER_OT_render")
     return running.has_window() and any(one.properties.animation for one in rendering)

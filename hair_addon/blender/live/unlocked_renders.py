@@ -27,7 +27,7 @@ def end(blender_scene):
 
 
 def offer():
-    """Timer: show the sentence and the setting in a menu of the first window."""
+    """Show the message and the setting in a menu of the first window. A timer of Blender."""
     for window in bpy.context.window_manager.windows[:1]:
         with bpy.context.temp_override(window=window):
             bpy.ops.wm.call_menu(name="VELLUS_MT_unlocked_render")

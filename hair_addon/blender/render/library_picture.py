@@ -83,7 +83,7 @@ def _studio(hair_object, points) -> Generator[bpy.types.Scene]:
 
 
 def _seen(surface):
-    """A surface and the meshes that are parented to it and rendered."""
+    """Return a surface and the meshes parented to it, those of them that are rendered."""
     return [o for o in (surface, *surface.children_recursive) if o.type == "MESH" and not o.hide_render]
 
 

@@ -94,8 +94,8 @@ def test_hair_is_made_and_carried_beside_nodes_that_were_changed(hair, way, capf
     new = grow(bpy.data.objects["Sphere"], guide_count=10, strand_count=30)
     invalidation.clear()
     assert_follows(*new)
-    said = capfd.readouterr()
-    assert "Traceback" not in said.err + said.out
+    reported = capfd.readouterr()
+    assert "Traceback" not in reported.err + reported.out
 
 
 def test_a_surface_that_is_not_a_mesh_is_reported(lit, capfd):
@@ -107,5 +107,5 @@ def test_a_surface_that_is_not_a_mesh_is_reported(lit, capfd):
     assert "mesh" in lit.data.vellus.status
     api.draw(width=16, height=12, samples_per_side=1)
     assert len(api.points(lit)) == 500
-    said = capfd.readouterr()
-    assert "Traceback" not in said.err + said.out
+    reported = capfd.readouterr()
+    assert "Traceback" not in reported.err + reported.out

@@ -201,11 +201,11 @@ def test_missing_flow_lines_are_reported_with_the_surface(plane):
     guides = grow(flow_lines="Flow")
     bpy.context.view_layer.objects.active = plane
 
-    def said():
+    def reported():
         return " ".join(draw(bpy.types.VELLUS_PT_surface).texts)
 
-    assert "flow lines" not in said()
+    assert "flow lines" not in reported()
     bpy.data.objects.remove(drawn)
-    assert 'No object "Flow"' in said() and "flow lines" in said()
+    assert 'No object "Flow"' in reported() and "flow lines" in reported()
     guides.data.vellus.guides.flow_lines = ""
-    assert "flow lines" not in said()
+    assert "flow lines" not in reported()

@@ -61,7 +61,7 @@ def test_hair_follows_the_geometry_of_another_object(source):
     assert LACKING not in [warning.text for warning in diagnostics.warnings_of(surface, [g.data for g in grown])]
 
 
-def test_faces_without_rest_positions_are_told(scene):
+def test_faces_without_rest_positions_are_reported(scene):
     surface = shown(lambda nodes: nodes.new("GeometryNodeMeshIcoSphere").outputs["Mesh"])
     grown = grow(surface)
     assert LACKING in [warning.text for warning in diagnostics.warnings_of(surface, [g.data for g in grown])]

@@ -139,7 +139,7 @@ def bulge(cube):
 
 @pytest.mark.parametrize("kind", ["SUBSURF", "MULTIRES"])
 def test_renders_do_not_depend_on_the_levels_of_viewports(cube, rendered, kind):
-    """Neither stored nor recomputed data change."""
+    """Neither stored nor recomputed data of hair depend on the viewport's levels."""
     if kind == "MULTIRES":
         cube.modifiers.clear()
         cube.modifiers.new("Multires", "MULTIRES")

@@ -150,7 +150,7 @@ def test_a_pose_cuts_no_polygons(ball, monkeypatch):
 
 @pytest.mark.parametrize("is_divided", [True, False])
 def test_hair_of_a_file_that_was_saved_in_edit_mode_is_drawn(ball, is_divided, tmp_path):
-    """There the mesh before its modifiers does not list the attributes of its corners and vertices."""
+    """In Edit Mode the mesh before its modifiers does not list the attributes of its corners and vertices."""
     if is_divided:
         subdivide(ball)
     bpy.ops.vellus.add_hair(guide_count=6, strand_count=20, relax_iterations=2)

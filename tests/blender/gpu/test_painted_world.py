@@ -159,7 +159,7 @@ def test_an_image_that_is_the_same_is_taken_apart_once(dark, tmp_path, monkeypat
 
 
 def test_a_sequence_shows_the_frame_of_the_scene(dark, tmp_path):
-    """As its node says: from which frame on, how many, and which of them first."""
+    """The node sets the first frame, the number of frames, and the image to begin with."""
     colors = {number: (0.1 * number, 0.2, 0.3, 1.0) for number in (1, 2, 3)}
     for number, color in colors.items():
         saved(tmp_path, color, f"sky_{number:04}.exr")
@@ -183,7 +183,7 @@ def test_a_sequence_shows_the_frame_of_the_scene(dark, tmp_path):
 
 
 def test_an_unloaded_world_image_lights_hair(dark, tmp_path):
-    """As in a file that was just opened in background mode."""
+    """Images are not loaded in a file that was just opened in background mode."""
     environment_node(dark, loaded(tmp_path))
     before = drawn()
     assert np.abs(before[..., :3]).max() > 0.1

@@ -176,7 +176,7 @@ def test_lights_near_hair_cast_shadows(scene, rng, kind, height):
 
 
 def test_the_sphere_around_hair_touches_it(scene, rng):
-    """Also after some strands have moved, and with objects that are scaled and turned."""
+    """It encloses hair after some strands have moved, and hair of scaled and rotated objects."""
     points, radii = tuft(rng, 300)
     hair = strand_textures.upload_strands(points, radii)
     strand_textures.move_strands(hair, np.array([3, 5]), points[[3, 5]] + np.float32(0.02))

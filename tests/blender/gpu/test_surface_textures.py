@@ -73,7 +73,7 @@ def test_a_pose_uploads_places_and_normals_of_vertices_and_a_turn_nothing(ball, 
 
 
 def test_another_topology_is_another_surface(ball):
-    """As many vertices with other triangles, and as many triangles with other materials."""
+    """The same number of vertices with other triangles, and the same number of triangles with other materials."""
     (first,) = surfaces()
     ball.data.flip_normals()
     (flipped,) = surfaces()

@@ -270,7 +270,7 @@ def planes(*rows):
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL], ids=["perspective", "parallel"])
 @pytest.mark.parametrize("thickness", [0.004, 0.03])
 def test_planes_along_the_view_leave_a_rectangle_of_the_picture(rng, shading, view_to_clip, thickness, in_compute):
-    """As Blender's Clipping Region: within it all is as without, and there is nothing around it."""
+    """Blender's Clipping Region: inside nothing changes, and outside nothing is drawn."""
     placed = [(*tuft(rng, thickness=thickness), np.eye(4)), (*tuft(rng, 20), np.diag([1.5, 1.5, 1.5, 1.0]))]
     # x and y of clip space between parts of its w, where the camera is at the origin.
     sides = [view_to_clip[row] * sign + 0.5 * view_to_clip[3] for row in (0, 1) for sign in (1.0, -1.0)]

@@ -124,12 +124,12 @@ def test_strands_stay_whose_face_is_left_alone(hair, name):
     np.testing.assert_allclose(points(hair)[is_far], before[is_far], rtol=0.0, atol=1e-3)
     assert roots_apart(hair) < 1e-6
     np.testing.assert_allclose(evaluated_points(hair), points(hair), rtol=0.0, atol=1e-6)
-    said = [int(number) for number in re.findall(r"\d+", guides.data.vellus.status)]
+    reported = [int(number) for number in re.findall(r"\d+", guides.data.vellus.status)]
     if name == "join":
         assert guides.data.vellus.status == ""
     else:
         # A cut face is made of others, which hold a part of its corners: some roots find theirs.
-        assert 0 < said[1] <= counts[1] and said[0] <= counts[0]
+        assert 0 < reported[1] <= counts[1] and reported[0] <= counts[0]
         assert "moved to the nearest points." in guides.data.vellus.status
     assert hair.data.vellus.status == ""
 

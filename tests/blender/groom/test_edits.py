@@ -166,7 +166,7 @@ def test_a_renamed_uv_map_is_found_again(hair):
 
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 3.0, 0.5), (-1.0, 1.0, 1.0)])
 def test_applying_the_scale_moves_nothing(sphere, scale):
-    """Neither the mesh nor its hair, now or when it is made again."""
+    """Neither the mesh nor its hair moves, now or when the hair is regenerated."""
     sphere.scale = scale
     bpy.context.view_layer.update()
     bpy.ops.vellus.add_hair(guide_count=20, strand_count=50)

@@ -185,7 +185,7 @@ def test_a_group_that_is_named_like_hair_is_picked(sphere):
 
 
 def _asked():
-    """What *New Hair System* begins with, where it is clicked."""
+    """Return the settings that *New Hair System* proposes when it is clicked."""
     asked = SimpleNamespace(density_group="", properties=SimpleNamespace(is_property_set=lambda name: False))
     bpy.types.VELLUS_OT_add_hair.prefill(asked, bpy.context)
     return asked

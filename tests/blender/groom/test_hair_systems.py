@@ -108,7 +108,7 @@ def test_the_eye_hides_hair_from_viewports_and_the_camera_from_renders(systems):
 
 
 def test_deleting_a_row_leaves_the_others_alone(systems):
-    """Also where the mesh is active, on which Delete Hair deletes all."""
+    """Also if the mesh is active: there Delete Hair would delete all hair."""
     activate("Sphere")
     bpy.ops.ed.undo_push(message="systems")
     bpy.ops.vellus.delete_system("EXEC_DEFAULT", True)

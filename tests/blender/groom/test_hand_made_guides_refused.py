@@ -25,7 +25,7 @@ def test_undo_brings_back_everything(imported, head):
 
 
 def refused(*chosen, **options):
-    """The sentence of a click that changes nothing."""
+    """Return the message of a refused click, which must change nothing."""
     before = snapshot(), [(o.name, o.parent, len(o.modifiers)) for o in bpy.data.objects]
     with pytest.raises(RuntimeError) as error:
         use(*chosen, **options)

@@ -19,7 +19,7 @@ def buttons():
 
 
 def draw_line(lines, *corners):
-    """As a stroke: Blender's Draw tool needs a window."""
+    """Add a line as a stroke would: Blender's Draw tool needs a window."""
     bpy.ops.object.mode_set(mode="OBJECT")
     spline = lines.data.splines.new("POLY")
     spline.points.add(len(corners) - 1)

@@ -12,7 +12,7 @@ def managers(*operators):
 
 
 def test_handlers_without_an_operator_are_passed_over():
-    """As Blender lists them after the type of a running operator was removed."""
+    """Blender lists such handlers after the type of a running operator was removed."""
     stroke = SimpleNamespace(bl_idname="SCULPT_CURVES_OT_brush_stroke")
     assert running.is_running("SCULPT_", managers(None, stroke))
     assert not running.is_running("TRANSFORM_", managers(None, stroke))

@@ -97,15 +97,15 @@ def test_a_mac_tells_what_is_free_and_not_used(system, monkeypatch):
     ],
     ids=["Windows refuses", "no function", "a Mac refuses", "too few numbers", "no function there", "another system"],
 )
-def test_what_the_system_does_not_tell_is_not_known_and_nothing_is_said(system, name, library, capsys):
+def test_what_the_system_does_not_tell_is_unknown_and_nothing_is_reported(system, name, library, capsys):
     system(name, library)
     assert memory.free_bytes() is None and memory.share_of_free(10**15) == 0.0
     with memory.asking():
         memory.require_for_hair(10**15)
     memory.require(10**15)
     memory.limit_this_process()
-    said = capsys.readouterr()
-    assert said.out + said.err == ""
+    reported = capsys.readouterr()
+    assert reported.out + reported.err == ""
 
 
 def test_no_library_is_not_known(system, monkeypatch):

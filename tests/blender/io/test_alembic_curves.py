@@ -61,12 +61,12 @@ def test_one_object_a_curve_is_hair_of_all_of_them(scene, sphere, lines, tmp_pat
         np.testing.assert_allclose(arrays["strand_widths"], 1e-4, rtol=1e-5)
     assert run_here(*words, "--object", "curve3").status == 0
     np.testing.assert_allclose(load(tmp_path / "out.npz")["strand_points"], lines[3:4], atol=1e-6)
-    for options, said in (
+    for options, reported in (
         (("--object", "fringe"), 'no curves "fringe", but curve0, curve1, curve2, curve3, curve4…'),
         (("--unit", "yards"), "yards is not a unit"),
     ):
         ended = run_here(*words, *options)
-        assert ended.status == 1 and said in ended.errors, ended
+        assert ended.status == 1 and reported in ended.errors, ended
 
 
 def test_scripts_read_them_too(scene, sphere, lines, tmp_path):
@@ -74,14 +74,14 @@ def test_scripts_read_them_too(scene, sphere, lines, tmp_path):
     found = api.import_curves(tmp_path / "curves.abc", sphere, "GUIDES", unit="cm", up="Y")
     assert found.notes == [] and found.guides is None
     np.testing.assert_allclose(world(found.curves), lines.reshape(-1, 3), atol=1e-6)
-    for arguments, said in (
+    for arguments, reported in (
         ({"unit": 1.0, "up": "Y"}, "in meters with Y up: they would lie on it in centimeters with Y up"),
         ({"up": "up"}, "Unknown axis"),
         ({"kind": "FUR"}, "Unknown kind"),
         ({"unit": "yards"}, "is not a unit"),
         ({"name": "fringe"}, "has no curves"),
     ):
-        with pytest.raises(api.HairError, match=said):
+        with pytest.raises(api.HairError, match=reported):
             api.import_curves(tmp_path / "curves.abc", sphere, **arguments)
 
 

@@ -32,7 +32,7 @@ def cards(hair, tmp_path):
 
 
 def layout(mesh_object):
-    """What any importer keeps of a mesh: number of triangles, sorted UV coordinates of the corners of these."""
+    """Return what any importer keeps of a mesh: number of triangles and sorted UV coordinates of their corners."""
     mesh = mesh_object.data
     mesh.calc_loop_triangles()
     uvs = np.empty((len(mesh.loops), 2), np.float32)

@@ -75,7 +75,7 @@ def largest_difference(some, others):
 
 @pytest.mark.gate(id="V23")
 def test_a_blender_without_the_addon_has_the_same_hair_and_picture(shot, tmp_path):
-    """Also in what Blender's own exporter writes there."""
+    """The same hair is in files of Blender's own exporter too."""
     set_up_camera()
     times = (0.75, 1.0, 1.25, 4.75, LAST + 0.25, LAST, 4.0)
     before, blurred = live(times), rendered(tmp_path / "live.png", 4)
@@ -114,7 +114,7 @@ def rendered(path, frame):
 
 
 def test_hair_in_slow_motion_is_delivered_as_it_moves(shot):
-    """Where the animation takes longer, hair falls in the animation's time."""
+    """If an animation is stretched in time, hair falls in the animation's time."""
     scene = bpy.context.scene
     scene.render.frame_map_old, scene.render.frame_map_new = 100, 250
     run_now(guide_baking.baking([shot], LAST, scene))
@@ -221,7 +221,7 @@ def test_guides_that_begin_after_the_last_frame_need_none(shot):
     assert made.path.exists() and (made.first, made.last) == (1, LAST)
 
 
-def test_a_blender_without_usd_is_told_at_once(shot, monkeypatch):
+def test_a_blender_without_usd_is_reported_at_once(shot, monkeypatch):
     monkeypatch.setattr(paths, "has_operator", lambda name: name != "wm.usd_export")
     before = state()
     with pytest.raises(HairError, match="lacks USD"):
@@ -248,7 +248,7 @@ def test_stopped_delivery_leaves_all_as_it_was(shot, tmp_path):
     assert not [*tmp_path.glob(".vellus*"), *tmp_path.glob("*.usdc")]
 
 
-def test_a_full_disk_is_told(shot, tmp_path):
+def test_a_full_disk_is_reported(shot, tmp_path):
     """A limit on the size of files stands for it."""
     deliver(shot)
     path = delivery.path_of(shot)

@@ -89,7 +89,7 @@ def test_strands_are_given_the_guides_that_weigh_most(hair, tmp_path):
 
 
 def test_guide_weights_are_exported_whether_hair_stores_them_or_not(hair, tmp_path):
-    """The same as stored ones, after guides were combed, and from a file that was opened a moment ago."""
+    """Computed weights equal stored ones, also after combing and in a file that was just opened."""
     guides = bpy.data.objects["Guides"]
     combed = points(guides).copy()
     combed[::2, 1:] += np.linspace(0.0, 0.2, combed.shape[1] - 1)[:, None] * np.float32([1.0, 0.5, 0.0])
@@ -170,7 +170,7 @@ def test_surfaces_and_hair_without_height_are_one_sentence(hair, tmp_path):
 
 
 def test_guides_without_object_and_surface_are_one_sentence(hair, tmp_path):
-    """Nothing says then where they are."""
+    """Without an object and a surface the location of guides is unknown."""
     guides = bpy.data.objects["Guides"]
     guides.data.surface = None
     bpy.data.objects.remove(guides)

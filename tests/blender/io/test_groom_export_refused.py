@@ -86,7 +86,7 @@ def test_what_cannot_be_exported_is_one_sentence(hair, tmp_path):
         run_now(groom_export.exporting(tmp_path / "groom.abc", [], ExportSettings(), bpy.context.scene))
 
 
-def test_what_importers_do_is_said(hair, tmp_path):
+def test_what_importers_do_is_reported(hair, tmp_path):
     sphere = bpy.data.objects["Sphere"]
     sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
     hair.data.vellus.root_key = "of other strands"

@@ -25,7 +25,7 @@ def hide_all():
 
 
 def state():
-    """What hides and selects objects, and the collections that they are in."""
+    """Return visibility and selection of objects, and their collections."""
     objects = {o: (o.hide_get(), o.hide_select, o.hide_render, o.select_get()) for o in bpy.data.objects}
     return objects, {o: {*o.users_collection} for o in objects}, {*bpy.data.collections}
 

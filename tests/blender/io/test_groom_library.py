@@ -234,9 +234,9 @@ def test_a_groom_replaces_itself_and_no_other(groom, tmp_path, names):
 
 
 def test_files_with_more_than_grooms_are_not_replaced(groom, library, tmp_path):
-    def refuse(path, said):
+    def refuse(path, reported):
         content = path.read_bytes()
-        with pytest.raises(HairError, match=said):
+        with pytest.raises(HairError, match=reported):
             api.save_groom(groom[1], path, picture=PICTURE)
         assert path.read_bytes() == content
 

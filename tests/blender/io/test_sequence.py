@@ -133,7 +133,7 @@ def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
 
 
 def test_another_machine_goes_on(turning, whole, tmp_path):
-    """Where the file and the frames have other paths: what counts is what is in them."""
+    """The file and the frames have other paths there: only their contents count."""
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()
     shutil.copy(turning, here / "ball.blend")
@@ -177,7 +177,7 @@ def test_frames_of_another_sequence_are_kept(turning, coarse_shadows, tmp_path):
 
 
 def test_a_full_disk_keeps_complete_frames(turning, coarse_shadows, tmp_path):
-    """As the system says it of a file that may not grow further."""
+    """The error is that of a file that may not grow further."""
     with largest_file(4096):
         ended = run_here(*words(turning, tmp_path, ending="exr"))
     assert ended.status == 1 and len(ended.errors.splitlines()) == 1
@@ -187,7 +187,7 @@ def test_a_full_disk_keeps_complete_frames(turning, coarse_shadows, tmp_path):
 
 
 def test_a_folder_without_space_is_reported(turning, tmp_path, monkeypatch):
-    """As on a disk that has no room for a name."""
+    """A disk may have no space left even for a file's name."""
 
     def refuse(_path):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -304,8 +304,8 @@ def test_what_moves_is_where_the_file_begins_and_has_all_its_times(rng, tmp_path
     del stage
     read = usd_curves.read(tmp_path / "a.usdc")
     (one,) = read.sets
-    said = [str(note) for note in read.notes]
-    assert [("Catmull-Rom splines become polylines" in one) for one in said] == [True] * (basis == "catmullRom")
+    reported = [str(note) for note in read.notes]
+    assert [("Catmull-Rom splines become polylines" in one) for one in reported] == [True] * (basis == "catmullRom")
     np.testing.assert_allclose(one.points[[0, -1]], points[[0, -1]], atol=1e-7)
     np.testing.assert_allclose(one.motion.times, np.array([1001, 1002, 1003]) / 25.0)
     assert not one.is_smooth.any()  # Blender plays polylines
@@ -412,7 +412,7 @@ def test_values_of_another_type_are_left_out(tmp_path, line, is_left_out):
 
 
 def test_an_array_of_negative_size_is_damaged():
-    """As a damaged .usdz gives it: its conversion raises, its truth value too."""
+    """Damaged .usdz files contain such arrays: their conversion raises, and so does their truth value."""
 
     class Values:
         def __array__(self, *_options, **_names):

@@ -39,7 +39,7 @@ def pixels(path):
 
 
 def column(picture):
-    """Where the sphere is, from left to right [pixels]."""
+    """Return the sphere's column in the picture, from the left [pixels]."""
     covered = picture[..., 3].sum(axis=0)
     return (covered * np.arange(len(covered))).sum() / covered.sum()
 

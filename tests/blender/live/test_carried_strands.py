@@ -206,7 +206,7 @@ def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_sh
 
 
 def test_a_surface_that_turns_as_an_object_passes_a_matrix(hair, window, coarse_shadows, monkeypatch):
-    """Nothing turns vertices, carries strands or uploads them, and light follows by a direction a frame."""
+    """Vertices and strands are not moved or uploaded; lighting only needs a direction per frame."""
     bpy.ops.object.light_add(type="SUN")
     surface = hair.data.surface
     frame, called = read(), []

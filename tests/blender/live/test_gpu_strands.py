@@ -52,7 +52,7 @@ def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, m
 
 
 def test_drawn_strands_take_eight_bytes_a_point(hair, window):
-    """And the memory of what makes them is counted with them."""
+    """The memory of the programs that compute strands is counted too."""
     drawn(hair)
     on_gpu = hair_cache.strands_on_gpu(hair.data)
     rows = on_gpu.texture.height * on_gpu.row_strands

@@ -150,7 +150,7 @@ def test_a_dragged_slider_hides_hair_until_it_rests(posed, monkeypatch):
 
 
 def test_scripts_that_move_sliders_read_strands(posed):
-    """Nothing is drawn between their updates."""
+    """Scripts read current strands although nothing is drawn between their updates."""
     posed.data.vellus.hair.automatic_influence = False
     for value in (0.31, 0.32, 0.33):
         move_slider(posed, value)

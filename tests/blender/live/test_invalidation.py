@@ -107,7 +107,7 @@ def stage(lit, monkeypatch):
 
 
 def seen():
-    """What a viewport shows, and what of: arrays by name."""
+    """Return the arrays that a viewport shows, by name."""
     context, space = bpy.context, view3d()
     space.shading.type = "MATERIAL"
     space.shading.use_scene_lights = space.shading.use_scene_world = True
@@ -165,7 +165,7 @@ def spoil():
 
 
 def undo():
-    """What a window shows ahead of the hair's Curves."""
+    """Undo as in a window, which shows changes before the hair's Curves are written."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(running, "has_window", lambda: True)
         bpy.data.objects["Hair"].data.vellus.hair.strand_count = 300

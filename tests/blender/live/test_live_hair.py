@@ -270,7 +270,7 @@ def test_a_deleted_surface_is_reported(hair):
 
 
 def test_an_operator_computes_once(sphere, monkeypatch):
-    """What an operator itself changes must not count as a change of its inputs."""
+    """Changes by an operator itself do not count as changes of its inputs."""
     calls = {"distribute_guides": 0, "bind_hair": 0}
 
     def counted(name):

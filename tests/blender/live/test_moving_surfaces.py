@@ -60,7 +60,7 @@ def bent(watched):
 
 @pytest.fixture
 def playing(bent, monkeypatch):
-    """The same while the animation plays."""
+    """Act as in a window while the animation plays."""
     monkeypatch.setattr(scene_time, "is_shown_moving", lambda: True)
     play(bent, 2, 3)
     return bent
@@ -238,7 +238,7 @@ def test_strands_that_change_while_the_surface_is_dragged_are_drawn(bent):
 
 
 def test_scripts_read_carried_hair(bent):
-    """Nothing is drawn between their updates, and no animation plays."""
+    """Scripts read current strands although nothing is drawn between updates and no animation plays."""
     for amount in (0.2, 0.5, 0.8):
         bend(bent.data.surface, amount)
         assert not are_hidden() and not is_left_out(bent)
@@ -279,7 +279,7 @@ def test_renders_carry_hair_that_viewports_hide(playing, monkeypatch):
 
 
 def test_all_objects_of_hair_are_hidden_and_carried_again(bent, monkeypatch):
-    """Also one that is copied while it is hidden."""
+    """Also an object that is copied while it is hidden."""
     other = bent.copy()
     bpy.context.scene.view_layers.new("Other")
     bpy.context.scene.collection.objects.link(other)
@@ -292,7 +292,7 @@ def test_all_objects_of_hair_are_hidden_and_carried_again(bent, monkeypatch):
 
 
 def test_files_that_were_kept_hidden_are_shown_when_opened(playing, tmp_path, monkeypatch):
-    """As Blender saves by itself while an animation plays."""
+    """Blender's auto-save writes such files while an animation plays."""
     monkeypatch.setattr(handlers, "_show_hidden", lambda: None)
     path = str(tmp_path / "kept.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, compress=False)

@@ -41,7 +41,7 @@ def play(first, last):
 
 
 def shown(guides):
-    """Where simulated guides are shown, or as they are combed."""
+    """Return the points of guides as shown: simulated, or as combed."""
     found = simulated_guides.point_cache.get(guides.data.session_uid)
     return points(guides) if found is None else found
 
@@ -231,7 +231,7 @@ def test_undone_combing_ends_what_is_played(swung):
     assert np.array_equal(shown(guides), combed)
 
 
-def test_a_surface_without_faces_is_said(swung):
+def test_a_surface_without_faces_is_reported(swung):
     guides, hair = swung
     play(1, 3)
     bpy.data.objects["Sphere"].data.clear_geometry()
@@ -271,7 +271,7 @@ def test_baked_frames_can_be_simulated_again_from_the_panel(swung):
     assert draw(bpy.types.VELLUS_PT_dynamics).drawn["vellus.bake_dynamics"] == before + 1
 
 
-def test_why_guides_are_not_simulated_stays_said(swung):
+def test_why_guides_are_not_simulated_stays_shown(swung):
     guides, _hair = swung
     guides.data.remove_curves()
     bpy.context.view_layer.update()
@@ -279,7 +279,7 @@ def test_why_guides_are_not_simulated_stays_said(swung):
     assert "no guides" in guides.data.vellus.dynamics_status
 
 
-def test_renders_that_hair_cannot_follow_are_said_with_the_setting(swung, capsys):
+def test_renders_that_hair_cannot_follow_are_reported_with_the_setting(swung, capsys):
     guides, _hair = swung
     scene = bpy.context.scene
     bpy.context.view_layer.objects.active = guides
@@ -300,7 +300,7 @@ def test_renders_that_hair_cannot_follow_are_said_with_the_setting(swung, capsys
     assert not draw(panel).drawn["use_lock_interface"]
 
 
-def test_fast_motion_in_few_substeps_is_told(swung):
+def test_fast_motion_in_few_substeps_is_reported(swung):
     settings = swung[0].data.vellus.dynamics
     settings.automatic_substeps, settings.substeps = False, 1
     play(1, 5)

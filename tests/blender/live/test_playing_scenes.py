@@ -35,7 +35,7 @@ def swung(hair, tmp_path, window):
 
 
 def played(guides, first=1, last=6):
-    """Where guides are simulated in the last of some frames, in local coordinates at rest."""
+    """Return simulated points of guides in the last of some frames, in local coordinates at rest."""
     for frame in range(first, last + 1):
         bpy.context.scene.frame_set(frame)
     return simulated_guides.point_cache.get(guides.data.session_uid).copy()
@@ -71,7 +71,7 @@ def test_units_of_the_scene_do_not_matter(swung):
 
 
 def test_a_mirrored_surface_moves_hair_as_its_mirror_image(swung):
-    """But for friction between hairs, whose grid is no mirror image of itself."""
+    """Friction between hairs is excluded: its grid is not its own mirror image."""
     guides, _hair = swung
     settings = guides.data.vellus.dynamics
     settings.hair_friction = settings.hair_pressure = 0.0
@@ -207,7 +207,7 @@ def test_slow_motion_is_the_same_motion(swung):
 
 
 def test_skipped_frames_are_not_simulated(swung):
-    """As with a frame step, or where Blender drops frames: what is known stays shown."""
+    """With a frame step or dropped frames, the last known state stays shown."""
     guides, _hair = swung
     third = played(guides, 1, 3)
     for frame in (5, 7, 9):

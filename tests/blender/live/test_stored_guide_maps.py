@@ -48,7 +48,7 @@ def comb(guides):
 
 
 def assert_stored(hair):
-    """What is stored are the weights by which strands follow guides now."""
+    """Assert that hair stores the weights by which its strands follow guides now."""
     bound, found = bindings.of(hair), guide_map(hair)
     expected = following.weights_now(bound.binding, bound.guides).weights.numpy()
     np.testing.assert_array_equal(found[1], expected)
@@ -99,7 +99,7 @@ def test_a_material_reads_them(hair):
 
 
 def test_nodes_of_a_file_that_was_opened_find_them(modified, tmp_path):
-    """Where hair is bound to nothing yet, and does not change."""
+    """Hair is not bound yet in such a file, and does not change."""
     hair, _tree = modified
     expected = [array.copy() for array in bindings.of(hair.data).guide_map]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "groom.blend"))

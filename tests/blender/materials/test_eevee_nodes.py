@@ -29,7 +29,7 @@ def rendered_hair(engine, folder):
 
 @even_guides
 def test_it_is_lit_about_as_by_cycles(lit, tmp_path):
-    """And covers as much: Blender's default draws strands a pixel wide or wider, five times as much of this picture."""
+    """Coverage is equal too: strands a pixel wide or wider, as by default in Blender, cover five times as much."""
     scene = bpy.context.scene
     lit.data.vellus.hair.strand_count, lit.data.vellus.appearance.melanin = 3000, 0.15
     bpy.data.objects["Sphere"].is_holdout = True
@@ -77,6 +77,6 @@ def test_random_colors_are_shown_too(hair):
 
 
 def test_strands_are_as_thick_for_light_as_they_are(hair):
-    """Else EEVEE takes hair to be as thick as its bounds, and no strand shades another."""
+    """Otherwise EEVEE would take hair to be as thick as its bounds, and no strand would shade another."""
     thickness = hair.data.materials[0].node_tree.nodes["EEVEE Output"].inputs["Thickness"]
     assert [link.from_socket.name for link in thickness.links] == ["Thickness"]

@@ -84,7 +84,7 @@ def varied_material(look):
 
 @pytest.mark.parametrize("name", LOOKS)
 def test_nodes_compute_the_strands_absorption(patch, tmp_path, name):
-    """What arrives at the absorption socket of every strand and height, made visible by Cycles."""
+    """Cycles shows the values at the absorption socket for every strand and height."""
     look = Appearance(**LOOKS[name])
     material, node = varied_material(look)
     patch.data.materials.append(material)

@@ -49,7 +49,7 @@ def test_the_wetter_of_look_and_style_is_seen(hair, wetness, amounts, wanted, mo
 
 
 def test_the_flat_color_darkens_with_the_style(hair):
-    """What EEVEE and Blender's own viewport show of hair."""
+    """EEVEE and Blender's own viewport show this color."""
     state, colors = hair.data.vellus, []
     style_items.assign(state, [wet.Settings(amount=0.0, lock=0.5)])
     for amount in (0.0, 0.5, 1.0):

@@ -43,15 +43,15 @@ def seen(hair, scene):
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e20])
-def test_one_strand_is_left_out_of_what_is_drawn_and_said_once(seen, value, capsys):
+def test_one_strand_is_not_drawn_and_reported_once(seen, value, capsys):
     before, count = api.points(seen.data), len(seen.data.curves)
     break_strands(seen, value, [BROKEN])
     for _redraw in range(3):
         (strands,) = drawn_hair()
     np.testing.assert_array_equal(strands.points, np.delete(before, BROKEN, axis=0))
     assert strands.strand_count == len(strands.randoms_here) == count - 1
-    said = capsys.readouterr().err
-    assert said.count("Vellus:") == said.count(SENTENCE) == 1 and "Traceback" not in said
+    reported = capsys.readouterr().err
+    assert reported.count("Vellus:") == reported.count(SENTENCE) == 1 and "Traceback" not in reported
     assert SENTENCE in " ".join(draw(bpy.types.VELLUS_PT_interpolation).texts)
 
 

@@ -84,7 +84,7 @@ def test_blades_make_the_figure_of_cycles(square, tmp_path, kind):
 
 
 def test_an_object_in_focus_is_sharp(square, tmp_path):
-    """Wherever the distance would be: along the view, seen from aside too."""
+    """The distance of the object is measured along the view, also from aside."""
     square.location = (1.0, 0.0, DISTANCE)
     square.data.shift_x = -1.0 / DISTANCE * square.data.lens / square.data.sensor_width
     sharp = rendered(tmp_path, film_transparent=True, sample_count=64)["Combined"]
@@ -113,7 +113,7 @@ def test_hair_blurs_with_the_surface_below_it(lit, tmp_path):
 
 @pytest.mark.parametrize("through_camera", [False, True])
 def test_a_rendered_viewport_blurs_only_through_the_camera(lit, tmp_path, monkeypatch, through_camera):
-    """As a render with as many samples; from elsewhere everything is in focus."""
+    """Its blur equals that of a render with as many samples; other views are in focus everywhere."""
     width, height = 96, 72
     blender_scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
     blender_scene.render.film_transparent = True

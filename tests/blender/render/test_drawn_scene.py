@@ -14,12 +14,12 @@ from tests.support.reading import points, write_points
 
 @pytest.fixture
 def forgotten(hair, monkeypatch):
-    """What is said to be hair only, update by update."""
+    """Return for each update whether it counts as a change of hair only."""
     bpy.ops.object.light_add(type="SUN")
     bpy.context.view_layer.update()
-    said = []
-    monkeypatch.setattr(viewport, "invalidate", lambda is_hair_only=False: said.append(is_hair_only))
-    return said
+    reported = []
+    monkeypatch.setattr(viewport, "invalidate", lambda is_hair_only=False: reported.append(is_hair_only))
+    return reported
 
 
 def comb(guides):

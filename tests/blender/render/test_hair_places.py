@@ -42,7 +42,7 @@ def creature(hair):
 
 
 def places(drawn):
-    """Where each of the hair is drawn, from left to right."""
+    """Return where each hair is drawn, from left to right."""
     return sorted(tuple(np.round(to_world[:3, 3], 4)) for _strands, _shading, to_world, *_ in drawn.hair)
 
 

@@ -42,7 +42,7 @@ def light_off_matt_wall(x, reflectance):
 
 
 def test_a_plane_takes_light_off_a_wall_of_hair(scene, rng):
-    """As off a matt wall that sends back as much; behind it there is none."""
+    """It equals light off a matt wall of the same albedo; behind the hair there is none."""
     reflectance = add_wall(scene, plane_and_sun(scene, ELEVATION), rng, "BLOND")
     light = light_along_x(pass_count=8)
     x = (np.arange(len(light)) + 0.5) / len(light) * 6.0 * PERIOD - 3.0 * PERIOD

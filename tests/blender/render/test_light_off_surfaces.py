@@ -114,7 +114,7 @@ def test_a_sun_from_the_side_is_reflected_to_strands_close_to_a_plane(scene):
 
 
 def test_a_wide_plane_lights_strands_at_any_height(scene):
-    """Even light has no distance: strands half as high as they are apart see as much of a wide plane as those on it."""
+    """Uniform light has no distance: strands at any height see as much of a wide plane as those on it."""
     tangent, towards = (np.cos(0.5), 0.0, np.sin(0.5)), (0.0, -0.6, 0.8)
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.angle = SUN, 0.0

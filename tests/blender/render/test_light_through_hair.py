@@ -74,7 +74,7 @@ def light_along_x(pass_count=4):
 
 
 def test_light_that_strands_pass_on_is_spread_by_their_height(scene, rng):
-    """What a sheet casts from two periods above has no stripes, and is as much as from close by."""
+    """The shadow of a sheet two periods above has no stripes, and transmits as much as from close by."""
     sheet = add_sheet(scene, plane_and_sun(scene), rng)
     found = []
     for height in (0.05 * PERIOD, 2.0 * PERIOD):

@@ -93,7 +93,7 @@ def test_supersampling_keeps_the_mean(lit):
 
 
 def test_a_viewport_without_hair_reads_nothing(sphere, monkeypatch):
-    """Whoever has the add-on on pays for it only where there is hair."""
+    """An enabled add-on does not read scenes without hair."""
 
     def forbidden(*_args, **_kwargs):
         raise AssertionError("the scene was read")

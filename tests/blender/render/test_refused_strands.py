@@ -33,9 +33,9 @@ def test_a_driver_that_refuses_a_texture_is_one_sentence(hair, raised, monkeypat
     assert bpy.app.timers.is_registered(refused_strands.show_in_panels), "they were drawn before"
     assert refused_strands.show_in_panels() is None
     bpy.app.timers.unregister(refused_strands.show_in_panels)
-    said = capsys.readouterr().err
-    assert said.count("Vellus: The graphics driver cannot allocate") == 1 and "decrease Strand Count" in said
-    assert "Traceback" not in said
+    reported = capsys.readouterr().err
+    assert reported.count("Vellus: The graphics driver cannot allocate") == 1 and "decrease Strand Count" in reported
+    assert "Traceback" not in reported
     shown = " ".join(draw(bpy.types.VELLUS_PT_interpolation).texts)
     assert "The graphics driver cannot allocate" in shown and "decrease Strand Count" in shown
     with pytest.raises(HairError, match="driver cannot allocate"):  # a picture that is asked for says it too

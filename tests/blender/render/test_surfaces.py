@@ -24,7 +24,7 @@ def picture():
 
 
 def by_cycles(tmp_path):
-    """The same by Cycles: light that arrives straight from lamps and the world."""
+    """Return Cycles' picture of light that arrives directly from lamps and the world."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.resolution_x = scene.render.resolution_y = SIZE
@@ -68,7 +68,7 @@ def test_a_surface_without_a_material_is_as_with_a_new_one(stage):
 
 
 def test_triangles_know_their_materials(stage):
-    """What paths of light meet: color, roughness, metal and reflectance of each triangle."""
+    """Paths of light get color, roughness, metallic and reflectance of each triangle."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=2, y_subdivisions=1)
     placed = bpy.context.object
     material_of(placed, Base_Color=(0.2, 0.4, 0.6, 1.0), Roughness=0.3, IOR=1.5)
@@ -340,7 +340,7 @@ def test_slots_of_like_materials_change_nothing(stage):
 
 
 def test_light_that_samples_share_is_as_bright_below_hair(stage):
-    """Where places are looked for hair at random, those that find none are not taken for the others."""
+    """Places sampled at random in search of hair: those that find none do not stand for the others."""
     material_of(plane(), Base_Color=(0.6, 0.5, 0.4, 1.0))
     bpy.ops.mesh.primitive_plane_add(size=0.5, rotation=(math.pi / 2, 0.0, 0.0), location=(0.0, -0.3, 0.0))
     bpy.ops.vellus.add_hair(guide_count=20, strand_count=60, length=0.2, radius=0.004)

@@ -81,7 +81,7 @@ def test_a_change_is_noticed_by_both(hair, guide_curves):
 
 
 def test_the_panel_shows_the_slider_that_wets_the_hair(hair, guide_curves):
-    """The same property as in the Styles panel: one slider."""
+    """It is the property that the Styles panel shows, in one slider."""
     state = guide_curves.vellus
     bpy.context.view_layer.objects.active = hair
     assert shared_wetness.slider_of(state) == (state.dynamics, "wetness")

@@ -216,7 +216,7 @@ def test_paths_by_name_are_renamed(keyed_styles):
 
 
 def test_keys_of_other_hair_and_other_settings_stay(keyed_styles):
-    """Even of hair that shares the action."""
+    """Also if that hair shares the action."""
     state, curves = keyed_styles, keyed_styles.id_data
     curves.keyframe_insert("vellus.appearance.melanin", frame=1)
     other = curves.copy()

@@ -25,7 +25,7 @@ LANGUAGES = translations.dictionaries()
 
 
 def fields(sentence):
-    """What is filled into a sentence, and how."""
+    """Return the fields of a message and their formats."""
     return sorted((name, form) for _, name, form, _ in string.Formatter().parse(sentence) if name is not None)
 
 
@@ -80,11 +80,11 @@ def german(monkeypatch):
 
 def test_a_stored_sentence_is_translated_as_it_was_raised(german):
     """Hair stores its errors in English with their values, so files do not depend on the language."""
-    said = {}  # sentence → translations: some sentences differ in the names of their values alone
+    reported = {}  # sentence → translations: some sentences differ in the names of their values alone
     for msgid, msgstr in german.items():
         values = {name: 7 if form else f"Head {i}" for i, (name, form) in enumerate(fields(msgid))}
-        said.setdefault(msgid.format(**values), set()).add(msgstr.format(**values))
-    assert [sentence for sentence, texts in said.items() if translations.status_text(sentence) not in texts] == []
+        reported.setdefault(msgid.format(**values), set()).add(msgstr.format(**values))
+    assert [sentence for sentence, texts in reported.items() if translations.status_text(sentence) not in texts] == []
 
 
 def test_a_stored_sentence_of_nobody_is_shown_as_it_is(german):
@@ -173,9 +173,9 @@ def test_refusals_with_values_are_translated(hair, monkeypatch, request, refusal
     with pytest.raises(HairError) as caught:
         REFUSALS[refusal](hair)
     german = request.getfixturevalue("german")
-    said = translations.error_text(caught.value)
-    assert said != str(caught.value) and said == german[caught.value.sentence].format(**caught.value.values)
-    assert translations.status_text(str(caught.value)) == said
+    reported = translations.error_text(caught.value)
+    assert reported != str(caught.value) and reported == german[caught.value.sentence].format(**caught.value.values)
+    assert translations.status_text(str(caught.value)) == reported
 
 
 def test_a_sentence_with_braces_and_no_values_is_left_alone():

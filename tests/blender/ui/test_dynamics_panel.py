@@ -131,7 +131,7 @@ def test_without_gravity_nothing_bends(state):
     assert sentence(state) == ""
 
 
-def test_what_cannot_be_read_is_said(state):
+def test_what_cannot_be_read_is_reported(state):
     state.dynamics.damping = float("nan")
     assert sentence(state) == "Damping must be between 0 and 0.5, not nan."
 
@@ -159,7 +159,7 @@ def test_hand_made_guides_have_a_length_of_their_own(imported):
 
 
 def test_combed_guides_bend_by_the_length_that_they_have(state):
-    """And panels say before a slider is moved that it is dead, and how long guides are."""
+    """Panels state before a slider is moved that it has no effect, and how long guides are."""
     guides = bpy.data.objects["Guides"]
     bpy.context.view_layer.objects.active = guides
     before = draw(bpy.types.VELLUS_PT_guides)
@@ -172,8 +172,8 @@ def test_combed_guides_bend_by_the_length_that_they_have(state):
     assert length == pytest.approx(0.3 * state.guides.length, rel=0.1)
     assert sentence(state).startswith(f"A {100 * length:.2g} cm guide")
     drawn = draw(bpy.types.VELLUS_PT_guides)
-    said = " ".join(drawn.texts)
-    assert "Guide Tools change guides" in said and f"Median length: {100 * length:.3g}" in said
+    reported = " ".join(drawn.texts)
+    assert "Guide Tools change guides" in reported and f"Median length: {100 * length:.3g}" in reported
     assert drawn.drawn["length"] == drawn.drawn["guide_count"] == 1  # gray, as they are for guides to come
     assert curves.vellus.status == ""
     bpy.ops.vellus.distribute_guides()

@@ -42,7 +42,7 @@ def test_a_step_that_says_nothing_is_called_as_the_one_before_it(window):
         return 1
 
     assert drive(Operator(work()), window) == {"FINISHED"}
-    assert [said.split("    ")[0] for said in window.status[:-1]] == ["Drawing: 25%"]
+    assert [line.split("    ")[0] for line in window.status[:-1]] == ["Drawing: 25%"]
 
 
 @pytest.mark.parametrize("event", [ESC, SimpleNamespace(type="MOUSEMOVE", value="NOTHING")])
@@ -157,7 +157,7 @@ def test_a_picture_in_stages_is_that_of_one_go_and_esc_ends_it_in_each(camera, w
 
 
 def in_a_thread(work):
-    """What a window does with work: compute in a thread, write here."""
+    """Do work as a window does: compute in a thread, write in this one."""
     compute = next(work)
     try:
         while True:

@@ -136,7 +136,7 @@ def use_mesh(scene, vertices, faces):
 
 
 @pytest.mark.parametrize(
-    ("vertices", "faces", "said"),
+    ("vertices", "faces", "reported"),
     [
         ([], [], "no faces"),
         ([(0, 0, 0), (1, 0, 0)], [], "no faces"),
@@ -145,9 +145,9 @@ def use_mesh(scene, vertices, faces):
         ([(0, 0, 0), (1, 0, 0), (0, math.inf, 0)], [(0, 1, 2)], "non-finite"),
     ],
 )
-def test_a_mesh_that_cannot_grow_hair_is_refused(scene, vertices, faces, said):
+def test_a_mesh_that_cannot_grow_hair_is_refused(scene, vertices, faces, reported):
     use_mesh(scene, vertices, faces)
-    assert said in refusal(bpy.ops.vellus.distribute_guides)
+    assert reported in refusal(bpy.ops.vellus.distribute_guides)
 
 
 def test_a_scale_of_zero_is_refused(sphere):
@@ -168,8 +168,8 @@ def test_nan_is_refused_for_guides(sphere, name, value):
 
 
 def test_nan_is_refused_for_hair(guides):
-    said = refusal(bpy.ops.vellus.interpolate_hair, influence_distance=math.nan, automatic_influence=False)
-    assert "Influence distance" in said
+    reported = refusal(bpy.ops.vellus.interpolate_hair, influence_distance=math.nan, automatic_influence=False)
+    assert "Influence distance" in reported
 
 
 @pytest.mark.parametrize(
@@ -233,7 +233,7 @@ def sockets(hair):
 
 @pytest.mark.parametrize("preset", presets.PRESETS)
 def test_every_preset_is_applied_whole(hair, preset):
-    """Whatever was there before: the settings and the material are the preset's, the way of drawing the artist's."""
+    """Settings and material become the preset's whatever they were; how hair is drawn stays the artist's choice."""
     look = presets.PRESETS[preset][1]
     state = hair.data.vellus
     unlike = Appearance(mode="classic", parametrization="ABSORPTION", tint=(0.1, 0.2, 0.3), random_color=1.0, coat=1.0)
@@ -345,8 +345,8 @@ def test_a_damaged_table_is_refused_by_the_picture(hair, camera, tmp_path):
     bpy.ops.vellus.bake_tables(directory=str(tmp_path), size=32)
     table = tmp_path / "n.exr"
     table.write_bytes(table.read_bytes()[:300])
-    said = refusal(bpy.ops.vellus.render_picture, filepath=str(tmp_path / "p.png"), width=8, height=8)
-    assert "n.exr" in said
+    reported = refusal(bpy.ops.vellus.render_picture, filepath=str(tmp_path / "p.png"), width=8, height=8)
+    assert "n.exr" in reported
     assert not (tmp_path / "p.png").exists()
 
 

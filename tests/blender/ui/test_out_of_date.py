@@ -17,9 +17,9 @@ SENTENCE = "Out of date: settings or inputs have changed."
 
 def is_said(name):
     shown = draw(getattr(bpy.types, f"VELLUS_PT_{name}"))
-    said = SENTENCE in " ".join(shown.texts)
-    assert shown.drawn["vellus.update_hair"] == said
-    return said
+    reported = SENTENCE in " ".join(shown.texts)
+    assert shown.drawn["vellus.update_hair"] == reported
+    return reported
 
 
 def comb(guides, amount=0.2):

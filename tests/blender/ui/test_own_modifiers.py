@@ -10,10 +10,10 @@ NODE_ASSETS = bpy.utils.system_resource("DATAFILES", path="assets/nodes") + "/pr
 
 
 def notes(active="Hair"):
-    """What the Shading panel says about modifiers."""
+    """Return the Shading panel's notes about modifiers."""
     bpy.context.view_layer.objects.active = bpy.data.objects[active]
-    said = " ".join(draw(bpy.types.VELLUS_PT_shading).texts)
-    return said if "renders only" in said else ""
+    reported = " ".join(draw(bpy.types.VELLUS_PT_shading).texts)
+    return reported if "renders only" in reported else ""
 
 
 def add_asset(hair, name):

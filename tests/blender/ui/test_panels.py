@@ -308,7 +308,7 @@ def test_the_redo_panel_draws_every_property_once(hair, operator):
 
 @pytest.mark.parametrize("operator", REDO)
 def test_names_of_data_are_picked_in_the_redo_panel(hair, operator):
-    """Not typed: vertex groups of the surface, images, objects and attributes."""
+    """They are not typed: vertex groups of the surface, images, objects and attributes."""
     sphere = bpy.data.objects["Sphere"]
     make_active(REDO[operator][0])
     own = set(getattr(bpy.types, f"VELLUS_OT_{operator}").__annotations__)

@@ -86,7 +86,7 @@ def test_one_undo_reverts_the_settings(hair, path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reported"),
     [
         ("{", "invalid JSON"),
         ('{"format": "Vellus groom settings", "version": 99}', "newer Vellus"),
@@ -97,7 +97,7 @@ def test_one_undo_reverts_the_settings(hair, path):
     ],
 )
 @pytest.mark.parametrize("active", ["Hair", "Bare"])
-def test_an_invalid_settings_file_changes_nothing(hair, tmp_path, text, said, active):
+def test_an_invalid_settings_file_changes_nothing(hair, tmp_path, text, reported, active):
     bpy.ops.mesh.primitive_cube_add()
     bpy.context.object.name = "Bare"
     bpy.context.view_layer.objects.active = bpy.data.objects[active]
@@ -105,7 +105,7 @@ def test_an_invalid_settings_file_changes_nothing(hair, tmp_path, text, said, ac
     before, settings_before = snapshot(), asdict(settings_of())
     with pytest.raises(RuntimeError) as refused:
         bpy.ops.vellus.load_groom_settings(filepath=str(tmp_path / "bad.json"))
-    assert said in str(refused.value) and "Traceback" not in str(refused.value)
+    assert reported in str(refused.value) and "Traceback" not in str(refused.value)
     assert (snapshot(), asdict(settings_of())) == (before, settings_before)
 
 

@@ -313,14 +313,14 @@ EFFECTIVE = [
 
 
 @pytest.mark.parametrize("case", NOTES)
-def test_why_a_style_does_nothing_is_said(still, case):
+def test_why_a_style_does_nothing_is_shown(still, case):
     settings, words = NOTES[case]
     style_items.assign(state(), [settings])
     assert words in " ".join(draw(bpy.types.VELLUS_PT_styles).texts)
 
 
 @pytest.mark.parametrize("settings", EFFECTIVE, ids=lambda settings: kind_of(settings))
-def test_of_others_nothing_is_said(still, settings):
+def test_nothing_is_reported_of_others(still, settings):
     style_items.assign(state(), [settings])
     assert style_notes.notes_of(still.data, state().styles[0]) == []
 
@@ -337,14 +337,14 @@ def test_the_order_of_styles_is_explained(still):
 def test_locks_that_are_too_small_are_explained(hair, settings, monkeypatch):
     style_items.assign(state(), [settings])
     bpy.context.view_layer.update()
-    said = style_notes.notes_of(hair.data, state().styles[0])
-    assert said == []
+    reported = style_notes.notes_of(hair.data, state().styles[0])
+    assert reported == []
     monkeypatch.setattr(clump_trees, "MOST_SITES", 20)
-    (said,) = style_notes.notes_of(hair.data, state().styles[0])
+    (reported,) = style_notes.notes_of(hair.data, state().styles[0])
     finest = math.sqrt(bindings.of(hair.data).styles.trees.area / (0.866 * 20))
     size = finest / (settings.ratio if kind_of(settings) == "CLUMP" else 0.32)
-    assert said == f"The locks are too small for this surface: a size of {size:.2f} m is used."
-    assert said in " ".join(draw(bpy.types.VELLUS_PT_styles).texts)
+    assert reported == f"The locks are too small for this surface: a size of {size:.2f} m is used."
+    assert reported in " ".join(draw(bpy.types.VELLUS_PT_styles).texts)
 
 
 def test_presets_are_offered_with_pictures_where_there_are_some(hair, tmp_path, monkeypatch):

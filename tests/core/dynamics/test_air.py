@@ -15,13 +15,13 @@ ORIGIN = np.array([0.3, -0.2, 0.1])
 
 
 def blown(device, fields, points, velocities=None, time=0.0):
-    """(airs (N, 3), accelerations (N, 3), drags (N,), what was said) at points (N, 3)."""
+    """(airs (N, 3), accelerations (N, 3), drags (N,), warnings) at points (N, 3)."""
     points = np.asarray(points, np.float32)
     velocities = np.zeros_like(points) if velocities is None else np.asarray(velocities, np.float32)
     air = Air((1, 1, len(points)), device)
     there = [wp.array(np.ascontiguousarray(a.T)[None], dtype=float, device=device) for a in (points, velocities)]
-    said = air.blow(fields, *there, time)
-    return air.airs.numpy()[0].T.copy(), air.accelerations.numpy()[0].T.copy(), air.drags.numpy()[0, 0].copy(), said
+    reported = air.blow(fields, *there, time)
+    return air.airs.numpy()[0].T.copy(), air.accelerations.numpy()[0].T.copy(), air.drags.numpy()[0, 0].copy(), reported
 
 
 def field(kind="WIND", **details):
@@ -33,7 +33,7 @@ def points_around(rng, count=200):
 
 
 def falloff(distance, minimum, maximum, power):
-    """As effect.cc has it: 1 up to the minimum, 0 beyond the maximum, between them (1 + d - minimum)^-power."""
+    """Return the falloff of effect.cc: 1 up to the minimum, 0 beyond the maximum, between (1 + d - minimum)^-power."""
     part = np.maximum(1.0 + distance - (minimum or 0.0), 1e-3) ** -power
     part = np.where((minimum is not None) & (distance < (minimum or 0.0)), 1.0, part)
     return np.where((maximum is not None) & (distance > (maximum or 0.0)), 0.0, part)
@@ -49,10 +49,10 @@ def test_spheres_fall_off_with_the_distance_from_the_shape(device, rng, minimum,
     beside = np.linalg.norm(offset - along[:, None] * AXIS, axis=1)
     distance = {"POINT": np.linalg.norm(offset, axis=1), "LINE": beside, "PLANE": np.abs(along)}[shape]
     one = field(strength=3.0, power=power, minimum=minimum, maximum=maximum, shape=shape)
-    airs, _, _, said = blown(device, [one], points)
+    airs, _, _, reported = blown(device, [one], points)
     wanted = 3.0 * falloff(distance, minimum, maximum, power)[:, None] * AXIS
     np.testing.assert_allclose(airs, wanted, atol=1e-5)
-    assert said == []
+    assert reported == []
 
 
 @pytest.mark.parametrize("direction", ["BOTH", "POSITIVE", "NEGATIVE"])
@@ -170,9 +170,9 @@ def test_turbulence_moves_with_its_object_unless_it_is_global(device, rng):
 )
 def test_fields_that_cannot_act_are_named_and_left_out(device, details):
     points = np.eye(3)
-    airs, _, _, said = blown(device, [field(), ForceField(**({"kind": "WIND"} | details))], points)
+    airs, _, _, reported = blown(device, [field(), ForceField(**({"kind": "WIND"} | details))], points)
     np.testing.assert_array_equal(airs, blown(device, [field()], points)[0])
-    assert len(said) == 1 and "Force field 2" in str(said[0])
+    assert len(reported) == 1 and "Force field 2" in str(reported[0])
 
 
 def test_whatever_is_absurd_stays_finite(device):

@@ -195,7 +195,7 @@ def test_what_does_not_fit_is_refused(hair, device):
 
 @pytest.mark.parametrize("spacing", [0.002, 0.006, 0.013])
 def test_a_straight_strand_alone_is_not_pushed(rng, device, spacing):
-    """Wherever and along whatever direction it lies in the grid, of cells longer or shorter than its segments."""
+    """Whatever its place and direction in the grid, with cells longer or shorter than its segments."""
     for _ in range(40):
         along = rng.normal(size=3)
         line = rng.uniform(0.0, 0.02, 3) + spacing * np.arange(12)[:, None] * along / np.linalg.norm(along)

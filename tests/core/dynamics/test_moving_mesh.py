@@ -71,7 +71,7 @@ def test_a_model_of_another_size_moves_as_its_original_does(guides):
 
 
 def test_guides_do_not_feel_those_of_another_region(guides):
-    """Where these are combed does not matter, but for the rounding of sums in mean masses."""
+    """The combing of another region's guides has no effect, but for rounding in sums of mean masses."""
     is_left = guides.numpy()[:, 0, 0] < 0.0
     bent = guides.numpy().copy()
     bent[~is_left] += np.float32([0.0, 0.0, -0.02]) * np.linspace(0.0, 1.0, 41, dtype=np.float32)[:, None]

@@ -76,7 +76,7 @@ def test_without_inertia_hair_moves_with_its_surface(rng):
 
 
 def test_hair_that_is_pinned_to_the_tip_moves_with_its_surface(rng):
-    """Also with something to collide with, of which no strand has a free point."""
+    """Also with a collider, though no strand has a free point."""
     groom, pose = fur(rng)
     simulation = Simulation(groom, DynamicsSettings(pinned=1.0), pose, World(obstacles=(ball(),)), DEVICE)
     np.testing.assert_allclose(play(simulation, pose, range(1, 5)), shake(4).moved(groom), atol=1e-6)
@@ -293,7 +293,7 @@ def test_pinned_points_only_follow_the_surface(rng, pinned):
 
 
 def test_a_number_of_substeps_that_is_set_is_taken_and_more_are_asked_for(rng):
-    """As many are asked for as automatic substeps would be, in fast frames."""
+    """The number asked for is that of automatic substeps in fast frames."""
     groom, pose = fur(rng)
     fixed, automatic = (
         Simulation(groom, DynamicsSettings(automatic_substeps=is_automatic), pose, World(), DEVICE)

@@ -146,7 +146,7 @@ def test_instances_show_curves_again(path):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "reported"),
     [
         (b"", "is not an Alembic file"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), "HDF5"),
@@ -155,9 +155,9 @@ def test_instances_show_curves_again(path):
         (b"Ogawa\xff\x00\x01" + struct.pack("<Q", 16) + struct.pack("<Q", 2**60), "damaged"),
     ],
 )
-def test_what_is_no_archive_is_refused_in_a_sentence(path, content, said):
+def test_what_is_no_archive_is_refused_in_a_sentence(path, content, reported):
     path.write_bytes(content)
-    with pytest.raises(HairError, match=said):
+    with pytest.raises(HairError, match=reported):
         alembic.grooms.read(path)
 
 

@@ -26,9 +26,9 @@ def curves_in(head, metres, up, count=30):
     return CurveSet("curves", lines, np.full(len(roots), 2), np.zeros(len(roots), bool))
 
 
-def choose(head, curves, said=NOTHING, stated=NOTHING):
+def choose(head, curves, reported=NOTHING, stated=NOTHING):
     file = CurveFile([curves], stated, Convention(0.01, "Y"))
-    return curve_units.choose(file, [curves], said, head, "hair.abc")
+    return curve_units.choose(file, [curves], reported, head, "hair.abc")
 
 
 @pytest.mark.parametrize("up", ["X", "Y", "Z"])
@@ -47,14 +47,14 @@ def test_what_is_said_or_stated_is_not_guessed(head):
     curves = curves_in(head, 0.01, "Z")
     found = choose(head, curves, stated=Convention(0.01, "Z"))
     assert (found.metres, found.up, found.notes) == (0.01, "Z", [])
-    found = choose(head, curves, said=Convention(0.01), stated=Convention(1.0, "Z"))
+    found = choose(head, curves, reported=Convention(0.01), stated=Convention(1.0, "Z"))
     assert (found.metres, found.up, found.notes) == (0.01, "Z", [])
 
 
 def test_roots_beyond_the_size_of_the_surface_are_refused_with_what_fits(head):
     curves = curves_in(head, 0.01, "Y")
     with pytest.raises(HairError, match="in meters with Y up: they would lie on it in centimeters with Y up"):
-        choose(head, curves, said=Convention(1.0, "Y"))
+        choose(head, curves, reported=Convention(1.0, "Y"))
     with pytest.raises(HairError, match="in centimeters with Z up: they would lie on it in centimeters with Y up"):
         choose(head, curves, stated=Convention(0.01, "Z"))
     with pytest.raises(HairError, match="check the unit, the axis and the surface"):
@@ -76,7 +76,7 @@ def test_somewhat_off_is_a_note_with_what_fits(head):
     found = choose(
         TriMesh(head.vertices - CENTRE.astype(np.float32), head.triangles),
         CurveSet("curves", moved.points - CENTRE / 0.0254, moved.counts, moved.is_smooth),
-        said=Convention(0.01, "Z"),
+        reported=Convention(0.01, "Z"),
     )
     assert found.metres == 0.01 and "they would lie on it in inches with Z up" in str(found.notes[0])
 

@@ -26,7 +26,7 @@ from tests.support.cached_frames import (
     check_whole,
     manifest,
     points_of,
-    said,
+    reported,
 )
 
 
@@ -45,7 +45,7 @@ def test_frames_and_states_come_back_bit_by_bit(folder):
     cache = FrameCache(folder)
     assert cache.read_frame(0).digest == DIGEST and cache.read_frame(0).key == manifest().key
     assert cache.manifest == dataclasses.replace(manifest(), state="complete")
-    assert cache.read_frame(4) is None and cache.read_state(99) is None and said(cache) == []
+    assert cache.read_frame(4) is None and cache.read_state(99) is None and reported(cache) == []
     assert sorted(path.name for path in folder.iterdir())[:3] == ["+00000000.npz", "+00000001.npz", "+00000002.npz"]
 
 
@@ -72,7 +72,7 @@ def test_frames_of_an_earlier_simulation_stay_and_are_told_apart(folder):
     keys = [cache.read_frame(number).key for number in range(-2, 4)]
     assert [cache.manifest.changed_parts(key) for key in keys] == [["settings"]] * 4 + [[]] * 2
     assert cache.read_state(3) is not None and cache.read_state(1) is None
-    assert len(said(cache)) == 1
+    assert len(reported(cache)) == 1
     bake(folder, [0], manifest(settings=1))
     cache = FrameCache(folder)
     assert [cache.manifest.changed_parts(cache.read_frame(n).key) for n in (-2, 0, 3)] == [[], [], ["settings"]]
@@ -105,7 +105,7 @@ def test_points_at_any_time(folder):
     cubic = between(*(points_of(number) for number in (-1, 0, 1, 2)), 0.25)
     np.testing.assert_array_equal(cache.points_at(0.25), cubic)
     np.testing.assert_array_equal(cache.points_at(2.5), between(None, points_of(2), points_of(3), None, 0.5))
-    assert cache.points_at(3.5) is None and cache.points_at(-2.5) is None and said(cache) == []
+    assert cache.points_at(3.5) is None and cache.points_at(-2.5) is None and reported(cache) == []
 
 
 # Writing.
@@ -142,7 +142,7 @@ def test_disk_full_at_fifty_places(folder):
     assert check_whole(folder)[0] == list(range(-2, 5))
 
 
-def test_a_folder_that_goes_away_is_told(folder):
+def test_a_folder_that_goes_away_is_reported(folder):
     with pytest.raises(HairError, match="lost its manifest"), baking(folder, manifest()) as writer:
         remove_all(folder)
         writer.write_frame(1, points_of(1), DIGEST)
@@ -223,7 +223,7 @@ def test_one_process_bakes_while_others_read(folder):
 
 
 def test_a_file_that_another_program_holds_is_tried_three_times(folder, monkeypatch):
-    """As Windows keeps programs from files that a virus scanner reads."""
+    """Windows refuses access to files that a virus scanner reads."""
     monkeypatch.setattr(time, "sleep", lambda _seconds: None)
     tries = []
 
@@ -310,7 +310,7 @@ PREPARED = [linked, with_files, with_claim_link, with_marker_link, with_other_ma
 
 @pytest.mark.parametrize("prepare", PREPARED, ids=lambda prepare: prepare.__name__)
 def test_nothing_is_written_to_a_folder_that_others_have_prepared(tmp_path, prepare):
-    """Nor anywhere else by it: the folder of a web application with its own manifest.json and numbered files."""
+    """Neither there nor elsewhere: the folder is a web application's, with its own manifest.json and numbered files."""
     victim, folder = tmp_path / "application", tmp_path / "cache"
     victim.mkdir()
     (victim / "manifest.json").write_text('{"name": "application"}')
@@ -326,7 +326,7 @@ def test_nothing_is_written_to_a_folder_that_others_have_prepared(tmp_path, prep
 
 
 def test_a_folder_is_identified_by_its_marker(folder):
-    """Even if its manifest is damaged, or all frames are removed and a foreign file remains."""
+    """Also if its manifest is damaged, or all frames are removed and a foreign file remains."""
     (folder / "manifest.json").write_bytes(b"damaged")
     bake(folder, [1])
     assert check_whole(folder)[0][:1] == [-2]

@@ -57,7 +57,7 @@ def test_slices_cover_all_curves_once():
         assert [i for chosen in groom_curves.slices(count) for i in range(count)[chosen]] == list(range(count))
 
 
-def test_the_limits_of_unreal_are_said_beyond_them_alone():
+def test_the_limits_of_unreal_are_reported_only_beyond_them():
     def notes(*counts_and_points):
         return [*groom_curves.limit_notes("a", np.concatenate([np.full(*one) for one in counts_and_points]))]
 

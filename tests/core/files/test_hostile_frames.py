@@ -14,7 +14,7 @@ import pytest
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import array_file, frame_manifest
 from hair_addon.core.files.frame_cache import FrameCache, remove
-from tests.support.cached_frames import bake, frame_bytes, manifest, points_of, said
+from tests.support.cached_frames import bake, frame_bytes, manifest, points_of, reported
 from tests.support.mutants.changes import mutated
 
 
@@ -36,7 +36,7 @@ def test_a_frame_cut_at_any_byte_is_missing(folder):
         path.write_bytes(data[:length])
         cache = FrameCache(folder)
         assert cache.read_frame(1) is None and cache.read_frame(1) is None
-        assert len(said(cache)) == 1  # once
+        assert len(reported(cache)) == 1  # once
     path.write_bytes(data + b"\0")
     assert FrameCache(folder).read_frame(1) is None
 
@@ -125,8 +125,8 @@ def test_whatever_else_stands_there_is_a_missing_frame(folder, kind):
     foreign(kind, folder / "+00000001.npz")
     cache = FrameCache(folder)
     assert cache.read_frame(1) is None and cache.points_at(0.5) is None
-    assert len(said(cache)) == 1
-    assert cache.points_at(-1.5) is not None and cache.points_at(2.5) is not None and said(cache) == []
+    assert len(reported(cache)) == 1
+    assert cache.points_at(-1.5) is not None and cache.points_at(2.5) is not None and reported(cache) == []
 
 
 @pytest.mark.parametrize("kind", [kind for kind in [*FOREIGN, "gone"] if kind not in {"future", "NaN"}])
@@ -175,4 +175,4 @@ def test_manifests_of_no_simulation_are_refused(folder, name, value):
     found = json.loads(path.read_text())
     path.write_text(json.dumps(found | {name: value}))
     cache = FrameCache(folder)
-    assert cache.manifest is None and len(said(cache)) == 1
+    assert cache.manifest is None and len(reported(cache)) == 1

@@ -147,7 +147,7 @@ def test_styles_of_a_file_are_in_its_order(tmp_path):
 
 
 def test_files_without_dynamics_are_read(tmp_path):
-    """As they were saved before there was any: at its default, or as it is."""
+    """Files saved before dynamics existed are read with its defaults, or leave it as it is."""
     found = settings_file.to_object(GroomSettings(GuideSettings(seed=4)))
     del found["dynamics"]
     path = write(tmp_path / "a.json", found)
@@ -175,7 +175,7 @@ def test_what_a_partial_file_leaves_out_stays(tmp_path_factory, wanted, present,
 
 
 @pytest.mark.parametrize(
-    ("given_styles", "said"),
+    ("given_styles", "reported"),
     [
         (curl.Settings(), "styles must be a list of styles"),
         ([HairSettings()], "A style must be the settings of a style"),
@@ -183,8 +183,8 @@ def test_what_a_partial_file_leaves_out_stays(tmp_path_factory, wanted, present,
         ([curl.Settings()] * 65, "at most 64 styles"),
     ],
 )
-def test_what_is_no_list_of_styles_is_refused(given_styles, said):
-    with pytest.raises(HairError, match=said):
+def test_what_is_no_list_of_styles_is_refused(given_styles, reported):
+    with pytest.raises(HairError, match=reported):
         GroomSettings(styles=given_styles)
 
 
@@ -195,7 +195,7 @@ def test_names_of_styles_are_as_many_strings(names):
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "reported"),
     [
         (head(styles={}), '"styles" must be a list of styles'),
         (head(styles=[{"kind": "CURL"}, 3]), '"styles[1]" must be a group of settings'),
@@ -235,11 +235,11 @@ def test_names_of_styles_are_as_many_strings(names):
         ([1, 2], "is not a groom settings file"),
     ],
 )
-def test_what_is_wrong_is_one_sentence_that_names_file_and_key(tmp_path, values, said):
+def test_what_is_wrong_is_one_sentence_that_names_file_and_key(tmp_path, values, reported):
     path = write(tmp_path / "groom.json", values)
     with pytest.raises(HairError) as refused:
         settings_file.read(path)
-    assert str(path) in str(refused.value) and said in str(refused.value)
+    assert str(path) in str(refused.value) and reported in str(refused.value)
     assert str(refused.value).count("\n") == 0
 
 

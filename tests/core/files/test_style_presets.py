@@ -103,7 +103,7 @@ def test_an_unknown_preset_is_one_sentence():
 
 @pytest.mark.parametrize("identifier", style_presets.PRESETS)
 def test_presets_name_only_what_departs_from_defaults(identifier):
-    """So a better default reaches them."""
+    """Improved defaults thus reach presets."""
     found = json.loads((style_presets.FOLDER / f"{identifier.lower()}.json").read_text(encoding="utf-8"))
     for values, style in zip(found["styles"], style_presets.read(identifier).styles, strict=True):
         defaults = type(style)()

@@ -207,13 +207,13 @@ def test_points_that_are_not_finite_are_refused(rng, tmp_path):
             write(tmp_path / "groom.abc", [(guides, [arrays["guides"]])])
 
 
-def test_what_an_importer_does_is_said(rng, tmp_path):
+def test_what_an_importer_does_is_reported(rng, tmp_path):
     guides, strands, arrays = groom(rng)
     arrays["strands"][[3, 7]] = arrays["strands"][[3, 7], :1]
     alone = np.ascontiguousarray(strands.guide_weights)
     alone[5] = 0.0
     bare = replace(strands, root_uvs=None, guide_weights=alone)
     notes = write(tmp_path / "groom.abc", [(guides, [arrays["guides"]]), (bare, [arrays["strands"]])])
-    said = [str(note) for note in notes]
-    assert len(said) == 3 and "2 strands have no length" in said[0] and "no UV coordinates" in said[1]
-    assert "follow no guide" in said[2]
+    reported = [str(note) for note in notes]
+    assert len(reported) == 3 and "2 strands have no length" in reported[0] and "no UV coordinates" in reported[1]
+    assert "follow no guide" in reported[2]

@@ -195,7 +195,7 @@ def test_non_finite_points_harm_no_other_curve(rng):
 
 
 def test_curves_without_segments_are_no_polylines():
-    """As all of a file may be, where its numbers of points are too small for its basis."""
+    """All curves of a file may be so, if they have too few points for its basis."""
     none = bezier_segments.Segments(np.zeros((0, 4, 3)), np.zeros(2, np.int64), np.zeros((0, 2)))
     values, counts, places = bezier_segments.polylines(none, np.zeros(0, np.int64))
     assert values.shape == (0, 3) and counts.tolist() == [0, 0] and places.shape == (0,)

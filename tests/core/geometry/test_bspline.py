@@ -45,7 +45,7 @@ def test_a_curve_moves_with_its_controls(rng):
 
 
 def test_weights_make_a_circle():
-    """What plain splines cannot be: a quarter of a circle, exactly, as rational quadratic [Piegl97]."""
+    """A rational quadratic spline is exactly a quarter of a circle [Piegl97]; plain splines cannot be."""
     controls = np.array([[(1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]])
     points = bspline.evaluate_recursive(controls, np.linspace(0.0, 1.0, 50), 2, weights=[1.0, 0.5**0.5, 1.0])
     np.testing.assert_allclose(np.linalg.norm(points, axis=-1), 1.0, atol=1e-12)

@@ -70,7 +70,7 @@ def moved_in_quad(rng, corners, count=300):
 
 
 def test_a_place_in_a_bent_quad_moves_straight_up_or_down(rng):
-    """So neighbors stay apart, and none moves further than the diagonals are apart, whatever the shape."""
+    """Neighbors thus stay apart, and no place moves further than the diagonals are apart, whatever the shape."""
     before, after, _mesh = moved_in_quad(rng, [(0, 0, 0), (1.2, 0.1, 0.3), (1.4, 1.2, 0), (0.1, 0.5, 0.3)])
     np.testing.assert_allclose(after[:, :2], before[:, :2], atol=1e-6)
     assert 0.05 < abs(after - before).max() <= 0.3

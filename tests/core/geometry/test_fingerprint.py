@@ -24,7 +24,7 @@ def test_the_same_points_leave_the_same_fingerprint(points, monkeypatch):
 
 @pytest.mark.parametrize("count", [0, 1, 33, 120, 500])
 def test_copied_points_are_the_points(points, count):
-    """And the fingerprint is that of the points; nothing beside them is written."""
+    """The fingerprint is that of the points, and nothing beside the copy is written."""
     there = np.full(3 * 41 * 500 + 7, np.nan, np.float32)
     copies = there[3 : 3 + 3 * 41 * count]
     assert fingerprint(points[:count], copies) == fingerprint(points[:count])

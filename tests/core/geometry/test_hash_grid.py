@@ -13,7 +13,7 @@ from tests.support.devices import DEVICE
 
 
 def found(points, queries, distance, limit, device=DEVICE):
-    """What `neighbours` returns, as NumPy arrays."""
+    """Return what `neighbours` returns, as NumPy arrays."""
     points, queries = (wp.array(np.float32(a), dtype=wp.vec3, device=device) for a in (points, queries))
     return [a.numpy() for a in hash_grid.neighbours(points, queries, distance, limit)]
 

@@ -22,7 +22,7 @@ def test_they_are_polar_factors_of_any_scale(rng):
 
 
 def test_singular_matrices_have_rotations_nearby(rng):
-    """Which one is open where a matrix is flat; it is a rotation, and as near as that of the decomposition."""
+    """The nearest rotation to a singular matrix is ambiguous: any that is as near as the decomposition's is right."""
     matrices = rng.normal(size=(50, 3, 2)) @ rng.normal(size=(50, 2, 3))
     found = nearest_rotation.nearest_rotations(matrices)
     np.testing.assert_allclose(found @ np.swapaxes(found, 1, 2), np.tile(np.eye(3), (50, 1, 1)), rtol=0.0, atol=1e-12)

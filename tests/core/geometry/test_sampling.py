@@ -74,7 +74,7 @@ def test_more_roots_keep_those_that_are_there(head):
 
 
 def test_neighbours_on_the_surface_are_neighbours_in_memory(head, rng):
-    """Whatever order a mesh's triangles come in: scans and decimated meshes have none."""
+    """The order of a mesh's triangles is arbitrary, as in scans and decimated meshes."""
     shuffled = TriMesh(head.vertices, rng.permutation(head.triangles))
     for mesh in (head, shuffled):
         points = mesh_math.positions(mesh, sample_surface(mesh, 20_000, seed=1))

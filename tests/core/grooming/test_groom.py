@@ -110,7 +110,7 @@ def test_combing_searches_nothing(head, scalp, guides, hair, hair_settings, monk
 
 
 def test_strands_in_the_processors_memory(head, scalp, guides, hair, hair_settings):
-    """Wherever they were computed: in new memory, in what is given, and some of them alone."""
+    """They are copied from any device: to new or given memory, or some of them only."""
     binding = bind_hair(head, guides, hair_settings, density=scalp)
     weights = following.weights_now(binding, guides)
     made, given = following.growing_points(binding, guides, weights).result(), np.full_like(hair.numpy(), np.nan)
@@ -227,7 +227,7 @@ def test_settings_do_not_import_warp():
 
 
 def test_every_kernel_is_compiled_in_the_step_that_says_so(head, monkeypatch):
-    """So that nobody waits for a compiler without being told: what is launched was loaded before."""
+    """Every kernel is loaded before its launch, so nobody waits for a compiler unannounced."""
     loaded, launched, launch = set(), set(), wp.launch
     monkeypatch.setattr(
         kernel_setup, "load", lambda modules, *_others: loaded.update(module.name for module in modules)

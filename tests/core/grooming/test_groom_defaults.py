@@ -59,7 +59,7 @@ def test_a_human_scalp_grows_human_hair(head, scalp):
 
 
 def test_fewer_strands_are_thicker(head, scalp):
-    """As in proportion to the distance of their roots: a head has real hair at real counts, and few are seen."""
+    """Thickness is proportional to the distance of roots: realistic at realistic counts, visible with few strands."""
     thickness = {
         count: 2.0 * groom_defaults.hair_size(head, scalp, strand_count=count).radius
         for count in (1, 600, 30_000, 60_000, 100_000, 1_000_000)
@@ -138,7 +138,7 @@ def test_single_precision_gives_sizes_back(rng):
 
 
 @pytest.mark.parametrize(
-    ("mesh", "density", "said"),
+    ("mesh", "density", "reported"),
     [
         (TriMesh(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.int32)), None, "zero area"),
         (TriMesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32)), None, "no faces"),
@@ -146,8 +146,8 @@ def test_single_precision_gives_sizes_back(rng):
         (cube(), np.full(8, np.nan), "not a number"),
     ],
 )
-def test_a_surface_without_size_is_reported(mesh, density, said):
-    with pytest.raises(HairError, match=said):
+def test_a_surface_without_size_is_reported(mesh, density, reported):
+    with pytest.raises(HairError, match=reported):
         groom_defaults.hair_size(mesh, density)
 
 

@@ -75,7 +75,7 @@ def test_images_on_another_shape_stand_on_it(rng):
     np.testing.assert_allclose(made[:, 0, 2], 0.05 * made[:, 0, 0], atol=1e-6)
 
 
-def test_nothing_to_mirror_is_said(sphere, rng):
+def test_nothing_to_mirror_is_reported(sphere, rng):
     points, _roots, _normals = standing(sphere, 50, rng)
     with pytest.raises(HairError, match="no guides to mirror"):
         mirroring(sphere, points[:, 0], ACROSS_X, np.zeros(50, bool))

@@ -94,7 +94,7 @@ def test_guides_are_more_even_than_chance(mesh, count):
 @given(mesh=hard_meshes(), power=st.integers(-20, 20))
 @settings(max_examples=12)
 def test_a_power_of_two_moves_no_root(mesh, power):
-    """Not by a bit; by other factors coordinates are rounded, and relaxation amplifies that."""
+    """The roots are bitwise equal; other factors round coordinates, and relaxation amplifies that."""
     scaled = TriMesh(np.float32(2.0**power) * mesh.vertices, mesh.triangles)
     expected, found = (cvt.place(m, 50, 1, 4, device=DEVICE) for m in (mesh, scaled))
     np.testing.assert_array_equal(found.triangle, expected.triangle)

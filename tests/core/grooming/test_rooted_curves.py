@@ -75,14 +75,14 @@ def test_far_roots_are_counted():
 
 
 @pytest.mark.parametrize(
-    ("curves", "said"),
+    ("curves", "reported"),
     [
         ([np.zeros((3, 3))], "length"),
         ([np.float32([[0, 0, 0], [0, 0, 1e20]])], "units"),
     ],
 )
-def test_what_cannot_be_used_is_one_sentence(curves, said):
-    with pytest.raises(HairError, match=said):
+def test_what_cannot_be_used_is_one_sentence(curves, reported):
+    with pytest.raises(HairError, match=reported):
         rooted_curves.root(GROUND, *rooted_curves.polylines(curves))
 
 

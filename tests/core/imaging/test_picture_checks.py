@@ -53,7 +53,7 @@ def test_a_cut_exr_is_found(tmp_path, rng, compression):
 
 
 def test_a_cut_exr_of_many_parts_is_found(tmp_path, rng):
-    """Whose headers are longer than what is read at first."""
+    """The headers of such a file are longer than what is read at first."""
     path = write_exr(tmp_path / "f.exr", rng, parts=300)
     content = path.read_bytes()
     assert picture_checks.is_whole(path) and content.rindex(b"part 299") > 65_536

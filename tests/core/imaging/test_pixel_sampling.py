@@ -23,7 +23,7 @@ def test_moments_divide_the_exposure_evenly(position):
 
 
 def test_moments_are_where_the_shutter_is_open():
-    """As many in each part of the time as its share of the light; a curve without light is none."""
+    """Each part of the time gets moments by its share of the light; a curve without light has no effect."""
     openings = np.repeat([0.0, 1.0, 3.0, 0.0], 64)
     times = pixel_sampling.moments(2.0, "START", 400, openings)
     np.testing.assert_array_equal(np.histogram(times, [0.0, 0.5, 1.0, 1.5, 2.0])[0], [0, 100, 300, 0])

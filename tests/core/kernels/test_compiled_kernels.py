@@ -203,7 +203,7 @@ def test_other_sources(folder):
 
 
 def test_other_options(folder, monkeypatch):
-    """What changes the code that Warp would compile, here checks of every number, is not in compiled kernels."""
+    """Compiled kernels are not loaded if options change the code that Warp would compile, such as checks of numbers."""
     module = wp.get_module(transform.__name__)
     monkeypatch.setattr(wp.config, "verify_fp", True)
     module.mark_modified()

@@ -12,7 +12,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.kernels import kernel_entries, kernel_setup
 from hair_addon.core.long_work import Job, Stopped
 
-SECONDS = 0.02  # that a module takes
+SECONDS = 0.02  # that compiling a module takes
 
 numbers = count()
 
@@ -80,7 +80,7 @@ def test_each_module_is_compiled_once(modules, compiled):
     assert compiled == once
 
 
-def test_progress_is_told(modules, compiled):
+def test_progress_is_reported(modules, compiled):
     told = []
     kernel_setup.load(modules, "cpu", lambda step, part: told.append((step, part)), most_threads=1)
     parts = [part for _step, part in told]

@@ -60,7 +60,7 @@ def test_what_artists_do_not_set_stays_as_it_was():
 
 
 def test_each_setting_of_the_tables_is_the_artist_s_or_the_baker_s():
-    """What the appearance decides overrides any base, and nothing else does."""
+    """Settings that the appearance decides override those of any base, and no others do."""
     bases = lookup_tables.Settings(), lookup_tables.Settings(
         mode="energy", eta=1.2, sigma_a=(3.0, 2.0, 1.0), tilt=0.01, shifts="PUBLISHED", roughness=0.7,
         radial_roughness=0.6, coat=0.5, beta_r=0.3, caustic="exact", glint_gain=3.0, glint_width=0.1, glint_fade=0.2,
@@ -130,7 +130,7 @@ def test_impossible_looks_are_refused(wrong):
 
 
 def color_of(name, **changes):
-    """What a groom of this look returns, RGB."""
+    """Return the color, RGB, of a groom of this look."""
     look = replace(presets.PRESETS[name][1], **changes)
     return np.array(appearance.kajiya_kay_settings(look).diffuse_color)
 
@@ -240,7 +240,7 @@ def test_even_hair_says_so():
 
 @given(st.floats(0.05, 0.9), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_random_strands_are_hair_of_other_melanin(melanin, spread, random):
-    """As Cycles varies it: the amount of melanin times 1 + 2 (random - ½) spread."""
+    """Melanin varies as in Cycles: its amount is multiplied by 1 + 2 (random - ½) spread."""
     found = strand_variation.strand_sigma_a(strands_of(melanin=melanin, random_color=spread), random, 0.0)
     other = min(melanin * (1.0 + 2.0 * (random - 0.5) * spread), 1.0)
     np.testing.assert_allclose(found, appearance.sigma_a(Appearance(melanin=other)), rtol=1e-9, atol=1e-12)

@@ -108,7 +108,7 @@ def test_switchbacks_wind_back():
 
 
 def test_switchbacks_that_are_far_apart_leave_most_coils_alone():
-    """But for the sense that they wind in; a change takes three tenths of the distance."""
+    """Only the sense in which coils wind differs; a change of sense takes three tenths of the distance."""
     strands = straight_strands(200, 0.3)
     members = np.arange(200)
     kept = winding(stepped(strands, helix(left_handed=0.0), members=members))
@@ -120,7 +120,7 @@ def test_switchbacks_that_are_far_apart_leave_most_coils_alone():
 
 @pytest.mark.parametrize("style", [curl.Settings(), frizz.Settings()], ids=["curl", "frizz"])
 def test_strands_that_turn_back_change_by_degrees(style):
-    """Where a strand turns by 170° from segment to segment its frames turn with it, without a jump."""
+    """Frames of a strand that turns by 170° from segment to segment turn with it, without a jump."""
     strands = straight_strands(8)
     angles = np.radians(170.0) * (np.arange(40) >= 20)
     segments = 0.005 * np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], axis=1)

@@ -83,7 +83,7 @@ def test_weights_of_other_surfaces_and_guides_are_refused(hair):
 
 
 def test_weights_are_those_of_positions(hair, rng):
-    """The same as interpolating vertices at roots."""
+    """Weights at positions equal those interpolated from vertices at roots."""
     weights = rng.random(len(hair.mesh.vertices))
     found = Mask(corners_of(hair, weights)).of_strands(hair.binding)
     np.testing.assert_allclose(found, mesh_math.interpolate(weights, hair.mesh, hair.binding.roots), atol=1e-6)

@@ -32,7 +32,7 @@ def hair():
 
 @pytest.fixture(scope="module")
 def made_again():
-    """The same hair, of other objects."""
+    """Return the same hair, of new objects."""
     return head(400, 60)
 
 
@@ -85,7 +85,7 @@ def test_a_style_without_effect_leaves_the_bits(hair, style):
 
 @pytest.mark.parametrize("name", ON_STRANDS)
 def test_strands_outside_a_mask_keep_their_bits(hair, name):
-    """Whatever styles come before and after, and also beside strands that the mask is on."""
+    """Whatever styles come before and after, and also next to strands within the mask."""
     settings, inputs = masked(STYLES[name], np.maximum(hair.mesh.vertices[:, 0], 0.0) * 10.0, hair)
     others = bend.Settings(), frizz.Settings()
     outside = inputs.masks[program.mask_key(settings)].of_strands(hair.binding) == 0.0

@@ -142,7 +142,7 @@ def spread(vectors):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_hair_against_the_normals_is_as_coherent_as_hair_along_them(sign, rng):
-    """As on a surface that is inside out: strands of one guide are displaced alike."""
+    """On a surface that is inside out, too, strands of one guide are displaced alike."""
     hair = straight(600)
     tilts = rng.normal(0.0, 0.15, (len(hair.guides), 1, 2))
     along = np.linspace(0.0, 1.0, hair.guides.point_count)[None, :, None] * 0.2

@@ -183,15 +183,15 @@ def undone():
 def baked():
     """Bake with its progress; then a longer one, and Esc."""
     scene().frame_end, scene().frame_current = COMPARED + 2, 3
-    said, running = set(), addon().host.running
+    reported, running = set(), addon().host.running
     with in_viewport():
         bpy.ops.vellus.bake_dynamics("INVOKE_DEFAULT")
     facts["bake"] = {"runs": running.job() is not None}
     while running.job() is not None:
-        said.add(running.job().step)
+        reported.add(running.job().step)
         yield
     yield from wait(0.5)
-    facts["bake"] |= {"steps": sorted(said), "frames": frames(), "frame": scene().frame_current, "state": state()}
+    facts["bake"] |= {"steps": sorted(reported), "frames": frames(), "frame": scene().frame_current, "state": state()}
     there = strands()
     go_to(COMPARED)
     yield from wait(0.5)

@@ -69,8 +69,8 @@ def rendered(found, folder):
     film()
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
     words = "render scene.blend --out ##.exr --frames 1-2 --width 48 --height 36 --samples 4 --json"
-    status, said = run_command(words, folder)
-    found.add("said", [status, *said])
+    status, reported = run_command(words, folder)
+    found.add("said", [status, *reported])
     for path in sorted(folder.glob("*.exr")):
         found.add_pixels(path.name, path)
 
@@ -139,8 +139,8 @@ def run_commands(folder):
     (folder / HEAD.name).write_bytes(HEAD.read_bytes())
     ran = []
     for name, words, files in _COMMANDS:
-        status, said = run_command(words, folder)
-        ran.append((name, status, said, {file: (folder / file).read_bytes() for file in files}))
+        status, reported = run_command(words, folder)
+        ran.append((name, status, reported, {file: (folder / file).read_bytes() for file in files}))
     return ran
 
 
@@ -152,15 +152,15 @@ def run_command(words, folder):
     command = [sys.executable, "-m", "hair_addon", *words.split()]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-    said = [re.sub(r'"(seconds|bytes)": [0-9.e-]+', r'"\1": 0', text) for text in (done.stdout, done.stderr)]
-    said = [re.sub(r"\b[0-9.]+ s\b", "0 s", text) for text in said]
-    return done.returncode, [text.replace(str(folder), "") for text in said]
+    reported = [re.sub(r'"(seconds|bytes)": [0-9.e-]+', r'"\1": 0', text) for text in (done.stdout, done.stderr)]
+    reported = [re.sub(r"\b[0-9.]+ s\b", "0 s", text) for text in reported]
+    return done.returncode, [text.replace(str(folder), "") for text in reported]
 
 
 def add_commands(found, ran):
     """Digests of what `run_commands` returned."""
-    for name, status, said, files in ran:
-        found.add(f"{name}/said", [status, *said])
+    for name, status, reported, files in ran:
+        found.add(f"{name}/said", [status, *reported])
         for file, data in files.items():
             # The order in which Blender's USD exporter writes siblings varies between runs.
             found.add(f"{name}/{file}", sorted(data.decode().splitlines()) if file.endswith(".usda") else data)

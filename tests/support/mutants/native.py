@@ -116,16 +116,16 @@ def _child(name, first, last):
             paths[place].write_bytes(mutated(wholes[place], source, is_text))
             try:
                 check(read(), whole)
-                said = "read"
+                reported = "read"
             except HairError as error:
-                said = (
+                reported = (
                     "refused" if str(error).endswith(".") and "\n" not in str(error) else f"no sentence: {error!s:.90}"
                 )
             except AssertionError as error:
-                said = f"accepted: {error!s:.90}"
+                reported = f"accepted: {error!s:.90}"
             except Exception as error:
-                said = f"{type(error).__name__}: {error!s:.90}"
-            print(" ".join(said.split()), file=out, flush=True)
+                reported = f"{type(error).__name__}: {error!s:.90}"
+            print(" ".join(reported.split()), file=out, flush=True)
             paths[place].write_bytes(wholes[place])
 
 

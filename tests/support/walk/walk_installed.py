@@ -114,10 +114,10 @@ def scripts(_zip_path, folder):
     bpy.ops.wm.save_as_mainfile(filepath="shot.blend")
     failed, runner = [], doctest.DocTestRunner(verbose=False)
     for example in _examples(api):
-        said = []
+        reported = []
         example.globs = {"api": api, "bpy": bpy}
-        runner.run(example, out=said.append)
-        failed += said
+        runner.run(example, out=reported.append)
+        failed += reported
     return {"blocks": ran, "examples": runner.tries, "failed": failed}
 
 

@@ -44,7 +44,7 @@ class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
 
     def __init__(self):
         super().__init__()
-        sys.stderr.said.clear()
+        sys.stderr.reported.clear()
         bpy.ops.wm.read_factory_settings(use_empty=True)
         bpy.context.preferences.edit.use_global_undo = True
         bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)

@@ -20,7 +20,7 @@ def step(**arguments):
     It runs within the artist's `law_of`, a context that may compare the states before and after.
     """
 
-    def said(function):
+    def reported(function):
         @functools.wraps(function)
         def say_and_do(self, **values):
             print(
@@ -31,7 +31,7 @@ def step(**arguments):
 
         return rule(**arguments)(say_and_do)
 
-    return said
+    return reported
 
 
 def needs_room(function):

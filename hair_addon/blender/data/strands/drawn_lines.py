@@ -79,7 +79,7 @@ def _read_edges(drawn, depsgraph):
 
 
 def _read_curves(curves):
-    """The same for a Curves datablock: segments between its control points."""
+    """Return (N, 3) float64 points and (L, 2) segments between the control points of a Curves datablock."""
     points = np.empty((len(curves.points), 3), np.float32)
     if len(points):
         curves.attributes["position"].data.foreach_get("vector", points.ravel())

@@ -56,9 +56,9 @@ class Pose:
         return carried(points, self.motion_at(vertices), (vertices[chosen], barycentric[chosen]))
 
     def carry_rooted(self, points, counts, places, chosen):
-        """The same for (N, 3) points of chosen strands with (M,) counts; places: from `rooted`.
+        """Return (N, 3) points of chosen strands with (M,) counts on the deformed surface; places: from `rooted`.
 
-        For processing many strands in parts.
+        Carries as `carry` does, for processing many strands in parts.
         """
         if not self.is_deformed:
             return points

@@ -39,7 +39,7 @@ class StrandChanges:
         program.image("boxes", self.bounds.boxes)
 
     def changed(self, strands: StrandsOnGPU) -> StrandsOnGPU:
-        """The `StrandsOnGPU` after the program, with exact bounds; waits until the program has run."""
+        """Return `strands` as the program leaves them, with exact bounds; waits until the program has run."""
         before = strands.moved.turn if strands.moved else 0
         if self.row_moved:
             moved = Moved(self.moved, self.row_moved, self.moved_rows, before + 1)

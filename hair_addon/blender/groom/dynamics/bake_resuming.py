@@ -56,7 +56,7 @@ def digest_of(guides: Curves, scene: Scene, settings: "guide_simulation.Dynamics
 def resuming(tasks: list[Task], its_scene: Remembered) -> Work[None]:
     """Advance tasks from their first frames to the last valid states, as work in steps."""
     resumable = {id(task): task.done for task in tasks if task.last_number > task.done}
-    frame, said = min(resumable.values(), default=0), time.perf_counter()
+    frame, reported = min(resumable.values(), default=0), time.perf_counter()
     while resumable:
         frame += 1
         due, scene = [task for task in tasks if resumable.get(id(task)) == frame - 1], its_scene.find()
@@ -67,9 +67,9 @@ def resuming(tasks: list[Task], its_scene: Remembered) -> Work[None]:
                 resumable[id(task)] = frame
             else:
                 del resumable[id(task)]
-        if time.perf_counter() - said > _PAUSE:
+        if time.perf_counter() - reported > _PAUSE:
             yield Stage(f"Checking frame {frame}", 0.0)
-            said = time.perf_counter()
+            reported = time.perf_counter()
     for task in tasks:
         if task.state is not None:
             task.done, arrays, seen = task.state

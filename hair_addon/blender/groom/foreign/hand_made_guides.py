@@ -47,7 +47,7 @@ class HandMade:
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
         """[(sentence, values)] to report to the user."""
         far = float(self.rooted.distances.max()) * 1000.0
-        said = (
+        messages = (
             (
                 self.rooted.skipped_count,
                 "{count} curves with zero length or non-finite points were removed.",
@@ -56,7 +56,7 @@ class HandMade:
             (self.rooted.reversed_count, "{count} curves ran from tip to root and were reversed.", {}),
             (self.rooted.far_count, "{count} curves start off the surface, by up to {far:.3g} mm.", {"far": far}),
         )
-        return [(sentence, {"count": count, **values}) for count, sentence, values in said if count]
+        return [(sentence, {"count": count, **values}) for count, sentence, values in messages if count]
 
 
 @dataclass(frozen=True)

@@ -54,23 +54,23 @@ class TransferredGroom:
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
         """[(sentence, values)] to report to the user."""
         places, surface = self.places, name_of(self.guides.surface)
-        said: list[tuple[str, dict[str, Any]]] = []
+        messages: list[tuple[str, dict[str, Any]]] = []
         if places.lost_count:
             sentence = (
                 "{count} of {all} guides could not be placed: {far} too far from the surface, {other} facing away."
             )
             values = {"all": self.guide_count, "far": places.far_count, "other": places.other_side_count}
-            said.append((sentence, {"count": places.lost_count, **values}))
+            messages.append((sentence, {"count": places.lost_count, **values}))
         if self.painted:
-            said.append(
+            messages.append(
                 ('"{name}" has new vertex groups: {names}.', {"name": surface, "names": ", ".join(self.painted)})
             )
         if self.cleared:
             sentence = 'These do not exist on "{name}" and were cleared from the settings: {names}.'
-            said.append((sentence, {"name": surface, "names": ", ".join(self.cleared)}))
+            messages.append((sentence, {"name": surface, "names": ", ".join(self.cleared)}))
         if self.has_overlap:
-            said.append(('The UVs of "{name}" overlap: guides may be on another part of it.', {"name": surface}))
-        return said
+            messages.append(('The UVs of "{name}" overlap: guides may be on another part of it.', {"name": surface}))
+        return messages
 
 
 @whole_changes.whole

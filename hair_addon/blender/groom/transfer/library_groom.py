@@ -66,12 +66,12 @@ class Applied:
 
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
         """[(sentence, values)] to report to the user."""
-        said = [
+        messages = [
             (self.lost_count, "{count} of {all} guides could not be placed on this surface and were left out.", {}),
             (len(self.left), "Not part of the groom: {names}.", {"names": ", ".join(self.left)}),
         ]
         values = {"all": self.guide_count}
-        return [(sentence, {"count": count, **values, **more}) for count, sentence, more in said if count]
+        return [(sentence, {"count": count, **values, **more}) for count, sentence, more in messages if count]
 
 
 def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:

@@ -234,9 +234,9 @@ class VELLUS_OT_import_groom(BrowsedOperator, bpy.types.Operator):
 
     def work(self, context):
         path, surface = paths.resolve(self.filepath), surface_of(context.object)
-        said = Convention(UNITS.get(self.unit), None if self.up == _FOUND else self.up)
+        convention = Convention(UNITS.get(self.unit), None if self.up == _FOUND else self.up)
         plays = self.kind == "HAIR" and bool(bpy.data.filepath)
-        wanted = io.curve_files.Wanted(self.kind, self.object_name, said, plays=plays)
+        wanted = io.curve_files.Wanted(self.kind, self.object_name, convention, plays=plays)
         settings = setting_properties.given_settings(self, DerivationSettings)
         return _importing(path, wanted, surface, settings)
 

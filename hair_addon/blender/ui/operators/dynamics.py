@@ -79,8 +79,8 @@ class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):
         """Warn about baking that needs much of the free memory; Esc stops it."""
         part = memory.share_of_free(byte_count)
         if memory.MUCH < part <= memory.MOST:
-            said = "Baking takes {percent}% of the free memory"
-            self.report({"WARNING"}, report_text(said, percent=round(100.0 * part)))
+            message = "Baking takes {percent}% of the free memory"
+            self.report({"WARNING"}, report_text(message, percent=round(100.0 * part)))
 
     def message(self, made):
         if made.broken:

@@ -73,8 +73,8 @@ def _draw_delivery(layout, context):
         return
     layout.operator("vellus.remove_delivery", icon="X")
     is_outdated = dynamics_notes.is_delivery_outdated(hair)
-    said = "Delivered hair is outdated: deliver again" if is_outdated else "Renders play delivered hair"
-    write(layout, context, interface_text(said), "ERROR" if is_outdated else "INFO")
+    message = "Delivered hair is outdated: deliver again" if is_outdated else "Renders play delivered hair"
+    write(layout, context, interface_text(message), "ERROR" if is_outdated else "INFO")
 
 
 def _settings_column(layout, context):

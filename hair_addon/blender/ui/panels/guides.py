@@ -57,16 +57,16 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
 
 def _draw_combed(layout, context, guides):
     """Show which settings have no effect on combed guides."""
-    said = interface_text("Combed: gray settings have no effect. Guide Tools change guides and keep their combing.")
-    write(layout, context, said, "INFO")
+    message = interface_text("Combed: gray settings have no effect. Guide Tools change guides and keep their combing.")
+    write(layout, context, message, "INFO")
     length = guide_states.of(guides).length / context.scene.unit_settings.scale_length
     shown = bpy.utils.units.to_string("METRIC", "LENGTH", length, precision=3)
     layout.label(text=interface_text("Median length: {length}", length=shown), icon="BLANK1", translate=False)
 
 
 def _draw_hand_made(layout, context, guides):
-    said = interface_text("Hand-made guides: settings do not apply, and they are never regenerated.")
-    write(layout, context, said, "INFO")
+    message = interface_text("Hand-made guides: settings do not apply, and they are never regenerated.")
+    write(layout, context, message, "INFO")
     layout.label(text=interface_text("{count} guides", count=len(guides.curves)), translate=False)
     setting_rows.row(layout, guides.vellus, "is_live")
     write_stale(layout, context, guides.vellus)

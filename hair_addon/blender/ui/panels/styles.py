@@ -108,8 +108,8 @@ def _draw_points(layout, context, hair):
     except HairError:  # already shown as the status of the hair
         return
     if wanted > present:
-        said = interface_text("Smooth curls need {wanted} points per strand.", wanted=wanted)
-        write(layout, context, said, "INFO")
+        message = interface_text("Smooth curls need {wanted} points per strand.", wanted=wanted)
+        write(layout, context, message, "INFO")
         layout.operator("vellus.use_points")
 
 

@@ -25,8 +25,8 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
         layout = split(self.layout)
         drawn = line_drawing.drawn_for(context.object)
         if drawn is not None:
-            said = "Draw lines on the surface. They take effect immediately."
-            write(layout, context, interface_text(said), "INFO")
+            message = "Draw lines on the surface. They take effect immediately."
+            write(layout, context, interface_text(message), "INFO")
             name = "vellus.draw_parting" if drawn.vellus.kind == "HAIR" else "vellus.draw_flow"
             layout.operator(name, text="Stop Drawing", icon="CHECKMARK")
             return

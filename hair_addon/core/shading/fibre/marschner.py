@@ -255,7 +255,7 @@ class Caustic:
         )
 
     def rows(self, index: slice | np.ndarray) -> "Caustic":
-        """The same for some of the cosines."""
+        """Return the caustics of some of the cosines."""
         return Caustic(self.phi_c[index], self.fade[index], self.area[index], self.width)
 
     def kept(self, phi: Values) -> np.ndarray:

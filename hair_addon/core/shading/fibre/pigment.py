@@ -53,7 +53,7 @@ def color_of_scattering(color: ArrayLike, scattering: Values) -> np.ndarray:
 
 
 def color_from_falloff(sigma_a: ArrayLike, falloff: Values) -> np.ndarray:
-    """The same from the `color_falloff` of that roughness."""
+    """The colour of many fibres of sigma_a (..., 3) by the `color_falloff` of their azimuthal roughness."""
     return np.exp(-falloff * np.sqrt(sigma_a))
 
 

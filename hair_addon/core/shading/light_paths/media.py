@@ -83,7 +83,7 @@ def medium_of(
 
 
 def unlit_medium_of(grid: StrandGrid, mesh: wp.Mesh | None) -> Medium:
-    """The same of a mesh whose triangles only hide what is behind them."""
+    """Return the `Medium` of strands and a mesh whose triangles only hide what is behind them."""
     corner_count = 0 if mesh is None else len(mesh.indices)
     return medium_of(grid, mesh, np.zeros((corner_count, 3)), np.zeros((corner_count // 3, 3)))
 

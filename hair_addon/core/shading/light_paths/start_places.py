@@ -178,7 +178,7 @@ def of_seen(
 
 
 def hashed(values: np.ndarray, seed: int, number: int | np.ndarray = 0) -> np.ndarray:
-    """(N,) uint32 of (N,) whole numbers, a seed and a second (N,) [Steele14, the finalizer of their generator]."""
+    """Return (N,) uint32 hashes of (N,) integers, a seed and second (N,) integers: the finalizer of [Steele14]."""
     bits = np.asarray(values).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     bits = bits + np.asarray(number).astype(np.uint64) * np.uint64(0xD1B54A32D192ED03)
     bits = bits + np.uint64((seed * 0x8CB92BA72F3D8DD7) % 2**64)

@@ -365,8 +365,8 @@ REFUSED = {
 def test_invalid_partings_are_refused(guides, ground, case):
     make, settings, words = REFUSED[case]
     make(ground)
-    said = refusal(**settings)
-    assert words in said and said.count("\n") <= 1
+    reported = refusal(**settings)
+    assert words in reported and reported.count("\n") <= 1
 
 
 def test_a_line_that_goes_missing_leaves_the_hair(guides):

@@ -77,7 +77,7 @@ def test_strands_are_where_warp_carries_them(blender, rooted):
 
 
 def test_strands_that_begin_apart_from_their_places_are_carried_to_these(blender, rooted):
-    """As on a cage; of strands at rest nothing changes."""
+    """Strands are carried to places apart from their first points, as on a cage; strands at rest do not change."""
     vertices, faces, places, points = rooted
     slides = np.random.default_rng(3).normal(scale=0.02, size=(len(points), 3)).astype(np.float32)
     slides[::3] = 0.0

@@ -131,7 +131,7 @@ def test_an_edit_leaves_where_strands_were(blender, rng):
 
 
 def test_much_hair_keeps_no_second_texture(blender, rng, monkeypatch):
-    """Where its strands were is not known then, as after two changes at once."""
+    """Former points of much hair are unknown, as after two changes at once."""
     monkeypatch.setattr(strand_changes, "MOST_MOVED", STRANDS * 9 - 1)
     binding, guides = bound_hair(rng, 9, 4)
     wanted = by_warp(binding, guides, np.eye(3))

@@ -48,7 +48,7 @@ def files_of(guides):
     return {path.name: path.read_bytes() for path in folder.glob("*.npz")}
 
 
-def said(guides, *frames):
+def reported(guides, *frames):
     for frame in frames:
         bpy.context.scene.frame_set(frame)
     return dynamics_state.state_of(guides.data)
@@ -69,36 +69,36 @@ def lift_ball(frame):
         ball.keyframe_insert("location", frame=number)
 
 
-def test_frames_of_another_animation_are_said(guides):
+def test_frames_of_another_animation_are_reported(guides):
     bake(guides, 20)
-    assert said(guides, 1, 5, 12, 20)[0] == "Frames {first} to {last} are baked"
+    assert reported(guides, 1, 5, 12, 20)[0] == "Frames {first} to {last} are baked"
     turn(0.3, 16)
-    assert said(guides, *range(1, 21)) == (
+    assert reported(guides, *range(1, 21)) == (
         "Frames from {frame} on are baked with another animation of the surface: bake again",
         {"frame": 12},
     )
     turn(0.0, 16)
-    assert said(guides, *range(1, 21))[0] == "Frames {first} to {last} are baked"
+    assert reported(guides, *range(1, 21))[0] == "Frames {first} to {last} are baked"
     lift_ball(6)
     sentence = "Frames from {frame} on are baked with other colliders, forces or keys: bake again"
-    assert said(guides, *range(1, 21)) == (sentence, {"frame": 7})
+    assert reported(guides, *range(1, 21)) == (sentence, {"frame": 7})
     bake(guides, 20)
-    assert said(guides, *range(1, 21))[0] == "Frames {first} to {last} are baked"
+    assert reported(guides, *range(1, 21))[0] == "Frames {first} to {last} are baked"
     bpy.context.scene.gravity.z = -5.0
-    assert said(guides, 9, 4) == (sentence, {"frame": 4})
+    assert reported(guides, 9, 4) == (sentence, {"frame": 4})
 
 
-def test_other_keys_of_a_setting_are_said(guides):
+def test_other_keys_of_a_setting_are_reported(guides):
     settings = guides.data.vellus.dynamics
     for frame, drag in ((6, 1.0), (12, 2.0)):
         settings.air_drag = drag
         settings.keyframe_insert("air_drag", frame=frame)
     bake(guides, 20)
-    assert said(guides, *range(1, 21))[0] == "Frames {first} to {last} are baked"
+    assert reported(guides, *range(1, 21))[0] == "Frames {first} to {last} are baked"
     settings.air_drag = 3.0
     settings.keyframe_insert("air_drag", frame=12)
     sentence = "Frames from {frame} on are baked with other colliders, forces or keys: bake again"
-    assert said(guides, *range(1, 21)) == (sentence, {"frame": 7})
+    assert reported(guides, *range(1, 21)) == (sentence, {"frame": 7})
 
 
 def test_baked_frames_are_of_the_same_animation_in_another_session(guides, tmp_path):
@@ -107,7 +107,7 @@ def test_baked_frames_are_of_the_same_animation_in_another_session(guides, tmp_p
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     guides = bpy.data.objects["Guides"]
-    assert said(guides, *range(1, 7))[0] == "Frames {first} to {last} are baked"
+    assert reported(guides, *range(1, 7))[0] == "Frames {first} to {last} are baked"
     assert bake(guides, 6) == 0
 
 
@@ -153,14 +153,14 @@ def test_baking_goes_on_with_a_collider_that_stopped(guides):
 
 def test_what_is_said_is_kept_while_baked_frames_play(guides, monkeypatch):
     bake(guides, 8)
-    said(guides, 1, 2)
+    reported(guides, 1, 2)
     asked, key_of = [], guide_baking.key_of
     monkeypatch.setattr(guide_baking, "key_of", lambda *given: asked.append(given) or key_of(*given))
-    assert said(guides, *range(3, 9))[0] == "Frames {first} to {last} are baked"
+    assert reported(guides, *range(3, 9))[0] == "Frames {first} to {last} are baked"
     assert not asked
     guides.data.vellus.dynamics.damping = 0.1
-    assert "with other settings or guides" in said(guides, 5)[0]
+    assert "with other settings or guides" in reported(guides, 5)[0]
     guides.data.vellus.dynamics.damping = 0.005
     moved = np.array([0.0, 0.0, 0.1], np.float32) + guides.data.attributes["position"].data[40].vector
     guides.data.attributes["position"].data[40].vector = moved
-    assert "with other settings or guides" in said(guides, 5)[0]
+    assert "with other settings or guides" in reported(guides, 5)[0]

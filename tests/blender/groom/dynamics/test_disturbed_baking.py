@@ -82,7 +82,7 @@ def leave_edit_mode():
 
 @pytest.fixture
 def ball(guides):
-    """What the guides collide with."""
+    """Return the object that guides collide with."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=0.5, location=(0.9, 0.0, 0.0))
     body = bpy.data.collections.new("Body")
     body.objects.link(bpy.context.object)
@@ -161,7 +161,7 @@ def test_baking_ends_with_a_sentence_and_keeps_its_frames(guides, disturb, sente
 
 
 @pytest.mark.usefixtures("made_anew")
-def test_a_keyed_setting_that_becomes_no_number_is_told_and_hair_stays(guides, hair, monkeypatch):
+def test_a_keyed_setting_that_becomes_no_number_is_reported_and_hair_stays(guides, hair, monkeypatch):
     """While it plays: baked frames are shown, and others as combed, until the setting is a number again."""
     combed = points(hair)
     bake(guides)

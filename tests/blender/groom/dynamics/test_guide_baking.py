@@ -170,7 +170,7 @@ def test_a_frame_that_is_missing_is_as_combed(swung):
 
 
 @pytest.mark.parametrize("change", ["settings", "guides"])
-def test_what_has_changed_since_is_said(swung, change):
+def test_what_has_changed_since_is_shown(swung, change):
     guides, _hair = swung
     bake(guides)
     bpy.context.scene.frame_set(4)
@@ -185,7 +185,7 @@ def test_what_has_changed_since_is_said(swung, change):
 
 
 def test_a_moved_part_line_outdates_what_was_baked(swung):
-    """Not in other frames, nor where it divides the guides as before; nor is it played without."""
+    """Frames are valid while the line divides guides as it did in the bake; without the line, baking is refused."""
     guides, hair = swung
     unparted = guide_baking.key_of(guides.data, bpy.context.scene)
     line = draw_line((0.0, -0.9, 1.2), (0.0, 0.9, 1.2))
@@ -251,7 +251,7 @@ def test_a_part_line_that_the_deformed_surface_leaves_behind_outdates_nothing(sw
 @even_guides
 @pytest.mark.parametrize("is_parted", [True, False])
 def test_guides_do_not_feel_those_beyond_a_part_line(swung, is_parted):
-    """Where these are combed does not matter, but for the rounding of sums in mean masses.
+    """The combing of guides beyond the line has no effect, but for rounding in sums of mean masses.
 
     Without contact: guides that a surface pushes buckle, by which rounding grows threefold in a frame.
     """

@@ -108,7 +108,7 @@ def test_draped_guides_are_as_wet_as_the_mask_says(hair, swung):
 
 
 def test_baked_frames_follow_from_the_mask(hair, swung):
-    """Also where keys move its amount, and where only a lesser style changes."""
+    """Also if keys animate the amount, and if only a weaker style changes."""
     scene = bpy.context.scene
     paint(1.0)
     api.add_style(hair, api.Wet(lock=0.4, mask="rain"))

@@ -185,7 +185,7 @@ def test_strands_whose_mesh_was_deleted_say_so(kept, sphere, capfd):
 
 @pytest.mark.parametrize("is_overridden", [False, True])
 def test_linked_strands_follow_simulated_guides_and_come_back(kept, tmp_path, is_overridden):
-    """As other hair of a linked character does; nothing of it is kept in the file that links it."""
+    """They behave like other hair of a linked character: nothing of it is stored in the file that links it."""
     path = tmp_path / "character.blend"
     bpy.data.libraries.write(str(path), {kept})
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

@@ -28,13 +28,13 @@ def strands(sphere, rng):
 
 @pytest.fixture
 def kept(sphere, strands):
-    """The same used as hair."""
+    """Return the same curves, used as hair."""
     use(sphere, strands)
     return strands
 
 
 def regenerate(hair_object):
-    """What Regenerate Strands does, whose settings are the hair's own in a window."""
+    """Regenerate strands with the hair's own settings, as in a window."""
     pipeline.interpolate_hair(*pipeline.inputs_of(hair_object.data), scene.present_depsgraph(), hair_object.data)
 
 

@@ -257,7 +257,7 @@ def test_a_mask_from_a_selection_is_replaced_by_the_next(styled):
     assert not np.allclose(lengths(), first)
 
 
-def test_without_a_selection_the_reason_is_said(styled):
+def test_without_a_selection_the_reason_is_shown(styled):
     with pytest.raises(RuntimeError, match="Select guides"):
         bpy.ops.vellus.mask_from_selection()
     guides = bpy.data.objects["Guides"].data

@@ -139,7 +139,7 @@ def test_masks_that_the_mesh_lacks_are_transferred(hair, sphere, capfd):
     assert curves.first_points(made.data)[:, 2].min() > -0.05
 
 
-def test_names_that_neither_mesh_has_are_cleared_and_said(hair, capfd):
+def test_names_that_neither_mesh_has_are_cleared_and_reported(hair, capfd):
     hair.data.vellus.styles[0].curl.mask = "elsewhere"
     guides_object(hair).data.attributes.new("elsewhere", "FLOAT", "CURVE")
     hair.data.vellus.hair.part_lines = ""
@@ -163,15 +163,15 @@ def test_lengths_of_dynamics_grow_with_the_surface(hair, scales):
     assert after.bend_stiffness == 5.0
 
 
-def test_guides_without_a_place_are_left_out_and_said(hair, capfd):
+def test_guides_without_a_place_are_left_out_and_reported(hair, capfd):
     target = other_sphere(3)
     for vertex in target.data.vertices:
         vertex.co.x = max(vertex.co.x, 0.0)
     update()
     _made, guides = transfer(target, hair, alignment="LOCAL", reach=0.01)
-    said = capfd.readouterr().out
+    reported = capfd.readouterr().out
     assert 0 < len(guides.data.curves) < GUIDES
-    assert f"{GUIDES - len(guides.data.curves)} of {GUIDES} guides could not be placed" in said
+    assert f"{GUIDES - len(guides.data.curves)} of {GUIDES} guides could not be placed" in reported
 
 
 @pytest.mark.parametrize("kind", ["groups", "empties"])

@@ -47,7 +47,7 @@ def pixels_of(path):
 
 
 def state():
-    """What the button may change, by name."""
+    """Return the parts of the file that the button may change, by name."""
     trees = [(tree.name, sorted(node.name for node in tree.nodes), links_of(tree)) for tree in bpy.data.node_groups]
     objects = [(o.name, [getattr(o, ray) for ray in RAYS], sorted(o.keys())) for o in bpy.data.objects]
     scene = bpy.context.scene

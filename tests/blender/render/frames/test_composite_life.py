@@ -64,7 +64,7 @@ def test_deleting_the_hair_s_scene_turns_it_off(composited):
 
 
 def test_a_file_hides_linked_hair_as_soon_as_it_is_open(composited, tmp_path):
-    """Whose ray visibility this file does not store."""
+    """The ray visibility of linked hair is not stored in this file."""
     bpy.ops.vellus.toggle_composite()
     bpy.data.libraries.write(str(tmp_path / "library.blend"), {composited})
     with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_there, here):
@@ -122,7 +122,7 @@ def test_the_first_view_layer_that_is_rendered_has_the_surfaces(composited):
 
 
 def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composited, tmp_path, capfd):
-    """And a window says so after the render, which Blender does not."""
+    """After the render a window shows the message, as Blender shows none."""
     scene = bpy.context.scene
     bpy.data.objects["Guides"].data.vellus.simulates = True
     configure(engine="CYCLES", resolution_x=8, resolution_y=6, film_transparent=True, use_compositing=True)
@@ -141,7 +141,7 @@ def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composite
 
 
 def test_a_scene_of_an_artist_is_never_deleted_or_changed(composited):
-    """Whose scene it is follows from the mark of what was made, not from what the setting points to."""
+    """A scene is the add-on's if it bears its mark, whatever the setting points to."""
     scene = bpy.context.scene
     own = bpy.data.scenes.new("Own")
     own.background_set, own.frame_start = scene, 3

@@ -226,14 +226,14 @@ def test_unsupported_renders_are_reported_in_one_sentence(lit, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("error", "said"),
+    ("error", "reported"),
     [
         (ZeroDivisionError, "could not render this: A sentence"),
         (KeyboardInterrupt, "Canceled: nothing was rendered"),
         (HairError, "A sentence"),
     ],
 )
-def test_an_interrupted_render_writes_no_picture(lit, tmp_path, monkeypatch, error, said):
+def test_an_interrupted_render_writes_no_picture(lit, tmp_path, monkeypatch, error, reported):
     """A defect of ours, Ctrl-C, what the artist can mend: said, in this frame and without going on to the next."""
     calls = []
 
@@ -243,9 +243,9 @@ def test_an_interrupted_render_writes_no_picture(lit, tmp_path, monkeypatch, err
 
     monkeypatch.setattr(film.Film, "add_pass", broken)
     configure(filepath=str(tmp_path / "nothing.png"))
-    with pytest.raises(RuntimeError, match=said):
+    with pytest.raises(RuntimeError, match=reported):
         bpy.ops.render.render(write_still=True)
-    with pytest.raises(RuntimeError, match=said):
+    with pytest.raises(RuntimeError, match=reported):
         bpy.ops.render.render(animation=True)
     assert not list(tmp_path.iterdir())
     assert len(calls) == 2
@@ -312,7 +312,7 @@ def test_hair_that_is_instanced_is_rendered_at_each_place(lit, tmp_path):
 
 
 def test_hair_s_own_modifiers_are_rendered(lit, tmp_path):
-    """As by Cycles: strands that a node group shortens are short."""
+    """Strands that a node group shortens are rendered short, as by Cycles."""
     bpy.context.view_layer.vellus.has_hair_mask = True
     before = rendered(tmp_path, film_transparent=True)["Hair Mask"]
     tree = bpy.data.node_groups.new("Short", "GeometryNodeTree")

@@ -34,7 +34,7 @@ def new_picture(kind, size=SIZE):
 
 
 def move(picture, drawn, view):
-    """What a viewport shows of the first pass after something moved."""
+    """Return what a viewport shows of the first pass after something moved."""
     picture.restart(is_moved=True)
     picture.add_pass(drawn, *view)
     return picture.read_shown()

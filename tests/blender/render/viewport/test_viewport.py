@@ -267,7 +267,7 @@ def test_blender_draws_hair_itself_only_where_this_does_not(hair):
 
 
 def blenders_drawing(shown):
-    """What Blender draws of an object: its display, or nothing, of bounds without a shape."""
+    """Return how Blender draws an object: its display type, or nothing for bounds without a shape."""
     shapes = np.empty(len(bpy.data.objects), np.int32)
     bpy.data.objects.foreach_get("display_bounds_type", shapes)
     has_shape = shapes[bpy.data.objects.find(shown.name)] < 4

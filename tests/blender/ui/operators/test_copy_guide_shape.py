@@ -99,9 +99,9 @@ def test_half_an_amount_is_between(groom):
 def test_regions_without_guides_are_refused(groom):
     surface = bpy.data.objects["Sphere"]
     surface.vertex_groups.new(name="empty")
-    for values, said in (
+    for values, reported in (
         ({"source": "empty"}, "No guide is rooted in"),
         ({"source": "right", "target": "empty"}, "no guides to copy to"),
     ):
-        with pytest.raises(RuntimeError, match=said):
+        with pytest.raises(RuntimeError, match=reported):
             bpy.ops.vellus.copy_guide_shape(**values)

@@ -170,7 +170,7 @@ def test_hair_follows_as_it_follows_a_brush(waved, monkeypatch, name):
 
 @pytest.mark.parametrize("name", TOOLS)
 def test_undo_in_a_window_keeps_hair_and_guides_together(waved, monkeypatch, name):
-    """There the hair's Curves are written when an interaction is over, after the undo step was made."""
+    """In a window the hair's Curves are written when an interaction ends, after the undo step was pushed."""
     monkeypatch.setattr(running, "has_window", lambda: True)
     before = points(bpy.data.objects["Guides"]), points(waved)
     use_tool(name)

@@ -38,11 +38,11 @@ def in_world(shown):
 
 
 def test_curves_of_another_program_are_hair_where_they_belong(scene, sphere, lines, tmp_path):
-    """One object a curve, centimeters, Y up: found, or as is said; what is wrong leaves nothing behind."""
+    """One object per curve, centimeters, Y up: detected or as given; errors leave nothing behind."""
     path = tmp_path / "curves.abc"
     of_maya(path, lines)
-    for said in ({}, {"unit": "cm", "up": "Y"}):
-        guides, hair = run(path, guide_count=4, **said)
+    for reported in ({}, {"unit": "cm", "up": "Y"}):
+        guides, hair = run(path, guide_count=4, **reported)
         np.testing.assert_allclose(in_world(hair), lines, atol=1e-6)
         assert hair.data.surface == sphere and len(guides.data.curves) == 4
         radii = np.array([one.value for one in hair.data.attributes["radius"].data])

@@ -28,7 +28,7 @@ def moved(mesh, by):
 
 
 def split(mesh):
-    """The same triangles without shared vertices, as some files have them."""
+    """Return the same triangles without shared vertices, as in some files."""
     return TriMesh(
         mesh.vertices[mesh.triangles].reshape(-1, 3), np.arange(mesh.triangles.size, dtype=np.int32).reshape(-1, 3)
     )

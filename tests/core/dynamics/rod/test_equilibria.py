@@ -27,7 +27,7 @@ def settled(groom, seconds=6):
 @pytest.mark.gate(id="V1")
 @pytest.mark.parametrize(("length", "gate"), [(0.05, 0.0005), (0.1, 0.002), (0.2, 0.0045)])
 def test_a_level_strand_becomes_the_heavy_elastica(length, gate):
-    """Whatever brakes it: drag that is not implicit with gravity would hold a part of the weight."""
+    """Drag has no effect: drag that is not implicit with gravity would hold a part of the weight."""
     simulation = settled(line(length, 25))
     assert largest_error(simulation, heavy_elastica(BENDING, WEIGHT, length, 25), length) < gate
     assert abs(simulation.rods.stretch()).max() < 1e-4

@@ -145,7 +145,7 @@ def test_a_strand_keeps_its_length():
     ("length", "vertex_count", "modulus"), [(0.01, 65, 4.0), (0.02, 65, 4000.0), (0.0512, 33, 4.0), (2.0, 65, 400.0)]
 )
 def test_short_and_stiff_segments_keep_their_length(length, vertex_count, modulus):
-    """Where rounding would make the matrix indefinite if LEAST_INERTIA did not keep frames heavy enough."""
+    """Without LEAST_INERTIA rounding would make their matrix indefinite."""
     settings = replace(FIBRE, youngs_modulus=min(modulus, 1e3), bend_stiffness=max(modulus / 1e3, 1.0))
     groom = np.concatenate([line(length, vertex_count), curl(length, vertex_count, 2, 0.05 * length)])
     simulation = Simulation(groom, settings)

@@ -113,7 +113,7 @@ def test_the_first_highlight_turns_to_the_root_and_a_coat_sharpens_it_alone():
 
 
 def test_transmitted_light_is_half_as_wide_and_inner_reflections_twice():
-    """As Marschner's lobes, measured: the deviation of theta_i + theta_o from the lobe's centre."""
+    """Widths as of Marschner's lobes: the deviation of theta_i + theta_o from the lobe's centre."""
     settings = energy_settings(roughness=0.15, tilt=0.05)
     theta_i = np.linspace(-1.5, 1.5, 6001)
     weights = energy_conserving.m_lobes(theta_i, 0.0, settings) * np.cos(theta_i)[:, None]

@@ -66,7 +66,7 @@ def sun(axis, power=3.0):
 
 
 def found_by(grid, light, seen_in, path_count, seed=0):
-    """What paths find on hair in a view."""
+    """Return what paths find on hair in a view."""
     seen = seen_rays.seen_by(grid, light.corners, seen_in, path_count, seed)
     return gather.gather(grid, light, seen, len(seen.segments), seed)[0]
 
@@ -269,7 +269,7 @@ def test_more_paths_are_taken_where_few_find_light(rng):
 
 
 def test_as_many_more_paths_are_taken_as_are_wanted(rng, monkeypatch):
-    """Where the error is a tenth above what is wanted, a fifth more paths bring it there: they are not doubled."""
+    """For an error a tenth above the target, a fifth more paths reach it: their number is not doubled."""
     grid = grid_of(strands_in_a_box(rng, 1500), (0.1, 0.3, 1.0), voxel_count=2_500)
     behind = surroundings(lamps=sun((0.0, -1.0, 0.0)))
     seen = seen_rays.seen_by(grid, behind.corners, ALONG_Y, 3000)
@@ -335,7 +335,7 @@ def test_white_fur_sends_back_what_a_random_walk_finds(rng):
 
 
 def mean_even(settings, view):
-    """What a fibre sends back of even light."""
+    """Return the part of uniform light that a fibre reflects."""
     return (
         2.0
         * np.pi

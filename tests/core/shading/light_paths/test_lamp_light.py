@@ -74,7 +74,7 @@ def turned(light, angle):
 
 
 def test_a_spot_is_a_point_within_its_cone():
-    """Nothing beyond it, half of the light halfway between the cosines of the cone and of its soft edge's beginning."""
+    """No light beyond the cone; half the light halfway between the cosines of the cone and of its soft edge's start."""
     cos_cone, blend = np.cos(0.6), 0.4
     cosines = {"inside": 1.0, "halfway": cos_cone + 0.5 * blend * (1.0 - cos_cone), "beyond": cos_cone - 0.01}
     found = {}

@@ -34,7 +34,7 @@ def random_angles(rng):
 
 @pytest.mark.parametrize("position", [0.0, 0.3, 0.5, 1.0])
 def test_dyed_hair_scatters_as_hair_of_that_colour(rng, position):
-    """Where all strands around have one absorption, its own tables say what they do."""
+    """If all strands have one absorption, tables of that absorption are the reference."""
     tables = bake(DYED)
     sigma_a = strand_variation.strand_sigma_a(tables.variation, 0.5, position)
     of_one = exact(tables, sigma_a)

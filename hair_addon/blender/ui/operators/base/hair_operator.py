@@ -50,11 +50,11 @@ class HairOperator:
         """Run `change` and report its message or its `HairError`."""
         try:
             with memory_as_sentence(), whole_changes.whole_change(getattr(context, "object", None)):
-                said = self.change(context)
+                message = self.change(context)
         except HairError as error:
             return self.refuse(error)
-        if said is not None:
-            self.report({"INFO"}, report_text(said[0], **said[1]))
+        if message is not None:
+            self.report({"INFO"}, report_text(message[0], **message[1]))
         return {"FINISHED"}
 
     def refuse(self, error):

@@ -26,7 +26,7 @@ class LongOperator(HairOperator):
     has_run = False  # in this session: its kernels are loaded
     _takes_much = False  # whether the artist has confirmed the memory use of the next run
     _asks = _is_confirming = False
-    _said = ""  # in the status bar
+    _status_text = ""  # in the status bar
 
     def work(self, context):
         """Return the work in steps (core/long_work.py)."""
@@ -81,8 +81,8 @@ class LongOperator(HairOperator):
             if running.job() is not None:
                 raise HairError("Hair is being computed: wait until it is done, or press Esc to cancel.")
             with memory.asking(self._asks):
-                said = run_now(self._whole_work(context))
-            return self._done(said)
+                message = run_now(self._whole_work(context))
+            return self._done(message)
         except memory.MuchMemory as much:
             return self._confirm(context, much)
         except HairError as error:
@@ -118,8 +118,8 @@ class LongOperator(HairOperator):
         """Ask for confirmation of the memory use; Blender executes the operator if confirmed."""
         self._is_confirming = True
         title = interface_text("Use {percent}% of the Free Memory?", percent=much.percent)
-        said = interface_text("These strands take {needed} GB.", needed=much.needed)
-        return context.window_manager.invoke_confirm(self, self._event, title=title, message=said, icon="WARNING")
+        message = interface_text("These strands take {needed} GB.", needed=much.needed)
+        return context.window_manager.invoke_confirm(self, self._event, title=title, message=message, icon="WARNING")
 
     def _begin_as_set(self):
         """Invoke a copy of this operator with the properties that are set."""
@@ -161,9 +161,9 @@ class LongOperator(HairOperator):
             self._end(context, {"CANCELLED"})
             raise
 
-    def _done(self, said):
+    def _done(self, message):
         type(self).has_run = True
-        self.report({"INFO"}, said)
+        self.report({"INFO"}, message)
         return {"FINISHED"}
 
     def _end(self, context, outcome):
@@ -174,11 +174,11 @@ class LongOperator(HairOperator):
     def _show(self, context):
         job = running.job()
         step = interface_text("Canceling" if job.is_stopping else job.step)
-        said = interface_text("{step}: {percent}%    Press Esc to cancel", step=step, percent=round(100 * job.part))
+        message = interface_text("{step}: {percent}%    Press Esc to cancel", step=step, percent=round(100 * job.part))
         # A redraw of hair may take as long as the computation: redraw only on changes.
-        if said != self._said:
-            self._said = said
-            context.workspace.status_text_set(said)
+        if message != self._status_text:
+            self._status_text = message
+            context.workspace.status_text_set(message)
             _redraw(context)
 
 
