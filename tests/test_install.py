@@ -69,8 +69,8 @@ def walk(extension, bare_python, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def used(walk):
-    """Return what the operators made."""
-    return walk("operators")
+    """Return what the operators and scripts made, in one Blender."""
+    return walk("use")
 
 
 def test_zip_holds_what_blender_runs_and_nothing_else(extension):
@@ -111,19 +111,20 @@ def test_installs_and_enables(walk):
 
 
 def test_installed_operators_run(walk, used):
-    assert used["results"] == [["FINISHED"]] * 5
-    assert used["curves"] == {"Guides": 30, "Hair": 300}
-    assert used["finite"]
+    made = used["operators"]
+    assert made["results"] == [["FINISHED"]] * 5
+    assert made["curves"] == {"Guides": 30, "Hair": 300}
+    assert made["finite"]
     names = ("m", "n", "n_trt", "n_res", "dual", "n_g", "n_g_trt")
-    assert used["tables"] == sorted(f"{name}.exr" for name in names)
-    assert used["cached"] == ["n.exr"]  # what the picture was drawn with
-    width, height, contrast = used["picture"]
+    assert made["tables"] == sorted(f"{name}.exr" for name in names)
+    assert made["cached"] == ["n.exr"]  # what the picture was drawn with
+    width, height, contrast = made["picture"]
     assert (width, height) == (160, 120) and contrast > 0.01
-    assert all(Path(wheel).is_relative_to(walk.profile) for wheel in used["wheels"])
+    assert all(Path(wheel).is_relative_to(walk.profile) for wheel in made["wheels"])
 
 
-def test_code_of_readme_and_docstrings_runs_in_the_extension(walk, used):
-    ran = walk("scripts")
+def test_code_of_readme_and_docstrings_runs_in_the_extension(used):
+    ran = used["scripts"]
     assert ran["failed"] == []
     assert (ran["blocks"], ran["examples"] > 60) == (2, True)
 

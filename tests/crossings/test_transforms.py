@@ -139,7 +139,7 @@ CHANGES = {
 SELECTED_TOO = [name for name in CHANGES if "and hair" in name]
 
 
-@pytest.mark.parametrize(("change", "place"), pairs(CHANGES, PLACES), indirect=["place"])
+@pytest.mark.parametrize(("change", "place"), pairs(CHANGES, PLACES, 5), indirect=["place"])
 def test_hair_goes_wherever_its_surface_goes(place, change):
     if place == "on a sheared rig" and change in SELECTED_TOO:
         pytest.skip("Blender itself distorts what is selected")

@@ -18,7 +18,8 @@ from tests.support import file_digest, folder_digest
 from tests.support.exchange.imported import curves_object, lines_on, select
 
 PACKAGE = str(Path(whole_changes.__file__).parents[1])
-PARTS = (0.3, 0.75, 0.93, 1.0)  # of the calls of an operator, where it fails
+# Parts of the calls of an operator, where it fails: for one operator after another.
+FEW_PARTS = ((0.3, 1.0), (0.75, 0.93))
 MANY_PARTS = tuple((n + 1) / 30 for n in range(30))
 
 
@@ -180,7 +181,15 @@ OTHERS = {
     *("select_guides", "select_hair", "smooth_guides", "stiffen_dynamics", "toggle_drawing", "trim_guides"),
     *("update_hair", "use_points", "use_uv_map"),
 }
-CASES = [pytest.param(name, *case, id=f"{name}-{case[0].__name__}") for name, cases in MAKING.items() for case in cases]
+CASES = [(name, *case) for name, cases in MAKING.items() for case in cases]
+
+
+def cases():
+    """Each of `CASES`, failing at two parts of its calls; that it fails at many takes long."""
+    for place, case in enumerate(CASES):
+        name = f"{case[0]}-{case[1].__name__}"
+        yield pytest.param(*case, FEW_PARTS[place % 2], id=f"{name}-few")
+        yield pytest.param(*case, MANY_PARTS, id=f"{name}-many", marks=pytest.mark.long)
 
 
 def test_every_operator_is_one_that_makes_data_or_not():
@@ -232,8 +241,7 @@ def called_back(frame):
     return False
 
 
-@pytest.mark.parametrize("parts", [PARTS, pytest.param(MANY_PARTS, marks=pytest.mark.long)], ids=["few", "many"])
-@pytest.mark.parametrize("name, begin, settings", CASES)
+@pytest.mark.parametrize("name, begin, settings, parts", cases())
 def test_what_fails_half_way_leaves_nothing(hair, tmp_path, name, begin, settings, parts):
     """Any function of the add-on raises what nobody expects: the file is as before, and no file is half written."""
     FOLDER[:] = [tmp_path]

@@ -104,7 +104,7 @@ def scene_files(blender, tmp_path_factory):
 
 
 # Side of the maps of world light in texels, and the least number of strands drawn into them: coarse maps resolve fewer.
-FINE_WORLD, COARSE_WORLD = (ambient_visibility._SIZE, ambient_visibility._LEAST_STRANDS), (64, 600)
+FINE_WORLD, COARSE_WORLD = (ambient_visibility._SIZE, ambient_visibility._LEAST_STRANDS), (32, 300)
 
 
 def set_world_maps(patch, size, least_strands):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Use of the installed extension as an artist does, in a Python with only the bpy wheel.
 
-    python -I walk_installed.py install|operators|scripts|twice ZIP FOLDER
+    python -I walk_installed.py install|use|twice ZIP FOLDER
 
 Prints one line of JSON at the end, which test_install.py checks.
 """
@@ -42,10 +42,15 @@ def install(zip_path, _folder):
     return {"result": list(result), "enabled": MODULE in bpy.context.preferences.addons}
 
 
-def operators(_zip_path, folder):
-    """Call operators for everything from mesh to pixels."""
+def use(_zip_path, folder):
+    """Run operators, then scripts, in one Blender: each start unpacks the wheels of the extension for four seconds."""
     gpu.init()
     bpy.ops.preferences.addon_enable(module=MODULE)
+    return {"operators": _operators(folder), "scripts": _scripts(folder)}
+
+
+def _operators(folder):
+    """Call operators for everything from mesh to pixels."""
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     camera = bpy.context.scene.camera
     camera.location, camera.rotation_euler = (0.0, -0.6, 0.0), (math.radians(90.0), 0.0, 0.0)
@@ -91,13 +96,13 @@ def _positions(curves):
     return values
 
 
-def scripts(_zip_path, folder):
+def _scripts(folder):
     """Run the code of docs/scripts.md and of docstrings, with the import documented for the extension."""
-    bpy.ops.preferences.addon_enable(module=MODULE)
     api = importlib.import_module(f"{MODULE}.hair_addon.api")
     import warp  # there since the extension was enabled
 
     warp.config.log_level = warp.LOG_WARNING  # what it says of loaded kernels is no part of an example
+    _draw_coarse_shadows()
     os.chdir(folder)
     ran = 0
     for block in re.findall(r"```python\n(.*?)```", SCRIPTS.read_text(encoding="utf-8"), re.DOTALL):
@@ -111,6 +116,7 @@ def scripts(_zip_path, folder):
     camera.location, camera.rotation_euler = (0.0, -6.0, 0.0), (math.radians(90.0), 0.0, 0.0)
     bpy.context.collection.objects.link(camera)
     bpy.context.scene.camera = camera
+    bpy.context.scene.vellus.multiple_scattering = "DUAL"  # without tracing light paths, as the code before did
     bpy.ops.wm.save_as_mainfile(filepath="shot.blend")
     failed, runner = [], doctest.DocTestRunner(verbose=False)
     for example in _examples(api):
@@ -119,6 +125,14 @@ def scripts(_zip_path, folder):
         runner.run(example, out=reported.append)
         failed += reported
     return {"blocks": ran, "examples": runner.tries, "failed": failed}
+
+
+def _draw_coarse_shadows():
+    """As `scenes.shrink_shadows`: examples are small pictures, and their maps take longer than all else."""
+    gpu_package = f"{MODULE}.hair_addon.blender.gpu"
+    world = importlib.import_module(f"{gpu_package}.ambient_visibility")
+    world._SIZE, world._LEAST_STRANDS = 32, 300
+    importlib.import_module(f"{gpu_package}.scene_lights")._MAP_SIZE = 128
 
 
 def _examples(api):
@@ -183,7 +197,7 @@ def _count_draw_handlers():
 
 if __name__ == "__main__":
     verb, zip_argument, folder_argument = sys.argv[1:]
-    verbs = {"install": install, "operators": operators, "scripts": scripts, "twice": twice}
+    verbs = {"install": install, "use": use, "twice": twice}
     outcome = verbs[verb](zip_argument, Path(folder_argument))
     if verb == "install":
         bpy.ops.wm.save_userpref()
