@@ -10,10 +10,12 @@ import argparse
 import hashlib
 import importlib
 import json
+import multiprocessing
 import os
 import platform
 import shutil
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,10 +47,20 @@ _X86 = (
     Processor("x86-64-v3", _AVX2),
     Processor("x86-64-v2", _AVX),
 )
-# Packages whose results are compared bit for bit between processors, by tests/support/any_processor.py.
-COMPARED = tuple(
-    f"core.{name}." for name in ("dynamics.rod", "geometry", "grooming", "interpolation", "placement", "styling")
-)
+# Modules whose results are compared bit for bit between processors, by tests/support/any_processor.py, which tells of
+# others that it loads.
+_COMPARED = {
+    "dynamics.rod": ("rod_solver", "rods"),
+    "geometry": (
+        *("bspline", "closest_point", "connected_components", "counting_sort", "fingerprint", "hash_grid"),
+        *("root_frames", "sampling"),
+    ),
+    "grooming": ("guide_growth",),
+    "interpolation": ("clump_centers", "guide_weights", "interpolation"),
+    "placement": ("exact_cells", "farthest", "preconditioner", "sampled_cells", "voronoi"),
+    "styling": ("stack", "steps"),
+}
+COMPARED = {f"core.{package}.{name}" for package, names in _COMPARED.items() for name in names}
 # Best first.
 PROCESSORS = {"linux-x64": _X86, "windows-x64": _X86, "macos-arm64": (Processor("apple-m1", ()),)}
 
@@ -77,8 +89,42 @@ def sources_digest():
 def compile_into(folder, processors, is_for_tests=False):
     """Write the folder that `compiled_kernels` reads: an index, and each Warp module for each `Processor`.
 
-    is_for_tests: for other processors than this one, compile only the packages that tests compare.
+    is_for_tests: for other processors than this one, compile only the modules that tests compare. Each processor's
+    modules are compiled by a process of their own: a module may take half of its time, which one thread takes.
     """
+    import warp as wp
+
+    wp.config.log_level = wp.LOG_WARNING
+    from hair_addon.core.kernels import compiled_kernels
+
+    features = compiled_kernels.processor_features()
+    here = next((processor for processor in processors if features.issuperset(processor.features)), None)
+    threads = -(-(os.process_cpu_count() or 1) // len(processors))
+    entries = {}
+    with ProcessPoolExecutor(
+        os.process_cpu_count(), multiprocessing.get_context("spawn"), max_tasks_per_child=1
+    ) as pool:
+        jobs = [
+            pool.submit(_compile_for, processor, folder, is_for_tests and processor != here, threads)
+            for processor in processors
+        ]
+        for processor, job in zip(processors, jobs, strict=True):
+            for name, (module_hash, file_digest) in job.result().items():
+                entry = entries.setdefault(name, {"hash": module_hash, "files": {}})
+                if file_digest:
+                    entry["files"][processor.name] = file_digest
+    index = {
+        "sources": sources_digest(),
+        "compiler": compiled_kernels.compiler(),
+        "processors": [{"name": kind.name, "features": sorted(kind.features)} for kind in processors],
+        "modules": entries,
+    }
+    (folder / "README.txt").write_text(README, encoding="utf-8")
+    (folder / compiled_kernels.INDEX).write_text(json.dumps(index, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def _compile_for(processor, folder, is_compared_only, threads):
+    """Write the modules of one `Processor`: {module: (hash, digest of its files, None where it is left out)}."""
     import warp as wp
 
     wp.config.kernel_cache_dir = str(CACHE)
@@ -89,34 +135,23 @@ def compile_into(folder, processors, is_for_tests=False):
     modules = [module for module in _warp_modules() if module.kernels]
     names = {module: compiled_kernels.short_name(module) for module in modules}
     # The hash that a user's Warp computes holds its flags, not the processor that those stand for.
-    entries = {names[m]: {"hash": m.get_module_hash(1).hex(), "files": {}} for m in modules}
+    found = {names[module]: (module.get_module_hash(1).hex(), None) for module in modules}
     native_flags = wp.config.cpu_compiler_flags
-    features = compiled_kernels.processor_features()
-    here = next((processor for processor in processors if features.issuperset(processor.features)), None)
-    for processor in processors:
-        is_whole = processor == here or not is_for_tests
-        wanted = [module for module in modules if is_whole or names[module].startswith(COMPARED)]
-        wp.config.cpu_compiler_flags = native_flags.replace("-march=native", f"-target-cpu {processor.name}")
-        assert wp.config.cpu_compiler_flags != native_flags
-        for module in wanted:
-            module.unload()
-        wp.force_load("cpu", wanted, max_workers=os.process_cpu_count() or 1)
-        for module in wanted:
-            made = Path(wp.config.kernel_cache_dir) / module.get_module_identifier(1)
-            paths = [folder / path for path in compiled_kernels.file_names(names[module], processor.name)]
-            for path, ending in zip(paths, (".o", ".meta"), strict=True):
-                (compiled,) = made.glob(f"*{ending}")
-                path.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(compiled, path)
-            entries[names[module]]["files"][processor.name] = compiled_kernels.digest(*paths)
-    index = {
-        "sources": sources_digest(),
-        "compiler": compiled_kernels.compiler(),
-        "processors": [{"name": kind.name, "features": sorted(kind.features)} for kind in processors],
-        "modules": entries,
-    }
-    (folder / "README.txt").write_text(README, encoding="utf-8")
-    (folder / compiled_kernels.INDEX).write_text(json.dumps(index, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    wp.config.cpu_compiler_flags = native_flags.replace("-march=native", f"-target-cpu {processor.name}")
+    assert wp.config.cpu_compiler_flags != native_flags
+    wanted = [module for module in modules if names[module] in COMPARED or not is_compared_only]
+    for module in wanted:
+        module.unload()
+    wp.force_load("cpu", wanted, max_workers=threads)
+    for module in wanted:
+        made = Path(wp.config.kernel_cache_dir) / module.get_module_identifier(1)
+        paths = [folder / path for path in compiled_kernels.file_names(names[module], processor.name)]
+        compiled = [path for ending in (".o", ".meta") for path in made.glob(f"*{ending}")]
+        for path, its in zip(paths, compiled, strict=True):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(its, path)  # the metadata of all processors, which is the same
+        found[names[module]] = found[names[module]][0], compiled_kernels.digest(*compiled)
+    return found
 
 
 def _warp_modules():

@@ -238,7 +238,7 @@ def run_mounted(mounting, words, folder):
 @needs_mounts
 @pytest.mark.parametrize(
     "kind",
-    [".blend", ".npz", *(pytest.param(kind, marks=pytest.mark.long) for kind in (".usdc", ".abc", ".png", "tables"))],
+    [".npz", *(pytest.param(kind, marks=SLOW) for kind in (".blend", ".usdc", ".abc", ".png", "tables"))],
 )
 def test_a_disk_that_is_really_full(words, tmp_path, kind):
     folder = tmp_path / "disk"
@@ -250,7 +250,7 @@ def test_a_disk_that_is_really_full(words, tmp_path, kind):
 
 
 @needs_mounts
-@pytest.mark.parametrize("kind", [pytest.param(".npz", marks=SLOW), ".exr", "tables", ".json"])
+@pytest.mark.parametrize("kind", [".exr", ".json", *(pytest.param(kind, marks=SLOW) for kind in (".npz", "tables"))])
 def test_a_read_only_folder_is_reported(words, tmp_path, kind):
     folder = tmp_path / "folder"
     folder.mkdir()

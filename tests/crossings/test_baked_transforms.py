@@ -10,6 +10,7 @@ from hair_addon.blender.live import dynamics_state
 from hair_addon.core.long_work import run_now
 from tests.support import placed_hair
 from tests.support.exchange.imported import select
+from tests.support.pairs import pairs
 from tests.support.placed_hair import require_carried, seen
 
 LAST = 4
@@ -55,8 +56,7 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize("place", ["turned", "mirrored", "on a scaled rig"])
+@pytest.mark.parametrize(("change", "place"), pairs(CHANGES, ["turned", "mirrored", "on a scaled rig"]))
 def test_baked_frames_play_where_they_did(baked_files, place, change):
     bpy.ops.wm.open_mainfile(filepath=baked_files(place))
     scene, guides = bpy.context.scene, bpy.data.objects["Hair Guides"].data

@@ -13,6 +13,7 @@ from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
 from tests.support.dynamics.following import assert_follows
+from tests.support.pairs import pairs
 from tests.support.reading import points, write_points
 
 
@@ -57,8 +58,7 @@ def drawn(hair):
     return hair_cache.strands_on_gpu(hair.data).points
 
 
-@pytest.mark.parametrize("strand_count", [40_000, 20])
-@pytest.mark.parametrize("deformer", DEFORMERS)
+@pytest.mark.parametrize(("deformer", "strand_count"), pairs(DEFORMERS, [40_000, 20], 2))
 def test_another_strand_count_on_a_deformed_surface(sphere, window, deformer, strand_count):
     """The picture shows the strands that will be written, carried by their own roots."""
     DEFORMERS[deformer](sphere)

@@ -12,6 +12,7 @@ from hair_addon import api
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.kernels import kernel_cache, kernel_setup
 from hair_addon.core.params import from_surface
+from tests.support import remembered
 from tests.support.commands import run_here
 from tests.support.devices import DEVICE
 from tests.support.reading import points
@@ -87,6 +88,7 @@ def test_hair_covers_its_surface(scene, coarse_shadows, add, side):
 @pytest.fixture
 def kernel_modules(monkeypatch):
     """(loaded, launched): names of the modules that were loaded before work began, and of those that it asked for."""
+    remembered.forget(monkeypatch)
     loaded, launched = set(), set()
     load_together, load = kernel_setup.load, kernel_cache.load
 

@@ -50,7 +50,7 @@ def stand(place):
 
 
 @pytest.mark.parametrize("is_picked", [False, True], ids=["selected", "picked"])
-@pytest.mark.parametrize(("is_deleted", "place"), pairs([False, True], PLACES, 2))
+@pytest.mark.parametrize(("is_deleted", "place"), pairs([False, True], PLACES))
 def test_attached_hair_stays_where_it_is(placed_file, place, is_deleted, is_picked):
     bpy.ops.wm.read_homefile(filepath=placed_file)
     if is_deleted:
@@ -107,7 +107,7 @@ def test_hair_far_from_a_mesh_is_not_attached_to_it(placed_file):
 
 @pytest.mark.parametrize("use", ["use_as_hair", "use_as_guides"])
 @pytest.mark.parametrize(
-    ("own_scale", "place"), pairs([(0.01, 0.01, 0.01), (1.0, 1.0, 1.0), (-50.0, 100.0, 80.0)], PLACES), ids=str
+    ("own_scale", "place"), pairs([(0.01, 0.01, 0.01), (1.0, 1.0, 1.0), (-50.0, 100.0, 80.0)], PLACES, 5), ids=str
 )
 def test_used_curves_keep_their_places_and_widths(placed_file, place, own_scale, use):
     bpy.ops.wm.read_homefile(filepath=placed_file)

@@ -13,6 +13,7 @@ from hair_addon.blender.groom import guide_maps
 from hair_addon.blender.io import groom_files, strand_arrays
 from hair_addon.core.files.groom_curves import closest_guides
 from tests.support.dynamics.following import update
+from tests.support.pairs import pairs
 from tests.support.reading import attribute
 
 GUIDE_COUNT, STRAND_COUNT = 12, 40
@@ -46,8 +47,7 @@ def assert_same(found, expected):
         np.testing.assert_allclose(values, wanted, rtol=0.0, atol=tolerance)
 
 
-@pytest.mark.parametrize("unit", [1.0, 0.01])
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize(("name", "unit"), pairs(FILES, [1.0, 0.01], 2))
 def test_a_groom_comes_back_as_it_was(sphere, scene, tmp_path, name, unit):
     """On a surface that is moved, turned and scaled, in a scene of meters and of centimeters."""
     scene.unit_settings.scale_length = unit

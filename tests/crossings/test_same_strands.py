@@ -24,12 +24,9 @@ POSES = {
 }
 
 
-# The others are those three in part.
+# The others are those two in part.
 @pytest.fixture(
-    params=[
-        pytest.param(name, marks=() if name in {"plain", "stretched", "mirrored"} else pytest.mark.long)
-        for name in POSES
-    ]
+    params=[pytest.param(name, marks=() if name in {"stretched", "mirrored"} else pytest.mark.long) for name in POSES]
 )
 def surface(request, sphere):
     """The sphere, standing in the world in one way or another."""

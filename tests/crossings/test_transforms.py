@@ -195,8 +195,15 @@ def test_styles_are_mirrored_with_the_surface(place):
         require_carried(before, seen())
 
 
-@pytest.mark.parametrize("change", ["apply scale", "apply all", "apply scale to body and hair"])
-@pytest.mark.parametrize("place", ["turned", "mirrored", "uneven", "uneven, subdivided 2"], indirect=True)
+@pytest.mark.parametrize(
+    ("change", "place"),
+    pairs(
+        ["apply scale", "apply all", "apply scale to body and hair"],
+        ["turned", "mirrored", "uneven", "uneven, subdivided 2"],
+        2,
+    ),
+    indirect=["place"],
+)
 def test_strands_stay_as_they_are_seen_where_a_transform_is_applied_to_a_deformed_surface(place, change):
     """They turn with it by other angles in other local coordinates."""
     placed_hair.bend(body())
@@ -235,8 +242,11 @@ def test_changes_without_vellus_are_followed_when_the_file_is_opened(place, chan
     require_carried(before, seen())
 
 
-@pytest.mark.parametrize("change", ["apply all", "apply scale", "origin to cursor"])
-@pytest.mark.parametrize("place", ["turned", "uneven", "mirrored", "on a scaled rig"], indirect=True)
+@pytest.mark.parametrize(
+    ("change", "place"),
+    pairs(["apply all", "apply scale", "origin to cursor"], ["turned", "uneven", "mirrored", "on a scaled rig"]),
+    indirect=["place"],
+)
 def test_undo_and_redo_leave_hair_on_its_surface(place, change):
     bpy.ops.ed.undo_push(message="before")
     before = seen()

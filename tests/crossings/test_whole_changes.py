@@ -241,7 +241,7 @@ def called_back(frame):
     return False
 
 
-@pytest.mark.parametrize("name, begin, settings, parts", cases())
+@pytest.mark.parametrize("name, begin, settings, parts", [*cases()])
 def test_what_fails_half_way_leaves_nothing(hair, tmp_path, name, begin, settings, parts):
     """Any function of the add-on raises what nobody expects: the file is as before, and no file is half written."""
     FOLDER[:] = [tmp_path]

@@ -57,13 +57,29 @@ def use(folder):
         module.unload()
 
 
+def not_from(folder):
+    """The names of modules that are loaded from elsewhere from now on, filled as they are loaded."""
+    use(folder)
+    load, names = compiled_kernels.load, []
+
+    def noting(module, device):
+        is_there = load(module, device)
+        if not is_there:
+            names.append(compiled_kernels.short_name(module))
+        return is_there
+
+    compiled_kernels.load = noting
+    return names
+
+
 def main():
     """Run the command line."""
     wp.config.log_level = wp.LOG_WARNING
+    load = compiled_kernels.load
     for folder in sys.argv[1:] or [""]:
-        if folder:
-            use(folder)
-        print(json.dumps({"laws": laws(), "digests": digests()}), flush=True)
+        compiled_kernels.load = load
+        compiled_here = not_from(folder) if folder else []
+        print(json.dumps({"laws": laws(), "digests": digests(), "compiled here": compiled_here}), flush=True)
 
 
 if __name__ == "__main__":

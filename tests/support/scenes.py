@@ -2,7 +2,7 @@
 """Fixtures: Blender without a window, the registered add-on, and scenes for hair."""
 
 import math
-from functools import lru_cache, partial
+from functools import partial
 from itertools import takewhile
 from types import SimpleNamespace
 
@@ -17,7 +17,7 @@ from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, scene_lights
 from hair_addon.blender.host import running
 from hair_addon.core.grooming.groom import GuideSettings
-from hair_addon.core.shading.tables import albedo, dual_scattering, lookup_tables
+from tests.support import remembered
 from tests.support.exchange.imported import curves_object, lines_on
 from tests.support.guide_tools import wave
 from tests.support.reading import vertex_positions
@@ -35,18 +35,10 @@ def blender():
         hair_addon.unregister()
 
 
-# Pure functions: {(module, name): the function with cached results}.
-REMEMBERED = {
-    (module, name): lru_cache(64)(getattr(module, name))
-    for module, name in ((lookup_tables, "bake"), (dual_scattering, "bake"), (albedo, "azimuthal_moments"))
-}
-
-
 @pytest.fixture(autouse=True)
-def tables_are_remembered(monkeypatch):
-    """Bake tables once per process for equal settings: the add-on clears its own cache with every file."""
-    for (module, name), remembered in REMEMBERED.items():
-        monkeypatch.setattr(module, name, remembered)
+def functions_remember(monkeypatch):
+    """Compute tables and roots once per process: the add-on clears its own caches with every file."""
+    remembered.remember(monkeypatch)
 
 
 # The initial scenes of most tests; each builds on the previous ones.

@@ -35,7 +35,7 @@ def test_it_is_lit_about_as_by_cycles(lit, tmp_path):
     bpy.data.objects["Sphere"].is_holdout = True
     light_up((0.3, 0.3, 0.3))
     bpy.context.view_layer.update()
-    scene.cycles.samples, scene.cycles.use_denoising, scene.eevee.taa_render_samples = 64, False, 4
+    scene.cycles.samples, scene.cycles.use_denoising, scene.eevee.taa_render_samples = 16, False, 4
     (cycles, cover), (eevee, eevee_cover) = (rendered_hair(name, tmp_path) for name in ("CYCLES", "BLENDER_EEVEE"))
     assert eevee_cover == pytest.approx(cover, rel=0.25)
     np.testing.assert_allclose(np.log(eevee / cycles), 0.0, atol=np.log(1.6))

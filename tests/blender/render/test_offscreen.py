@@ -26,6 +26,7 @@ from hair_addon.blender.settings import preferences
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from hair_addon.core.shading.fibre import kajiya_kay
 from hair_addon.core.shading.tables import lookup_tables, strand_tables
+from tests.support.pairs import pairs
 from tests.support.reading import points
 
 
@@ -178,8 +179,7 @@ def test_each_look_is_drawn_from_tables_of_its_own_baked_where_the_user_wants(li
     assert baked == [(lookup_tables, "cuda:3"), (strand_tables, "cuda:3")]
 
 
-@pytest.mark.parametrize("model", ["KAJIYA_KAY", "MARSCHNER"])
-@pytest.mark.parametrize("mode", ["energy", "classic"])
+@pytest.mark.parametrize(("model", "mode"), pairs(["KAJIYA_KAY", "MARSCHNER"], ["energy", "classic"], 2))
 def test_dyed_tips_are_drawn_in_their_colour(lit, model, mode):
     """Under light from everywhere and from the sun: a red dye at the tips, and nothing else, reddens the tips."""
     thicken(lit)

@@ -13,6 +13,7 @@ from hair_addon.blender.gpu import drawing, visibility_buffer
 from hair_addon.blender.host import notices
 from hair_addon.blender.render import drawn_scene, offscreen, scene_drawing
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
+from tests.support.pairs import pairs
 from tests.support.rendering import add_orthographic_camera
 
 SIZE = 48
@@ -109,8 +110,7 @@ def link_image(principled, image, socket="Base Color"):
     return node
 
 
-@pytest.mark.parametrize("metallic", [0.0, 1.0])
-@pytest.mark.parametrize("roughness", [0.15, 0.3, 0.6, 1.0])
+@pytest.mark.parametrize(("roughness", "metallic"), pairs([0.15, 0.3, 0.6, 1.0], [0.0, 1.0], 2))
 def test_a_sphere_reflects_as_in_cycles(roughness, metallic, stage, tmp_path):
     ball(Base_Color=(0.5, 0.25, 0.1, 1.0), Roughness=roughness, Metallic=metallic, IOR=1.6)
     sun(math.radians(50.0), 0.0, math.radians(30.0))
@@ -360,8 +360,7 @@ def test_light_that_samples_share_is_as_bright_below_hair(stage):
     assert deviations[0] < 1.5 * deviations[1]
 
 
-@pytest.mark.parametrize("kind", ["SUN", "POINT", "SPOT", "AREA"])
-@pytest.mark.parametrize("has_hair", [False, True])
+@pytest.mark.parametrize(("kind", "has_hair"), pairs(["SUN", "POINT", "SPOT", "AREA"], [False, True], 2))
 def test_surfaces_cast_shadows_as_in_cycles(kind, has_hair, stage, tmp_path):
     """A box on a floor, as far from hair as can be seen, in the light of one lamp: each block of 4 × 4 pixels."""
     stage.camera.data.ortho_scale = 6.0

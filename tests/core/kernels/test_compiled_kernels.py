@@ -134,6 +134,7 @@ def test_the_same_hair_and_nothing_is_compiled(folders, tmp_path):
 def test_strands_are_the_same_bits_on_every_processor(folders):
     """With the kernels of each kind, and where NumPy, OpenBLAS and the C library take this processor for an old one."""
     best, *others = made_by(*folders)
+    assert [made["compiled here"] for made in (best, *others)] == [[]] * len(folders), "see compile_kernels.COMPARED"
     assert all(sizes == [] for made in (best, *others) for sizes in made["laws"].values())
     for made in (*others, *made_by(folders[-1], environment=os.environ | OLD_PROCESSOR)):
         assert made["digests"] == best["digests"]

@@ -11,6 +11,7 @@ import pytest
 
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.core.grooming import following, groom
+from tests.support.pairs import pairs
 from tests.support.reading import attribute, guide_map, points, write_points
 
 LEAN = math.radians(60.0)
@@ -234,8 +235,7 @@ def test_hair_follows_its_part_line(guides):
     assert bindings.of(hair.data) is bound
 
 
-@pytest.mark.parametrize("kind", LINES)
-@pytest.mark.parametrize("how", ["hide_viewport", "hide_set", "unlinked"])
+@pytest.mark.parametrize(("kind", "how"), pairs(LINES, ["hide_viewport", "hide_set", "unlinked"]))
 def test_a_line_parts_hair_out_of_sight_too(guides, kind, how):
     line = LINES[kind]()
     strands = grown(part_lines="Line")

@@ -12,11 +12,11 @@ from tests.support.counting import counts_of
 from tests.support.dynamics.following import update
 from tests.support.guide_tools import CHOSEN, SHAPING, TOOLS, grown_from_nothing, lengths_of, select_guides, use_tool
 from tests.support.interface.layout import draw_all, redo_panel
+from tests.support.pairs import pairs
 from tests.support.reading import points, snapshot
 
 
-@pytest.mark.parametrize("active", ["Sphere", "Guides", "Hair"])
-@pytest.mark.parametrize("name", TOOLS)
+@pytest.mark.parametrize(("name", "active"), pairs(TOOLS, ["Sphere", "Guides", "Hair"]))
 def test_hair_follows_whatever_is_active(waved, name, active):
     before, strands = points(bpy.data.objects["Guides"]), points(waved)
     bpy.context.view_layer.objects.active = bpy.data.objects[active]
@@ -119,8 +119,7 @@ def test_a_half_selected_guide_changes_by_half(waved):
     np.testing.assert_allclose(lengths_of(after), 0.75 * before, rtol=1e-4)
 
 
-@pytest.mark.parametrize("mode", ["SCULPT_CURVES", "EDIT"])
-@pytest.mark.parametrize("name", TOOLS)
+@pytest.mark.parametrize(("name", "mode"), pairs(TOOLS, ["SCULPT_CURVES", "EDIT"], 2))
 def test_tools_work_where_artists_select(waved, name, mode):
     outside, _strands = use_tool(name)
     bpy.ops.ed.undo()

@@ -9,6 +9,7 @@ from hair_addon.core.shading.fibre.fresnel import bravais_indices
 from hair_addon.core.shading.fibre.pigment import sigma_a_from_melanin
 from hair_addon.core.shading.tables import lookup_tables
 from tests.support import cylinder_tracer
+from tests.support.pairs import share_of
 
 ETA = 1.55
 SIZE = 256
@@ -41,7 +42,7 @@ def assert_close(found, expected, where):
     assert np.all(excess[:, where] < 0.0)
 
 
-@pytest.mark.parametrize("degrees", THETA_D)
+@pytest.mark.parametrize("degrees", share_of(THETA_D, 2))
 def test_texels_are_the_light_that_leaves_through_them(hair, degrees):
     """At the middle of a row even the caustic's own texel agrees: both sides are means over it."""
     sigma_a, tables = hair
@@ -61,7 +62,7 @@ def test_rows_hold_all_the_energy(hair, degrees):
     np.testing.assert_allclose(found, expected, rtol=5e-4, atol=1e-7)
 
 
-@pytest.mark.parametrize("degrees", [10, 33, 55, 70])
+@pytest.mark.parametrize("degrees", share_of([10, 33, 55, 70]))
 def test_half_float_lookups_between_rows(hair, degrees):
     """What a shader reads from half floats with bilinear filtering, away from the caustic."""
     sigma_a, tables = hair
