@@ -5,7 +5,6 @@ tubes of it, and the groom in a library."""
 import pytest
 
 from tests.desktop import walks
-from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
 
@@ -15,13 +14,7 @@ TOOLS = (
 )
 
 
-# Tools draw nothing of their own: Vulkan, by software, takes as long again and is for the long run.
-@pytest.fixture(
-    scope="module",
-    params=[
-        pytest.param(name, marks=pytest.mark.long if name == "vulkan" else ()) for name in desktop_blender.BACKENDS
-    ],
-)
+@pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)
 def walk(request, desktop, extension, new_profile):
     """The `Walk` with one backend."""
     return walks.take(desktop, "guide_tools", extension, new_profile(), request.param, size=(760, 540))

@@ -19,6 +19,11 @@ _COMPLAINT = re.compile(r"Vellus:|Traceback|\w*(Error|Exception)\b(?! \(0x)|<\w+
 # For tests of what is the same with any driver: which parts a walk has with which is told by its file.
 with_opengl = pytest.mark.parametrize("walk", desktop_blender.BACKENDS[:1], indirect=True)
 
+# For walks that draw nothing of their own: Vulkan, in software, takes as long again and is left to the long run.
+LONG_WITH_VULKAN = [
+    pytest.param(name, marks=pytest.mark.long if name == "vulkan" else ()) for name in desktop_blender.BACKENDS
+]
+
 
 class Walk:
     """What came of a walk: `facts` that its script noted, the `log` of all it printed, its pictures in `folder`."""

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 import warp as wp
 
-from hair_addon.core.geometry import transform
+from hair_addon.core.geometry import bspline
 from hair_addon.core.kernels import compiled_kernels
 from tests.support import any_processor
 from tools import build_extension, compile_kernels
@@ -77,7 +77,7 @@ def folder(made, tmp_path, monkeypatch):
 
 
 def loads():
-    return compiled_kernels.load(wp.get_module(transform.__name__), wp.get_device("cpu"))
+    return compiled_kernels.load(wp.get_module(bspline.__name__), wp.get_device("cpu"))
 
 
 def change_index(folder, change):
@@ -199,13 +199,13 @@ def test_another_compiler(folder, part):
 
 
 def test_other_sources(folder):
-    change_index(folder, lambda index: index["modules"]["core.geometry.transform"].update(hash="0" * 64))
+    change_index(folder, lambda index: index["modules"]["core.geometry.bspline"].update(hash="0" * 64))
     assert not loads()
 
 
 def test_other_options(folder, monkeypatch):
     """Compiled kernels are not loaded if options change the code that Warp would compile, such as checks of numbers."""
-    module = wp.get_module(transform.__name__)
+    module = wp.get_module(bspline.__name__)
     monkeypatch.setattr(wp.config, "verify_fp", True)
     module.mark_modified()
     try:
@@ -227,7 +227,7 @@ def test_a_lesser_processor(folder):
 
 def test_a_damaged_file(folder):
     processor, _modules = compiled_kernels._fitting(folder)
-    binary, _meta = compiled_kernels.file_names("core.geometry.transform", processor)
+    binary, _meta = compiled_kernels.file_names("core.geometry.bspline", processor)
     content = bytearray((folder / binary).read_bytes())
     content[len(content) // 2] ^= 1
     (folder / binary).write_bytes(content)

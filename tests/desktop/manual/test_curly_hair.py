@@ -4,7 +4,6 @@
 import pytest
 
 from tests.desktop import walks
-from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
 
@@ -15,7 +14,7 @@ SIZE = (1100, 700)  # of the window [pixels]: software drivers take their time f
 PARTS = {"opengl": ("cut", "curl", "beyond"), "vulkan": ("cut", "curl")}
 
 
-@pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
+@pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)
 def walk(request, desktop, extension, new_profile):
     """The `Walk` with one backend."""
     parts = PARTS[request.param]

@@ -4,14 +4,13 @@
 import pytest
 
 from tests.desktop import walks
-from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
 
 SIZE = (1100, 700)  # of the window [pixels]: software drivers take their time for each
 
 
-@pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
+@pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)
 def walk(request, desktop, extension, tmp_path_factory):
     """The `Walk` with one backend."""
     profile = tmp_path_factory.mktemp("profile")
