@@ -13,6 +13,7 @@ from hair_addon import api
 from hair_addon.blender.groom import bindings
 from hair_addon.core.params import Settings, declared
 from hair_addon.core.styling.kinds import KINDS, OFFERS
+from tests.support.pairs import share_of
 from tests.support.reading import points
 
 FEW, MANY = 3, 8
@@ -105,7 +106,7 @@ class Changing:
 OFFER_OF_KINDS = {offer.kind: name for name, offer in OFFERS.items()}.values()
 
 
-@pytest.mark.parametrize("offer", OFFER_OF_KINDS)
+@pytest.mark.parametrize("offer", share_of(OFFER_OF_KINDS, 2))
 def test_changes_of_a_style_keep_nothing_of_those_before(hair, offer):
     changing = Changing(hair, offer, 40)
     for begin in (changing.dragged, changing.keyed, changing.driven):

@@ -10,9 +10,10 @@ from hair_addon.blender.host import running
 from hair_addon.blender.render import drawn_scene, hair_cache, refused_strands
 from hair_addon.core.errors import HairError
 from tests.support.interface.layout import draw
+from tests.support.pairs import share_of
 
 
-@pytest.mark.parametrize("raised", [RuntimeError, ValueError, MemoryError])
+@pytest.mark.parametrize("raised", share_of([RuntimeError, ValueError, MemoryError], 2))
 def test_a_driver_that_refuses_a_texture_is_one_sentence(hair, raised, monkeypatch, capsys):
     tries, real = [], gpu.types.GPUTexture
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from hair_addon.core.dynamics.rod.rod_solver import EMPTY, FINISH, PREDICT, SOLVE, Surroundings
 from tests.support.dynamics.rod_contact import Ball, Plane, advance_touching, planes_of
 from tests.support.dynamics.rods import FIBRE, GRAVITY, Simulation, curl, in_lanes, line
+from tests.support.pairs import pairs
 
 KEEP = 5e-4  # [m]
 
@@ -117,11 +118,10 @@ def test_a_strand_around_a_cylinder_holds_as_a_capstan(substeps, gate):
 
 
 INCLINE = Plane((0.5, 0.0, np.cos(np.pi / 6.0)))
-STRESS = [(vertex_count, substeps) for vertex_count in (11, 41) for substeps in (2, 4, 8)]
 
 
 @pytest.mark.gate(id="V16")
-@pytest.mark.parametrize("vertex_count,substeps", STRESS)
+@pytest.mark.parametrize(("vertex_count", "substeps"), pairs([11, 41], [2, 4, 8], 2))
 def test_strands_that_fall_on_something_stay_outside_and_whole(vertex_count, substeps):
     """Three shapes, friction 0 to 2, stiffness over six decades, on a plane, an incline and a ball: 648 strands."""
     angle = np.linspace(0.0, 1.5, vertex_count)

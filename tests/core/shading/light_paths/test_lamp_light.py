@@ -21,6 +21,7 @@ from tests.core.shading.light_paths.test_gather import (
     strands_in_a_box,
     surroundings,
 )
+from tests.support.pairs import share_of
 
 wp.set_module_options({"enable_backward": False})
 
@@ -33,7 +34,7 @@ def lamp(kind, distance, radius, power=1.0):
     return found
 
 
-@pytest.mark.parametrize("kind", [lamps.SUN, lamps.POINT, lamps.AREA])
+@pytest.mark.parametrize("kind", share_of([lamps.SUN, lamps.POINT, lamps.AREA], 2))
 def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
     """Hair in a cone of light: a lamp far off, and a world with the radiance of its disk in each direction."""
     rough = lookup_tables.Settings(mode="energy", roughness=0.8, radial_roughness=0.8)
