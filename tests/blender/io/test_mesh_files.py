@@ -186,6 +186,8 @@ def test_arrays_are_in_metres_and_the_axes_of_the_file(scene, tmp_path, kind):
             gravity,
             "--tilt",
             0,
+            "--relax-iterations",
+            0,
             *options,
         )
         length = 10.0 if kind.startswith("blend") else 0.1 * size
