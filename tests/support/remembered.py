@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tests compute again and again, and what depends on arguments alone, is computed once in a process."""
+"""Results that tests ask for again and again, and that depend on arguments alone, computed once per process."""
 
 import dataclasses
 import hashlib
@@ -16,7 +16,7 @@ _place, _placements = cvt.place, {}
 
 
 def place(mesh, count, seed, iterations, *, progress=lambda part: None, **given):
-    """`cvt.place`, which remembers points and what was told of progress: it is told again, and may stop again."""
+    """Call `cvt.place`, or return its earlier result after the same reports of progress, which may stop it again."""
     key = _digest((mesh.vertices, mesh.triangles, mesh.smooth_vertices, count, seed, iterations, sorted(given.items())))
     if key not in _placements:
         told = []
@@ -36,7 +36,7 @@ def place(mesh, count, seed, iterations, *, progress=lambda part: None, **given)
 
 
 def _digest(value):
-    """Of nested tuples, lists, dataclasses and arrays."""
+    """Return the SHA-1 of nested tuples, lists, dataclasses and arrays."""
     total = hashlib.sha1()
 
     def add(one):
@@ -55,7 +55,7 @@ def _digest(value):
     return total.digest()
 
 
-# {(module, name): a function that is called in its place}.
+# {(module, name): the function that is called instead}.
 REMEMBERED = {
     (module, name): lru_cache(64)(getattr(module, name))
     for module, name in ((lookup_tables, "bake"), (dual_scattering, "bake"), (albedo, "azimuthal_moments"))
@@ -63,11 +63,11 @@ REMEMBERED = {
 
 
 def remember(patch):
-    """Remember from now on; patch: a `pytest.MonkeyPatch`."""
+    """Keep results from now on; patch: a `pytest.MonkeyPatch`."""
     for (module, name), remembered in REMEMBERED.items():
         patch.setattr(module, name, remembered)
 
 
 def forget(patch):
-    """For tests of what is computed itself."""
+    """Place roots anew, for tests of placing itself or of memory; patch: a `pytest.MonkeyPatch`."""
     patch.setattr(cvt, "place", _place)

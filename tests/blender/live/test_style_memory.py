@@ -13,6 +13,7 @@ from hair_addon import api
 from hair_addon.blender.groom import bindings
 from hair_addon.core.params import Settings, declared
 from hair_addon.core.styling.kinds import KINDS, OFFERS
+from tests.support import remembered
 from tests.support.pairs import share_of
 from tests.support.reading import points
 
@@ -29,6 +30,12 @@ def earlier_things_are_left_out():
     gc.freeze()
     yield
     gc.unfreeze()
+
+
+@pytest.fixture(autouse=True)
+def placed_anew(functions_remember, monkeypatch):
+    """Keep what the add-on keeps, not the roots of all earlier values that tests remember."""
+    remembered.forget(monkeypatch)
 
 
 def things_alive():
