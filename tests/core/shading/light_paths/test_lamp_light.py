@@ -114,7 +114,7 @@ def test_an_area_lamp_of_any_spread_sends_its_power(spread):
     """Its radiance, by the cosine, summed over the cone: with the least spread of Blender too."""
     cos_cone = np.cos(0.5 * np.radians(spread))
     edges = np.linspace(cos_cone, 1.0, 501)
-    cosines = wp.array((0.5 * (edges[:-1] + edges[1:])).astype(np.float32), dtype=float)
+    cosines = wp.array((0.5 * (edges[:-1] + edges[1:])).astype(np.float32), dtype=float, device="cpu")
     found = wp.zeros_like(cosines)
     wp.launch(_falloffs, dim=len(cosines), inputs=[np.float32(cos_cone), cosines, found], device="cpu")
     power = 2.0 * np.mean(found.numpy() * cosines.numpy(), dtype=float) * (1.0 - cos_cone)
