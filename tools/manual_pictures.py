@@ -5,7 +5,8 @@ Grows hair on the sample's head, opens it in a window of a desktop Blender with 
 of each panel in a sidebar of `SIDEBAR_WIDTH`. With the name `windows`, also build/manual/window_*.png of the whole
 window for each kind of active object, to look for labels that are cut. The name `five_minutes` writes only
 README's pictures, docs/five_minutes/*.png, cut from the windows of `tests/desktop/manual/first_minutes.py`;
-`curly_hair` writes those of the page Curly Hair, from `tests/desktop/manual/curly_hair.py`.
+`curly_hair` writes those of the page Curly Hair, from `tests/desktop/manual/curly_hair.py`; `shading_modes` writes a
+sheet of Blender's shading modes, from `tests/desktop/manual/shading_modes.py`.
 """
 
 import shutil
@@ -31,6 +32,15 @@ CURLY_HAIR = (
 )
 CURLY_PARTS = ("cut", "curl")
 CURLY_SIZE = (560, 373)
+
+# Rows and columns of the sheet of shading modes; (left, top, right, bottom) pixels of its window; samples and strands.
+SHADING_MODELS = ("cube", "monkey", "head")
+SHADING_COLUMNS = (
+    *("studio_default", "studio_paint", "studio_rim", "matcap", "flat"),
+    *("forest", "sunset", "studio", "rendered"),
+)
+SHADING_PART, SHADING_WINDOW, SHADING_TILE = (90, 110, 650, 480), (900, 600), (224, 148)
+SHADING_SAMPLES, SHADING_STRANDS = 8, 30_000
 
 # (left, top, right, bottom) pixels of its window: the 3D view with the top of its sidebar; and the size it is shown in.
 SEEN_PART = (190, 60, 1310, 807)
@@ -66,6 +76,8 @@ def start():
         return take_five_minutes(blender, extension, folder / "five_minutes")
     if sys.argv[1:] == ["curly_hair"]:
         return take_curly_hair(blender, extension, folder / "curly_hair")
+    if sys.argv[1:] == ["shading_modes"]:
+        return take_shading_modes(blender, extension, folder / "shading_modes")
     if len(sys.argv) == 1 or not (folder / "head.blend").exists():
         save_sample(folder / "head.blend")
     arguments = [extension, folder / "head.blend", *sys.argv[1:]]
@@ -100,7 +112,30 @@ def take_curly_hair(blender, extension, folder):
     return 0
 
 
-def take_walk(blender, name, parts, extension, folder, *more):
+def take_shading_modes(blender, extension, folder):
+    """Write the sheet of shading modes; returns the exit status."""
+    more = SHADING_SAMPLES, SHADING_STRANDS
+    name, size = "manual/shading_modes", SHADING_WINDOW
+    if error := take_walk(blender, name, SHADING_MODELS, extension, folder, *more, size=size):
+        return error
+    write_sheet(folder, MANUAL / "shading_modes.png")
+    return 0
+
+
+def write_sheet(folder, path):
+    """Write the sheet of shading modes from the pictures in a folder: a model in each row."""
+    import numpy as np
+
+    left, top, right, bottom = SHADING_PART
+    rows = [
+        np.concatenate([read(folder / f"{model}_{name}.png")[top:bottom, left:right] for name in SHADING_COLUMNS], 1)
+        for model in SHADING_MODELS
+    ]
+    width, height = SHADING_TILE
+    write(path, np.concatenate(rows), (width * len(SHADING_COLUMNS), height * len(SHADING_MODELS)))
+
+
+def take_walk(blender, name, parts, extension, folder, *more, size=WINDOW_SIZE):
     """Run parts of a script of tests/desktop in a window of the pictures' size; returns an error message, or ""."""
     profile = folder / "profile"
     shutil.rmtree(folder, ignore_errors=True)
@@ -108,7 +143,7 @@ def take_walk(blender, name, parts, extension, folder, *more):
     script, log = ROOT / "tests" / "desktop" / f"{name}.py", folder / "log.txt"
     for part in parts:
         words = [part, extension, folder, *more]
-        status = blender.run(script, words, profile=profile, limit=1200, size=WINDOW_SIZE, log=log)
+        status = blender.run(script, words, profile=profile, limit=1200, size=size, log=log)
         if status:
             return f"{name}.py ended with status {status}, see {log}"
     return ""

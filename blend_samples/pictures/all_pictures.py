@@ -44,6 +44,7 @@ SLOW = {
     "dynamics": "blend_samples/dynamics/dynamics.py shaking wind ball --out OUT --docs docs",
     "five_minutes": "tools/manual_pictures.py five_minutes",
     "curly_hair": "tools/manual_pictures.py curly_hair",
+    "shading_modes": "tools/manual_pictures.py shading_modes",
     "panels": "tools/manual_pictures.py",
 }
 
@@ -74,6 +75,7 @@ OTHERS = {
     "dynamics": ("dynamics_*.png",),
     "five_minutes": ("five_minutes/*.png",),
     "curly_hair": ("manual/curly_*.png",),
+    "shading_modes": ("manual/shading_modes.png",),
     "panels": tuple(
         f"manual/{name}.png"
         for name in (

@@ -15,7 +15,7 @@ from ..host.caches import Cache
 from . import uniforms
 
 _MOST_WRAP = 0.5  # the greatest softness of a lamp: of softer lights a part is ambient light
-_DIMMED_BEHIND = 0.7  # hair lets light from behind through, which the opaque surfaces that lights are made for do not
+_DIMMED_BEHIND = 0.85  # hair lets light from behind through, which the opaque surfaces that lights are made for do not
 _LEAST_DIFFUSE = 1e-3  # least diffuse color relative to the specular color, as highlights are relative to other light
 
 image_cache = Cache(capacity=8)  # StudioImage → {layer: (H, W, 3)}

@@ -13,7 +13,7 @@ def draw(context):
         drawn, camera = viewport.drawn_scene_of(context), viewport.matrices_of(context.region_data)
         lens = _lens(context)
         per_side = 1 if lens is not None else hair_picture.samples_per_side()
-        options = per_side, context.scene.render.film_transparent
+        options = per_side, _is_transparent(context, drawn)
         region_picture = region_pictures.picture_of(context.region, ViewFilm, *options)
         film = region_picture.picture
         if region_picture.turn_to(drawn, (*map(float, (*camera[0].ravel(), *camera[1].ravel())), lens)):
@@ -22,6 +22,12 @@ def draw(context):
             film.add_pass(drawn, *camera, lens)
         film.show()
         return not film.is_fine
+
+
+def _is_transparent(context, drawn):
+    """Whether the background is left to Blender: by the film, or since a studio light is not shown in it."""
+    has_background = drawn.light.hdri is None or context.space_data.shading.studiolight_background_alpha > 0.0
+    return context.scene.render.film_transparent or not has_background
 
 
 def _lens(context):

@@ -12,6 +12,7 @@ from hair_addon.blender.data.pictures import viewport_shading
 from hair_addon.blender.gpu import studio_lights
 from hair_addon.blender.render import drawn_scene, solid_hair
 from hair_addon.blender.render.viewport import hair_picture, viewport
+from tests.support.rendering import light_up
 from tests.support.viewports import context_of, view3d
 
 SIZE = 64
@@ -331,6 +332,41 @@ def test_white_hair_is_lit_by_lights_without_a_size(ball):
     )
     light = picture_of(drawn, camera)
     assert np.isfinite(light).all() and mean_of(light).min() > 0.1
+
+
+@pytest.mark.parametrize("kind", ["MATERIAL", "RENDERED"])
+def test_the_scene_lights_hair_as_far_as_the_viewport_asks(ball, kind):
+    """By its lamps, its world, both or neither: the studio light's image replaces the world, turned and in strength."""
+    bpy.ops.object.light_add(type="SUN", rotation=(0.5, 0.3, 0.0))
+    bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
+    light_up((0.2, 0.3, 0.4))
+    ball.shading.type, ball.shading.studio_light = kind, "studio.exr"
+    ball.shading.studiolight_intensity, camera, ending = 0.5, facing(), "_render" if kind == "RENDERED" else ""
+    drawn, shown = None, {}
+    for lights, world in ((True, True), (False, True), (True, False), (False, False)):
+        setattr(ball.shading, f"use_scene_lights{ending}", lights)
+        setattr(ball.shading, f"use_scene_world{ending}", world)
+        light = viewport_shading.read(ball, bpy.context.scene, camera[0]).light
+        drawn = relit(drawn, light) if drawn else read(ball, camera)[0]
+        shown[lights, world] = drawn
+    assert shown[True, True].light == viewport_shading.SCENE_LIGHT
+    assert [len(shown[lights, True].lamps.lamps) for lights in (True, False)] == [1, 0]
+    np.testing.assert_allclose(shown[False, True].lights["world"][:, :3], [(0.2, 0.3, 0.4)] * 6, rtol=1e-6)
+    suns = [shown[lights, False].lights["light"]["axis"][: shown[lights, False].lights["count"]] for lights in (1, 0)]
+    assert len(suns[0]) == len(suns[1]) + 1 > 1
+    total = total_of(shown[False, False])
+    ball.shading.studiolight_intensity, ball.shading.studiolight_rotate_z = 1.0, 0.4
+    turned_light = relit(drawn, viewport_shading.read(ball, bpy.context.scene, camera[0]).light)
+    np.testing.assert_allclose(total_of(turned_light), 2.0 * total, rtol=0.02)
+    brightest = turned_light.lights["light"]["axis"][0, :3]
+    # A direction turned by the rotation is the image's: light comes from the other side.
+    np.testing.assert_allclose(brightest, turned(-0.4) @ suns[1][0, :3], atol=1e-4)
+
+
+def total_of(drawn):
+    """Irradiance of a small ball from all sides."""
+    record = drawn.lights
+    return record["light"]["power"][: record["count"], :3].sum(axis=0) + 4 * np.pi * record["world"][:, :3].mean(axis=0)
 
 
 def test_color_management_is_what_blender_applies(ball):
