@@ -4,7 +4,7 @@
 Values are as in Blender's Workbench and EEVEE engines. Records are equal if hair looks the same.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -149,6 +149,19 @@ def _solid_light(shading, world_to_view):
         lights=tuple(_studio_light(light, to_world) for light in source.solid_lights if light.use),
         ambient=tuple(map(float, source.light_ambient)),
         has_highlights=has_highlights and (source is system or studio.has_specular_highlight_pass),
+    )
+
+
+_NEAR = np.cos(np.radians(5.0))  # a turn of lights that is hardly visible while the view turns too
+
+
+def is_near(light, other):
+    """Whether two `ViewportLight`s differ in a small turn of studio lights only."""
+    if replace(light, lights=()) != replace(other, lights=()) or len(light.lights) != len(other.lights):
+        return False
+    return all(
+        replace(one, direction=two.direction) == two and float(np.dot(one.direction, two.direction)) >= _NEAR
+        for one, two in zip(light.lights, other.lights, strict=True)
     )
 
 

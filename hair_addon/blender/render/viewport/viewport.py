@@ -41,6 +41,7 @@ class _View:
     shows: tuple  # key of the viewport's settings that decide what is read
     drawn: drawn_scene.DrawnScene | None = None
     lit: dict = field(default_factory=dict)  # pointer of a region → `drawn` in the light of the region's view
+    wanted: dict = field(default_factory=dict)  # the same → the light of its last redraw
     outdated: drawn_scene.DrawnScene | None = None  # the previous scene, if only hair has changed
     former: drawn_scene.DrawnScene | None = None  # the previous scene
     is_playing: bool = False  # whether it was read during playback, or while a surface was being moved
@@ -200,11 +201,15 @@ def drawn_scene_of(context):
 def _lit(view, context, light):
     """The `DrawnScene` of a `_View` in the light of the context's region.
 
-    Regions of a viewport, as in a quad view, differ in lights that follow the view.
+    Regions of a viewport, as in a quad view, differ in lights that follow the view. While it turns they follow in
+    steps, as each step draws shadow maps.
     """
     region = context.region.as_pointer()
     known = view.lit.get(region, view.drawn)
-    if known.light != light and known.hair:
+    is_turning = view.wanted.get(region) != light
+    view.wanted[region] = light
+    is_late = is_turning and viewport_shading.is_near(known.light, light)
+    if known.light != light and known.hair and not is_late:
         maps = known.shadow_maps if _is_lone(view, region, known) else None
         turned = drawn_scene.relit(
             known, context.scene, context.view_layer, context.evaluated_depsgraph_get(), light, maps, is_ours(context)

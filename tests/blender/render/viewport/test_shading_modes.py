@@ -314,6 +314,15 @@ def test_viewports_of_other_shading_leave_each_other_alone(ball, monkeypatch):
     again = shown()
     assert work == ["relit", "relit"] and again[2] is first[2]
     assert again[0].shadow_maps is first[0].shadow_maps  # drawn over
+    work.clear()
+    before = again[0]
+    for angle in np.radians([2.0, 4.0, 6.0, 8.0, 10.0]):  # lights follow in steps
+        contexts[0].region_data.view_matrix = facing(angle)[0]
+        again = shown()
+    assert work == ["relit"] and again[0] is not before and again[1:] == shown()[1:]
+    assert work == ["relit", "relit"]  # and exactly where the view rests
+    exact = viewport_shading.read(ball, bpy.context.scene, facing(np.radians(10.0))[0]).light
+    assert shown()[0].light == exact and len(work) == 2
     contexts[2].region_data.view_matrix = facing(0.7)[0]
     work.clear()
     assert shown()[2] is first[2] and not work  # an HDRI does not follow the view
