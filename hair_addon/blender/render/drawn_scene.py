@@ -106,6 +106,8 @@ def read(
         if is_shaded:
             meshes = drawn_meshes.split_clear(meshes)
         surroundings = _upload(meshes, is_shaded, has_paths=viewport is None)
+        if shown.light.kind != viewport_shading.SCENE:
+            surroundings["blockers"] = _below_hair(surroundings["blockers"], places)
         world, lamps, maps = _world_of(shown.light, blender_scene, view_layer), None, None
     else:
         surroundings = {name: getattr(before, name) for name in _SURROUNDINGS}
@@ -147,6 +149,13 @@ def read(
     )
     maps = maps or scene_lights.new_maps(lamps.record, is_shaded)
     return _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
+
+
+def _below_hair(blockers, places):
+    """The `Blocker`s that hair grows on: in Solid shading other surfaces cast no shadows."""
+    surfaces = {place.hair_object.data.surface for place in places} - {None}
+    uids = {surface.session_uid for surface in surfaces}
+    return tuple(blocker for blocker in blockers if blocker.owner[1] in uids)
 
 
 def relit(drawn, blender_scene, view_layer, depsgraph, light, maps=None, is_wide=False):

@@ -78,7 +78,7 @@ def set_up():
     bpy.context.view_layer.update()
     yield from wait(0.5)
     turn = 0.5 if PART == "cube" else 0.35
-    right = Vector((math.cos(turn), math.sin(turn), 0.0)) * 1.3 * bare.dimensions.x
+    right = Vector((math.cos(turn), math.sin(turn), 0.0)) * 1.55 * bare.dimensions.x
     beside.location += right
     # The mesh beside the hair is of its color, and so is the surface below, but for the head.
     tone = hair.active_material.diffuse_color if hair.active_material else (0.3, 0.2, 0.1, 1.0)
@@ -93,7 +93,7 @@ def set_up():
     view.view_perspective, view.view_rotation = "PERSP", Euler((1.25, 0.0, turn)).to_quaternion()
     middle = bare.matrix_world @ (0.125 * sum(map(Vector, bare.bound_box), Vector()))
     view.view_location = middle + 0.5 * right
-    view.view_distance = 2.5 * max(bare.dimensions.x, 0.75 * bare.dimensions.z)
+    view.view_distance = 2.9 * max(bare.dimensions.x, 0.7 * bare.dimensions.z)
     yield from wait(0.5)
 
 

@@ -87,9 +87,10 @@ class ViewportShading:
 
     @property
     def strands(self):
-        """A key of all but lights: of what strands are shaded by."""
+        """A key of all but lights: of what strands are shaded by, and of whether surfaces cast shadows."""
         light = self.light
-        return (light.matcap, light.has_highlights) if light.matcap else None, self.color, self.is_wire
+        matcap = (light.matcap, light.has_highlights) if light.matcap else None
+        return light.kind == SCENE, matcap, self.color, self.is_wire
 
 
 BY_SCENE = ViewportShading()  # by the look and the light of the scene

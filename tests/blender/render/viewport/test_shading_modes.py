@@ -262,6 +262,25 @@ def test_wires_are_thin_and_in_the_color_of_the_theme(ball):
     assert viewport_shading.read(ball, bpy.context.scene, camera[0]).color.kind == "RANDOM"
 
 
+def test_other_surfaces_cast_no_shadow_in_solid_shading(ball):
+    """As Workbench's meshes; in the light of the scene they do."""
+    camera = facing()
+    pictures = {}
+    for has_roof in (False, True):
+        if has_roof:
+            bpy.ops.mesh.primitive_cube_add(size=4.0, location=(0.0, 0.0, 4.0))
+            bpy.context.view_layer.update()
+        for light in ("STUDIO", "FLAT"):
+            solid(ball, light=light)
+            pictures[light, has_roof] = picture_of(read(ball, camera)[0], camera)
+        ball.shading.type = "MATERIAL"
+        pictures["HDRI", has_roof] = picture_of(read(ball, camera)[0], camera)
+    for light in ("STUDIO", "FLAT"):
+        np.testing.assert_array_equal(pictures[light, True], pictures[light, False])
+    below, free = (mean_of(pictures["HDRI", has_roof]) @ LUMINANCE for has_roof in (True, False))
+    assert below < 0.9 * free
+
+
 def test_hair_turns_with_its_lights(ball):
     """The bright side of the ball, from above."""
     camera = facing(is_above=True)
