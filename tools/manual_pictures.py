@@ -118,7 +118,7 @@ def take_shading_modes(blender, extension, folder):
     name, size = "manual/shading_modes", SHADING_WINDOW
     if error := take_walk(blender, name, SHADING_MODELS, extension, folder, *more, size=size):
         return error
-    write_sheet(folder, MANUAL / "shading_modes.png")
+    write_sheet(folder, MANUAL / "shading_modes.jpg")
     return 0
 
 
@@ -162,15 +162,15 @@ def read(path):
 
 
 def write(path, pixels, size=None):
-    """Colors as a PNG, scaled to a size (width, height) where one is given."""
+    """Colors as a PNG or JPEG, scaled to a size (width, height) where one is given."""
     import bpy
 
     image = bpy.data.images.new(path.stem, pixels.shape[1], pixels.shape[0])
     image.pixels.foreach_set(pixels[::-1].ravel())
     if size is not None:
         image.scale(*size)
-    image.filepath_raw, image.file_format = str(path), "PNG"
-    image.save()
+    image.filepath_raw, image.file_format = str(path), "JPEG" if path.suffix == ".jpg" else "PNG"
+    image.save(quality=90)
     bpy.data.images.remove(image)
 
 

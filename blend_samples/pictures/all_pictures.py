@@ -75,7 +75,7 @@ OTHERS = {
     "dynamics": ("dynamics_*.png",),
     "five_minutes": ("five_minutes/*.png",),
     "curly_hair": ("manual/curly_*.png",),
-    "shading_modes": ("manual/shading_modes.png",),
+    "shading_modes": ("manual/shading_modes.jpg",),
     "panels": tuple(
         f"manual/{name}.png"
         for name in (
