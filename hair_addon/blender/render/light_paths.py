@@ -56,7 +56,7 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     most = _MOST_TIMES * count
     starting = -(-len(seen.segments) // _SAMPLES_A_PATH)
     tracing = part_of(progress, 0.3, 1.0)
-    sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, starting, seed, device, most, tracing)
+    sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, starting, seed, most, tracing)
     means = [light_paths.voxel_means.shares(of_hair, taken, grid.origin) for of_hair in sums]
     visibility = [
         {**textures, "light_grid": light_grid.upload(of_hair)}
@@ -83,8 +83,7 @@ def window_of(hair, world_to_view, view_to_clip):
 
 def _strands_of(strands, shading, to_world, first):
     """`strand_grid.Strands` of hair on the GPU; first: index of its first look."""
-    points = strands.points @ to_world[:3, :3].T.astype(np.float32) + to_world[:3, 3].astype(np.float32)
-    count = len(points)
+    count, point_count = strands.points.shape[:2]
     randoms = np.full(count, 0.5) if strands.randoms_here is None else strands.randoms_here
     layers = shading.layers
     is_wettest = np.zeros(count, int)
@@ -97,18 +96,25 @@ def _strands_of(strands, shading, to_world, first):
         for settings, variation in fibres
     ]
 
-    def absorption(strand, place):
-        settings, variation = fibres[0]  # water does not change pigments
+    settings, variation = fibres[0]  # water does not change pigments
+    ends, gradient = np.array([0.0, 1.0]), np.zeros(point_count)
+    if variation is not None:
+        places = np.linspace(0.0, 1.0, point_count)
+        gradient = strand_variation.tip_gradient(variation.gradient_start, variation.gradient_end, places)
+
+    def absorption(chosen):
         if variation is None:
-            return np.broadcast_to(np.asarray(settings.sigma_a, float), (*np.broadcast(strand, place).shape, 3))
-        return strand_variation.strand_sigma_a(variation, randoms[strand], place)
+            return np.broadcast_to(np.asarray(settings.sigma_a, float), (1, 2, 3))
+        return strand_variation.sigma_a_along(variation, randoms[chosen, None], ends)
 
     return light_paths.strand_grid.Strands(
-        points,
+        strands.points,
         strands.radii * drawing.scale_of(to_world),
         absorption,
+        gradient,
         np.stack(roughness)[is_wettest, np.arange(count)],
         first + is_wettest,
+        to_world,
     )
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         native_code,
         parallel,
         replays,
+        running_sums,
     )
 else:
     __getattr__ = submodules(__name__)

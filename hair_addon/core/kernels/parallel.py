@@ -154,6 +154,15 @@ def empty_vectors(shape: tuple[int, ...], device: wp.DeviceLike) -> wp.array:
     return wp.array(np.empty((*shape, 3), np.float32), dtype=wp.vec3, device=device, copy=False)
 
 
+def empty(count: int, kind: type, device: wp.DeviceLike) -> wp.array:
+    """`wp.empty` of numbers, in the memory of `empty_vectors`."""
+    device = wp.get_device(device)
+    if not device.is_cpu:
+        return wp.empty(count, dtype=kind, device=device)
+    memory = np.empty(count, np.int32 if kind is int else wp.dtype_to_numpy(kind))
+    return wp.array(memory, dtype=kind, device=device, copy=False)
+
+
 def empty_for_results(shape: tuple[int, ...], device: wp.DeviceLike) -> wp.array:
     """Return an array of vec3 in CPU memory for a device's results: pinned for a GPU, for faster transfers."""
     if wp.get_device(device).is_cpu:

@@ -8,7 +8,7 @@ import warp as wp
 
 from hair_addon.blender.gpu import kernel_programs
 from hair_addon.core.imaging import lamps
-from hair_addon.core.shading.light_paths import gather, media, seen_rays, start_places, view
+from hair_addon.core.shading.light_paths import gather, media, seen_rays, start_places, view, voxel_sums
 from tests.core.shading.light_paths.test_gather import (
     ALONG_Y,
     FLOOR,
@@ -167,14 +167,14 @@ def paths_of(grid, light, count):
     """({parameter: value} of `gather._gather`, number of paths, the mesh, which Warp knows while it is held)."""
     seen, mesh = seen_rays.seen_by(grid, light.corners, ALONG_Y, count), media.mesh_of(light.corners)
     medium = media.medium_of(grid, mesh, light.normals, light.albedo, light.gloss)
-    starts = start_places.of_seen(medium, grid, seen, start_places.voxels_of(grid, seen.places), count, 0, "cpu")
+    starts = start_places.of_seen(medium, seen, start_places.voxels_of(medium, media.vectors(seen.places)), count, 0)
     given = {
         "medium": medium,
         "sources": media.sources_of(light, 0.01),
         "seen_in": view.on_device(seen.view),
         "first": 0,
     }
-    given |= {name: wp.array(getattr(starts, name), dtype=int) for name in ("segments", "keys")}
+    given |= {name: getattr(starts, name) for name in ("segments", "keys")}
     return given, len(starts.segments), mesh
 
 
@@ -196,13 +196,13 @@ def test_paths_of_light_are_those_of_the_processor(rng):
     difference = (found["out_light"] - expected["out_light"]).astype(float)
     is_same = np.abs(difference).max(axis=1) < 1e-3 * (1e-3 + expected["out_light"].max(axis=1))
     assert is_same.mean() > 0.75
-    sums = []
-    for light_there in (found["out_light"], expected["out_light"]):
-        by_voxel = np.zeros((1, *grid.shape[::-1], 3))
-        gather._add_by_voxel(by_voxel, grid, expected["out_position"], np.zeros(count, int), light_there)
-        sums.append(by_voxel)
-    squares = np.zeros_like(sums[0])
-    gather._add_by_voxel(squares, grid, expected["out_position"], np.zeros(count, int), difference**2)
+    by_voxel, squared = voxel_sums.VoxelSums(grid), voxel_sums.VoxelSums(grid)
+    places, *lights = (
+        media.vectors(values) for values in (expected["out_position"], found["out_light"], expected["out_light"])
+    )
+    by_voxel.add(places, given["segments"], *lights, 0)
+    squared.add(places, given["segments"], *[media.vectors(difference**2)] * 2, 0)
+    sums, (squares, _) = (np.split(of.of_systems()[0].numpy()[..., :6], 2, axis=-1) for of in (by_voxel, squared))
     is_used = sums[1].sum(axis=-1) > 0.0
     assert is_used.sum() > 50
     off = (sums[0] - sums[1])[is_used] / np.sqrt(squares[is_used] + (1e-4 * sums[1][is_used]) ** 2)
@@ -227,8 +227,8 @@ def test_light_of_one_event_is_the_same_to_rounding(rng):
 def test_places_in_sight_are_those_of_the_processor(rng):
     grid, light = lit_scene(rng, (0.1, 0.3, 1.0))
     given, _count, _mesh = paths_of(grid, light, 2000)
-    segments = np.flatnonzero(np.diff(grid.strands) == 0).astype(np.int32)
-    keys = wp.array(start_places.hashed(segments, 1).astype(np.int32), dtype=int)
+    segments = np.flatnonzero(np.diff(grid.strands.numpy()) == 0).astype(np.int32)
+    keys = wp.array(rng.integers(-(2**31), 2**31, len(segments)).astype(np.int32), dtype=int)
     given = {
         "medium": given["medium"],
         "view": given["seen_in"],
@@ -236,7 +236,7 @@ def test_places_in_sight_are_those_of_the_processor(rng):
         "keys": keys,
         "first": 0,
     }
-    expected = run_in_warp(start_places._see, len(segments), given, {"out_is_seen": wp.uint8})["out_is_seen"]
+    expected = run_in_warp(start_places._see, len(segments), given, {"out_is_seen": int})["out_is_seen"]
     found = kernel_programs.prepare(start_places._see, given, light.corners.reshape(-1, 3, 3)).run(len(segments))
     assert 100 < expected.sum() < len(segments) - 100
     assert (found["out_is_seen"] != expected).sum() <= 2

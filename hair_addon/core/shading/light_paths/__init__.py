@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         surface_walk,
         view,
         voxel_means,
+        voxel_sums,
         world_light,
     )
 else:

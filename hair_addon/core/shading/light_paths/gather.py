@@ -12,12 +12,12 @@ import warp as wp
 
 from ...kernels.checks import require_count, require_indices
 from ...long_work import Progress, no_progress, part_of
-from . import grid_walk, start_places, view
+from . import grid_walk, start_places, view, voxel_sums
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
 from .lamp_light import Event, light_at_once, light_by_share, light_met
 from .light_sources import Sources, across
-from .media import Surroundings, launch, medium_of, mesh_of, sources_of, unlit_medium_of
+from .media import Surroundings, launch, medium_of, mesh_of, sources_of, unlit_medium_of, vectors
 from .seen_rays import Seen
 from .start_places import start
 from .strand_grid import StrandGrid
@@ -120,13 +120,12 @@ def gather(
     seen: Seen,
     path_count: int,
     seed: int = 0,
-    device: wp.DeviceLike = "cpu",
     most_paths: int = 0,
     progress: Progress = no_progress,
-) -> tuple[np.ndarray, int]:
-    """(systems, Z, Y, X, 12) float64 by voxel, sums of RGB: over paths their light, and what even light would give;
-    over samples, which are others, what is drawn without paths, and what even light would give there; and how many
-    paths.
+) -> tuple[list[wp.array4d[wp.float64]], int]:
+    """(Z, Y, X, 12) of each system by voxel, sums of RGB: over paths their light, and what even light would give; over
+    samples, which are others, what is drawn without paths, and what even light would give there; and how many paths.
+    All on the device of the grid.
 
     About `path_count` start on hair that is in sight. Then follow as many as the standard error of their mean light
     seems to need to fall to 1.5 % of it, at most as many again, until it has fallen so far or there would be more than
@@ -136,33 +135,32 @@ def gather(
     require_indices("segments", seen.segments, len(grid.points) - 1)
     for name in ("places", "drawn"):
         require_count(name, len(getattr(seen, name)), count)
-    systems = grid.systems[grid.strands]
-    sums = np.zeros((len(grid.kept), *grid.shape[::-1], 12))
+    device, sums = grid.device, voxel_sums.VoxelSums(grid)
     if not count:
-        return sums, 0
-    voxels = start_places.voxels_of(grid, seen.places)
+        return sums.of_systems(), 0
     with wp.ScopedDevice(device):
         mesh = mesh_of(surroundings.corners)
         medium = medium_of(grid, mesh, surroundings.normals, surroundings.albedo, surroundings.gloss)
         in_sight, _hiding = _sight_of(grid, surroundings) or (medium, mesh)
-        sources = sources_of(surroundings, _FAINT * float(seen.drawn.sum(axis=1, dtype=np.float64).mean()))
-        drawn = np.concatenate([seen.drawn, _even_there(medium, seen, device)], axis=-1)
-        _add_by_voxel(sums[..., 6:], grid, seen.places, systems[seen.segments], drawn)
+        segments = wp.array(seen.segments.astype(np.int32, copy=False), dtype=int)
+        places, drawn = vectors(seen.places), vectors(seen.drawn)
+        sources = sources_of(surroundings, _FAINT * voxel_sums.brightness(drawn)[0] / count)
+        sums.add(places, segments, drawn, _even_there(medium, seen.view, segments, places), 6)
+        voxels = start_places.voxels_of(medium, places)
         total, squares, taken, tried, turn, more = 0.0, 0.0, 0, 0, 0, path_count
         while True:
-            starts = start_places.of_seen(in_sight, grid, seen, voxels, more, seed * _MOST_TURNS + turn, device)
+            starts = start_places.of_seen(in_sight, seen, voxels, more, seed * _MOST_TURNS + turn)
             told = part_of(progress, tried / (tried + more), 1.0)
-            positions, light, even = _traced(medium, sources, seen.view, starts, device, told)
-            found = np.concatenate([light, even], axis=-1)
-            _add_by_voxel(sums[..., :6], grid, positions, systems[starts.segments], found)
-            brightness = light.sum(axis=1, dtype=np.float64)
-            total, squares = total + float(brightness.sum()), squares + float(np.square(brightness).sum())
+            positions, light, even = _traced(medium, sources, seen.view, starts, told)
+            sums.add(positions, starts.segments, light, even, 0)
+            of_turn = voxel_sums.brightness(light)
+            total, squares = total + of_turn[0], squares + of_turn[1]
             taken += len(light)
             tried, turn = tried + more, turn + 1
             wanted = (_standard_error(total, squares, taken) / _KNOWN) ** 2  # times as many
             more = int(tried * min(max(_SPARE * wanted - 1.0, _LEAST_TURN), 1.0))
             if wanted < 1.0 or tried + more > most_paths:
-                return sums, taken
+                return sums.of_systems(), taken
 
 
 def _sight_of(grid, surroundings):
@@ -174,41 +172,27 @@ def _sight_of(grid, surroundings):
     return unlit_medium_of(grid, mesh), mesh
 
 
-def _even_there(medium, seen, device):
-    """(N, 3) that even light would give at samples."""
-    found = wp.zeros(len(seen.segments), dtype=wp.vec3)
-    given = [wp.array(seen.segments.astype(np.int32), dtype=int), wp.array(seen.places, dtype=wp.vec3)]
-    launch(_even, len(found), [medium, view.on_device(seen.view), *given, found], device)
-    return found.numpy()
+def _even_there(medium, seen_in, segments, places):
+    """(N,) RGB that even light would give at samples."""
+    found, device = wp.zeros(len(segments), dtype=wp.vec3), medium.points.device
+    launch(_even, len(found), [medium, view.on_device(seen_in), segments, places, found], device)
+    return found
 
 
-def _traced(medium, sources, seen_in, starts, device, progress):
-    """Of paths: where they start, light from there, and what even light would give, (N, 3) each."""
-    count, seen_here, made = len(starts.segments), view.on_device(seen_in), []
+def _traced(medium, sources, seen_in, starts, progress):
+    """Of paths: where they start, light from there, and what even light would give, (N,) each."""
+    count, seen_here, device = len(starts.segments), view.on_device(seen_in), medium.points.device
+    found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
     # A GPU takes about as long for a share as for all.
-    share = max(count // _SHARES, _LEAST_SHARE) if wp.get_device(device).is_cpu else max(count, 1)
+    share = max(count // _SHARES, _LEAST_SHARE) if device.is_cpu else max(count, 1)
     for first in range(0, max(count, 1), share):
-        some = slice(first, first + share)
-        given = [wp.array(values[some], dtype=int) for values in (starts.segments, starts.keys)]
-        found = [wp.zeros(len(given[0]), dtype=wp.vec3) for _ in range(3)]
-        launch(_gather, len(given[0]), [medium, sources, seen_here, *given, *found], device)
-        made.append([array.numpy() for array in found])
+        some = slice(first, min(first + share, count))
+        rows = [array[some] for array in (starts.segments, starts.keys, *found)]
+        launch(_gather, len(rows[0]), [medium, sources, seen_here, *rows], device)
         progress(FOLLOWING, min(some.stop / max(count, 1), 1.0))
-    return [np.concatenate(parts) for parts in zip(*made, strict=True)]
+    return found
 
 
 def _standard_error(total, squares, count):
     """Of the mean of values with a sum and a sum of squares, as a part of it."""
     return np.sqrt(max(squares - total * total / count, 0.0)) / total if total > 0.0 else np.inf
-
-
-def _add_by_voxel(sums, grid, positions, systems, values):
-    """Add values (N, C) at positions (N, 3) of hairs (N,) to (systems, Z, Y, X, C) sums."""
-    column, row, layer = grid.voxels_at(positions).T
-    at = np.ravel_multi_index((systems, layer, row, column), sums.shape[:4])
-    # Most voxels are empty: the memory of those that are used is read alone.
-    used, which = np.unique(at, return_inverse=True)
-    channels = values.shape[1]
-    each = (which[:, None] * channels + np.arange(channels)).ravel()
-    found = np.bincount(each, weights=values.ravel(), minlength=len(used) * channels)
-    sums[np.unravel_index(used, sums.shape[:4])] += found.reshape(-1, channels)

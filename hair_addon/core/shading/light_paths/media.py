@@ -58,7 +58,7 @@ def mesh_of(corners: np.ndarray) -> wp.Mesh | None:
 def medium_of(
     grid: StrandGrid, mesh: wp.Mesh | None, normals: np.ndarray, albedo: np.ndarray, gloss: np.ndarray | None = None
 ) -> Medium:
-    """A grid and the triangles of a mesh on the current device, as `Surroundings` has their values."""
+    """A grid and the triangles of a mesh on its device, the current one, as `Surroundings` has their values."""
     corner_count = 0 if mesh is None else len(mesh.indices)
     gloss = np.zeros((corner_count // 3, 3)) if gloss is None else gloss
     require_count("surface gloss", len(gloss), corner_count // 3)
@@ -69,13 +69,15 @@ def medium_of(
     cells = grid.cells
     medium.along_voxel = cells.along_voxel
     medium.widths = wp.vec4(*cells.widths.tolist())
-    medium.bricks, medium.starts = wp.array(cells.bricks, dtype=int), wp.array(cells.starts, dtype=int)
-    medium.segments = wp.array(cells.segments, dtype=int)
-    medium.lines = wp.array(cells.lines.reshape(-1), dtype=wp.uint32)
-    medium.points, medium.sigma_a = vectors(grid.points), vectors(grid.sigma_a)
-    medium.radii, medium.roughness = wp.array(grid.radii, dtype=float), wp.array(grid.roughness, dtype=float)
-    medium.strands, medium.fibres = wp.array(grid.strands, dtype=int), wp.array(grid.fibres, dtype=int)
-    medium.fibre_rows = wp.array(grid.fibre_rows, dtype=float)
+    medium.bricks, medium.starts, medium.segments, medium.lines = (
+        cells.bricks,
+        cells.starts,
+        cells.segments,
+        cells.lines,
+    )
+    medium.points, medium.sigma_a, medium.radii = grid.points, grid.sigma_a, grid.radii
+    medium.strands, medium.roughness, medium.fibres = grid.strands, grid.roughness, grid.fibres
+    medium.fibre_rows = grid.fibre_rows
     medium.mesh, medium.has_mesh = wp.uint64(0) if mesh is None else mesh.id, int(mesh is not None)
     medium.normals, medium.albedo, medium.gloss = (vectors(values) for values in (normals, albedo, gloss))
     medium.reflected = wp.array(surface_albedo.table(), dtype=wp.vec4)

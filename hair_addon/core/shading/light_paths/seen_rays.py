@@ -50,13 +50,14 @@ def _find(
 
 
 def met_by(
-    grid: StrandGrid, corners: np.ndarray, view: View, ray_count: int, seed: int = 0, device: wp.DeviceLike = "cpu"
+    grid: StrandGrid, corners: np.ndarray, view: View, ray_count: int, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """(segments (N,), places (N, 3)) where rays meet strands before a surface, triangles of corners (3 F, 3).
 
     ray_count: of rays over the picture, rounded to a square; those that meet no strand are left out.
     """
     side = max(1, round(ray_count**0.5))
+    device = grid.device
     with wp.ScopedDevice(device):
         mesh = mesh_of(corners)
         medium = unlit_medium_of(grid, mesh)
@@ -67,11 +68,9 @@ def met_by(
     return found[is_hair], places[is_hair]
 
 
-def seen_by(
-    grid: StrandGrid, corners: np.ndarray, view: View, ray_count: int, seed: int = 0, device: wp.DeviceLike = "cpu"
-) -> Seen:
+def seen_by(grid: StrandGrid, corners: np.ndarray, view: View, ray_count: int, seed: int = 0) -> Seen:
     """`Seen` of `met_by`: nothing is drawn of the strands yet."""
-    segments, places = met_by(grid, corners, view, ray_count, seed, device)
+    segments, places = met_by(grid, corners, view, ray_count, seed)
     area = AREA / max(1, round(ray_count**0.5)) ** 2
     return Seen(view, segments, places, np.zeros((len(segments), 3), np.float32), area)
 
@@ -96,15 +95,14 @@ def _place(
     out_place[sample] = start + part * along
 
 
-def places_at(
-    grid: StrandGrid, view: View, segments: np.ndarray, at: np.ndarray, device: wp.DeviceLike = "cpu"
-) -> np.ndarray:
+def places_at(grid: StrandGrid, view: View, segments: np.ndarray, at: np.ndarray) -> np.ndarray:
     """(N, 3) places of segments (N,) that are nearest to the rays at (N, 2) of a picture, from -1 to 1."""
     require_count("places in the picture", len(at), len(segments))
     require_indices("segments", segments, len(grid.points) - 1)
+    device = grid.device
     with wp.ScopedDevice(device):
         places = wp.zeros(len(segments), dtype=wp.vec3)
         rows = [wp.array(segments.astype(np.int32), dtype=int), wp.array(at.astype(np.float32), dtype=wp.vec2)]
-        given = [on_device(view), wp.array(grid.points, dtype=wp.vec3), *map(parallel.Rows, rows)]
+        given = [on_device(view), grid.points, *map(parallel.Rows, rows)]
         parallel.launch(_place, len(segments), given, [places], device)
         return places.numpy()

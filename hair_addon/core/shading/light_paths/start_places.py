@@ -9,13 +9,13 @@ begin at the same places, and their light changes by as little.
 
 from dataclasses import dataclass
 
-import numpy as np
 import warp as wp
 
+from ...kernels import kernel_cache, running_sums
+from ...kernels.checks import require_count
 from .grid_walk import PASSED, STRAND, Medium, Met, place_on, walk
 from .media import launch
 from .seen_rays import Seen
-from .strand_grid import StrandGrid
 from .view import ViewOnDevice, depth_at, direction_at, on_device, seen_at
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -23,14 +23,15 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 _LEAST_SHARE = 0.005  # of all paths that a segment may have, where there are too many tries
 _MOST_TRIES = 32  # places for each path: in deep hair few are in sight
 _MOST_PLACES = wp.constant(64)  # along a segment, where its cells are looked up
+_MOST_PARTS = 4096  # of all segments, whose tries are added up
 
 
 @dataclass(frozen=True, eq=False)
 class Starts:
     """N places in sight where paths begin, on segments."""
 
-    segments: np.ndarray  # (N,) int32 of a grid
-    keys: np.ndarray  # (N,) int32 of random numbers
+    segments: wp.array[int]  # (N,) of a grid
+    keys: wp.array[int]  # (N,) of random numbers
 
 
 @wp.func
@@ -113,21 +114,43 @@ def _count(
     out_count[segment] = count
 
 
-def voxels_of(grid: StrandGrid, places: np.ndarray) -> np.ndarray:
-    """(Z, Y, X) uint8: one in voxels in which places (N, 3) are, and in all that touch these.
+@wp.func
+def voxel_at(place: wp.vec3, corner: wp.vec3, voxel: float, shape: wp.vec3i):
+    """Numbers along X, Y, Z of the voxel of a grid that holds a place, the nearest beside the grid."""
+    at = (place - corner) * (1.0 / voxel)
+    found = wp.vec3i(0, 0, 0)
+    for axis in range(3):
+        found[axis] = int(wp.clamp(at[axis], 0.0, float(shape[axis] - 1)))
+    return found
+
+
+@wp.kernel
+def _mark(places: wp.array[wp.vec3], corner: wp.vec3, voxel: float, out_holds: wp.array3d[wp.uint8]):
+    shape = wp.vec3i(out_holds.shape[2], out_holds.shape[1], out_holds.shape[0])
+    at = voxel_at(places[wp.tid()], corner, voxel, shape)
+    out_holds[at[2], at[1], at[0]] = wp.uint8(1)
+
+
+@wp.kernel
+def _spread(holds: wp.array3d[wp.uint8], out_touches: wp.array3d[wp.uint8]):
+    z, y, x = wp.tid()
+    if holds[z, y, x] > wp.uint8(0):
+        for layer in range(wp.max(z - 1, 0), wp.min(z + 2, holds.shape[0])):
+            for row in range(wp.max(y - 1, 0), wp.min(y + 2, holds.shape[1])):
+                for column in range(wp.max(x - 1, 0), wp.min(x + 2, holds.shape[2])):
+                    out_touches[layer, row, column] = wp.uint8(1)
+
+
+def voxels_of(medium: Medium, places: wp.array[wp.vec3]) -> wp.array3d[wp.uint8]:
+    """(Z, Y, X): one in voxels in which places (N,) are, and in all that touch these.
 
     Thin hair is missed by samples, and may be in sight beside them.
     """
-    x, y, z = grid.shape
-    at = grid.voxels_at(places)
-    found = np.zeros((z, y, x), np.uint8)
-    found[at[:, 2], at[:, 1], at[:, 0]] = 1
-    for axis in range(3):
-        line = np.moveaxis(found, axis, 0)
-        before = line.copy()
-        line[1:] |= before[:-1]
-        line[:-1] |= before[1:]
-    return found
+    x, y, z = (int(count) for count in medium.shape)
+    holds, touches = (wp.zeros((z, y, x), dtype=wp.uint8, device=places.device) for _ in range(2))
+    kernel_cache.launch(_mark, len(places), [places, medium.corner, medium.voxel], [holds], places.device)
+    kernel_cache.launch(_spread, (z, y, x), [holds], [touches], places.device)
+    return touches
 
 
 @wp.kernel
@@ -136,52 +159,104 @@ def _see(
     view: ViewOnDevice,
     segments: wp.array[int],
     keys: wp.array[int],
-    out_is_seen: wp.array[wp.uint8],
+    out_is_seen: wp.array[int],
     first: int,
 ):
     place = first + wp.tid()
     met, direction, _state = start(medium, view, segments[place], keys[place])
     if _is_in_sight(medium, view, met, direction):
-        out_is_seen[place] = wp.uint8(1)
+        out_is_seen[place] = 1
+
+
+@wp.kernel
+def _add_counts(counts: wp.array[int], part_size: int, out_totals: wp.array[wp.int64]):
+    part = wp.tid()
+    total = wp.int64(0)
+    for segment in range(part * part_size, wp.min((part + 1) * part_size, counts.shape[0])):
+        total += wp.int64(counts[segment])
+    out_totals[part] = total
+
+
+def _total(counts):
+    """The sum of (N,) numbers, which may be above what one of them can be."""
+    size = max(-(-len(counts) // _MOST_PARTS), 1)
+    totals = wp.empty(-(-len(counts) // size), dtype=wp.int64)
+    kernel_cache.launch(_add_counts, len(totals), [counts, size], [totals], counts.device)
+    return int(totals.numpy().sum())
 
 
 def _tries(medium, view, is_seen, density, count, seed, device):
     """(segments,) how often each is tried, less often where there would be too many for `count` paths."""
-    counts, most = wp.zeros(len(medium.points) - 1, dtype=int), count
+    counts, most = wp.zeros(max(len(medium.points) - 1, 0), dtype=int), count
     while True:
         launch(_count, len(counts), [medium, view, is_seen, density, most, seed, counts], device)
-        numbers = counts.numpy().clip(0, most)
-        tries = int(numbers.sum(dtype=np.int64))
+        tries = _total(counts)
         if tries <= _MOST_TRIES * count:
-            return numbers
+            return counts
         if most > _LEAST_SHARE * count:
             most //= 4  # of strands next the camera, nearly all of which are beside the picture
         else:
             density *= 0.9 * _MOST_TRIES * count / tries
 
 
-def of_seen(
-    medium: Medium, grid: StrandGrid, seen: Seen, voxels: np.ndarray, count: int, seed: int, device: wp.DeviceLike
-) -> Starts:
-    """About `count` `Starts`; voxels: of what is seen, by `voxels_of`."""
-    seen_in, is_seen = on_device(seen.view), wp.array(voxels, dtype=wp.uint8)
-    numbers = _tries(medium, seen_in, is_seen, count / (len(seen.segments) * seen.area), count, seed, device)
-    segments = np.flatnonzero(numbers)
-    each = np.repeat(segments, numbers[segments])
-    firsts = np.cumsum(numbers[segments]) - numbers[segments]
-    keys = hashed(each, seed + 1, np.arange(len(each)) - np.repeat(firsts, numbers[segments])).astype(np.int32)
-    each = each.astype(np.int32)
-    in_sight = wp.zeros(len(each), dtype=wp.uint8)
-    launch(_see, len(each), [medium, seen_in, wp.array(each), wp.array(keys), in_sight], device)
-    is_start = in_sight.numpy().astype(bool)
-    return Starts(each[is_start], keys[is_start])
+@wp.func
+def _hashed(value: wp.uint64, number: wp.uint64, seed: wp.uint64):
+    """A hash of two numbers and the product of a seed: the finalizer of [Steele14]."""
+    bits = value * wp.uint64(0x9E3779B97F4A7C15) + number * wp.uint64(0xD1B54A32D192ED03) + seed
+    bits = (bits ^ (bits >> wp.uint64(30))) * wp.uint64(0xBF58476D1CE4E5B9)
+    bits = (bits ^ (bits >> wp.uint64(27))) * wp.uint64(0x94D049BB133111EB)
+    return wp.uint32(bits ^ (bits >> wp.uint64(31)))
 
 
-def hashed(values: np.ndarray, seed: int, number: int | np.ndarray = 0) -> np.ndarray:
-    """Return (N,) uint32 hashes of (N,) integers, a seed and second (N,) integers: the finalizer of [Steele14]."""
-    bits = np.asarray(values).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    bits = bits + np.asarray(number).astype(np.uint64) * np.uint64(0xD1B54A32D192ED03)
-    bits = bits + np.uint64((seed * 0x8CB92BA72F3D8DD7) % 2**64)
-    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
-        bits = (bits ^ (bits >> np.uint64(shift))) * np.uint64(factor)
-    return (bits ^ (bits >> np.uint64(31))).astype(np.uint32)
+@wp.kernel
+def _list(
+    counts: wp.array[int],
+    ends: wp.array[int],
+    seed: wp.uint64,
+    out_segments: wp.array[int],
+    out_keys: wp.array[int],
+    first: int,
+):
+    segment = first + wp.tid()
+    at = ends[segment] - counts[segment]
+    for number in range(counts[segment]):
+        out_segments[at + number] = segment
+        out_keys[at + number] = int(_hashed(wp.uint64(segment), wp.uint64(number), seed))
+
+
+@wp.kernel
+def _keep(
+    segments: wp.array[int],
+    keys: wp.array[int],
+    is_kept: wp.array[int],
+    ends: wp.array[int],
+    out_segments: wp.array[int],
+    out_keys: wp.array[int],
+):
+    place = wp.tid()
+    if is_kept[place] == 1:
+        out_segments[ends[place] - 1] = segments[place]
+        out_keys[ends[place] - 1] = keys[place]
+
+
+def of_seen(medium: Medium, seen: Seen, voxels: wp.array3d[wp.uint8], count: int, seed: int) -> Starts:
+    """About `count` `Starts`, on the device of a medium; voxels: of what is seen, by `voxels_of`."""
+    device, seen_in = medium.points.device, on_device(seen.view)
+    for side, wanted in zip(voxels.shape[::-1], medium.shape, strict=True):
+        require_count("voxels", side, int(wanted))
+    with wp.ScopedDevice(device):
+        counts = _tries(medium, seen_in, voxels, count / (len(seen.segments) * seen.area), count, seed, device)
+        ends, tries = running_sums.ends_of(counts)
+        segments, keys, in_sight = (wp.zeros(tries, dtype=int) for _ in range(3))
+        launch(_list, len(counts), [counts, ends, _product(seed + 1), segments, keys], device)
+        launch(_see, tries, [medium, seen_in, segments, keys, in_sight], device)
+        ends, found = running_sums.ends_of(in_sight)
+        starts = Starts(wp.empty(found, dtype=int), wp.empty(found, dtype=int))
+        given = [segments, keys, in_sight, ends]
+        kernel_cache.launch(_keep, tries, given, [starts.segments, starts.keys], device)
+        return starts
+
+
+def _product(seed):
+    """The product of a seed for `_hashed`."""
+    return wp.uint64((seed * 0x8CB92BA72F3D8DD7) % 2**64)

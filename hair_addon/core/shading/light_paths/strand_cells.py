@@ -11,12 +11,12 @@ import numpy as np
 import warp as wp
 
 from ...errors import HairError
-from ...kernels import parallel
+from ...kernels import kernel_cache, parallel, running_sums
+from ...kernels.checks import require_count
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 _LEAST_SEGMENTS = 20_000  # fewer are not worth a thread
-_MOST_PARTS = wp.constant(1600)  # of a segment, each about as long as two cells
 _WIDER = wp.constant(1e-4)  # part of a cell by which segments are taken as wider, for rounding
 _REACH = wp.constant(1.7321)  # cells from a cell's centre to the nearest point of a line, at most
 _STEPS = wp.constant(1023.0)  # of that point, along each axis
@@ -31,10 +31,10 @@ class StrandCells:
 
     along_voxel: int  # K
     radius: float  # the largest [m]
-    bricks: np.ndarray  # (V,) int32: of each voxel, which of those that are divided it is; -1: it is empty
-    starts: np.ndarray  # (B K³ + 1,) int32: first of each cell in `segments`
-    segments: np.ndarray  # (M,) int32: first points of segments, once for each cell that they are in
-    lines: np.ndarray  # (M, 2) uint32: of those `line_of`
+    bricks: wp.array[int]  # (V,): of each voxel, which of those that are divided it is; -1: it is empty
+    starts: wp.array[int]  # (B K³ + 1,): first of each cell in `segments`
+    segments: wp.array[int]  # (M,) first points of segments, once for each cell that they are in, rising in each
+    lines: wp.array[wp.uint32]  # (2 M,) two words of `line_of` for each of those
 
     @property
     def widths(self) -> np.ndarray:
@@ -58,7 +58,7 @@ class _Strands:
 
 @wp.struct
 class _Axis:
-    """A segment's axis: from `origin` + first `way` to `origin` + last `way` where only a part of it is meant."""
+    """A segment's axis: from `origin` + first × `way` to `origin` + last × `way` where only a part of it is meant."""
 
     origin: wp.vec3
     way: wp.vec3
@@ -83,32 +83,45 @@ def _axis_of(hair: _Strands, segment: int, side: float):
 
 
 @wp.func
-def _is_in_cell(axis: _Axis, first: float, last: float, low: wp.vec3, side: float):
-    """Whether a part of a segment comes into a cell with its width."""
-    enter = first
-    leave = last
-    for along in range(3):
-        one = (low[along] - axis.radius - axis.origin[along]) * axis.inverse[along]
-        other = (low[along] + side + axis.radius - axis.origin[along]) * axis.inverse[along]
-        enter = wp.max(enter, wp.min(one, other))
-        leave = wp.min(leave, wp.max(one, other))
-    return enter <= leave
+def _cells_along(hair: _Strands, axis: _Axis, along: int, first: float, last: float, per_side: float):
+    """(first, last) cells along X, Y or Z that a part of a segment is in with its width."""
+    a = axis.origin[along] + first * axis.way[along] - hair.corner[along]
+    b = axis.origin[along] + last * axis.way[along] - hair.corner[along]
+    most = float(hair.shape[along] * hair.along_voxel - 1)
+    low = wp.clamp((wp.min(a, b) - axis.radius) * per_side, 0.0, most)
+    high = wp.clamp((wp.max(a, b) + axis.radius) * per_side, 0.0, most)
+    return int(low), int(high)
 
 
 @wp.func
-def _range_of(hair: _Strands, axis: _Axis, first: float, last: float, side: float):
-    """(first, last) cells along X, Y, Z of the box around a part of a segment."""
-    a = axis.origin + first * axis.way
-    b = axis.origin + last * axis.way
-    low = wp.vec3i(0, 0, 0)
-    high = wp.vec3i(0, 0, 0)
-    for along in range(3):
-        most = hair.shape[along] * hair.along_voxel - 1
-        least = (wp.min(a[along], b[along]) - axis.radius - hair.corner[along]) / side
-        largest = (wp.max(a[along], b[along]) + axis.radius - hair.corner[along]) / side
-        low[along] = wp.clamp(int(wp.floor(least)), 0, most)
-        high[along] = wp.clamp(int(wp.floor(largest)), 0, most)
-    return low, high
+def _part_in_layer(hair: _Strands, axis: _Axis, along: int, cell: int, first: float, last: float, side: float):
+    """(first, last) of a part of a segment as far as it is in one layer of cells; first is above last without."""
+    low = hair.corner[along] + side * float(cell) - axis.origin[along]
+    one = (low - axis.radius) * axis.inverse[along]
+    other = (low + side + axis.radius) * axis.inverse[along]
+    return wp.max(first, wp.min(one, other)), wp.min(last, wp.max(one, other))
+
+
+@wp.func
+def _place_word(origin: wp.vec3, way: wp.vec3, centre: wp.vec3, side: float, halvings: int):
+    part = wp.dot(centre - origin, way) / wp.max(wp.dot(way, way), 1e-30)
+    nearest = (origin + part * way - centre) / (2.0 * _REACH * side) + wp.vec3(0.5, 0.5, 0.5)
+    where = wp.uint32(halvings) << wp.uint32(30)
+    for axis in range(3):
+        step = wp.clamp(int(nearest[axis] * _STEPS + 0.5), 0, int(_STEPS))
+        where = where | (wp.uint32(step) << wp.uint32(10 * axis))
+    return where
+
+
+@wp.func
+def _direction_word(way: wp.vec3):
+    flat = way / wp.max(wp.abs(way[0]) + wp.abs(way[1]) + wp.abs(way[2]), 1e-30)
+    x = flat[0]
+    y = flat[1]
+    if flat[2] < 0.0:
+        x = (1.0 - wp.abs(flat[1])) * wp.where(flat[0] < 0.0, -1.0, 1.0)
+        y = (1.0 - wp.abs(flat[0])) * wp.where(flat[1] < 0.0, -1.0, 1.0)
+    return wp.uint32((0.5 + 0.5 * x) * _TURNS + 0.5) | (wp.uint32((0.5 + 0.5 * y) * _TURNS + 0.5) << wp.uint32(16))
 
 
 @wp.func
@@ -117,20 +130,7 @@ def line_of(origin: wp.vec3, way: wp.vec3, centre: wp.vec3, side: float, halving
     halvings: of the widest radius, to that of the segment; and its direction on an octahedron [Meyer10], of 16 bits
     along both axes.
     """
-    part = wp.dot(centre - origin, way) / wp.max(wp.dot(way, way), 1e-30)
-    nearest = (origin + part * way - centre) / (2.0 * _REACH * side) + wp.vec3(0.5, 0.5, 0.5)
-    where = wp.uint32(halvings) << wp.uint32(30)
-    for axis in range(3):
-        step = wp.clamp(int(nearest[axis] * _STEPS + 0.5), 0, int(_STEPS))
-        where = where | (wp.uint32(step) << wp.uint32(10 * axis))
-    flat = way / wp.max(wp.abs(way[0]) + wp.abs(way[1]) + wp.abs(way[2]), 1e-30)
-    x = flat[0]
-    y = flat[1]
-    if flat[2] < 0.0:
-        x = (1.0 - wp.abs(flat[1])) * wp.where(flat[0] < 0.0, -1.0, 1.0)
-        y = (1.0 - wp.abs(flat[0])) * wp.where(flat[1] < 0.0, -1.0, 1.0)
-    turned = wp.uint32((0.5 + 0.5 * x) * _TURNS + 0.5) | (wp.uint32((0.5 + 0.5 * y) * _TURNS + 0.5) << wp.uint32(16))
-    return where, turned
+    return _place_word(origin, way, centre, side, halvings), _direction_word(way)
 
 
 @wp.func
@@ -149,113 +149,235 @@ def line_from(where: wp.uint32, turned: wp.uint32, side: float):
     return scale * point - wp.vec3(middle, middle, middle), wp.vec3(x, y, z), int(where >> wp.uint32(30))
 
 
-@wp.kernel
-def _register(
-    hair: _Strands,
-    bricks: wp.array[int],
-    is_counting: int,
-    first: int,
-    out_ends: wp.array[int],
-    out_segments: wp.array[int],
-    out_lines: wp.array2d[wp.uint32],
-):
-    """Count the segments of each cell, or fill each cell's from the end before it on."""
-    segment = first + wp.tid()
-    if hair.strands[segment] != hair.strands[segment + 1]:
-        return
-    k = hair.along_voxel
-    side = hair.voxel / float(k)
-    axis = _axis_of(hair, segment, side)
+@wp.func
+def _halvings_of(hair: _Strands, axis: _Axis):
+    """How often the largest radius can be halved and is still a segment's or above it."""
     halvings = int(0)
     width = 0.5 * hair.radius
     while halvings < _WIDTHS - 1 and axis.radius < width:
         halvings += 1
         width *= 0.5
-    parts = 1 + wp.clamp(int(wp.length(axis.way) / (2.0 * side)), 0, _MOST_PARTS)
-    step = 1.0 / float(parts)
-    before_low = wp.vec3i(0, 0, 0)
-    before_high = wp.vec3i(-1, -1, -1)
-    for part in range(parts):
-        start = step * float(part)
-        low, high = _range_of(hair, axis, start, start + step, side)
-        for z in range(low[2], high[2] + 1):
-            for y in range(low[1], high[1] + 1):
-                for x in range(low[0], high[0] + 1):
-                    corner = hair.corner + side * wp.vec3(float(x), float(y), float(z))
-                    if _is_in_cell(axis, start, start + step, corner, side):
-                        is_known = x >= before_low[0] and y >= before_low[1] and z >= before_low[2]
-                        is_known = is_known and x <= before_high[0] and y <= before_high[1] and z <= before_high[2]
-                        if is_known:
-                            is_known = _is_in_cell(axis, start - step, start, corner, side)
-                        brick = bricks[((z / k) * hair.shape[1] + y / k) * hair.shape[0] + x / k]
-                        if brick >= 0 and not is_known:
-                            cell = ((brick * k + z % k) * k + y % k) * k + x % k
-                            at = wp.atomic_add(out_ends, cell, 1)
-                            if is_counting == 0:
-                                centre = corner + 0.5 * wp.vec3(side, side, side)
-                                where, turned = line_of(axis.origin, axis.way, centre, side, halvings)
+    return halvings
+
+
+@wp.kernel
+def _find(
+    hair: _Strands,
+    is_counting: int,
+    bricks: wp.array[int],
+    ends: wp.array[wp.int64],
+    out_is_used: wp.array[int],
+    out_cells: wp.array[int],
+    out_segments: wp.array[int],
+    out_lines: wp.array[wp.uint32],
+    first: int,
+):
+    """Count the cells of each segment and mark their voxels, or write them before the segment's end.
+
+    Layer by layer, row by row: of a segment as much as is in a layer has its rows, and of that as much as is in a row
+    its cells. None is looked at in vain.
+    """
+    segment = first + wp.tid()
+    if hair.strands[segment] != hair.strands[segment + 1]:
+        if is_counting == 1:
+            ends[segment] = wp.int64(0)
+        return
+    k = hair.along_voxel
+    side = hair.voxel / float(k)
+    per_side = 1.0 / side
+    axis = _axis_of(hair, segment, side)
+    halvings = int(0)
+    turned = wp.uint32(0)
+    count = int(0)
+    at = int(0)
+    end = int(0)
+    if is_counting == 0:
+        halvings = _halvings_of(hair, axis)
+        turned = _direction_word(axis.way)
+        end = int(ends[segment])
+        if segment > 0:
+            at = int(ends[segment - 1])
+    low_z, high_z = _cells_along(hair, axis, 2, 0.0, 1.0, per_side)
+    for z in range(low_z, high_z + 1):
+        first_z, last_z = _part_in_layer(hair, axis, 2, z, 0.0, 1.0, side)
+        if first_z <= last_z:
+            low_y, high_y = _cells_along(hair, axis, 1, first_z, last_z, per_side)
+            for y in range(low_y, high_y + 1):
+                first_y, last_y = _part_in_layer(hair, axis, 1, y, first_z, last_z, side)
+                if first_y <= last_y:
+                    row = ((z / k) * hair.shape[1] + y / k) * hair.shape[0]
+                    low_x, high_x = _cells_along(hair, axis, 0, first_y, last_y, per_side)
+                    if is_counting == 1:
+                        count += high_x - low_x + 1
+                        for voxel in range(low_x / k, high_x / k + 1):
+                            out_is_used[row + voxel] = 1
+                    else:
+                        voxel = row + low_x / k
+                        in_voxel = low_x % k
+                        in_brick = ((z % k) * k + y % k) * k
+                        centre = hair.corner + side * wp.vec3(float(low_x) + 0.5, float(y) + 0.5, float(z) + 0.5)
+                        for _x in range(low_x, high_x + 1):
+                            if at < end:
+                                out_cells[at] = bricks[voxel] * k * k * k + in_brick + in_voxel
                                 out_segments[at] = segment
-                                out_lines[at, 0] = where
-                                out_lines[at, 1] = turned
-        before_low = low
-        before_high = high
+                                out_lines[2 * at] = _place_word(axis.origin, axis.way, centre, side, halvings)
+                                out_lines[2 * at + 1] = turned
+                                at += 1
+                            in_voxel += 1
+                            if in_voxel == k:
+                                in_voxel = 0
+                                voxel += 1
+                            centre += wp.vec3(side, 0.0, 0.0)
+    if is_counting == 1:
+        ends[segment] = wp.int64(count)
+
+
+@wp.kernel
+def _number(is_used: wp.array[int], ends: wp.array[int], out_bricks: wp.array[int]):
+    voxel = wp.tid()
+    out_bricks[voxel] = wp.where(is_used[voxel] > 0, ends[voxel] - 1, -1)
+
+
+@wp.kernel
+def _count(cells: wp.array[int], first: int, out_counts: wp.array[int]):
+    wp.atomic_add(out_counts, cells[first + wp.tid()], 1)
+
+
+@wp.kernel
+def _add_shares(counts: wp.array2d[int], out_total: wp.array[int]):
+    cell = wp.tid()
+    total = int(0)
+    for share in range(counts.shape[0]):
+        total += counts[share, cell]
+    out_total[cell] = total
+
+
+@wp.kernel
+def _begin_shares(starts: wp.array[int], counts: wp.array2d[int]):
+    """Of each share of the segments where its own begin in each cell: those of earlier shares come first."""
+    cell = wp.tid()
+    at = starts[cell]
+    for share in range(counts.shape[0]):
+        count = counts[share, cell]
+        counts[share, cell] = at
+        at += count
+
+
+@wp.kernel
+def _put(
+    cells: wp.array[int],
+    segments: wp.array[int],
+    lines: wp.array[wp.uint32],
+    first: int,
+    ends: wp.array[int],
+    out_segments: wp.array[int],
+    out_lines: wp.array[wp.uint32],
+):
+    """Put each into the next place of its cell, on one core of the processor: they stay in order."""
+    entry = first + wp.tid()
+    cell = cells[entry]
+    at = ends[cell]
+    ends[cell] = at + 1
+    out_segments[at] = segments[entry]
+    out_lines[2 * at] = lines[2 * entry]
+    out_lines[2 * at + 1] = lines[2 * entry + 1]
+
+
+@wp.kernel
+def _take(
+    order: wp.array[int],
+    segments: wp.array[int],
+    lines: wp.array[wp.uint32],
+    out_segments: wp.array[int],
+    out_lines: wp.array[wp.uint32],
+):
+    at = wp.tid()
+    entry = order[at]
+    out_segments[at] = segments[entry]
+    out_lines[2 * at] = lines[2 * entry]
+    out_lines[2 * at + 1] = lines[2 * entry + 1]
+
+
+@wp.kernel
+def _rise(out_order: wp.array[int]):
+    out_order[wp.tid()] = wp.tid()
 
 
 def build(
-    points: np.ndarray,
-    radii: np.ndarray,
-    strands: np.ndarray,
+    points: wp.array[wp.vec3],
+    radii: wp.array[float],
+    strands: wp.array[int],
+    radius: float,
     voxels: tuple[np.ndarray, float, tuple[int, int, int]],
     along_voxel: int,
-    device: wp.DeviceLike = "cpu",
 ) -> StrandCells:
-    """The cells of strands of points (N, 3) with radii (N,) [m], of which (N,) tells whose point it is.
+    """The cells, on their device, of strands of points (N,) with radii (N,) [m], of which (N,) tells whose point it is.
 
-    voxels: corner (3,) and side [m], and numbers along X, Y, Z, of voxels that hold all strands, each at least as wide
-    as `along_voxel` strands.
+    radius: the largest [m]; voxels: corner (3,) and side [m], and numbers along X, Y, Z, of voxels that hold all
+    strands, each at least as wide as `along_voxel` strands.
     """
+    require_count("radii", len(radii), len(points))
+    require_count("strands of points", len(strands), len(points))
+    device = points.device
     corner, side, shape = voxels
     with wp.ScopedDevice(device):
         hair = _Strands()
-        hair.points, hair.radii = wp.array(points, dtype=wp.vec3), wp.array(radii, dtype=float)
-        hair.strands, hair.radius = wp.array(strands, dtype=int), float(radii.max())
+        hair.points, hair.radii, hair.strands, hair.radius = points, radii, strands, radius
         hair.corner, hair.voxel, hair.shape = wp.vec3(*corner.tolist()), side, wp.vec3i(*shape)
-        hair.along_voxel = 1
-        numbers = np.arange(int(np.prod(shape)), dtype=np.int32)
-        is_used = sum(_counts(hair, numbers, len(numbers), device)) > 0
-        bricks = np.where(is_used, np.cumsum(is_used, dtype=np.int32) - 1, -1).astype(np.int32)
         hair.along_voxel = along_voxel
-        starts, ends = _ends(_counts(hair, bricks, int(bricks.max()) + 1, device))
-        count = int(starts[-1])
-        segments, lines = wp.empty(count, dtype=int), wp.empty((count, 2), dtype=wp.uint32)
-        outputs = [[wp.array(one, dtype=int), segments, lines] for one in ends]
-        given = [hair, wp.array(bricks, dtype=int), 0]
-        parallel.launch_shares(_register, len(points) - 1, given, outputs, device)
-        return StrandCells(along_voxel, hair.radius, bricks, starts, segments.numpy(), lines.numpy())
+        segment_count, voxel_count = max(len(points) - 1, 0), int(np.prod(shape))
+        none, no_lines = wp.empty(1, dtype=int), wp.empty(2, dtype=wp.uint32)
+        is_used, counts = wp.zeros(voxel_count, dtype=int), wp.empty(segment_count, dtype=wp.int64)
+        _by_segments(hair, [1, none, counts, is_used, none, none, no_lines])
+        ends, count = running_sums.ends_of(counts)
+        if count > np.iinfo(np.int32).max // 2:  # kernels count both words of each line
+            raise HairError("Strands are too wide for light among them: use dual scattering.")
+        numbers, brick_count = running_sums.ends_of(is_used)
+        bricks = wp.empty(voxel_count, dtype=int)
+        kernel_cache.launch(_number, voxel_count, [is_used, numbers], [bricks], device)
+        # Sorting on a GPU takes twice the room.
+        cells = parallel.empty(count if device.is_cpu else 2 * count, int, device)
+        segments, lines = parallel.empty(count, int, device), parallel.empty(2 * count, wp.uint32, device)
+        _by_segments(hair, [0, bricks, ends, none, cells, segments, lines])
+        by_cell = _sorted_by_cores if device.is_cpu else _sorted
+        found = by_cell(cells, brick_count * along_voxel**3, segments, lines)
+        return StrandCells(along_voxel, radius, bricks, *found)
 
 
-def _counts(hair, bricks, brick_count, device):
-    """Of each share of the segments how many are in each cell."""
-    count = len(hair.points) - 1
-    shares = parallel.share_count(count, device, _LEAST_SEGMENTS)
-    found = [wp.zeros(brick_count * hair.along_voxel**3, dtype=int) for _ in range(shares)]
-    nothing = [wp.empty(1, dtype=int), wp.empty((1, 2), dtype=wp.uint32)]
-    given = [hair, wp.array(bricks, dtype=int), 1]
-    parallel.launch_shares(_register, count, given, [[one, *nothing] for one in found], device)
-    return [one.numpy() for one in found]
+def _by_segments(hair, given):
+    """`_find` for all segments."""
+    count, device = max(len(hair.points) - 1, 0), hair.points.device
+    if count:
+        parts = parallel.part_count(count, device, _LEAST_SEGMENTS)
+        parallel.launch_shares(_find, count, [hair, *given], [[] for _ in range(parts)], device)
 
 
-def _ends(counts):
-    """((cells + 1,) first of each cell in all, for each share of the segments where its own begin)."""
-    total = counts[0].astype(np.int64)
-    for one in counts[1:]:
-        total += one
-    starts = np.zeros(len(total) + 1, np.int64)
-    np.cumsum(total, out=starts[1:])
-    if starts[-1] > np.iinfo(np.int32).max // 2:  # kernels count both words of each line
-        raise HairError("Strands are too wide for light among them: use dual scattering.")
-    ends, before = [], starts[:-1].astype(np.int32)
-    for one in counts:
-        ends.append(before)
-        before = before + one
-    return starts.astype(np.int32), ends
+def _sorted(cells, cell_count, segments, lines):
+    """((cells + 1,) starts, segments and lines by cell) of M that are in any order in (2 M,) cells: by a radix sort."""
+    device, count = cells.device, len(segments)
+    counts, starts = (wp.zeros(cell_count + 1, dtype=int, device=device) for _ in range(2))
+    order = wp.empty(2 * count, dtype=int, device=device)
+    found = parallel.empty(count, int, device), parallel.empty(2 * count, wp.uint32, device)
+    kernel_cache.launch(_count, count, [cells, 0], [counts], device)
+    wp.utils.array_scan(counts, starts, inclusive=False)
+    kernel_cache.launch(_rise, count, outputs=[order], device=device)
+    wp.utils.radix_sort_pairs(cells, order, count, end_bit=max(cell_count - 1, 1).bit_length())
+    kernel_cache.launch(_take, count, [order, segments, lines], found, device)
+    return starts, *found
+
+
+def _sorted_by_cores(cells, cell_count, segments, lines):
+    """What `_sorted` returns: each core of the processor puts a share of the segments into their cells."""
+    device, count = cells.device, len(segments)
+    counts = wp.zeros((parallel.share_count(count, device, _LEAST_SEGMENTS), cell_count + 1), dtype=int, device=device)
+    total, starts = (wp.zeros(cell_count + 1, dtype=int, device=device) for _ in range(2))
+    found = parallel.empty(count, int, device), parallel.empty(2 * count, wp.uint32, device)
+    if count:
+        shares = [counts[share] for share in range(len(counts))]
+        parallel.launch_shares(_count, count, [cells], [[share] for share in shares], device)
+        kernel_cache.launch(_add_shares, cell_count + 1, [counts], [total], device)
+        wp.utils.array_scan(total, starts, inclusive=False)
+        kernel_cache.launch(_begin_shares, cell_count + 1, [starts, counts], device=device)
+        given = [cells, segments, lines]
+        parallel.launch_shares(_put, count, given, [[share, *found] for share in shares], device)
+    return starts, *found

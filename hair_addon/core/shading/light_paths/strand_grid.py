@@ -6,16 +6,19 @@ one by few tests. Very many strands are thinned out: the rest is wider, and stop
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import warp as wp
 
 from ...errors import HairError
+from ...kernels import kernel_cache, parallel
 from ...kernels.checks import require_count, require_indices
 from ..fibre import marschner
 from ..fibre.principled import scale_from_radial_roughness
 from . import strand_cells
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 SEGMENT_COUNT = 3_000_000  # at most, of all strands
 VOXEL_COUNT = 375_000
@@ -24,21 +27,25 @@ CELLS_ALONG_VOXEL = 3  # at most: cells are wider than strands
 _SIZES_AN_OCTAVE = 4  # of voxels
 _LEAST_SEGMENTS = 8  # of a strand, that it can bend
 _AT_ONCE = 1000  # strands that are looked at for any area
+_MOST_PARTS, _LEAST_PART = 4096, 256  # of all points that are measured, and points of a part
 
 
 @dataclass(frozen=True, eq=False)
 class Strands:
-    """One system of hair: S strands of P points in the world.
+    """One system of hair: S strands of P points.
 
-    absorption: function of indices of strands (N, 1) and places along them (P,), root 0 to tip 1, → sigma_a (N, P, 3);
-    fibre: (S,) index of each strand's settings among those given to `build`.
+    absorption: function of indices of strands (N,) → sigma_a (N, 2, 3), or (1, 2, 3) where all have the same, at roots
+    and at tips; gradient: (P,) part of the way between both; fibre: (S,) index of each strand's settings among those
+    given to `build`.
     """
 
-    points: np.ndarray  # (S, P, 3) [m]
-    radii: np.ndarray  # (S, P) [m]
-    absorption: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    points: np.ndarray  # (S, P, 3)
+    radii: np.ndarray  # (S, P) in the world [m]
+    absorption: Callable[[np.ndarray], np.ndarray]
+    gradient: np.ndarray  # (P,)
     roughness: np.ndarray  # (S,) longitudinal, in [0, 1]
     fibre: np.ndarray  # (S,)
+    to_world: np.ndarray = field(default_factory=lambda: np.eye(4))  # (4, 4) of points, to [m]
 
 
 @dataclass(frozen=True)
@@ -61,14 +68,14 @@ class StrandGrid:
     voxel: float  # side [m]
     shape: tuple[int, int, int]  # voxels along X, Y, Z
     cells: strand_cells.StrandCells
-    points: np.ndarray  # (N, 3) float32 [m]
-    radii: np.ndarray  # (N,) float32 [m]
-    sigma_a: np.ndarray  # (N, 3) float32
-    strands: np.ndarray  # (N,) int32: whose point it is
-    roughness: np.ndarray  # (S,) float32
-    fibres: np.ndarray  # (S,) int32: rows of `fibre_rows`
-    systems: np.ndarray  # (S,) int32: which hair
-    fibre_rows: np.ndarray  # (F, 5) float32: ior, azimuthal scale, tilt, shift of TRT in tilts, coat
+    points: wp.array[wp.vec3]  # (N,) [m]
+    radii: wp.array[float]  # (N,) [m]
+    sigma_a: wp.array[wp.vec3]  # (N,)
+    strands: wp.array[int]  # (N,): whose point it is
+    roughness: wp.array[float]  # (S,)
+    fibres: wp.array[int]  # (S,): rows of `fibre_rows`
+    systems: wp.array[int]  # (S,): which hair
+    fibre_rows: wp.array2d[float]  # (F, 5): ior, azimuthal scale, tilt, shift of TRT in tilts, coat
     kept: tuple[Kept, ...]  # of each system
 
     @property
@@ -76,10 +83,10 @@ class StrandGrid:
         """Numbers along X, Y, Z of the first voxel, of all that fill the world."""
         return tuple(np.rint(self.corner / self.voxel).astype(int).tolist())
 
-    def voxels_at(self, places: np.ndarray) -> np.ndarray:
-        """(N, 3) int64 numbers along X, Y, Z of the voxels that hold places (N, 3), the nearest beside the grid."""
-        at = (places - self.corner.astype(np.float32)) * np.float32(1.0 / self.voxel)
-        return at.astype(np.int64).clip(0, np.array(self.shape) - 1)
+    @property
+    def device(self) -> wp.Device:
+        """The device that its arrays are on."""
+        return self.points.device
 
 
 def build(
@@ -95,49 +102,58 @@ def build(
     """
     for strands in systems:
         require_count("radii", strands.radii.size, strands.points.shape[0] * strands.points.shape[1])
+        require_count("places of a gradient", len(strands.gradient), strands.points.shape[1])
         require_count("values of roughness", len(strands.roughness), len(strands.points))
         require_count("fibers", len(strands.fibre), len(strands.points))
         require_indices("fibers", strands.fibre, len(fibres))
-    if not 0.0 < sum(float(_segment_areas(strands.points, strands.radii).sum()) for strands in systems) < np.inf:
-        raise HairError("Light needs strands of a length and a width above zero.")
     share = segment_count / max(sum(strands.radii[:, 1:].size for strands in systems), 1)
-    kept, parts, point_count = [], [], 0
-    for strands in systems:
-        found, *part = _thinned(strands, share)
-        kept.append(Kept(*found, point_count))
-        parts.append(part)
-        point_count += len(part[0])
-    points, radii, sigma_a = (np.concatenate([part[index] for part in parts]) for index in range(3))
-    roughness, fibre = (np.concatenate([part[index] for part in parts]) for index in (3, 4))
-    counts = [len(part[3]) for part in parts]
-    strand_of_points = np.repeat(
-        np.arange(sum(counts), dtype=np.int32), np.repeat([one.point_count for one in kept], counts)
-    )
-    voxels = _voxels(points, float(radii.max()), voxel_count)
-    along_voxel = min(max(int(voxels[1] / (2.0 * radii.max())), 1), CELLS_ALONG_VOXEL)
-    cells = strand_cells.build(points, radii, strand_of_points, voxels, along_voxel, device)
-    return StrandGrid(
-        *voxels,
-        cells,
-        points,
-        radii,
-        sigma_a,
-        strand_of_points,
-        roughness.astype(np.float32),
-        fibre.astype(np.int32),
-        np.repeat(np.arange(len(counts), dtype=np.int32), counts),
-        np.array([_fibre_row(settings) for settings in fibres], np.float32),
-        tuple(kept),
-    )
+    chosen = [_chosen(strands, share) for strands in systems]
+    counts = [
+        len(range(0, len(strands.points), stride)) for strands, (stride, _at) in zip(systems, chosen, strict=True)
+    ]
+    firsts = np.cumsum([0, *(count * len(at) for count, (_stride, at) in zip(counts, chosen, strict=True))]).tolist()
+    kept = [Kept(stride, len(at), first) for (stride, at), first in zip(chosen, firsts, strict=False)]
+    with wp.ScopedDevice(device):
+        device = wp.get_device()
+        arrays = [wp.empty(firsts[-1], dtype=kind) for kind in (wp.vec3, float, wp.vec3, int)]
+        for index, (strands, (_stride, at)) in enumerate(zip(systems, chosen, strict=True)):
+            rows = slice(firsts[index], firsts[index + 1])
+            _thin(strands, kept[index], at, sum(counts[:index]), [array[rows] for array in arrays])
+        points, radii, sigma_a, strand_of_points = arrays
+        low, high, widest, area = _measured(points, radii, strand_of_points)
+        if not 0.0 < area < np.inf:
+            raise HairError("Light needs strands of a length and a width above zero.")
+        voxels = _voxels(low, high, widest, voxel_count)
+        along_voxel = min(max(int(voxels[1] / (2.0 * widest)), 1), CELLS_ALONG_VOXEL)
+        cells = strand_cells.build(points, radii, strand_of_points, widest, voxels, along_voxel)
+        strided = [(strands, one.stride) for strands, one in zip(systems, kept, strict=True)]
+        roughness = np.concatenate([strands.roughness[::stride] for strands, stride in strided])
+        fibre = np.concatenate([strands.fibre[::stride] for strands, stride in strided])
+        return StrandGrid(
+            *voxels,
+            cells,
+            points,
+            radii,
+            sigma_a,
+            strand_of_points,
+            wp.array(roughness.astype(np.float32), dtype=float),
+            wp.array(fibre.astype(np.int32), dtype=int),
+            wp.array(np.repeat(np.arange(len(counts), dtype=np.int32), counts), dtype=int),
+            wp.array(np.array([_fibre_row(settings) for settings in fibres], np.float32).reshape(-1, 5), dtype=float),
+            tuple(kept),
+        )
 
 
 def has_area(systems: Sequence[Strands]) -> bool:
     """Whether any strand has a length and a width, which light could meet."""
-    return any(
-        _segment_areas(strands.points[first : first + _AT_ONCE], strands.radii[first : first + _AT_ONCE]).any()
-        for strands in systems
-        for first in range(0, len(strands.points), _AT_ONCE)
-    )
+    for strands in systems:
+        turn = strands.to_world[:3, :3].T
+        for first in range(0, len(strands.points), _AT_ONCE):
+            some = slice(first, first + _AT_ONCE)
+            along = np.diff(strands.points[some], axis=1) @ turn
+            if (np.linalg.norm(along, axis=-1) * (strands.radii[some, 1:] + strands.radii[some, :-1])).any():
+                return True
+    return False
 
 
 def segment_of(grid: StrandGrid, system: int, strands: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -147,39 +163,121 @@ def segment_of(grid: StrandGrid, system: int, strands: np.ndarray, places: np.nd
     return kept.first_point + strands // kept.stride * kept.point_count + along
 
 
-def _segment_areas(points, radii):
-    """(S, P - 1) length × width of segments [m²] of strands (S, P, 3) with radii (S, P)."""
-    along = np.diff(points, axis=1)
-    lengths = np.sqrt(np.einsum("spc,spc->sp", along, along))
-    return lengths * (radii[:, 1:] + radii[:, :-1])
-
-
-def _thinned(strands, share):
-    """((stride, point count), points (N, 3), radii, sigma_a, roughness, fibre) with about a share of the segments."""
-    count, point_count = strands.radii.shape
+def _chosen(strands, share):
+    """(stride of strands, indices of points along each) that keep about a share of the segments."""
+    point_count = strands.points.shape[1]
     most = max(point_count - 1, 1)
     wanted = most  # segments of a strand
     if share < 1.0:
         wanted = max(int(share * most), min(most, _LEAST_SEGMENTS))
     stride = max(1, round(wanted / (share * most))) if share < 1.0 else 1
-    at = np.rint(np.linspace(0, point_count - 1, wanted + 1)).astype(int)
-    chosen = np.arange(0, count, stride)
-    points = strands.points[chosen][:, at].reshape(-1, 3).astype(np.float32)
-    radii = (strands.radii[chosen][:, at] * (count / len(chosen))).reshape(-1).astype(np.float32)
-    sigma_a = strands.absorption(chosen[:, None], at / most).astype(np.float32).reshape(-1, 3)
-    found = stride, len(at)
-    return found, points, radii, sigma_a, strands.roughness[chosen], strands.fibre[chosen]
+    return stride, np.rint(np.linspace(0, point_count - 1, wanted + 1)).astype(np.int32)
 
 
-def _voxels(places, radius, voxel_count):
-    """(corner, side, numbers along X, Y, Z) of voxels around all strands.
+@wp.kernel
+def _keep(
+    points: wp.array2d[wp.vec3],
+    radii: wp.array2d[float],
+    sigma_a: wp.array2d[wp.vec3],
+    gradient: wp.array[float],
+    at: wp.array[int],
+    turn: wp.mat33,
+    shift: wp.vec3,
+    wider: float,
+    first_strand: int,
+    out_points: wp.array[wp.vec3],
+    out_radii: wp.array[float],
+    out_sigma_a: wp.array[wp.vec3],
+    out_strands: wp.array[int],
+    first: int,
+):
+    kept = first + wp.tid()
+    strand = kept / at.shape[0]
+    point = at[kept % at.shape[0]]
+    row = wp.min(strand, sigma_a.shape[0] - 1)
+    out_points[kept] = turn * points[strand, point] + shift
+    out_radii[kept] = wider * radii[strand, point]
+    out_sigma_a[kept] = sigma_a[row, 0] + gradient[point] * (sigma_a[row, 1] - sigma_a[row, 0])
+    out_strands[kept] = first_strand + strand
+
+
+def _thin(strands, kept, at, first_strand, outputs):
+    """Write the points, radii, sigma_a and strands of what is kept of a system; first_strand: number of its first."""
+    device, count = outputs[0].device, len(strands.points)
+    chosen = np.arange(0, count, kept.stride)
+    sigma_a = np.asarray(strands.absorption(chosen), np.float32)
+    require_count("absorptions", len(sigma_a), len(chosen) if len(sigma_a) != 1 else 1)
+    to_world = np.asarray(strands.to_world, np.float32)
+    points, radii = (
+        np.ascontiguousarray(values[:: kept.stride], np.float32) for values in (strands.points, strands.radii)
+    )
+    given = [
+        wp.array(points, dtype=wp.vec3, ndim=2, copy=False),
+        wp.array(radii, dtype=float, ndim=2, copy=False),
+        wp.array(sigma_a, dtype=wp.vec3, ndim=2, copy=False),
+        wp.array(np.asarray(strands.gradient, np.float32), dtype=float),
+        wp.array(at, dtype=int),
+        wp.mat33(*to_world[:3, :3].ravel().tolist()),
+        wp.vec3(*to_world[:3, 3].tolist()),
+        count / max(len(chosen), 1),
+        first_strand,
+    ]
+    parts = parallel.part_count(len(outputs[0]), device)
+    if len(outputs[0]):
+        parallel.launch_shares(_keep, len(outputs[0]), [*given, *outputs], [[] for _ in range(parts)], device)
+
+
+@wp.kernel
+def _measure(
+    points: wp.array[wp.vec3],
+    radii: wp.array[float],
+    strands: wp.array[int],
+    part_size: int,
+    out_low: wp.array[wp.vec3],
+    out_high: wp.array[wp.vec3],
+    out_widest: wp.array[float],
+    out_area: wp.array[float],
+):
+    """The bounds of a part of all points, their largest radius, and length × width of segments."""
+    part = wp.tid()
+    start = part * part_size
+    low = points[start]
+    high = low
+    widest = radii[start]
+    area = float(0.0)
+    for point in range(start, wp.min(start + part_size, points.shape[0])):
+        low = wp.min(low, points[point])
+        high = wp.max(high, points[point])
+        widest = wp.max(widest, radii[point])
+        if point + 1 < points.shape[0]:
+            if strands[point] == strands[point + 1]:
+                area += wp.length(points[point + 1] - points[point]) * (radii[point] + radii[point + 1])
+    out_low[part] = low
+    out_high[part] = high
+    out_widest[part] = widest
+    out_area[part] = area
+
+
+def _measured(points, radii, strands):
+    """((3,) least and largest coordinates, largest radius, sum of length × width of segments); no area without any."""
+    count = len(points)
+    if not count:
+        return np.zeros(3), np.zeros(3), 0.0, 0.0
+    size = max(-(-count // _MOST_PARTS), _LEAST_PART)
+    parts = -(-count // size)
+    found = [wp.empty(parts, dtype=kind) for kind in (wp.vec3, wp.vec3, float, float)]
+    kernel_cache.launch(_measure, parts, [points, radii, strands, size], found, points.device)
+    low, high, widest, area = (array.numpy() for array in found)
+    return low.min(axis=0), high.max(axis=0), float(widest.max()), float(area.sum(dtype=np.float64))
+
+
+def _voxels(low, high, radius, voxel_count):
+    """(corner, side, numbers along X, Y, Z) of voxels around all strands, whose points are between (3,) and (3,).
 
     They stay where they are in the world while hair moves, and their size is one of a few: what is averaged by voxel
     changes no more than the hair does.
     """
-    # Column by column: NumPy is slow along the long axis of narrow arrays.
-    low, high = (np.array([end(column) for column in places.T], np.float64) for end in (np.min, np.max))
-    low, high = low - radius, high + radius
+    low, high = low.astype(np.float64) - radius, high.astype(np.float64) + radius
     least = 1e-6 * max(float((high - low).max()), 1e-6)
     size = np.maximum(high - low, least)
     side = max(float(np.prod(size) / voxel_count) ** (1.0 / 3.0), float(size.max()) / (MOST_VOXELS - 2), 2.0 * radius)

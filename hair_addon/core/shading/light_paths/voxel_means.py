@@ -1,90 +1,317 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums over paths by voxel → ratios without holes: where there are few paths, those of larger voxels count as well."""
+"""Sums over paths by voxel → ratios without holes: where there are few paths, those of larger voxels count as well.
+
+All of it happens on the device of the sums. A thread adds up in the order of its voxels or of its part, so the same
+sums give the same bits.
+"""
 
 import numpy as np
+import warp as wp
 
+from ...kernels import kernel_cache, parallel
+from ...kernels.checks import require_count
+
+wp.set_module_options({"enable_backward": False})
+
+CHANNELS = 12  # RGB of four sums: light of paths, even light there, what is drawn, and even light there
 _PRIOR = 512.0  # paths that the ratio of the voxels around stands for
+_LEAST_VOXELS = 4096  # fewer are not worth a thread
+_MOST_PARTS = 512  # of all voxels, whose sums are added up
+rgb = wp.types.vector(length=3, dtype=wp.float64)
 
 
-def shares(sums: np.ndarray, path_count: int, origin: tuple[int, int, int] = (0, 0, 0)) -> np.ndarray:
-    """(Z, Y, X, 12) sums of `gather` over some paths → (Z, Y, X, 4): RGB in parts of what even light gives, and how
-    much of what is drawn is kept.
+@wp.func
+def _rgb_at(sums: wp.array4d[wp.float64], z: int, y: int, x: int, first: int):
+    return rgb(sums[z, y, x, first], sums[z, y, x, first + 1], sums[z, y, x, first + 2])
+
+
+@wp.kernel
+def _mark(
+    sums: wp.array4d[wp.float64],
+    out_layers: wp.array[wp.uint8],
+    out_rows: wp.array[wp.uint8],
+    out_columns: wp.array[wp.uint8],
+    first: int,
+):
+    """Which layers, rows and columns have any paths or samples."""
+    voxel = first + wp.tid()
+    x = voxel % sums.shape[2]
+    y = voxel / sums.shape[2] % sums.shape[1]
+    z = voxel / (sums.shape[2] * sums.shape[1])
+    if sums[z, y, x, 3] > wp.float64(0.0) or sums[z, y, x, 9] > wp.float64(0.0):
+        out_layers[z] = wp.uint8(1)
+        out_rows[y] = wp.uint8(1)
+        out_columns[x] = wp.uint8(1)
+
+
+@wp.kernel
+def _halve(sums: wp.array4d[wp.float64], shift: wp.vec3i, out_sums: wp.array4d[wp.float64], first: int):
+    """Sums over blocks of 2 × 2 × 2 voxels, the first of them without its lower half along axes whose shift is 1."""
+    voxel = first + wp.tid()
+    x = voxel % out_sums.shape[2]
+    y = voxel / out_sums.shape[2] % out_sums.shape[1]
+    z = voxel / (out_sums.shape[2] * out_sums.shape[1])
+    for channel in range(out_sums.shape[3]):
+        total = wp.float64(0.0)
+        for corner in range(8):
+            at_z = 2 * z + corner / 4 - shift[0]
+            at_y = 2 * y + corner / 2 % 2 - shift[1]
+            at_x = 2 * x + corner % 2 - shift[2]
+            is_low = at_z >= 0 and at_y >= 0 and at_x >= 0
+            if is_low and at_z < sums.shape[0] and at_y < sums.shape[1] and at_x < sums.shape[2]:
+                total += sums[at_z, at_y, at_x, channel]
+        out_sums[z, y, x, channel] = total
+
+
+@wp.func
+def _place(at: int, shift: int, count: int):
+    """(voxel below, voxel above, part of the way) of the centre of a voxel between `count` ones of twice the size."""
+    place = wp.float64(0.5) * (wp.float64(at + shift) + wp.float64(0.5)) - wp.float64(0.5)
+    below = wp.clamp(int(wp.floor(place)), 0, count - 1)
+    part = wp.clamp(place - wp.float64(below), wp.float64(0.0), wp.float64(1.0))
+    return below, wp.min(below + 1, count - 1), part
+
+
+@wp.func
+def _between(
+    ratios: wp.array4d[wp.float64],
+    channel: int,
+    z: int,
+    y: int,
+    low: int,
+    high: int,
+    part: wp.float64,
+):
+    return (wp.float64(1.0) - part) * ratios[z, y, low, channel] + part * ratios[z, y, high, channel]
+
+
+@wp.kernel
+def _refine(
+    sums: wp.array4d[wp.float64],
+    shift: wp.vec3i,
+    total: wp.array4d[wp.float64],
+    prior: wp.float64,
+    around: wp.array4d[wp.float64],
+    out_ratios: wp.array4d[wp.float64],
+    first: int,
+):
+    """Ratios of voxels from those of the voxels of twice the size, linear between these."""
+    voxel = first + wp.tid()
+    x = voxel % sums.shape[2]
+    y = voxel / sums.shape[2] % sums.shape[1]
+    z = voxel / (sums.shape[2] * sums.shape[1])
+    low_z, high_z, part_z = _place(z, shift[0], around.shape[0])
+    low_y, high_y, part_y = _place(y, shift[1], around.shape[1])
+    low_x, high_x, part_x = _place(x, shift[2], around.shape[2])
+    one = wp.float64(1.0)
+    for channel in range(around.shape[3]):
+        below = (one - part_y) * _between(around, channel, low_z, low_y, low_x, high_x, part_x)
+        below += part_y * _between(around, channel, low_z, high_y, low_x, high_x, part_x)
+        above = (one - part_y) * _between(around, channel, high_z, low_y, low_x, high_x, part_x)
+        above += part_y * _between(around, channel, high_z, high_y, low_x, high_x, part_x)
+        ratio = (one - part_z) * below + part_z * above
+        of = 6 * (channel / 3) + channel % 3
+        weight = wp.max(prior * total[0, 0, 0, of + 3], wp.float64(1e-12))
+        ratio = (sums[z, y, x, of] + weight * ratio) / (sums[z, y, x, of + 3] + weight)
+        out_ratios[z, y, x, channel] = ratio
+
+
+@wp.kernel
+def _divide(total: wp.array4d[wp.float64], out_ratios: wp.array4d[wp.float64]):
+    channel = wp.tid()
+    of = 6 * (channel / 3) + channel % 3
+    out_ratios[0, 0, 0, channel] = total[0, 0, 0, of] / wp.max(total[0, 0, 0, of + 3], wp.float64(1e-12))
+
+
+@wp.func
+def _known_at(sums: wp.array4d[wp.float64], voxel: int):
+    """(light, even light, what is drawn as if of that even light) where all are known; no even light without."""
+    x = voxel % sums.shape[2]
+    y = voxel / sums.shape[2] % sums.shape[1]
+    z = voxel / (sums.shape[2] * sums.shape[1])
+    light = rgb()
+    even = rgb()
+    drawn = rgb()
+    if sums[z, y, x, 3] > wp.float64(0.0) and sums[z, y, x, 9] > wp.float64(0.0):
+        light = _rgb_at(sums, z, y, x, 0)
+        even = _rgb_at(sums, z, y, x, 3)
+        drawn = _rgb_at(sums, z, y, x, 6)
+        there = _rgb_at(sums, z, y, x, 9)
+        for channel in range(3):
+            drawn[channel] *= even[channel] / wp.max(there[channel], wp.float64(1e-12))
+    return light, even, drawn
+
+
+@wp.kernel
+def _add_known(sums: wp.array4d[wp.float64], part_size: int, out_parts: wp.array2d[wp.float64]):
+    """(3 × RGB) light, even and drawn light of a part of all voxels."""
+    part = wp.tid()
+    lights = rgb()
+    evens = rgb()
+    drawns = rgb()
+    voxels = sums.shape[0] * sums.shape[1] * sums.shape[2]
+    for voxel in range(part * part_size, wp.min((part + 1) * part_size, voxels)):
+        light, even, drawn = _known_at(sums, voxel)
+        lights += light
+        evens += even
+        drawns += drawn
+    for channel in range(3):
+        out_parts[part, channel] = lights[channel]
+        out_parts[part, 3 + channel] = evens[channel]
+        out_parts[part, 6 + channel] = drawns[channel]
+
+
+@wp.kernel
+def _add_parts(parts: wp.array2d[wp.float64], out_totals: wp.array[wp.float64]):
+    channel = wp.tid()
+    total = wp.float64(0.0)
+    for part in range(parts.shape[0]):
+        total += parts[part, channel]
+    out_totals[channel] = total
+
+
+@wp.kernel
+def _add_products(
+    sums: wp.array4d[wp.float64], totals: wp.array[wp.float64], part_size: int, out_parts: wp.array2d[wp.float64]
+):
+    """(light × drawn, drawn²) of what differs from even light, over even light, in a part of all voxels."""
+    part = wp.tid()
+    product = wp.float64(0.0)
+    square = wp.float64(0.0)
+    voxels = sums.shape[0] * sums.shape[1] * sums.shape[2]
+    for voxel in range(part * part_size, wp.min((part + 1) * part_size, voxels)):
+        light, even, drawn = _known_at(sums, voxel)
+        for channel in range(3):
+            if even[channel] > wp.float64(0.0):
+                total = wp.max(totals[3 + channel], wp.float64(1e-12))
+                light_there = light[channel] - totals[channel] / total * even[channel]
+                drawn_there = drawn[channel] - totals[6 + channel] / total * even[channel]
+                # A voxel counts by its paths, not by their square.
+                share = wp.float64(1.0) / wp.max(even[channel], wp.float64(1e-12))
+                product += share * light_there * drawn_there
+                square += share * drawn_there * drawn_there
+    out_parts[part, 0] = product
+    out_parts[part, 1] = square
+
+
+@wp.kernel
+def _keep(
+    ratios: wp.array4d[wp.float64],
+    products: wp.array[wp.float64],
+    origin: wp.vec3i,
+    out_shares: wp.array3d[wp.vec4],
+    first: int,
+):
+    """Shares of a voxel, or of the nearest one that has ratios; origin: the first of these, along Z, Y, X."""
+    voxel = first + wp.tid()
+    column = voxel % out_shares.shape[2]
+    row = voxel / out_shares.shape[2] % out_shares.shape[1]
+    layer = voxel / (out_shares.shape[2] * out_shares.shape[1])
+    x = wp.clamp(column - origin[2], 0, ratios.shape[2] - 1)
+    y = wp.clamp(row - origin[1], 0, ratios.shape[1] - 1)
+    z = wp.clamp(layer - origin[0], 0, ratios.shape[0] - 1)
+    most = wp.clamp(products[0] / wp.max(products[1], wp.float64(1e-30)), wp.float64(0.0), wp.float64(1.0))
+    light = _rgb_at(ratios, z, y, x, 0)
+    drawn = _rgb_at(ratios, z, y, x, 3)
+    kept = most
+    for channel in range(3):
+        kept = wp.min(kept, light[channel] / wp.max(drawn[channel], wp.float64(1e-12)))
+    kept = wp.max(kept, wp.float64(0.0))
+    light -= kept * drawn
+    out_shares[layer, row, column] = wp.vec4(float(light[0]), float(light[1]), float(light[2]), float(kept))
+
+
+def shares(sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int, int] = (0, 0, 0)) -> np.ndarray:
+    """(Z, Y, X, 12) sums of `gather` over some paths → (Z, Y, X, 4) float32: RGB in parts of what even light gives, and
+    how much of what is drawn is kept.
 
     Both together are the paths' light. What is drawn tells apart strands and places that the paths' mean is too coarse
     for; as much is kept as explains the paths best, but where that is more than they find in any channel.
     """
-    # One hair may take a small part of the grid of all.
-    box, beside = _box_of((sums[..., 3] > 0.0) | (sums[..., 9] > 0.0))
-    sums = sums[box]
-    origin = tuple(first + part.start for first, part in zip(origin, box[::-1], strict=True))
-    light, drawn = (smooth_ratios(pair, path_count, origin) for pair in (sums[..., :6], sums[..., 6:]))
-    most = explained_part(sums)
-    kept = np.clip((light / np.maximum(drawn, 1e-12)).min(axis=-1, keepdims=True), 0.0, most)
-    return np.pad(np.concatenate([light - kept * drawn, kept], axis=-1), [*beside, (0, 0)], mode="edge")
+    require_count("sums", sums.shape[3], CHANNELS)
+    with wp.ScopedDevice(sums.device):
+        found = wp.empty(sums.shape[:3], dtype=wp.vec4)
+        # One hair may take a small part of the grid of all.
+        box = _box_of(sums)
+        low = tuple(part.start for part in box)
+        inner = sums[box]
+        ratios = _smooth(inner, path_count, tuple(one + before for one, before in zip(origin, low[::-1], strict=True)))
+        _by_voxels(_keep, found, [ratios, _explained(inner), wp.vec3i(*low), found])
+        return found.numpy()
 
 
-def _box_of(is_used):
-    """(slices along Z, Y, X around all that is used of (Z, Y, X), numbers of voxels before and after them)."""
-    box = []
-    for axis in range(3):
-        others = tuple(other for other in range(3) if other != axis)
-        (used,) = np.nonzero(is_used.any(axis=others))
-        box.append(slice(int(used[0]), int(used[-1]) + 1) if len(used) else slice(0, is_used.shape[axis]))
-    beside = [(part.start, length - part.stop) for part, length in zip(box, is_used.shape, strict=True)]
-    return tuple(box), beside
-
-
-def explained_part(sums: np.ndarray) -> float:
+def explained_part(sums: wp.array4d[wp.float64]) -> float:
     """The part of what is drawn, from 0 to 1, with the least squared difference from the paths' light over all voxels
     of (Z, Y, X, 12) sums, beside any part of even light in each channel.
     """
-    is_known = (sums[..., 3] > 0.0) & (sums[..., 9] > 0.0)
-    light, even, drawn, there = np.split(np.asarray(sums[is_known], np.float64), 4, axis=-1)
-    drawn = drawn * (even / np.maximum(there, 1e-12))
-    share = 1.0 / np.maximum(even, 1e-12)  # a voxel counts by its paths, not by their square
-    total = np.maximum(even.sum(axis=0), 1e-12)
-    light, drawn = (values - values.sum(axis=0) / total * even for values in (light, drawn))
-    return float(np.clip((share * light * drawn).sum() / max(float((share * drawn**2).sum()), 1e-30), 0.0, 1.0))
+    with wp.ScopedDevice(sums.device):
+        product, square = _explained(sums).numpy().tolist()
+    return min(max(product / max(square, 1e-30), 0.0), 1.0)
 
 
 def smooth_ratios(
-    sums: np.ndarray, path_count: int, origin: tuple[int, int, int] = (0, 0, 0), prior: float = _PRIOR
+    sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int, int] = (0, 0, 0)
 ) -> np.ndarray:
-    """(Z, Y, X, 6) sums of light RGB and of even light RGB over some paths → (Z, Y, X, 3) ratios of both.
+    """(Z, Y, X, 6 N) sums of light RGB and of even light RGB over some paths, N times → (Z, Y, X, 3 N) ratios of both.
 
-    From large voxels to small ones each ratio is drawn to that of the voxel around it, by `prior` average paths.
-    origin: number of the first voxel along X, Y, Z: those of even numbers share a larger one with the next.
+    From large voxels to small ones each ratio is drawn to that of the voxel around it, by as many average paths as the
+    prior. origin: number of the first voxel along X, Y, Z: those of even numbers share a larger one with the next.
     Black where there is no light at all.
     """
-    levels, shifts, first = [np.asarray(sums, np.float64)], [], np.array(origin[::-1])
+    with wp.ScopedDevice(sums.device):
+        return _smooth(sums, path_count, origin).numpy()
+
+
+def _smooth(sums, path_count, origin):
+    """`smooth_ratios` as an array on the device."""
+    levels, shifts, first = [sums], [], np.array(origin[::-1])
     while max(levels[-1].shape[:3]) > 1:
         # Two on both sides of the world's origin would never become one.
-        shifts.append(np.where(np.array(levels[-1].shape[:3]) > 2, first % 2, 0))
+        sides = np.array(levels[-1].shape[:3])
+        shift = np.where(sides > 2, first % 2, 0)
         first = first // 2
-        levels.append(_halved(levels[-1], shifts[-1]))
-    total = levels.pop()
-    ratios = total[..., :3] / np.maximum(total[..., 3:], 1e-12)
-    weight = np.maximum(prior / max(path_count, 1) * total[0, 0, 0, 3:], 1e-12)
-    for level, shift in zip(reversed(levels), reversed(shifts), strict=True):
-        around = _doubled(ratios, level.shape, shift)
-        ratios = (level[..., :3] + weight * around) / (level[..., 3:] + weight)
+        halved = wp.empty((*((sides + shift + 1) // 2).tolist(), sums.shape[3]), dtype=wp.float64)
+        shifts.append(wp.vec3i(*shift.tolist()))
+        _by_voxels(_halve, halved, [levels[-1], shifts[-1], halved])
+        levels.append(halved)
+    total, channels = levels[-1], sums.shape[3] // 2
+    ratios = wp.empty((1, 1, 1, channels), dtype=wp.float64)
+    kernel_cache.launch(_divide, channels, [total], [ratios], sums.device)
+    prior = wp.float64(_PRIOR / max(path_count, 1))
+    for level, shift in zip(levels[-2::-1], reversed(shifts), strict=True):
+        finer = wp.empty((*level.shape[:3], channels), dtype=wp.float64)
+        _by_voxels(_refine, finer, [level, shift, total, prior, ratios, finer])
+        ratios = finer
     return ratios
 
 
-def _halved(sums, shift):
-    """Sums over blocks of 2 × 2 × 2 voxels, the first of them without its lower half along axes whose shift is 1."""
-    ends = [(before, (length + before) % 2) for length, before in zip(sums.shape, shift.tolist(), strict=False)]
-    padded = np.pad(sums, [*ends, (0, 0)])
-    z, y, x = (length // 2 for length in padded.shape[:3])
-    return padded.reshape(z, 2, y, 2, x, 2, -1).sum(axis=(1, 3, 5))
+def _explained(sums):
+    """(2,) on the device: their quotient is `explained_part`."""
+    count = sums.shape[0] * sums.shape[1] * sums.shape[2]
+    size = -(-count // _MOST_PARTS)
+    parts = -(-count // size)
+    rows, totals = wp.empty((parts, 9), dtype=wp.float64), wp.empty(9, dtype=wp.float64)
+    kernel_cache.launch(_add_known, parts, [sums, size], [rows], sums.device)
+    kernel_cache.launch(_add_parts, 9, [rows], [totals], sums.device)
+    products, found = wp.empty((parts, 2), dtype=wp.float64), wp.empty(2, dtype=wp.float64)
+    kernel_cache.launch(_add_products, parts, [sums, totals, size], [products], sums.device)
+    kernel_cache.launch(_add_parts, 2, [products], [found], sums.device)
+    return found
 
 
-def _doubled(values, shape, shift):
-    """Values (..., 3) of voxels at the centers of those of half the size, linear between them; shift: of `_halved`."""
-    for axis in range(3):
-        places = 0.5 * (np.arange(shape[axis]) + shift[axis] + 0.5) - 0.5
-        below = np.clip(np.floor(places).astype(int), 0, values.shape[axis] - 1)
-        above = np.minimum(below + 1, values.shape[axis] - 1)
-        part = np.clip(places - below, 0.0, 1.0).reshape([-1 if axis == one else 1 for one in range(4)])
-        values = np.take(values, below, axis) * (1.0 - part) + np.take(values, above, axis) * part
-    return values
+def _by_voxels(kernel, voxels, inputs):
+    """Run a kernel for each voxel of (Z, Y, X, ...)."""
+    count = voxels.shape[0] * voxels.shape[1] * voxels.shape[2]
+    parts = parallel.part_count(count, voxels.device, _LEAST_VOXELS)
+    parallel.launch_shares(kernel, count, inputs, [[] for _ in range(parts)], voxels.device)
+
+
+def _box_of(sums):
+    """Slices along Z, Y, X around all that is used of (Z, Y, X, 12) sums; of all, where none is."""
+    used = [wp.zeros(side, dtype=wp.uint8) for side in sums.shape[:3]]
+    _by_voxels(_mark, sums, [sums, *used])
+    box = []
+    for marks in used:
+        (at,) = np.nonzero(marks.numpy())
+        box.append(slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(0, len(marks)))
+    return tuple(box)

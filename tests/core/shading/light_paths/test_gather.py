@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import warp as wp
 
 from hair_addon.core.errors import HairError
 from hair_addon.core.imaging import lamps
@@ -38,7 +39,8 @@ def grid_of(points, sigma_a, radius=0.004, settings=None, **details):
     strands = strand_grid.Strands(
         points.astype(np.float32),
         np.broadcast_to(np.float32(radius), points.shape[:2]),
-        lambda strand, place: np.broadcast_to(sigma_a, (*np.broadcast(strand, place).shape, 3)),
+        lambda _chosen: np.broadcast_to(sigma_a, (1, 2, 3)),
+        np.zeros(points.shape[1]),
         np.full(count, settings.roughness),
         np.zeros(count, int),
     )
@@ -65,10 +67,21 @@ def sun(axis, power=3.0):
     return lamp
 
 
+def gathered(*args, **details):
+    """(systems, Z, Y, X, 12) sums and how many paths."""
+    sums, taken = gather.gather(*args, **details)
+    return np.stack([of_hair.numpy() for of_hair in sums]), taken
+
+
+def by_voxel(sums):
+    """(Z, Y, X, N) numbers as `voxel_means` takes them."""
+    return wp.array(sums, dtype=wp.float64, device="cpu")
+
+
 def found_by(grid, light, seen_in, path_count, seed=0):
     """Return what paths find on hair in a view."""
     seen = seen_rays.seen_by(grid, light.corners, seen_in, path_count, seed)
-    return gather.gather(grid, light, seen, len(seen.segments), seed)[0]
+    return gathered(grid, light, seen, len(seen.segments), seed)[0]
 
 
 def ratio(sums):
@@ -96,10 +109,10 @@ def test_faint_light_counts_as_much_in_the_mean(rng):
     grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), voxel_count=625)
     light = surroundings(lamps=np.concatenate([sun((0.0, 1.0, 0.0)), sun((0.6, 0.8, 0.0), 1.0), sun((0.0, 0.6, -0.8))]))
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 20_000)
-    exact = gather.gather(grid, light, replace(seen, drawn=0.0 * seen.drawn), 60_000)[0]
+    exact = gathered(grid, light, replace(seen, drawn=0.0 * seen.drawn), 60_000)[0]
     for factor, tolerance in ((1.0, 0.025), (30.0, 0.06)):
         drawn = np.full_like(seen.drawn, factor * ratio(exact).mean())
-        found = gather.gather(grid, light, replace(seen, drawn=drawn), 60_000, seed=1)[0]
+        found = gathered(grid, light, replace(seen, drawn=drawn), 60_000, seed=1)[0]
         np.testing.assert_allclose(ratio(found), ratio(exact), rtol=tolerance)
 
 
@@ -108,7 +121,7 @@ def test_light_of_voxels_and_what_they_keep_of_the_drawn_is_that_of_paths(rng):
     grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), voxel_count=625)
     light = surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 20_000)
-    (alone,) = gather.gather(grid, light, seen, 20_000)[0]
+    (alone,) = gathered(grid, light, seen, 20_000)[0]
     lights, even = alone[..., :3], alone[..., 3:6]
     for drawn, low, high in (
         (0.0 * lights, 0.0, 1.0),
@@ -119,12 +132,12 @@ def test_light_of_voxels_and_what_they_keep_of_the_drawn_is_that_of_paths(rng):
         (even * rng.random(even.shape), 0.0, 0.1),
     ):
         sums = np.concatenate([lights, even, drawn, even], axis=-1)
-        found = voxel_means.shares(sums, 10**9)
+        found = voxel_means.shares(by_voxel(sums), 10**9)
         there = found[..., :3] * sums[..., 3:6] + found[..., 3:] * sums[..., 6:9]
         np.testing.assert_allclose(there, sums[..., :3], atol=1e-3 * sums.max())
         kept = found[..., 3][sums[..., 3] > 0.0]
         assert kept.min() >= 0.0 and kept.max() <= 1.0
-        assert low - 1e-6 <= voxel_means.explained_part(sums) <= high + 1e-6
+        assert low - 1e-6 <= voxel_means.explained_part(by_voxel(sums)) <= high + 1e-6
 
 
 def test_the_nearest_strand_is_met(rng):
@@ -151,7 +164,7 @@ def test_the_nearest_strand_is_met(rng):
     is_segment = places[:, 1] > y.min(axis=1) - 1e-4
     assert is_segment.mean() > 0.9
     expected = start[y.argmin(axis=1)[is_segment]]
-    np.testing.assert_allclose(grid.points[segments[is_segment]], expected, atol=1e-5)
+    np.testing.assert_allclose(grid.points.numpy()[segments[is_segment]], expected, atol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -205,7 +218,7 @@ def test_strands_next_to_the_camera_leave_paths_for_others(rng):
     to_clip = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, 1.00002, 0, -0.0200002], [0, 1.0, 0, 0]])
     seen = seen_rays.seen_by(grid, np.zeros((0, 3)), view.View(to_clip), 40_000)
     assert (seen.places[:, 1] > 0.0099).all()
-    sums, taken = gather.gather(grid, surroundings(world=1.0), seen, 10_000)
+    sums, taken = gathered(grid, surroundings(world=1.0), seen, 10_000)
     assert 2_500 < taken < 11_000
     np.testing.assert_allclose(ratio(sums), 1.0, rtol=1e-3)
 
@@ -231,7 +244,7 @@ def test_thinned_strands_stop_as_much_light(rng):
     every = np.arange(3000)
     segments = strand_grid.segment_of(thin, 0, every, np.full(3000, 0.99))
     near = np.abs(every // thin.kept[0].stride * thin.kept[0].stride - every)
-    assert (thin.strands[segments] == thin.strands[segments + 1]).all()
+    assert (thin.strands.numpy()[segments] == thin.strands.numpy()[segments + 1]).all()
     assert near.max() < thin.kept[0].stride
 
 
@@ -256,11 +269,10 @@ def test_more_paths_are_taken_where_few_find_light(rng):
     behind, even = surroundings(lamps=sun((0.0, -1.0, 0.0))), surroundings(world=1.0)
     seen = seen_rays.seen_by(grid, behind.corners, ALONG_Y, 400)
     count = len(seen.segments)
-    _bright, taken = gather.gather(grid, even, seen, count, most_paths=64 * count)
+    _bright, taken = gathered(grid, even, seen, count, most_paths=64 * count)
     assert taken < 64 * count
     few, many = (
-        [gather.gather(grid, behind, seen, count, seed, most_paths=most) for seed in range(8)]
-        for most in (0, 64 * count)
+        [gathered(grid, behind, seen, count, seed, most_paths=most) for seed in range(8)] for most in (0, 64 * count)
     )
     for (_few, one), (_many, all_of_them) in zip(few, many, strict=True):
         assert one == pytest.approx(count, rel=0.25) and all_of_them == pytest.approx(64 * count, rel=0.1)
@@ -276,9 +288,9 @@ def test_as_many_more_paths_are_taken_as_are_wanted(rng, monkeypatch):
     errors, standard_error = [], gather._standard_error
     monkeypatch.setattr(gather, "_standard_error", lambda *of: errors.append(standard_error(*of)) or errors[-1])
     count = len(seen.segments)
-    _sums, few = gather.gather(grid, behind, seen, count)
+    _sums, few = gathered(grid, behind, seen, count)
     monkeypatch.setattr(gather, "_KNOWN", errors[0] / 1.1)
-    _sums, more = gather.gather(grid, behind, seen, count, most_paths=64 * count)
+    _sums, more = gathered(grid, behind, seen, count, most_paths=64 * count)
     assert 1.1 * few < more < 1.7 * few
     assert errors[-1] < errors[0] / 1.1
 
@@ -286,8 +298,8 @@ def test_as_many_more_paths_are_taken_as_are_wanted(rng, monkeypatch):
 def lit_from_below(grid, light, path_count):
     """`ratio` of light that does not come straight from a lamp."""
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, path_count)
-    found, _count = gather.gather(grid, light, seen, path_count)
-    straight, _count = gather.gather(grid, replace(light, albedo=0.0 * light.albedo), seen, path_count)
+    found, _count = gathered(grid, light, seen, path_count)
+    straight, _count = gathered(grid, replace(light, albedo=0.0 * light.albedo), seen, path_count)
     return (found - straight)[..., :3].sum(axis=(0, 1, 2, 3)) / found[..., 3:6].sum(axis=(0, 1, 2, 3))
 
 
@@ -354,7 +366,9 @@ def test_voxels_without_paths_take_the_ratio_around_them(rng):
     sums = np.zeros((4, 4, 4, 6))
     filled = rng.random((4, 4, 4)) < 0.3
     sums[filled] = np.array([2.0, 4.0, 6.0, 1.0, 1.0, 1.0]) * rng.uniform(1, 50, filled.sum())[:, None]
-    np.testing.assert_allclose(voxel_means.smooth_ratios(sums, 1000), np.tile([2.0, 4.0, 6.0], (4, 4, 4, 1)), rtol=1e-9)
+    np.testing.assert_allclose(
+        voxel_means.smooth_ratios(by_voxel(sums), 1000), np.tile([2.0, 4.0, 6.0], (4, 4, 4, 1)), rtol=1e-9
+    )
 
 
 def test_drawn_light_keeps_edges_that_noisy_paths_do_not_find(rng):
@@ -363,7 +377,7 @@ def test_drawn_light_keeps_edges_that_noisy_paths_do_not_find(rng):
     drawn = np.where(np.arange(8) < 3, 0.2, 1.0)[:, None] * even
     expected = 0.6 * drawn + 0.3 * even
     light = expected * rng.exponential(size=(8, 8, 8, 1))
-    found = voxel_means.shares(np.concatenate([light, even, drawn, even], axis=-1), 8**3)
+    found = voxel_means.shares(by_voxel(np.concatenate([light, even, drawn, even], axis=-1)), 8**3)
     there = found[..., :3] + found[..., 3:] * drawn
     np.testing.assert_allclose(there.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.15)
     assert there.std(axis=(0, 1)).max() < 0.05
@@ -376,8 +390,8 @@ def test_hair_has_the_same_light_in_a_grid_of_more_hair(rng):
     origin = (5, -2, 9)
     wide = np.pad(sums, [*beside, (0, 0)])
     around = tuple(first - before for first, (before, _after) in zip(origin, beside[::-1], strict=True))
-    found = voxel_means.shares(wide, 1000, around)
+    found = voxel_means.shares(by_voxel(wide), 1000, around)
     assert found.shape[:3] == wide.shape[:3]
-    np.testing.assert_array_equal(found[3:7, :6, 4:9], voxel_means.shares(sums, 1000, origin))
+    np.testing.assert_array_equal(found[3:7, :6, 4:9], voxel_means.shares(by_voxel(sums), 1000, origin))
     assert np.isfinite(found).all()
-    assert not voxel_means.shares(np.zeros((2, 2, 2, 12)), 10)[..., :3].any()
+    assert not voxel_means.shares(by_voxel(np.zeros((2, 2, 2, 12))), 10)[..., :3].any()

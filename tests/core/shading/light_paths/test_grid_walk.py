@@ -81,7 +81,7 @@ def rays(rng, medium_points):
 def test_the_nearest_segment_is_found(rng, voxel_count):
     points, radii = mixed_strands(rng)
     grid = grid_of(points, WHITE, radii, voxel_count=voxel_count)
-    places, directions = rays(rng, grid.points)
+    places, directions = rays(rng, grid.points.numpy())
     own = rng.integers(-1, len(points), RAYS)
     with wp.ScopedDevice("cpu"):
         medium = media.medium_of(grid, None, np.zeros((0, 3)), np.zeros((0, 3)))
@@ -103,7 +103,7 @@ def test_the_nearest_segment_is_found(rng, voxel_count):
 def test_strands_hide_a_wall_and_it_hides_them(rng):
     points, radii = mixed_strands(rng)
     grid = grid_of(points, WHITE, radii, voxel_count=500)
-    places, directions = rays(rng, grid.points)
+    places, directions = rays(rng, grid.points.numpy())
     with wp.ScopedDevice("cpu"):
         mesh = media.mesh_of(WALL)
         rows = [wp.array(values, dtype=wp.vec3) for values in (places, directions)]

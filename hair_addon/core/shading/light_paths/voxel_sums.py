@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sums by voxel and by system of hair of what paths and samples find, on the device of a grid.
+
+The same paths give the same bits, in whatever order a GPU takes them: there whole numbers are added up, with 62 bits
+for the sum of as many values as there are of the largest.
+"""
+
+import numpy as np
+import warp as wp
+
+from ...kernels import kernel_cache
+from ...kernels.checks import require_count
+from .start_places import voxel_at
+from .strand_grid import StrandGrid
+from .voxel_means import CHANNELS
+
+wp.set_module_options({"enable_backward": False})
+
+_MOST_PARTS = 4096  # of all values
+_LARGEST_SUM = 4.0e18  # of whole numbers, below 2^62
+
+
+@wp.struct
+class _Places:
+    """Which sum each of N values is added to: that of its place's voxel and of its segment's hair."""
+
+    places: wp.array[wp.vec3]
+    segments: wp.array[int]
+    strands: wp.array[int]
+    systems: wp.array[int]
+    corner: wp.vec3
+    voxel: float
+    shape: wp.vec3i
+
+
+@wp.func
+def _row_of(at: _Places, index: int):
+    cell = voxel_at(at.places[index], at.corner, at.voxel, at.shape)
+    row = (cell[2] * at.shape[1] + cell[1]) * at.shape[0] + cell[0]
+    return at.systems[at.strands[at.segments[index]]] * (at.shape[0] * at.shape[1] * at.shape[2]) + row
+
+
+@wp.kernel
+def _add_in_order(
+    at: _Places,
+    first_values: wp.array[wp.vec3],
+    second_values: wp.array[wp.vec3],
+    first_channel: int,
+    out_sums: wp.array2d[wp.float64],
+):
+    """On one core of the processor, where one value comes after the other."""
+    index = wp.tid()
+    row = _row_of(at, index)
+    for channel in range(3):
+        out_sums[row, first_channel + channel] += wp.float64(first_values[index][channel])
+        out_sums[row, first_channel + 3 + channel] += wp.float64(second_values[index][channel])
+
+
+@wp.kernel
+def _find_largest(
+    first_values: wp.array[wp.vec3], second_values: wp.array[wp.vec3], part_size: int, out_largest: wp.array[float]
+):
+    part = wp.tid()
+    largest = float(0.0)
+    for index in range(part * part_size, wp.min((part + 1) * part_size, first_values.shape[0])):
+        for channel in range(3):
+            largest = wp.max(largest, wp.abs(first_values[index][channel]))
+            largest = wp.max(largest, wp.abs(second_values[index][channel]))
+    wp.atomic_max(out_largest, 0, largest)
+
+
+@wp.func
+def _scale(largest: wp.array[float], count: int):
+    """Whole numbers in one, of `count` values up to the largest."""
+    return wp.float64(_LARGEST_SUM) / (wp.max(wp.float64(largest[0]), wp.float64(1e-30)) * wp.float64(count))
+
+
+@wp.kernel
+def _add_whole(
+    at: _Places,
+    first_values: wp.array[wp.vec3],
+    second_values: wp.array[wp.vec3],
+    largest: wp.array[float],
+    out_whole: wp.array2d[wp.int64],
+):
+    index = wp.tid()
+    row = _row_of(at, index)
+    scale = _scale(largest, first_values.shape[0])
+    for channel in range(3):
+        wp.atomic_add(out_whole, row, channel, wp.int64(scale * wp.float64(first_values[index][channel])))
+        wp.atomic_add(out_whole, row, 3 + channel, wp.int64(scale * wp.float64(second_values[index][channel])))
+
+
+@wp.kernel
+def _add_sums(
+    whole: wp.array2d[wp.int64],
+    largest: wp.array[float],
+    count: int,
+    first_channel: int,
+    out_sums: wp.array2d[wp.float64],
+):
+    row, channel = wp.tid()
+    if whole[row, channel] != wp.int64(0):
+        out_sums[row, first_channel + channel] += wp.float64(whole[row, channel]) / _scale(largest, count)
+
+
+class VoxelSums:
+    """(systems, Z, Y, X, 12) sums over a `StrandGrid`, zero at first: `voxel_means.CHANNELS` of each voxel."""
+
+    def __init__(self, grid: StrandGrid) -> None:
+        self.grid = grid
+        self._voxels = grid.shape[::-1]
+        rows = len(grid.kept) * int(np.prod(self._voxels))
+        self._sums = wp.zeros((rows, CHANNELS), dtype=wp.float64, device=grid.device)
+
+    def of_systems(self) -> list[wp.array4d[wp.float64]]:
+        """(Z, Y, X, 12) of each system of hair."""
+        count = int(np.prod(self._voxels))
+        firsts = range(0, len(self._sums), count)
+        return [self._sums[first : first + count].reshape((*self._voxels, CHANNELS)) for first in firsts]
+
+    def add(
+        self,
+        places: wp.array[wp.vec3],
+        segments: wp.array[int],
+        first_values: wp.array[wp.vec3],
+        second_values: wp.array[wp.vec3],
+        first_channel: int,
+    ) -> None:
+        """Add RGB (N,) to three channels from `first_channel` on, and others to the three after these.
+
+        segments: of the grid, which the caller has checked.
+        """
+        count = len(segments)
+        for values in (places, first_values, second_values):
+            require_count("values by voxel", len(values), count)
+        if not count:
+            return
+        given = [self._places(places, segments), first_values, second_values]
+        add = _in_order if self.grid.device.is_cpu else _in_any_order
+        add(self._sums, given, first_channel)
+
+    def _places(self, places, segments):
+        grid, at = self.grid, _Places()
+        at.places, at.segments, at.strands, at.systems = places, segments, grid.strands, grid.systems
+        at.corner, at.voxel, at.shape = wp.vec3(*grid.corner.tolist()), grid.voxel, wp.vec3i(*grid.shape)
+        return at
+
+
+def _in_order(sums, given, first_channel):
+    kernel_cache.launch(_add_in_order, len(given[1]), [*given, first_channel], [sums], sums.device)
+
+
+def _in_any_order(sums, given, first_channel):
+    count, device = len(given[1]), sums.device
+    largest = wp.zeros(1, dtype=float, device=device)
+    whole = wp.zeros((len(sums), 6), dtype=wp.int64, device=device)
+    size = -(-count // _MOST_PARTS)
+    kernel_cache.launch(_find_largest, -(-count // size), [*given[1:], size], [largest], device)
+    kernel_cache.launch(_add_whole, count, [*given, largest], [whole], device)
+    kernel_cache.launch(_add_sums, whole.shape, [whole, largest, count, first_channel], [sums], device)
+
+
+@wp.kernel
+def _add_brightness(values: wp.array[wp.vec3], part_size: int, out_parts: wp.array2d[wp.float64]):
+    part = wp.tid()
+    total = wp.float64(0.0)
+    squares = wp.float64(0.0)
+    for index in range(part * part_size, wp.min((part + 1) * part_size, values.shape[0])):
+        value = values[index]
+        brightness = wp.float64(value[0]) + wp.float64(value[1]) + wp.float64(value[2])
+        total += brightness
+        squares += brightness * brightness
+    out_parts[part, 0] = total
+    out_parts[part, 1] = squares
+
+
+def brightness(values: wp.array[wp.vec3]) -> tuple[float, float]:
+    """Return the sum of all channels of (N,) RGB, and the sum of the squares of the sum of three."""
+    if not len(values):
+        return 0.0, 0.0
+    size = -(-len(values) // _MOST_PARTS)
+    parts = wp.empty((-(-len(values) // size), 2), dtype=wp.float64, device=values.device)
+    kernel_cache.launch(_add_brightness, len(parts), [values, size], [parts], values.device)
+    total, squares = parts.numpy().sum(axis=0).tolist()
+    return total, squares
