@@ -39,7 +39,7 @@ SHADING_COLUMNS = (
     *("studio_default", "studio_paint", "studio_rim", "matcap", "flat"),
     *("forest", "sunset", "studio", "rendered"),
 )
-SHADING_PART, SHADING_WINDOW, SHADING_TILE = (90, 110, 650, 480), (900, 600), (224, 148)
+SHADING_PART, SHADING_WINDOW, SHADING_TILE = (60, 80, 690, 500), (900, 600), (224, 149)
 SHADING_SAMPLES, SHADING_STRANDS = 8, 30_000
 
 # (left, top, right, bottom) pixels of its window: the 3D view with the top of its sidebar; and the size it is shown in.
