@@ -25,24 +25,12 @@ def find(drawn, grid, camera, window, count, turn):
         with buffer.surfaces():
             scene_drawing.draw_hiding(drawn, view)
         scene_drawing.draw_hair(drawn, view, buffer)
-        shape = tile[3], tile[2]
-        found = np.array(buffer.segments.read(), np.int64).reshape(shape)
-        color = np.array(buffer.color.read(), np.float32).reshape(*shape, 4)[..., :3]
-    segments, rows, columns = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0, int)]
-    for system, (first, segment_count) in enumerate(buffer.segment_ranges):
-        row, column = np.nonzero((found >= first) & (found < first + segment_count))
-        a_strand = drawn.hair[system][0].point_count - 1
-        strand, place = np.divmod(found[row, column] - first, a_strand)
-        segments.append(light_paths.strand_grid.segment_of(grid, system, strand, (place + 0.5) / a_strand))
-        rows.append(row)
-        columns.append(column)
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    shown = np.concatenate(segments).astype(np.int32)
+        picture = np.array(buffer.segments.read(), np.uint32).reshape(tile[3], tile[2])
+        color = np.array(buffer.color.read(), np.float32).reshape(tile[3], tile[2], 4)
+    a_strand = [hair[0].point_count - 1 for hair in drawn.hair]
+    ranges = [(*range_of, segments) for range_of, segments in zip(buffer.segment_ranges, a_strand, strict=True)]
     seen_in = light_paths.view.View(view["world_to_clip"].T.astype(np.float64))
-    at = np.stack([(2 * column + 1) / tile[2] - 1.0, (2 * row + 1) / tile[3] - 1.0], axis=-1)
-    places = light_paths.seen_rays.places_at(grid, seen_in, shown, at)
-    area = light_paths.view.AREA / (tile[2] * tile[3])
-    return light_paths.seen_rays.Seen(seen_in, shown, places, color[row, column], area)
+    return light_paths.seen_rays.shown_in(grid, seen_in, picture, color, ranges)
 
 
 def _samples(view_to_clip, window, count):

@@ -17,7 +17,7 @@ from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
 from .lamp_light import Event, light_at_once, light_by_share, light_met
 from .light_sources import Sources, across
-from .media import Surroundings, launch, medium_of, mesh_of, sources_of, unlit_medium_of, vectors
+from .media import Surroundings, launch, medium_of, mesh_of, sources_of, unlit_medium_of
 from .seen_rays import Seen
 from .start_places import start
 from .strand_grid import StrandGrid
@@ -132,7 +132,7 @@ def gather(
     `most_paths`: few paths of dark hair find a lamp.
     """
     count = len(seen.segments)
-    require_indices("segments", seen.segments, len(grid.points) - 1)
+    require_indices("segments", seen.segments.numpy(), len(grid.points) - 1)
     for name in ("places", "drawn"):
         require_count(name, len(getattr(seen, name)), count)
     device, sums = grid.device, voxel_sums.VoxelSums(grid)
@@ -142,8 +142,7 @@ def gather(
         mesh = mesh_of(surroundings.corners)
         medium = medium_of(grid, mesh, surroundings.normals, surroundings.albedo, surroundings.gloss)
         in_sight, _hiding = _sight_of(grid, surroundings) or (medium, mesh)
-        segments = wp.array(seen.segments.astype(np.int32, copy=False), dtype=int)
-        places, drawn = vectors(seen.places), vectors(seen.drawn)
+        segments, places, drawn = seen.segments, seen.places, seen.drawn
         sources = sources_of(surroundings, _FAINT * voxel_sums.brightness(drawn)[0] / count)
         sums.add(places, segments, drawn, _even_there(medium, seen.view, segments, places), 6)
         voxels = start_places.voxels_of(medium, places)

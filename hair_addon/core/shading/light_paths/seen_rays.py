@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands that rays of a picture meet: without drawing any, or at samples that were drawn."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
 
-from ...kernels import parallel
+from ...kernels import parallel, running_sums
 from ...kernels.checks import require_count, require_indices
 from .grid_walk import FAR, STRAND, Medium, walk
 from .media import launch, mesh_of, unlit_medium_of
@@ -18,12 +19,12 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Hair that is seen in a picture, at N samples of it."""
+    """Hair that is seen in a picture, at N samples of it; arrays are on the device of the grid."""
 
     view: View
-    segments: np.ndarray  # (N,) int32 of a grid, which samples show
-    places: np.ndarray  # (N, 3) [m] there
-    drawn: np.ndarray  # (N, 3) radiance that is drawn there without paths
+    segments: wp.array[int]  # (N,) of a grid, which samples show
+    places: wp.array[wp.vec3]  # (N,) [m] there
+    drawn: wp.array[wp.vec3]  # (N,) radiance that is drawn there without paths
     area: float  # of the picture that each sample stands for
 
 
@@ -72,7 +73,9 @@ def seen_by(grid: StrandGrid, corners: np.ndarray, view: View, ray_count: int, s
     """`Seen` of `met_by`: nothing is drawn of the strands yet."""
     segments, places = met_by(grid, corners, view, ray_count, seed)
     area = AREA / max(1, round(ray_count**0.5)) ** 2
-    return Seen(view, segments, places, np.zeros((len(segments), 3), np.float32), area)
+    with wp.ScopedDevice(grid.device):
+        drawn = wp.zeros(len(segments), dtype=wp.vec3)
+        return Seen(view, wp.array(segments, dtype=int), wp.array(places, dtype=wp.vec3), drawn, area)
 
 
 @wp.kernel
@@ -95,14 +98,82 @@ def _place(
     out_place[sample] = start + part * along
 
 
-def places_at(grid: StrandGrid, view: View, segments: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """(N, 3) places of segments (N,) that are nearest to the rays at (N, 2) of a picture, from -1 to 1."""
-    require_count("places in the picture", len(at), len(segments))
-    require_indices("segments", segments, len(grid.points) - 1)
+@wp.kernel
+def _number(
+    picture: wp.array[wp.uint32],
+    drawn_ranges: wp.array2d[int],
+    out_segments: wp.array[int],
+    out_is_hair: wp.array[int],
+    first: int,
+):
+    """Which segment of a grid each sample shows; drawn_ranges: by system as `shown_in` fills them."""
+    sample = first + wp.tid()
+    shown = picture[sample]
+    for system in range(drawn_ranges.shape[0]):
+        begin = wp.uint32(drawn_ranges[system, 0])
+        if shown >= begin and shown - begin < wp.uint32(drawn_ranges[system, 1]):
+            segment = int(shown - begin)
+            of_strand = drawn_ranges[system, 2]
+            kept = drawn_ranges[system, 4]
+            # The middle of the drawn segment, as a part of the strand, in segments that are kept.
+            along = (2 * (segment % of_strand) + 1) * (kept - 1) / (2 * of_strand)
+            strand = segment / of_strand / drawn_ranges[system, 3]
+            out_segments[sample] = drawn_ranges[system, 5] + strand * kept + along
+            out_is_hair[sample] = 1
+
+
+@wp.kernel
+def _list(
+    segments: wp.array[int],
+    is_hair: wp.array[int],
+    ends: wp.array[int],
+    color: wp.array[wp.vec4],
+    width: int,
+    height: int,
+    out_segments: wp.array[int],
+    out_at: wp.array[wp.vec2],
+    out_drawn: wp.array[wp.vec3],
+    first: int,
+):
+    sample = first + wp.tid()
+    if is_hair[sample] == 1:
+        index = ends[sample] - 1
+        out_segments[index] = segments[sample]
+        x = float(2 * (sample % width) + 1) / float(width) - 1.0
+        out_at[index] = wp.vec2(x, float(2 * (sample / width) + 1) / float(height) - 1.0)
+        out_drawn[index] = wp.vec3(color[sample][0], color[sample][1], color[sample][2])
+
+
+def shown_in(
+    grid: StrandGrid, view: View, picture: np.ndarray, color: np.ndarray, ranges: Sequence[tuple[int, int, int]]
+) -> Seen:
+    """`Seen` of a picture of numbers of drawn segments (H, W) uint32, and their radiance (H, W, 4) float32.
+
+    ranges: of each system (number of its first segment, how many there are, how many a strand has); other numbers are
+    not hair. Places are those of segments that are nearest to the rays through the samples' centers.
+    """
+    height, width = picture.shape
+    require_count("colors", color.size, 4 * picture.size)
+    require_count("systems in the picture", len(ranges), len(grid.kept))
+    ends_of_systems = [*(kept.first_point for kept in grid.kept[1:]), len(grid.points)]
+    rows = []
+    for (begin, count, of_strand), kept, end in zip(ranges, grid.kept, ends_of_systems, strict=True):
+        if count:
+            last = kept.first_point + (count // of_strand - 1) // kept.stride * kept.point_count + kept.point_count - 1
+            require_indices("points", [last], end)
+        rows.append((begin, count, max(of_strand, 1), kept.stride, kept.point_count, kept.first_point))
     device = grid.device
     with wp.ScopedDevice(device):
-        places = wp.zeros(len(segments), dtype=wp.vec3)
-        rows = [wp.array(segments.astype(np.int32), dtype=int), wp.array(at.astype(np.float32), dtype=wp.vec2)]
-        given = [on_device(view), grid.points, *map(parallel.Rows, rows)]
-        parallel.launch(_place, len(segments), given, [places], device)
-        return places.numpy()
+        numbers, is_hair = (wp.zeros(picture.size, dtype=int) for _ in range(2))
+        drawn_ranges = wp.array(np.array(rows, np.int32).reshape(-1, 6), dtype=int)
+        shown = wp.array(np.ascontiguousarray(picture).reshape(-1), dtype=wp.uint32, copy=False)
+        colors = wp.array(np.ascontiguousarray(color).reshape(-1, 4), dtype=wp.vec4, copy=False)
+        launch(_number, picture.size, [shown, drawn_ranges, numbers, is_hair], device)
+        ends, count = running_sums.ends_of(is_hair)
+        segments, at = wp.empty(count, dtype=int), wp.empty(count, dtype=wp.vec2)
+        places, drawn = (wp.empty(count, dtype=wp.vec3) for _ in range(2))
+        given = [numbers, is_hair, ends, colors, width, height, segments, at, drawn]
+        launch(_list, picture.size, given, device)
+        given = [on_device(view), grid.points, parallel.Rows(segments), parallel.Rows(at)]
+        parallel.launch(_place, count, given, [places], device)
+        return Seen(view, segments, places, drawn, AREA / picture.size)

@@ -156,13 +156,6 @@ def has_area(systems: Sequence[Strands]) -> bool:
     return False
 
 
-def segment_of(grid: StrandGrid, system: int, strands: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """(N,) segments of a grid that show strands (N,) of a system at places (N,) along them, root 0 to tip 1."""
-    kept = grid.kept[system]
-    along = np.clip((places * (kept.point_count - 1)).astype(int), 0, kept.point_count - 2)
-    return kept.first_point + strands // kept.stride * kept.point_count + along
-
-
 def _chosen(strands, share):
     """(stride of strands, indices of points along each) that keep about a share of the segments."""
     point_count = strands.points.shape[1]

@@ -109,9 +109,9 @@ def test_faint_light_counts_as_much_in_the_mean(rng):
     grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), voxel_count=625)
     light = surroundings(lamps=np.concatenate([sun((0.0, 1.0, 0.0)), sun((0.6, 0.8, 0.0), 1.0), sun((0.0, 0.6, -0.8))]))
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 20_000)
-    exact = gathered(grid, light, replace(seen, drawn=0.0 * seen.drawn), 60_000)[0]
+    exact = gathered(grid, light, replace(seen, drawn=wp.zeros_like(seen.drawn)), 60_000)[0]
     for factor, tolerance in ((1.0, 0.025), (30.0, 0.06)):
-        drawn = np.full_like(seen.drawn, factor * ratio(exact).mean())
+        drawn = wp.full_like(seen.drawn, factor * ratio(exact).mean())
         found = gathered(grid, light, replace(seen, drawn=drawn), 60_000, seed=1)[0]
         np.testing.assert_allclose(ratio(found), ratio(exact), rtol=tolerance)
 
@@ -217,7 +217,7 @@ def test_strands_next_to_the_camera_leave_paths_for_others(rng):
     grid = grid_of(points, WHITE, 0.002, voxel_count=2_500)
     to_clip = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, 1.00002, 0, -0.0200002], [0, 1.0, 0, 0]])
     seen = seen_rays.seen_by(grid, np.zeros((0, 3)), view.View(to_clip), 40_000)
-    assert (seen.places[:, 1] > 0.0099).all()
+    assert (seen.places.numpy()[:, 1] > 0.0099).all()
     sums, taken = gathered(grid, surroundings(world=1.0), seen, 10_000)
     assert 2_500 < taken < 11_000
     np.testing.assert_allclose(ratio(sums), 1.0, rtol=1e-3)
@@ -241,11 +241,45 @@ def test_thinned_strands_stop_as_much_light(rng):
     assert len(thin.points) < 0.5 * len(full.points)
     seen = [len(seen_rays.seen_by(grid, np.zeros((0, 3)), ALONG_Y, 40_000).segments) for grid in (full, thin)]
     assert seen[1] == pytest.approx(seen[0], rel=0.05)
-    every = np.arange(3000)
-    segments = strand_grid.segment_of(thin, 0, every, np.full(3000, 0.99))
-    near = np.abs(every // thin.kept[0].stride * thin.kept[0].stride - every)
-    assert (thin.strands.numpy()[segments] == thin.strands.numpy()[segments + 1]).all()
-    assert near.max() < thin.kept[0].stride
+
+
+def test_samples_show_the_segments_and_places_that_are_drawn(rng):
+    """Of two systems, of which the second is thinned out, and what is not hair, in a picture of numbers."""
+    points = strands_in_a_box(rng, 30)
+    grid = grid_of(points, BLACK, 0.002)
+    height, width, of_strand = 20, 30, 3
+    picture = rng.integers(0, 7 + 90 + 20, (height, width)).astype(np.uint32)
+    picture[0, :5] = 2**31 + 8  # of surfaces
+    color = rng.random((height, width, 4)).astype(np.float32)
+    found = seen_rays.shown_in(grid, ALONG_Y, picture, color, [(7, 90, of_strand)])
+    row, column = np.nonzero((picture >= 7) & (picture < 97))
+    strand, along = np.divmod(picture[row, column].astype(int) - 7, of_strand)
+    np.testing.assert_array_equal(found.segments.numpy(), 4 * strand + along)
+    np.testing.assert_array_equal(found.drawn.numpy(), color[row, column, :3])
+    assert found.area == pytest.approx(4.0 / picture.size)
+    start, end = points[strand, along], points[strand, along + 1]
+    places = found.places.numpy()
+    part = ((places - start) * (end - start)).sum(axis=1) / ((end - start) ** 2).sum(axis=1)
+    np.testing.assert_allclose(places, start + np.clip(part, 0.0, 1.0)[:, None] * (end - start), atol=1e-5)
+    # Beside the ray through the sample's center as little as any place of the segment.
+    at = np.stack([(2 * column + 1) / width - 1.0, (2 * row + 1) / height - 1.0], axis=-1)
+    flat, axes = end[:, [0, 2]] - start[:, [0, 2]], [0, 2]
+    nearest = np.clip(((at - start[:, axes]) * flat).sum(axis=1) / (flat**2).sum(axis=1), 0.0, 1.0)
+    np.testing.assert_allclose(part, nearest, atol=1e-3)
+    with pytest.raises(HairError, match="out of range"):
+        seen_rays.shown_in(grid, ALONG_Y, picture, color, [(7, 93, of_strand)])
+
+
+def test_samples_show_segments_that_are_kept(rng):
+    """Of strands of 16 segments, each second of which is kept with 8."""
+    points = np.concatenate([strands_in_a_box(rng, 40)] * 5, axis=1)[:, :17]
+    thin = grid_of(points, BLACK, 0.001, segment_count=160)
+    (kept,) = thin.kept
+    assert (kept.stride, kept.point_count) == (2, 9)
+    picture = np.arange(640, dtype=np.uint32).reshape(20, 32)
+    found = seen_rays.shown_in(thin, ALONG_Y, picture, np.zeros((20, 32, 4), np.float32), [(0, 640, 16)])
+    strand, along = np.divmod(np.arange(640), 16)
+    np.testing.assert_array_equal(found.segments.numpy(), strand // 2 * 9 + along // 2)
 
 
 @pytest.mark.parametrize("height", [0.5, 2.0])

@@ -7,7 +7,15 @@ import numpy as np
 import warp as wp
 
 from hair_addon.core.shading.light_paths import gather, seen_rays, world_light
-from tests.core.shading.light_paths.test_gather import ALONG_Y, found_by, grid_of, ratio, strands_in_a_box, surroundings
+from tests.core.shading.light_paths.test_gather import (
+    ALONG_Y,
+    found_by,
+    gathered,
+    grid_of,
+    ratio,
+    strands_in_a_box,
+    surroundings,
+)
 
 wp.set_module_options({"enable_backward": False})
 
@@ -55,9 +63,9 @@ def test_directions_and_paths_that_meet_the_sky_find_the_same_light(rng, monkeyp
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 10_000)
     monkeypatch.setattr(gather, "_KNOWN", 1e-6)
     count = len(seen.segments)
-    by_both, _taken = gather.gather(grid, light, seen, count, most_paths=8 * count)
+    by_both, _taken = gathered(grid, light, seen, count, most_paths=8 * count)
     monkeypatch.setattr(world_light, "_UNEVEN", np.inf)
-    met, _taken = gather.gather(grid, light, seen, count, most_paths=8 * count)
+    met, _taken = gathered(grid, light, seen, count, most_paths=8 * count)
     np.testing.assert_allclose(ratio(by_both), ratio(met), rtol=0.05)
 
 
