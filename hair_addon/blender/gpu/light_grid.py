@@ -15,7 +15,7 @@ none_cache = Cache(capacity=1)
 def upload(means):
     """A texture of (Z, Y, X, 4) `voxel_means.shares`, linear between voxels, whose sides avoid powers of two."""
     beside = avoid_powers_of_two(means.shape[:3]) - means.shape[:3]
-    texels = np.clip(means, -_GREATEST, _GREATEST).astype(np.float32)
+    texels = np.clip(means, -_GREATEST, _GREATEST).astype(np.float32, copy=False)
     texels = np.pad(texels, [*((0, more) for more in beside), (0, 0)], mode="edge")
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
     texture = gpu.types.GPUTexture(texels.shape[2::-1], format="RGBA16F", data=data)

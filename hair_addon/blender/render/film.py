@@ -143,7 +143,9 @@ class Film:
 
     def read(self):
         """{pass: (height, width, channels) float32}, bottom row first: means over the samples, least depths."""
-        found = {name: self._read(texture) / self._weight_sum for name, texture in self._sums.items()}
+        found = {name: self._read(texture) for name, texture in self._sums.items()}
+        for values in found.values():
+            values /= self._weight_sum  # in place: another picture of this size takes as long to allocate
         if self._depth is not None:
             mask, depth, covered, _none = np.split(self._read(self._depth), 4, axis=-1)
             found |= {"Hair Mask": mask / self._weight_sum, "Depth": depth}

@@ -36,7 +36,7 @@ def world_of(picture: np.ndarray) -> World:
     height, width = picture.shape[:2]
     edges = np.sin(np.pi * (np.arange(height + 1) / height - 0.5))
     solid_angles = np.diff(edges)[:, None] * (2.0 * np.pi / width)
-    power = picture.sum(axis=-1) * solid_angles
+    power = (picture[..., 0] + picture[..., 1] + picture[..., 2]) * solid_angles  # NumPy is slow along short axes
     chances = power / max(power.sum(), 1e-30)
     rows = chances.sum(axis=1)
     columns = np.cumsum(chances, axis=1) / np.maximum(rows, 1e-30)[:, None]
