@@ -30,6 +30,7 @@ OTHERS = {
     "blender/io/mesh_files.py": "a USD file that was opened",
     "blender/io/usd_stage.py": "USD",
     "blender/render/library_picture.py": "a picture that was just drawn",
+    "core/files/light_images.py": "OpenEXR",
     "core/files/table_exr.py": "OpenEXR",
     # What Vellus has written for itself, or the system.
     "blender/gpu/shaders.py": "the add-on's own shaders",

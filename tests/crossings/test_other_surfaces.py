@@ -100,7 +100,7 @@ def test_hair_far_from_a_mesh_is_not_attached_to_it(placed_file):
     other.location.x += 50.0
     bpy.context.view_layer.update()
     select(other, bpy.data.objects["Guides"])
-    with pytest.raises(RuntimeError, match="farther from"):
+    with pytest.raises(RuntimeError, match="too far from"):
         bpy.ops.vellus.attach_to_surface()
     require_carried(before, seen())
 

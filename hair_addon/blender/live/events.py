@@ -23,7 +23,7 @@ def curves_reported(datablock):
 
 
 def hair_evaluated(hair_object):
-    """Blender has evaluated an object of hair again: its modifiers may have changed the strands."""
+    """Blender has evaluated an object of hair for another frame: its modifiers may have changed the strands."""
     modified_hair.invalidate(hair_object)
 
 

@@ -52,7 +52,6 @@ def after_depsgraph_update(scene, depsgraph):
     file_changes.follow([scene])
     is_seen = viewport.is_up_to_date()
     events.scene_changed(is_hair_only=_is_hair_only(reports))
-    _note_evaluated(reports)
     if any(report.is_of(bpy.types.Scene) for report in reports):
         looks.follow_guides(depsgraph.view_layer)
         composite.follow(scene)
@@ -157,12 +156,6 @@ def _type_of_object(report):
     return report.datablock.type if report.is_of(bpy.types.Object) and report.datablock is not None else None
 
 
-def _note_evaluated(reports):
-    for report in reports:
-        if report.is_geometry and _type_of_object(report) == "CURVES":
-            events.hair_evaluated(report.datablock)
-
-
 def _are_curves(report):
     if report.is_of(bpy.types.Object):
         return _type_of_object(report) == "CURVES" and not report.is_transform
@@ -255,7 +248,9 @@ def after_frame_change(scene, depsgraph):
     reports = updates.read(depsgraph, bpy.app.handlers.frame_change_post, after_frame_change)
     if scene_time.is_shown(depsgraph):
         events.scene_changed(is_hair_only=_is_hair_only_in_frame(reports))
-        _note_evaluated(reports)
+        for report in reports:
+            if report.is_geometry and _type_of_object(report) == "CURVES":
+                events.hair_evaluated(report.datablock)
         deformed = updates.deformed(reports)
         moving_surfaces.frame_changed(deformed & _surfaces())
         frame_faces.note(deformed & _surfaces(), depsgraph)

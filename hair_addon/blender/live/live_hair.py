@@ -10,7 +10,7 @@ import sys
 import bpy
 
 from ...core.errors import HairError
-from ..data.strands import curves, delivered_hair, simulated_guides
+from ..data.strands import curves, simulated_guides
 from ..groom import bindings, changed_weights, hair_outside, pipeline, size_fitting, staleness, writing
 from ..groom.foreign import kept_following
 from ..groom.styles import painted_masks
@@ -256,11 +256,16 @@ def cancel_writing():
 
 def write_soon(hair):
     """Write hair after a pause in which nothing changes; at once without a window, or if modifiers take its strands."""
-    if not running.has_window() or any(map(modified_hair.is_modified, delivered_hair.objects_of(hair))):
+    if not running.has_window() or _is_drawn_modified(hair):
         _write(hair)
         return
     cancel_writing()  # restarts the pause with every change: a stroke consists of many
     bpy.app.timers.register(write_after_pause, first_interval=_PAUSE, persistent=True)
+
+
+def _is_drawn_modified(hair):
+    """Whether viewports have drawn hair with modifiers of the artist."""
+    return any(known.datablock == hair.session_uid for known in modified_hair.modified_cache.values())
 
 
 def write_after_pause():

@@ -17,6 +17,7 @@ from hair_addon.blender.live import events, invalidation
 from hair_addon.blender.render import hair_cache
 from hair_addon.blender.render.viewport import hair_picture, viewport
 from tests.blender.gpu.test_world_texture import environment_node
+from tests.blender.ui.test_own_modifiers import add_asset
 from tests.support.invariants import changed
 from tests.support.reading import points, write_points
 from tests.support.viewports import context_of, view3d
@@ -154,6 +155,18 @@ def repaint():
     bpy.data.images["Sky"].generated_color = (0.9, 0.1, 0.0, 1.0)
 
 
+def play_modifiers():
+    """One that viewports have drawn, and another that is keyed."""
+    add_asset(bpy.data.objects["Hair"], "Curl Hair Curves")
+    keyed = add_asset(bpy.data.objects["Hair"], "Duplicate Hair Curves")
+    for frame in (1, 2):
+        keyed.show_viewport = frame == 2
+        keyed.keyframe_insert("show_viewport", frame=frame)
+    bpy.context.scene.frame_set(1)
+    seen()
+    bpy.context.scene.frame_set(2)
+
+
 def spoil():
     """Another hair, surface, light and picture, which viewports have drawn."""
     sculpt()
@@ -183,6 +196,7 @@ def open_another(folder):
 # What somebody does, by the event that is told of it.
 SCENARIOS = {
     "scene_changed": lambda _folder: move_sun(),
+    "hair_evaluated": lambda _folder: play_modifiers(),
     "curves_reported": lambda _folder: sculpt(),
     "strands_made": lambda _folder: regrow(),
     "surface_moved": lambda _folder: bend(),

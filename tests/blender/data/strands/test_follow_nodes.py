@@ -212,7 +212,7 @@ def test_other_faces_root_guides_again_and_say_so(sphere):
     write_points(guides, combed)
     sphere.modifiers.new("Coarser", "DECIMATE").ratio = 0.5
     update()
-    assert "faces" in guides.data.vellus.status
+    assert "Faces" in guides.data.vellus.status
     np.testing.assert_allclose(points(guides), combed, atol=1e-6)
     assert len(hair.data.curves) == 200 and np.isfinite(points(hair)).all()
     for curves_object in (guides, hair):

@@ -219,4 +219,4 @@ def test_no_attraction_says_why_nothing_changes(waved, capfd):
     before = points(bpy.data.objects["Guides"])
     use_tool("attract_guides", amount=0.0)
     assert np.array_equal(points(bpy.data.objects["Guides"]), before)
-    assert "at an amount of 0 they stay as they are" in capfd.readouterr().out
+    assert "No guides changed: the amount is 0" in capfd.readouterr().out
