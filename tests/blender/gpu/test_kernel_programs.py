@@ -4,6 +4,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import warp as wp
 
 from hair_addon.blender.gpu import kernel_programs
@@ -40,6 +41,13 @@ class _Given:
     words: wp.array[wp.uint32]
     shape: wp.vec3i
     factor: float
+
+
+@pytest.fixture(autouse=True)
+def on_the_processor():
+    """Arrays are made where the kernels run that they are compared with, on a computer with CUDA too."""
+    with wp.ScopedDevice("cpu"):
+        yield
 
 
 @wp.func

@@ -12,6 +12,13 @@ from hair_addon.core.shading.tables import lookup_tables
 from tests.core.shading.light_paths.test_gather import WHITE, grid_of, strands_in_a_box
 
 
+@pytest.fixture(autouse=True)
+def on_the_processor():
+    """Arrays are made where the kernels run that they are compared with, on a computer with CUDA too."""
+    with wp.ScopedDevice("cpu"):
+        yield
+
+
 def two_systems(rng):
     """A grid of two hairs of 60 and 90 strands."""
     settings = lookup_tables.Settings(mode="energy")
