@@ -124,8 +124,9 @@ def grow():
     show("grown", results=[list(distributed), list(interpolated)])
     facts["sidebar"] = {"rectangle": rectangle(sidebar), "category": sidebar.active_panel_category}
     np.save(OUT / "offscreen.npy", offscreen_light(addon()))
-    settings = bpy.context.scene.view_settings
-    facts["transform"] = [settings.view_transform, settings.look, settings.exposure, settings.gamma]
+    pictures, transforms = addon().data.pictures.viewport_shading, addon().gpu.display_transform
+    used = transforms.DisplayTransform.of(bpy.context.scene, pictures.NO_SETTINGS)  # of Solid shading
+    facts["transform"] = [used.view, used.look or "None", 0.0, used.gamma]
     yield
 
 

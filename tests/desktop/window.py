@@ -204,7 +204,9 @@ def offscreen_light(blender):
     view, samples = area.spaces.active.region_3d, 4
     size = (region.width * samples, region.height * samples)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph, area.spaces.active)
+    space, shading = area.spaces.active, blender.data.pictures.viewport_shading
+    look = shading.read(space, bpy.context.scene, np.array(view.view_matrix, np.float64))
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph, space, shown=look)
     matrices = np.array(view.view_matrix, np.float64), np.array(view.window_matrix, np.float64)
     record = drawing.pass_record(*matrices, size)
     buffer = blender.gpu.visibility_buffer.VisibilityBuffer(*size)
