@@ -5,6 +5,8 @@ In Material Preview EEVEE would draw them a second time, and Blender would defor
 surface or a slider without showing them. Renders are never affected. Hair is shown before anything else may read it.
 """
 
+from collections import defaultdict
+
 import bpy
 from bpy.types import Curves, Object
 
@@ -38,7 +40,9 @@ def pause(surfaces: set[Object]) -> None:
     if any(paused_cache.get(d.session_uid) and not _is_drawn_here(d) for d in bpy.data.hair_curves):
         resume()
         return
-    _hide([d for d in bpy.data.hair_curves if d.surface in surfaces], paused_cache)
+    moved = [d for d in bpy.data.hair_curves if d.surface in surfaces and paused_cache.get(d.session_uid) is None]
+    if moved:
+        _hide(moved, paused_cache, _users())
 
 
 def resume() -> None:
@@ -52,12 +56,15 @@ def hide(datablocks: list[Curves]) -> None:
     if not _may_hide_any():
         show()
         return
+    users, is_any_shown = _users(), False
     for datablock in datablocks:
         uid = datablock.session_uid
-        if hidden_cache.get(uid) is not None and not (_is_drawn_here(datablock) and _may_hide(_users_of(datablock))):
+        if hidden_cache.get(uid) is not None and not (_is_drawn_here(datablock) and _may_hide(users[datablock])):
             hidden_cache.invalidate(uid)
-            _show_others()
-    _hide(datablocks, hidden_cache)
+            is_any_shown = True
+    if is_any_shown:
+        _show_others()
+    _hide(datablocks, hidden_cache, users)
 
 
 def show() -> None:
@@ -72,11 +79,11 @@ def show_all() -> None:
     show()
 
 
-def _hide(datablocks, cache):
+def _hide(datablocks, cache, users_of):
     for datablock in datablocks:
         if cache.get(datablock.session_uid) is not None or not _is_drawn_here(datablock):
             continue
-        users = _users_of(datablock)
+        users = users_of[datablock]
         # Check all objects: some may be linked or have other nodes.
         if _may_hide(users) and (is_hidden(datablock) or not _are_read_by_others(users)):
             is_done = [follow_nodes.hide(user, True) for user in users]
@@ -92,8 +99,13 @@ def _show_others():
                 follow_nodes.hide(curves_object, False)
 
 
-def _users_of(datablock):
-    return [user for user in bpy.data.objects if user.type == "CURVES" and user.data == datablock]
+def _users():
+    """{Curves: [objects]}, empty for Curves without objects."""
+    found = defaultdict(list)
+    for user in bpy.data.objects:
+        if user.type == "CURVES":
+            found[user.data].append(user)
+    return found
 
 
 def _may_hide_any():

@@ -410,6 +410,7 @@ def _drawn_hair(hair_object, depsgraph, is_viewport, shown):
         strands = modified_hair.strands_on_gpu(hair_object, depsgraph)
         shading = hair_cache.shading_of(hair_object.data, strands, is_neutral)
     else:
+        modified_hair.forget(hair_object)
         strands, shading = hair_cache.hair_on_gpu(hair_object.data, is_viewport, is_neutral)
     return strands, strands and solid_hair.shown_as(shading, shown, hair_object)
 

@@ -19,7 +19,8 @@ modified_cache = Cache()  # session_uid of an object → _Modified
 class _Modified:
     """The evaluated strands of an object; is_current: whether its evaluation has not been reported since."""
 
-    datablock: int  # session_uid of the Curves
+    owner: int  # session_uid of the object
+    datablock: int  # session_uid of its Curves
     arrays: tuple
     on_gpu: StrandsOnGPU
     is_current: bool = True
@@ -42,8 +43,24 @@ def strands_on_gpu(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph
     if known is not None and all(map(np.array_equal, read.arrays, known.arrays)):
         known.is_current = True
         return known.on_gpu
-    made = _Modified(hair_object.data.session_uid, read.arrays, strand_textures.upload_strands(*read.arrays))
+    forget_deleted()
+    made = _Modified(
+        hair_object.session_uid, hair_object.data.session_uid, read.arrays, strand_textures.upload_strands(*read.arrays)
+    )
     return modified_cache.keep(hair_object.session_uid, made).on_gpu
+
+
+def forget(hair_object: bpy.types.Object) -> None:
+    """Free the strands of an object that has no modifiers of the artist any more."""
+    modified_cache.invalidate(hair_object.session_uid)
+
+
+def forget_deleted() -> None:
+    """Free the strands of objects that were deleted."""
+    present = {one.session_uid for one in bpy.data.objects} if len(modified_cache) else set()
+    for known in modified_cache.values():
+        if known.owner not in present:
+            modified_cache.invalidate(known.owner)
 
 
 def invalidate(hair_object: bpy.types.Object) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.gpu import strand_textures
-from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render import drawn_scene, modified_hair
 from tests.blender.live.test_carried_strands import bend
 from tests.blender.ui.test_own_modifiers import add_asset
 from tests.support import drawn_strands
@@ -71,3 +71,37 @@ def test_what_blender_did_not_evaluate_again_is_not_uploaded_again(modified, mon
     bend(modified.data.surface, 0.3)
     drawn()
     assert uploads
+
+
+def test_strands_of_removed_modifiers_and_deleted_objects_are_freed(modified):
+    copy = modified.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    read_all()
+    assert len(modified_hair.modified_cache) == 2
+    bpy.data.objects.remove(copy)
+    modified.modifiers[-1].show_viewport = False
+    read_all()
+    assert len(modified_hair.modified_cache) == 1
+    modified.modifiers[-1].show_viewport = True
+    read_all()
+    assert [known.owner for known in modified_hair.modified_cache.values()] == [modified.session_uid]
+
+
+def read_all():
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph).hair
+
+
+@pytest.mark.parametrize("scale", [(0.01, 0.01, 0.01), (-1.0, 1.0, 1.0), (1.0, 3.0, 0.5)])
+def test_places_and_widths_are_those_of_the_render_wherever_the_surface_stands(modified, scale):
+    surface = modified.data.surface
+    surface.location, surface.rotation_euler, surface.scale = (3.0, -2.0, 1.0), (0.4, 0.3, 1.0), scale
+    bend(surface, 0.3)
+    ((strands, _shading, to_world, _part),) = read_all()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    ((rendered, _shading, place, _part),) = drawn_scene.read_unlit(depsgraph, {}, None, None).hair
+    places = [drawn_strands.places(one) @ m[:3, :3].T + m[:3, 3] for one, m in ((strands, to_world), (rendered, place))]
+    np.testing.assert_allclose(*places, atol=CLOSE)
+    np.testing.assert_allclose(*(np.array(one.radii_texture.read()) for one in (strands, rendered)))
