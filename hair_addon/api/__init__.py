@@ -68,6 +68,7 @@ from .styles import (
     set_styles,
     styles_of,
 )
+from .systems import delete_hair, hair_systems, look_names, style_preset_names
 from .tables import bake_tables, table_settings
 
 __all__ = [
@@ -99,15 +100,18 @@ __all__ = [
     "bake_dynamics",
     "bake_tables",
     "change_guides",
+    "delete_hair",
     "deliver_dynamics",
     "distribute_guides",
     "draw",
     "dynamics_of",
     "export_groom",
     "groom_names",
+    "hair_systems",
     "import_curves",
     "interpolate_hair",
     "load_settings",
+    "look_names",
     "make_hair_cards",
     "make_hair_tubes",
     "points",
@@ -120,6 +124,7 @@ __all__ = [
     "settings_of",
     "shade",
     "simulate",
+    "style_preset_names",
     "styles_of",
     "table_settings",
     "transfer_groom",

@@ -21,6 +21,7 @@ from ..core.params import require_class
 from ..core.shading import presets
 from ..core.shading.appearance import Appearance, shown_changes
 from ..core.styling.base import StyleSettings
+from . import systems
 from .arguments import are_arrays, changed, checked_progress, choice, mesh_of, path_of, require_no_names
 from .blender_access import blender
 from .styles import styled_strands
@@ -137,7 +138,7 @@ def points(strands: Curves | Strands) -> np.ndarray:
 def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | None = None, **changes: Any) -> None:
     """Set the look of hair, for the viewport and for Cycles.
 
-    look: an `Appearance`, the name of a preset such as "BLOND", or None for the current one; changes: fields of
+    look: an `Appearance`, a name of `look_names` such as "BLOND", or None for the current one; changes: fields of
     `Appearance`; model: "MARSCHNER" or "KAJIYA_KAY", None for the current one. Changing melanin, redness or tint,
     color, or absorption also selects that parametrization.
 
@@ -148,14 +149,20 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
     target = _curves(hair, "HAIR")
     present = blender.settings.properties.own_look_of(target.vellus)
     if isinstance(look, str):
-        preset = presets.PRESETS[choice(look, "preset", presets.PRESETS)]
-        look = replace(preset[1], mode=present.mode)  # the mode is not part of a preset
+        look = replace(_look(look), mode=present.mode)  # the mode is not part of a preset
     wanted = changed(Appearance, present if look is None else look, shown_changes(changes))
     if model is not None:
         choice(model, "model", [identifier for identifier, _label, _description in blender.settings.properties.MODELS])
     blender.groom.transfer.groom_settings.assign_look(target, wanted)
     if model is not None:
         target.vellus.model = model
+
+
+def _look(name):
+    """Return the built-in or saved `Appearance` of a name. Raises `HairError`."""
+    if name in presets.PRESETS:
+        return presets.PRESETS[name][1]
+    return blender.settings.saved_looks.read(choice(name, "preset", systems.look_names()))
 
 
 # Settings.

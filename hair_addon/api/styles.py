@@ -30,6 +30,7 @@ from ..core.styling.smooth import Settings as Smooth
 from ..core.styling.style_inputs import Inputs
 from ..core.styling.trim import Settings as Trim
 from ..core.styling.wet import Settings as Wet
+from . import systems
 from .arguments import changed, checked_progress, choice
 from .blender_access import blender
 
@@ -116,7 +117,7 @@ def set_styles(hair: Curves, styles: Sequence[StyleSettings], *, progress: Progr
 def apply_style_preset(
     hair: Curves, preset: str, *, fit: bool = True, keep_styles: bool = False, progress: Progress = no_progress
 ) -> None:
-    """Replace the styles of hair Curves with those of a preset such as "CURLY".
+    """Replace the styles of hair Curves with those of a preset, a name of `style_preset_names` such as "CURLY".
 
     fit: whether lengths, which are for a human head, are scaled to the surface; keep_styles: append the preset's styles
     to the present ones instead of replacing them; progress: as in `add_style`.
@@ -125,7 +126,8 @@ def apply_style_preset(
     >>> [style.octaves for style in api.styles_of(bpy.data.objects["Hair"])]
     [3]
     """
-    found = style_presets.read(choice(preset, "style preset", style_presets.PRESETS))
+    name = choice(preset, "style preset", systems.style_preset_names())
+    found = style_presets.read(name) if name in style_presets.PRESETS else blender.settings.saved_styles.read(name)
     fit, keep = plain_value("fit", fit, False, _SWITCH), plain_value("keep_styles", keep_styles, False, _SWITCH)
     target = blender.data.arguments.curves_of(hair, "HAIR")
     work = blender.groom.styles.hair_styles.applying_preset(target, found, is_fitted=fit, keeps_styles=keep)

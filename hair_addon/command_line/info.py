@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""info: show the hair, settings or tables in a file."""
+"""info: show the hair, settings or tables in a file, or list looks and style presets."""
 
 import math
 from dataclasses import asdict
@@ -15,8 +15,12 @@ blender = lazy.Package("..blender", __package__)
 
 def add(verbs):
     """Add the command's options."""
-    parser = verbs.add_parser("info", help="show the hair, settings or tables in a file")
-    parser.add_argument("input", help=".blend, a mesh, .npz, groom settings (.json) or a table (.exr)")
+    parser = verbs.add_parser(
+        "info",
+        help="show the hair, settings or tables in a file, or list looks and style presets",
+        description="Show the hair, settings or tables in a file. Without a file, list the looks and style presets.",
+    )
+    parser.add_argument("input", nargs="?", help=".blend, a mesh, .npz, groom settings (.json) or a table (.exr)")
     options.add_scripts(parser)
     options.add_common(parser)
     parser.set_defaults(run=run)
@@ -24,6 +28,12 @@ def add(verbs):
 
 def run(given, console):
     """Read the file and print its summary."""
+    if given.input is None:
+        blender.require_registered()
+        saved = blender.settings
+        values = {"looks": saved.saved_looks.all_names(), "style_presets": saved.saved_styles.all_names()}
+        console.result({"verb": "info", **values}, "\n".join(_in_lines(values)))
+        return
     describe = {".npz": _arrays, ".json": _settings, ".exr": _tables}.get(given.input.suffix.lower())
     if describe is None:
         opening.open_file(given, console, has_curves=True)

@@ -12,7 +12,7 @@ _OPTIONS = ("out", "settings", "guides_from", "hair_from", "from_library", "deli
 def resolve(given):
     """Convert each path option to a `Path`. Raises `HairError` for // without a .blend file."""
     blend = None
-    if hasattr(given, "input"):
+    if getattr(given, "input", None) is not None:
         given.input = _resolved(given.input, None, "give the path of the file itself")
         blend = given.input if given.input.suffix.lower() == ".blend" else None
     for name in _OPTIONS:

@@ -48,6 +48,11 @@ def add(verbs):
         default=False,
         help="render also where linked libraries, images or caches are missing, with a warning",
     )
+    parser.add_argument(
+        "--dry-run",
+        action="store_true",
+        help="check everything and print what would be rendered; creates the folder of the frames, but no file",
+    )
     parser.add_argument("--overwrite", action="store_true", help="render existing frames again")
     parser.add_argument(
         "--jobs", type=options.count, default=1, metavar="N", help="number of processes on this machine [1]"
@@ -71,8 +76,11 @@ def run(given, console):
     without = blender.io.frames.missing_files(numbers, given.allow_missing)
     if without:
         console.warn(without)
-    blender.io.frames.bind_simulated()
     settings = _frame_settings(given, blender.io.frames.scene_size())
+    if given.dry_run:
+        _plan(given, console, numbers, settings)
+        return
+    blender.io.frames.bind_simulated()
     if blender.io.frames.is_sequence(given.out):
         _make_sequence(given, console, numbers, settings)
     else:
@@ -82,11 +90,39 @@ def run(given, console):
         _report(given, console, numbers[0], given.out, started)
 
 
-def _make_sequence(given, console, numbers, settings):
+def _plan(given, console, numbers, settings):
+    """Print what the command would render; raises `HairError` where it would fail before the first frame."""
+    blender.io.frames.require_camera(blender.host.scene_time.present_scene())
+    left = numbers
+    if blender.io.frames.is_sequence(given.out) and not given.overwrite:
+        described = _description(given, settings)
+        blender.io.sequence.require_continuable(given.out, numbers, described)
+        left = blender.io.sequence.unrendered_frames(given.out, numbers)
+    values = {"verb": "render", "input": str(given.input), "dry_run": True, "engine": given.engine}
+    values |= {"out": str(given.out), "width": settings.width, "height": settings.height}
+    values |= {"samples": settings.sample_count or blender.io.frames.scene_samples(given.engine)}
+    values |= {"frames": numbers, "to_render": left, "hair": blender.io.inspection.rendered_hair()}
+    console.result(values, _plan_in_words(values))
+
+
+def _plan_in_words(values):
+    count, left = len(values["frames"]), len(values["to_render"])
+    size = f"{values['width']} x {values['height']} pixels, {values['samples']} samples"
+    yet = f"{left} of {count} frames" if count > 1 else f"{left} frame"
+    lines = [f"Would render {yet} with {values['engine']}, {size}: {values['out']}"]
+    lines += [f"{hair['name']}: {hair['strands']} strands on {hair['surface']}" for hair in values["hair"]]
+    return "\n".join(lines if values["hair"] else [*lines, "No hair is rendered."])
+
+
+def _description(given, settings):
+    """Return what identifies the sequence that a command renders."""
     names = [name for name, _default, _details in declared(PictureSettings) if name not in DRAWING_FIELDS]
     values = {name: getattr(settings, name) for name in names}
-    described = blender.io.sequence.description(given.input, given.engine, values | {"scripts": given.enable_scripts})
-    blender.io.sequence.begin(given.out, numbers, described, given.overwrite)
+    return blender.io.sequence.description(given.input, given.engine, values | {"scripts": given.enable_scripts})
+
+
+def _make_sequence(given, console, numbers, settings):
+    blender.io.sequence.begin(given.out, numbers, _description(given, settings), given.overwrite)
     if given.jobs > 1:
         _run_jobs(given, console, numbers, settings)
         return

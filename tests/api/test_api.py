@@ -15,7 +15,19 @@ import pytest
 import warp
 
 from hair_addon import api
-from hair_addon.api import cards, dynamics, export, grooms, guide_tools, imports, library, pictures, styles, tables
+from hair_addon.api import (
+    cards,
+    dynamics,
+    export,
+    grooms,
+    guide_tools,
+    imports,
+    library,
+    pictures,
+    styles,
+    systems,
+    tables,
+)
 from hair_addon.api.blender_access import NO_BLENDER
 from hair_addon.core.kernels import compiled_kernels
 from hair_addon.core.long_work import Stopped
@@ -25,7 +37,7 @@ from tests.support.dynamics.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULES = (api, grooms, dynamics, guide_tools, styles, tables, export, library, imports, pictures, cards)
+MODULES = (api, grooms, dynamics, guide_tools, styles, tables, export, library, imports, pictures, cards, systems)
 WITHOUT_BLENDER = "import sys\nfor name in ('bpy', 'gpu', 'mathutils', 'imbuf'): sys.modules[name] = None\n"
 
 
@@ -86,9 +98,9 @@ def test_the_example_of_plain_arrays_runs_without_blender(tmp_path):
 
 def test_examples_of_the_documentation_run(tmp_path):
     """Examples run unchanged: the add-on registers itself in a checkout."""
-    in_blender, plain = shown_code()
+    in_blender, keyframes, plain = shown_code()
     assert "import bpy" in in_blender and "bpy" not in plain
-    run_python(in_blender, tmp_path)
+    run_python(in_blender + keyframes, tmp_path)
     run_python(WITHOUT_BLENDER + plain, tmp_path)
 
 
@@ -191,6 +203,15 @@ def test_points_follow_guides_that_were_combed(guides):
     guides.data.update_tag()
     update()
     assert np.abs(api.points(hair) - before).max() > 0.1
+
+
+def test_deleting_hair_leaves_guides_that_other_hair_follows(guides):
+    first, second = (api.interpolate_hair(guides, strand_count=40) for _ in range(2))
+    assert api.hair_systems() == [first, second] and api.hair_systems(guides.data.surface) == [first, second]
+    api.delete_hair(first)
+    assert api.hair_systems() == [second] and second.vellus.guide_curves == guides.data
+    api.delete_hair(guides)
+    assert api.hair_systems() == [] and not [o for o in bpy.data.objects if o.type == "CURVES"]
 
 
 def test_a_look_keeps_how_it_is_drawn(hair):

@@ -13,7 +13,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.io import frames
-from hair_addon.core.files import settings_file, table_exr
+from hair_addon.core.files import settings_file, style_presets, table_exr
 from hair_addon.core.files.settings_file import GroomSettings
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.shading import appearance
@@ -217,7 +217,37 @@ def test_info_reads_files_of_vellus(mesh, tmp_path):
         assert run_here("info", tmp_path / name, "--json").results[0]["settings"]["size"] == 32
 
 
+def test_info_without_a_file_lists_looks_and_style_presets():
+    listed = run_here("info", "--json").results[0]
+    assert listed == {"verb": "info", "looks": [*PRESETS], "style_presets": [*style_presets.PRESETS]}
+    assert "AUBURN" in run_here("info").out
+
+
 # ---------------------------------------------------------------------------------------------------------- render
+
+
+def test_a_dry_run_states_what_is_rendered_and_writes_no_file(shot, tmp_path):
+    folder = tmp_path / "frames"
+    words = ("render", shot, "--frames", "1-3", "--samples", 3, "--width", 60, "--out", folder / "f_#.png", "--json")
+    plan = run_here(*words, "--dry-run").results[0]
+    assert (plan["frames"], plan["to_render"], plan["samples"], plan["width"]) == ([1, 2, 3], [1, 2, 3], 3, 60)
+    assert [(hair["name"], hair["surface"]) for hair in plan["hair"]] == [("Hair", "Sphere")]
+    assert [*folder.iterdir()] == []
+    assert run_here(*words).status == 0
+    (folder / "f_2.png").unlink()
+    before = sorted(folder.iterdir())
+    assert run_here(*words, "--dry-run").results[0]["to_render"] == [2]
+    assert sorted(folder.iterdir()) == before
+    other = run_here(*words, "--dry-run", "--engine", "cycles")
+    assert other.status == 1 and "belongs to another sequence (engine)" in other.errors
+
+
+def test_a_dry_run_fails_where_rendering_would(shot, tmp_path):
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    bpy.data.objects.remove(bpy.context.scene.camera)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "blind.blend"))
+    ended = run_here("render", tmp_path / "blind.blend", "--dry-run", "--out", tmp_path / "f.png")
+    assert (ended.status, ended.out) == (1, "") and "no camera" in ended.errors
 
 
 def test_frames_are_drawn_each_to_its_file(shot, tmp_path):

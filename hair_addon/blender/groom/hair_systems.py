@@ -20,12 +20,16 @@ def systems_of(surface: Object, view_layer: ViewLayer) -> list[Curves]:
     """Return the Curves of the hair systems on a mesh object that have objects in a view layer, oldest first."""
     if surface is None or not any(c.surface == surface for c in bpy.data.hair_curves):
         return []  # panels call this on every redraw, and a view layer may have thousands of objects
+    return [c for c in all_systems(view_layer) if c.surface == surface]
+
+
+def all_systems(view_layer: ViewLayer) -> list[Curves]:
+    """Return the Curves of all hair systems that have objects in a view layer, oldest first."""
     curves = {o.data for o in view_layer.objects if o is not None and o.type == "CURVES"}
     hair = {c for c in curves if c.vellus.kind == "HAIR"}
     followed = {c.vellus.guide_curves for c in hair}
     lone_guides = {c for c in curves - followed if c.vellus.kind == "GUIDES"}
-    found = [c for c in hair | lone_guides if c.surface == surface]
-    return sorted(found, key=lambda c: c.session_uid)
+    return sorted(hair | lone_guides, key=lambda c: c.session_uid)
 
 
 def edited_system(view_layer: ViewLayer) -> Curves | None:

@@ -84,6 +84,12 @@ def require_view_layer():
         raise HairError("No view layer of the scene is rendered: turn on Use for Rendering in one of them.")
 
 
+def require_camera(blender_scene):
+    """Raise `HairError` if a scene has no camera."""
+    if blender_scene.camera is None:
+        raise HairError("The scene has no camera: add one.")
+
+
 def bind_simulated():
     """Bind simulated hair in its start frame, so that its bits do not depend on the frame rendered first.
 
@@ -128,8 +134,7 @@ def write_frame(path, frame, engine, settings, partial=None, progress=no_progres
         raise HairError(f"There is no frame {frame}: Blender's frames range from {FIRST_FRAME} to {LAST_FRAME}.")
     require_view_layer()
     _require_layers(path, settings.has_passes)
-    if blender_scene.camera is None:
-        raise HairError("The scene has no camera: add one.")
+    require_camera(blender_scene)
     files, partial = view_files.files_of(path), partial or new_partial_of(Path(path))
     partials = view_files.files_of(partial)
     with atomic_files(files, partials), _rendering(blender_scene, partial, engine, settings):
@@ -181,12 +186,20 @@ def _of_scene(blender_scene, path, engine, settings):
     yield image, "color_depth", color_depth
     yield image, "views_format", view_files.views_format(path, settings.has_passes)
     if settings.sample_count:
-        owner, name = {
-            "vellus": (blender_scene.vellus, "sample_count"),
-            "cycles": (blender_scene.cycles, "samples"),
-            "eevee": (blender_scene.eevee, "taa_render_samples"),
-        }[engine]
-        yield owner, name, settings.sample_count
+        yield *_sample_property(blender_scene, engine), settings.sample_count
+
+
+def scene_samples(engine):
+    """Return the number of samples per pixel that the open scene sets for an engine, a key of `ENGINES`."""
+    return getattr(*_sample_property(bpy.context.scene, engine))
+
+
+def _sample_property(blender_scene, engine):
+    return {
+        "vellus": (blender_scene.vellus, "sample_count"),
+        "cycles": (blender_scene.cycles, "samples"),
+        "eevee": (blender_scene.eevee, "taa_render_samples"),
+    }[engine]
 
 
 def _of_layer(view_layer):

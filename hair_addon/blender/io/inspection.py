@@ -15,6 +15,7 @@ from ..groom import diagnostics
 from ..groom.dynamics import frame_folders, guide_baking
 from ..host import scene_time
 from ..host.notices import name_of
+from ..render import hair_places
 from ..settings import properties, setting_properties, style_items
 from . import strand_arrays
 
@@ -29,6 +30,19 @@ def open_file():
         "hair": [_hair(c) for c in bpy.data.hair_curves if c.vellus.kind == "HAIR"],
         "curves": [_counts(c) for c in bpy.data.hair_curves if c.vellus.kind == "NONE"],
     }
+
+
+def rendered_hair():
+    """Return [{name, strands, surface}] of each hair object that renders of the open scene show.
+
+    Instances are not listed apart from their object.
+    """
+    layers = [layer for layer in bpy.context.scene.view_layers if layer.use]
+    objects = dict.fromkeys(place.hair_object for layer in layers for place in hair_places.hair_places(layer, None, ()))
+    return [
+        {"name": name_of(o), "strands": len(o.data.curves), "surface": o.data.surface and name_of(o.data.surface)}
+        for o in objects
+    ]
 
 
 def _surface(surface_object):

@@ -60,6 +60,15 @@ def begin(pattern, numbers, described, replaces=False):
         time.sleep(_PAUSE)
 
 
+def require_continuable(pattern, numbers, described):
+    """Raise `HairError` if `begin` would refuse to continue the files that exist; writes nothing."""
+    record = record_of(pattern)
+    if record.exists():
+        _require_same(record, described)
+    else:
+        _require_none(pattern, numbers)
+
+
 @contextlib.contextmanager
 def _claimed(path):
     """`claim`, with OSError converted to `HairError`."""
@@ -80,11 +89,10 @@ def _begin(pattern, numbers, record, described, replaces):
     if replaces:
         for path in _files(pattern, numbers):
             path.unlink(missing_ok=True)
-    elif record.exists():
-        _require_same(record, described)
-        return
     else:
-        _require_none(pattern, numbers)
+        require_continuable(pattern, numbers, described)
+        if record.exists():
+            return
     with atomic_file(record) as partial:
         partial.write_text(json.dumps(described, indent=1) + "\n", encoding="utf-8")
 
@@ -146,6 +154,11 @@ def make(pattern, numbers, write, progress=no_progress):
 def missing_frames(pattern, numbers):
     """Numbers of missing frames; removes partial files of killed processes."""
     _sweep(pattern, numbers)
+    return unrendered_frames(pattern, numbers)
+
+
+def unrendered_frames(pattern, numbers):
+    """Numbers of frames without complete files; changes nothing."""
     return [number for number in numbers if not _is_done(frames.path_of(pattern, number))]
 
 

@@ -8,12 +8,18 @@ from dataclasses import asdict
 
 from ...core.files import settings_file
 from ...core.params import declared
+from ...core.shading import presets
 from ...core.shading.appearance import Appearance
 from .saved_files import SavedFiles
 
 FILES = SavedFiles("looks")
 
 names, change_time, remove = FILES.names, FILES.change_time, FILES.remove
+
+
+def all_names():
+    """Names of the built-in looks, then of saved ones."""
+    return [*presets.PRESETS, *names()]
 
 
 def write(name, look):

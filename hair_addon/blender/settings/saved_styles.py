@@ -9,6 +9,11 @@ FILES = SavedFiles("styles")
 names, remove = FILES.names, FILES.remove
 
 
+def all_names():
+    """Names of the built-in style presets, then of saved ones."""
+    return [*style_presets.PRESETS, *names()]
+
+
 def write(name, settings):
     """Save the styles of `GroomSettings` under a name, replacing an existing preset. Raises `HairError`."""
     settings_file.write_object(FILES.path(name, create=True), style_presets.to_object(settings))
