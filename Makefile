@@ -53,10 +53,11 @@ pictures: $(installed) ## the pictures of README and manual, in docs; ARGS="styl
 build: $(installed) ## dist/vellus-VERSION-PLATFORM.zip; PLATFORM=linux-x64, windows-x64, macos-arm64 or all
 	$(python) tools/build_extension.py $(PLATFORM)
 
-lint: $(installed) ## ruff: rules and format; pyrefly: types
+lint: $(installed) ## ruff: rules and format; pyrefly: types; zizmor: workflows
 	$(python) -m ruff check
 	$(python) -m ruff format --check
 	$(python) -m pyrefly check
+	.venv/bin/zizmor --offline --no-progress --quiet .github/workflows
 
 samples: $(installed) ## the .blend files of blend_samples
 	$(python) blend_samples/build_samples.py $(ARGS)
