@@ -19,11 +19,13 @@ if TYPE_CHECKING:
         guide_copies,
         guide_count,
         guide_growth,
+        guide_layers,
         guide_lengths,
         guide_shapes,
         guide_tool_settings,
         guide_trim,
         hair_styles,
+        layer_transfer,
         rooted_curves,
         transfer_settings,
     )

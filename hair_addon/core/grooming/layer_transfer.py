@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Layers of guides carried to another set of guides, by the weights with which strands follow guides (Eq. 9).
+
+Turns are averaged as rotation vectors in the frames of the roots: the vector of each guide is carried to the other root
+by the least rotation between the normals.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..geometry.strands import curve_offsets
+from .guide_layers import GuideLayers, added, without_layers
+from .guide_shapes import rotations
+
+_SAME_PLACE = 1e-6  # of the extent of the roots: guides that are closer are the same
+
+
+def transferred(
+    layers: GuideLayers, others: GuideLayers, indices: np.ndarray, weights: np.ndarray, apart: np.ndarray | None = None
+) -> GuideLayers:
+    """Return other guides (M) with the layers of guides, whose weights (L, M) are interpolated too.
+
+    others: `GuideLayers` without layers; indices (M, k): guides that each follows, -1 for none, with weights (M, k);
+    apart (M,): distance to the first of them, as a fraction of the extent of the roots, None if unknown. Guides at the
+    place of another with as many points take its turns bit for bit.
+    """
+    indices, weights = np.asarray(indices), np.where(np.asarray(indices) >= 0, weights, 0.0).astype(np.float64)
+    sums = weights.sum(axis=1, keepdims=True)
+    weights = np.where(sums > 0.0, weights / np.where(sums > 0.0, sums, 1.0), 0.0)
+    weights[sums[:, 0] == 0.0, 0] = 1.0
+    indices = np.maximum(indices, 0)
+    is_same = np.zeros(len(indices), bool)
+    if apart is not None:
+        is_same = (apart <= _SAME_PLACE) & (np.asarray(layers.counts)[indices[:, 0]] == others.counts)
+        weights[is_same] = 0.0
+        weights[is_same, 0] = 1.0
+    found = others
+    for _layer in layers.turns:
+        found = added(found)
+    found = replace(found, weights=np.einsum("mk,lmk->lm", weights, layers.weights[:, indices]).astype(np.float32))
+    starts, other_starts = curve_offsets(layers.counts), curve_offsets(others.counts)
+    vectors = _root_vectors(layers)
+    axes, other_axes = _axes(layers), _axes(others)
+    for count in np.unique(others.counts[others.counts > 1]):
+        chosen = np.flatnonzero(others.counts == count)
+        places = other_starts[chosen][:, None] + np.arange(1, count)
+        turns = np.zeros((len(layers.turns), len(chosen), int(count) - 1, 3))
+        stretches = np.zeros(turns.shape[:-1])
+        for slot in range(indices.shape[1]):
+            share, sources = weights[chosen, slot], indices[chosen, slot]
+            rows = np.flatnonzero(share > 0.0)
+            if not len(rows):
+                continue
+            sampled = _sampled(starts, np.asarray(layers.counts), sources[rows], int(count))
+            carry = rotations(axes[sources[rows], :, 2], other_axes[chosen[rows], :, 2])
+            # Columns of axes are the frame: into the other root's frame, from the root's vector in space.
+            into = np.swapaxes(other_axes[chosen[rows]], 1, 2) @ carry
+            turned = np.einsum("mij,lmpj->lmpi", into, vectors[:, sampled])
+            turns[:, rows] += share[rows][None, :, None, None] * turned
+            stretches[:, rows] += share[rows][None, :, None] * layers.stretches[:, sampled]
+        found.turns[:, places] = _quaternions(turns)
+        found.stretches[:, places] = stretches
+    for guide in np.flatnonzero(is_same):
+        own = slice(other_starts[guide], other_starts[guide + 1])
+        source = indices[guide, 0]
+        found.turns[:, own] = layers.turns[:, starts[source] : starts[source + 1]]
+        found.stretches[:, own] = layers.stretches[:, starts[source] : starts[source + 1]]
+    # The same turns need the same frames.
+    found.tangents[is_same], found.normals[is_same] = (
+        layers.tangents[indices[is_same, 0]],
+        layers.normals[indices[is_same, 0]],
+    )
+    return found
+
+
+def chosen_guides(layers: GuideLayers, kept: np.ndarray) -> GuideLayers:
+    """Return the layers of some guides; kept (M,): their indices."""
+    starts, counts = curve_offsets(layers.counts), np.asarray(layers.counts)[kept]
+    of_points = np.concatenate([np.zeros(0, int), *(np.arange(starts[g], starts[g + 1]) for g in kept)])
+    some = without_layers(layers.base[of_points], counts, layers.normals[kept])
+    return replace(
+        some,
+        tangents=layers.tangents[kept],
+        turns=layers.turns[:, of_points],
+        stretches=layers.stretches[:, of_points],
+        weights=layers.weights[:, kept],
+    )
+
+
+def _sampled(starts, counts, sources, count):
+    """Return (M, count - 1) indices of the points that end the segments of guides, at equal fractions."""
+    segments = np.maximum(counts[sources] - 1, 1)[:, None]
+    places = (np.arange(count - 1) + 0.5) / (count - 1)
+    offsets = 1 + np.minimum((places[None] * segments).astype(np.int64), segments - 1)
+    return starts[sources][:, None] + np.minimum(offsets, counts[sources][:, None] - 1)
+
+
+def _axes(layers):
+    """Return (G, 3, 3): columns tangent, side and normal of each root's frame."""
+    normals, tangents = layers.normals.astype(np.float64), layers.tangents.astype(np.float64)
+    return np.stack([tangents, np.cross(normals, tangents), normals], axis=2)
+
+
+def _root_vectors(layers):
+    """Return (L, N, 3) rotation vectors of turns in space, as at the roots."""
+    quaternions = layers.turns.astype(np.float64)
+    axis = quaternions[..., 1:]
+    sine = np.linalg.norm(axis, axis=-1)
+    angle = 2.0 * np.arctan2(sine, quaternions[..., 0])
+    angle = np.where(sine > 0.0, angle, 0.0)
+    vectors = axis * (angle / np.where(sine > 0.0, sine, 1.0))[..., None]
+    return np.einsum("nij,lnj->lni", np.repeat(_axes(layers), layers.counts, axis=0), vectors)
+
+
+def _quaternions(vectors):
+    """Return quaternions (..., 4) w, x, y, z of rotation vectors (..., 3)."""
+    angles = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    sines = np.sin(0.5 * angles) / np.where(angles > 0.0, angles, 1.0)
+    return np.concatenate([np.cos(0.5 * angles), vectors * sines], axis=-1)
