@@ -96,3 +96,19 @@ def test_guides_without_auto_update_stay(masked, image):
     paint(image, slice(0, SIDE // 2))
     bpy.context.view_layer.update()
     assert np.array_equal(points(masked), before)
+
+
+def test_an_image_painted_black_is_reported_until_it_is_painted_again(masked, image):
+    """Also for hair whose settings are unchanged, which is bound, and loses no strands."""
+    bpy.ops.vellus.interpolate_hair(strand_count=40)
+    hair = next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR")
+    hair.data.vellus.hair.density_image = "Density"
+    bpy.context.view_layer.update()
+    before = points(hair)
+    assert not hair.data.vellus.status
+    for columns, sentence in ((slice(0), "is black"), (slice(None), ""), (slice(0), "is black")):
+        paint(image, columns)
+        bpy.context.view_layer.update()
+        status = hair.data.vellus.status
+        assert sentence in status if sentence else not status
+        assert np.array_equal(points(hair), before)

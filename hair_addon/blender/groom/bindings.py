@@ -52,8 +52,6 @@ class BoundHair:
     is_written: bool = False  # whether the datablock holds these points
     has_moved_only: bool = False  # whether only points, and possibly the guide map, are unwritten
     is_map_written: bool = False  # whether the datablock holds this guide map
-    written_radii: np.ndarray | None = None  # (P,) in the datablock, None if they may have changed
-    is_report_due: bool = False  # whether Blender has yet to report our write, which is ignored
     straight: "BoundHair | None" = None  # the same without styles while viewports show it: only it follows strokes
     is_behind: bool = False  # whether points are older than `guides`, which only the display has followed
 
@@ -217,9 +215,6 @@ kept_cache = Cache()  # session_uid of kept hair Curves → `kept_following.Kept
 
 def keep(datablock: Curves, bound: BoundHair) -> None:
     """Cache the binding of a hair Curves datablock."""
-    before = of(datablock)
-    if before is not None:
-        bound.written_radii = before.written_radii
     binding_cache.keep(datablock.session_uid, bound)
 
 
@@ -230,7 +225,6 @@ def grow_in_place_of(datablock: Curves | None, bound: BoundHair) -> None:
     """
     if datablock is not None and (before := of(datablock)) is not None:
         binding_cache.invalidate(datablock.session_uid)
-        bound.written_radii = before.written_radii
         if before.free is None and before.growing is not None and before.growing.exception() is None:
             # A new array: drawing identifies data by its array.
             bound.growing = Future()
@@ -257,12 +251,6 @@ def invalidate(datablock: Curves) -> None:
     """Drop the bindings of a datablock that was changed by other code."""
     binding_cache.invalidate(datablock.session_uid)
     kept_cache.invalidate(datablock.session_uid)
-
-
-def is_reported() -> None:
-    """Mark all our writes as reported by Blender: the next report is a different change."""
-    for bound in binding_cache.values():
-        bound.is_report_due = False
 
 
 def has_unwritten() -> bool:

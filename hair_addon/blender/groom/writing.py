@@ -105,9 +105,7 @@ def write_hair(target: Curves) -> None:
             binding.identities,
             leaders=binding.leaders,
             normals=normals,
-            written_radii=bound.written_radii,
         )
-        bound.written_radii = radii
         curves.write_clumps(target, bound.styles.clumps)
         if curves.write_wetness(target, bound.styles.wetness):
             looks.evaluate_shading(target)
@@ -117,7 +115,7 @@ def write_hair(target: Curves) -> None:
     curves.write_points(target, bound.growing)
     state.is_stale = False  # choosing other guides has marked it
     state.followed = staleness.guides_digest(state.guide_curves)
-    bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
+    bound.is_written = bound.has_moved_only = bound.is_map_written = True
     _store_roots(state.guide_curves, bound)
 
 

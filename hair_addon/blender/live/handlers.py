@@ -8,7 +8,7 @@ from bpy.app.handlers import persistent
 
 from ..data import surface_space, usable_surfaces
 from ..data.strands import curves_objects
-from ..groom import bindings, frame_faces, hidden_hair, pipeline, staleness
+from ..groom import frame_faces, hidden_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import memory, running, scene_time
 from ..host.notices import name_of
@@ -100,7 +100,6 @@ def after_depsgraph_update(scene, depsgraph):
             events.curves_reported(datablock)
             if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):
                 combed[datablock] = reported.points_of(datablock)
-    bindings.is_reported()
     for hair in _of_kind("HAIR"):
         if hair.vellus.is_stale and hair.vellus.is_live:
             hidden_previews.hair_changed(hair, is_seen)

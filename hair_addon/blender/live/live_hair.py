@@ -124,6 +124,7 @@ def regenerate(hair, depsgraph):
         if _follow_simulated(hair):
             _write(hair)
         events.strands_made(hair)
+        _guides_written(hair)
         return
     try:
         curves.require_not_linked(hair)
@@ -239,6 +240,7 @@ def _write(hair):
     try:
         writing.write_hair(hair)
         modified_hair.invalidate_users(hair)  # the next evaluation has them, which may come without a report
+        _guides_written(hair)
         bound = bindings.of(hair)
         if bound is not None and bound.free is not None:
             events.strands_made(hair)  # some strands were moved out of colliders
@@ -246,6 +248,12 @@ def _write(hair):
         bindings.invalidate(hair)
         hair.vellus.status = str(error)
         print(f"Vellus: {error}", file=sys.stderr)
+
+
+def _guides_written(hair):
+    """Draw guides at the roots that were stored with their hair; Blender reports these only in its next update."""
+    if hair.vellus.guide_curves is not None:
+        events.curves_reported(hair.vellus.guide_curves)
 
 
 def cancel_writing():

@@ -30,6 +30,8 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
             place = reported.place_before(guides)
             followed = edited_surfaces.follow_surface(guides, depsgraph, place, state.is_live)
             was_edited = followed is not Followed.NOTHING
+            if was_edited:
+                _strands_carried(guides)
             if not state.is_live:
                 state.is_stale = state.is_stale or (is_mesh_edited and not was_edited)
                 carried |= {guides} if was_edited else set()
@@ -42,7 +44,6 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
             state.status = str(error)
             continue
         if was_edited:
-            events.strands_made(guides)
             gone_along = set(applied_transforms.followed_by(guides)) if followed is Followed.APPLIED else set()
             mark_followers(guides, gone_along)
             in_place |= gone_along
@@ -56,11 +57,17 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
             continue
         if frame_faces.are_others(hair):
             continue
-        with _refusal_as_status(state):
+        with _refusal_as_status(hair):
             if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):
                 _mark(hair)
             elif has_masks(state) and hair not in in_place:
                 state.is_stale = True
+
+
+def _strands_carried(guides):
+    """Draw guides and the hair between them as an edit has left them; Blender reports them only in its next update."""
+    for datablock in (guides, *curves.followers(guides)):
+        events.strands_made(datablock)
 
 
 def follow_applied():
@@ -72,12 +79,17 @@ def follow_applied():
 
 
 @contextmanager
-def _refusal_as_status(state):
-    """Show a `HairError` as the status of guides or hair."""
+def _refusal_as_status(target):
+    """Show a `HairError` as the status of guides or hair, and mark them as stale.
+
+    Regenerating them raises the error again while the reason lasts, and clears the status afterwards. Bound hair would
+    pass for up to date, as its settings are unchanged.
+    """
     try:
         yield
     except HairError as error:
-        state.status = str(error)
+        target.vellus.status = str(error)
+        _mark(target)
 
 
 def _is_carried(datablock):
@@ -97,7 +109,7 @@ def follow_mask(guides, depsgraph):
         state = hair.vellus
         if not state.is_live or hair.surface is None:
             continue
-        with _refusal_as_status(state):
+        with _refusal_as_status(hair):
             if not masks.own(state.hair) and staleness.has_other_mask(hair, depsgraph):
                 _mark(hair)
 
@@ -111,7 +123,7 @@ def follow_partings(changed, depsgraph):
         if not state.is_live:
             state.is_stale = True
             continue
-        with _refusal_as_status(state):
+        with _refusal_as_status(hair):
             if staleness.has_other_parting(hair, depsgraph):
                 _mark(hair)
 
@@ -126,7 +138,7 @@ def follow_flow(changed, depsgraph):
         if not state.is_live:
             state.is_stale = True
             continue
-        with _refusal_as_status(state):
+        with _refusal_as_status(guides):
             if staleness.has_other_flow(guides, depsgraph):
                 state.is_stale = True
 
@@ -154,7 +166,7 @@ def follow_images(target, depsgraph):
     state.is_stale = True
     if state.kind != "HAIR" or not text_of(state.hair, "density_image") or target.surface.mode == "TEXTURE_PAINT":
         return
-    with _refusal_as_status(state):
+    with _refusal_as_status(target):
         if staleness.has_other_mask(target, depsgraph):
             _mark(target)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import HairError
+from ..data.strands import attributes
 from ..data.strands.posed_strands import Pose
 from ..gpu import shaders, strand_textures
 from ..gpu.strands import device_choice, strand_carrier, strand_maker, style_maker
@@ -114,7 +115,8 @@ class StrandGenerator:
                 self.maker = self.maker.weighed(strand_maker.bound_strands(binding))
             self.maker = self.maker.limited(binding.limits.fading, binding.keep_length)
         self._binding = binding
-        if not np.array_equal(cached.radii[0], bound.radii):
+        # If only points have moved, the radii are those of the datablock, which others may have changed.
+        if not bound.has_moved_only and not attributes.repeats(cached.radii.ravel(), bound.radii):
             cached.radii = np.broadcast_to(bound.radii, cached.radii.shape)
             cached.on_gpu = strand_textures.with_radii(cached.on_gpu, cached.radii)
         wetness = bound.styles.wetness

@@ -17,7 +17,7 @@ from ...core.files import table_cache, table_exr
 from ...core.kernels.checks import require_count, require_indices
 from ...core.shading import appearance
 from ...core.shading.tables import lookup_tables, strand_tables
-from ..data.strands import curves, posed_strands, simulated_guides, stored_roots
+from ..data.strands import attributes, curves, posed_strands, simulated_guides, stored_roots
 from ..gpu import hair_shading, strand_textures
 from ..groom import bindings
 from ..host import notices, paths
@@ -233,19 +233,12 @@ def invalidate_pose(surface_object):
 def invalidate_unless_same(datablock):
     """Drop the cache of a datablock that Blender reports as changed, if it did change.
 
-    Blender also reports Curves if their surface moved or a property changed. Strands that are waiting to be written, or
-    were just written, are no change.
+    Blender also reports Curves if their surface moved or a property changed, and our own writes. Points are compared
+    with those that were written: others may have changed them since, before Blender reports either.
     """
     uid, bound = datablock.session_uid, bindings.of(datablock)
     if bound is not None:
-        if not bound.is_report_due:
-            bound.written_radii = None
         if not bound.is_written:
-            return
-        if bound.is_report_due:
-            cached = _strands_of(uid)
-            if cached is None or cached.points is not bound.shown.points:
-                strand_cache.invalidate(uid)
             return
         if not _are_points(datablock, bound.points):
             bindings.invalidate(datablock)
@@ -308,8 +301,18 @@ def _read(datablock, bound, shown):
         (_identities, randoms), wetness = bound.binding.identities, bound.styles.wetness
     # Roots are taken from the binding too: the datablock may store the roots of earlier strands.
     places, rooted_on = bound.surface.places(bound.binding.roots), _rooted_on(datablock, bound.surface.topology)
-    radii = np.tile(bound.radii, (len(shown.points), 1))
+    radii = _radii_of(datablock, bound, len(shown.points))
     return _CachedStrands(shown.points, radii, randoms, wetness, places, rooted_on, False, growing=shown.growing)
+
+
+def _radii_of(datablock, bound, count):
+    """(S, P) radii of bound hair; those of its datablock, which others may have changed, unless it has newer ones."""
+    shape = count, len(bound.radii)
+    if bound.is_written or bound.has_moved_only:
+        stored = curves.read_radii(datablock)
+        if not attributes.repeats(stored, bound.radii):
+            return stored.reshape(shape)
+    return np.broadcast_to(bound.radii, shape)
 
 
 def _shown_strands(datablock):

@@ -30,8 +30,8 @@ def path_count(blender_scene, size):
 def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_progress):
     """A `DrawnScene` whose hair is lit by `count` paths through a grid, for a view with these (4, 4) matrices.
 
-    Returns the scene unchanged, for dual scattering of all hair, if `count` is 0, no hair with an area is in view, any
-    light is linked, or any hair is not shaded by the energy-conserving model.
+    Returns the scene unchanged, for dual scattering of all hair, if `count` is 0, no hair with an area is in view, no
+    path starts in sight, any light is linked, or any hair is not shaded by the energy-conserving model.
     """
     if not count or not drawn.hair:
         return drawn
@@ -57,6 +57,8 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     starting = -(-len(seen.segments) // _SAMPLES_A_PATH)
     tracing = part_of(progress, 0.3, 1.0)
     sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, starting, seed, most, tracing)
+    if not taken:
+        return drawn
     means = [light_paths.voxel_means.shares(of_hair, taken, grid.origin) for of_hair in sums]
     visibility = [
         {**textures, "light_grid": light_grid.upload(of_hair)}

@@ -10,8 +10,8 @@ from hair_addon.blender.data.strands import posed_strands, stored_roots
 from hair_addon.blender.gpu import ambient_visibility, strand_textures
 from hair_addon.blender.gpu.strands import device_choice, vertex_turner
 from hair_addon.blender.groom import bindings, pipeline
-from hair_addon.blender.live import live_hair
-from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.live import events, live_hair
+from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.blender.settings import style_items
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import vertex_turns
@@ -19,7 +19,7 @@ from hair_addon.core.imaging import ambient_cube
 from hair_addon.core.styling import curl, lean
 from tests.support.counting import counts_of
 from tests.support.gpu_strands import CLOSE, comb, drawn, grown
-from tests.support.reading import points
+from tests.support.reading import points, write_points
 
 
 def bend(surface_object, amount):
@@ -234,3 +234,19 @@ def test_hair_that_warp_computes_is_lit_as_at_rest_while_it_plays(hair, coarse_s
     monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
     read(former=read())
     assert len(measured) == 2
+
+
+def test_guides_are_drawn_at_the_roots_that_are_stored_with_their_hair(hair):
+    """In the update that stores them, before Blender reports the guides."""
+    guides = bpy.data.objects["Guides"]
+    bend(hair.data.surface, 0.5)
+    hair.data.vellus.is_live = False
+    slid = points(guides)
+    slid[:10] = slid[10:20]
+    write_points(guides, slid)
+    hair_cache.strands_on_gpu(guides.data)
+    hair.data.vellus.is_live, hair.data.vellus.hair.seed = True, 9
+    bpy.context.view_layer.update()
+    drawn_at_once = hair_cache.strands_on_gpu(guides.data).points
+    events.strands_made(guides.data)
+    assert np.array_equal(drawn_at_once, hair_cache.strands_on_gpu(guides.data).points)

@@ -8,8 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data.strands import curves
-from hair_addon.blender.groom import pipeline
+from hair_addon.blender.data.strands import attributes
+from hair_addon.blender.groom import bindings, pipeline
+from hair_addon.blender.render import hair_cache
 from hair_addon.blender.settings import properties, setting_properties
 from hair_addon.core.grooming import groom
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
@@ -48,8 +49,8 @@ def test_a_changed_guide_setting_makes_guides_and_their_hair_again(hair):
 def test_radii_are_written_where_they_are_others(hair, monkeypatch):
     """Again where somebody has changed them, and not while they are what was written."""
     written = []
-    write = curves._write_radii
-    monkeypatch.setattr(curves, "_write_radii", lambda *args: (written.append(1), write(*args)))
+    write = attributes.write
+    monkeypatch.setattr(attributes, "write", lambda *args: (written.append(args[1]), write(*args)))
     before = attribute(hair, "radius")
     settings = setting_properties.to_settings(hair.data.vellus.hair, HairSettings)
 
@@ -60,13 +61,44 @@ def test_radii_are_written_where_they_are_others(hair, monkeypatch):
 
     make(2)
     make(3)
-    assert written == []
+    assert "id" in written and "radius" not in written
     hair.data.attributes["radius"].data.foreach_set("value", 3.0 * before)
     hair.data.update_tag()
     update()
     make(4)
-    assert len(written) == 1
+    assert written.count("radius") == 1
     np.testing.assert_array_equal(attribute(hair, "radius"), before)
+
+
+def test_strands_edited_before_blender_reports_our_write_are_drawn(hair):
+    """The handler's own write and the edit after it come as one report."""
+    hair_cache.strands_on_gpu(hair.data)
+    hair.data.vellus.hair.seed = 9
+    update()  # its handler writes the strands
+    edited = points(hair)
+    edited[:, -1] += np.float32(0.1)
+    write_points(hair, edited)
+    assert np.array_equal(hair_cache.strands_on_gpu(hair.data).points, edited)
+
+
+@pytest.mark.usefixtures("made_anew")
+def test_radii_edited_by_hand_are_drawn(hair):
+    """Also those of bound hair, and while its guides are combed."""
+    guides = bpy.data.objects["Guides"]
+    hair.data.vellus.hair.seed = 9
+    update()
+    hair_cache.strands_on_gpu(hair.data)
+    assert bindings.of(hair.data) is not None
+    edited = 3.0 * attribute(hair, "radius")
+    edited[41:82] *= 2.0
+    hair.data.attributes["radius"].data.foreach_set("value", edited)
+    hair.data.update_tag()
+    update()
+    assert np.array_equal(hair_cache.strands_on_gpu(hair.data).radii.ravel(), edited)
+    combed = points(guides)
+    combed[:, -1] += 0.1
+    write_points(guides, combed)
+    assert np.array_equal(hair_cache.strands_on_gpu(hair.data).radii.ravel(), edited)
 
 
 def test_hair_follows_a_combed_guide(hair):

@@ -9,10 +9,11 @@ from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves, follow_nodes
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import handlers, live_hair, moving_surfaces
+from hair_addon.blender.render import hair_cache
 from tests.blender.live.test_carried_strands import bend
 from tests.support.counting import Traffic, counts_of
 from tests.support.gpu_strands import CLOSE, drawn
-from tests.support.reading import evaluated_points, points
+from tests.support.reading import evaluated_points, points, write_points
 
 
 def objects():
@@ -235,6 +236,23 @@ def test_strands_that_change_while_the_surface_is_dragged_are_drawn(bent):
     moving_surfaces.resume()
     bpy.context.view_layer.update()
     np.testing.assert_allclose(drawn(bent), evaluated_points(bent), atol=CLOSE)
+
+
+def test_hand_edited_strands_are_drawn_on_an_edited_mesh_that_is_dragged(watched):
+    """They follow with the same update, although they are hidden from Blender, which reports them with the next."""
+    edited = points(watched)
+    edited[:, -1] += np.float32(0.1)
+    write_points(watched, edited)
+    mesh = watched.data.surface.data
+    for _step in range(4):
+        drawn(watched)
+        mesh.vertices[0].co *= 1.1
+        mesh.update()
+        bpy.context.view_layer.update()
+        at_once = hair_cache.strands_on_gpu(watched.data).points
+        assert np.array_equal(at_once, points(watched))
+    assert are_hidden() and not np.array_equal(at_once, edited)
+    moving_surfaces.resume()
 
 
 def test_scripts_read_carried_hair(bent):

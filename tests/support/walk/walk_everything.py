@@ -209,7 +209,7 @@ def _state_of(datablock):
     counts = np.diff(curve_data.curve_offsets(datablock))
     # If a script removes the guides of hair, its status reports this after loading or undo.
     is_said = not keyed and (datablock.vellus.kind != "HAIR" or datablock.vellus.guide_curves is not None)
-    return points, counts, roots, values, is_said and bool(datablock.vellus.status)
+    return points, counts, roots, values, datablock.vellus.status if is_said else ""
 
 
 def _values(attribute):
@@ -227,7 +227,7 @@ def is_as(before):
         now = after[name]
         changed_values = {k: (v, now[3].get(k)) for k, v in values.items() if now[3].get(k) != v}
         assert changed_values == {}, (name, changed_values)
-        assert now[4] == status, (name, status, now[4])
+        assert bool(now[4]) == bool(status), (name, status, now[4])
         assert np.array_equal(now[1], counts), (name, len(counts), len(now[1]))
         assert np.array_equal(now[0], points), (name, float(abs(now[0] - points).max()))
         assert now[2].keys() == roots.keys(), (name, [*roots], [*now[2]])

@@ -39,19 +39,18 @@ def _write_radii(curves, radii):
     attributes.write(curves, "radius", "FLOAT", "POINT", np.tile(radii, len(curves.curves)))
 
 
-def make_strands(curves, surface, roots, radii, identities, *, leaders=None, normals=None, written_radii=None):
+def make_strands(curves, surface, roots, radii, identities, *, leaders=None, normals=None):
     """Resize the curves for strands, and write everything except their points.
 
     roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; identities: from `Surface.identities`;
     leaders: (S,) int32, the strand that represents the guide of each strand; None for guides;
-    normals: (S, 3) float32 of the surface at the roots, if known; written_radii: (P,) radii of the curves, if known.
+    normals: (S, 3) float32 of the surface at the roots, if known.
     Returns the `Surface` that the roots are stored on, like `write_roots`.
     """
     if len(roots) == 0:
         raise ValueError("no strands: an empty list of curves would crash Blender")
-    is_new = _resize(curves, len(roots), len(radii))
-    if is_new or "radius" not in curves.attributes or not np.array_equal(radii, written_radii):
-        _write_radii(curves, radii)
+    _resize(curves, len(roots), len(radii))
+    _write_radii(curves, radii)
     if leaders is not None:
         # Blender's hair nodes clump, curl and braid strands around this curve.
         attributes.write(curves, "guide_curve_index", "INT", "CURVE", leaders)
@@ -171,17 +170,16 @@ def write_moved(curves, points):
 
 
 def _resize(curves, strand_count, point_count):
-    """Resize curves; returns whether all strands are new."""
+    """Resize curves, unless they have these sizes."""
     if len(curves.curves) == strand_count and len(curves.points) == strand_count * point_count:
         sizes = point_counts(curves)
         if (sizes == point_count).all():
-            return False
+            return
     if len(curves.curves):
         curves.remove_curves()
     # `add_curves` accepts plain integers only.
     curves.add_curves([int(point_count)] * int(strand_count))
     curves.set_types(type="POLY")
-    return True
 
 
 def curve_offsets(curves):

@@ -184,11 +184,11 @@ def _traced(medium, sources, seen_in, starts, progress):
     found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
     # A GPU takes about as long for a share as for all.
     share = max(count // _SHARES, _LEAST_SHARE) if device.is_cpu else max(count, 1)
-    for first in range(0, max(count, 1), share):
+    for first in range(0, count, share):  # none if no place is in sight: Warp has no empty slices
         some = slice(first, min(first + share, count))
         rows = [array[some] for array in (starts.segments, starts.keys, *found)]
         launch(_gather, len(rows[0]), [medium, sources, seen_here, *rows], device)
-        progress(FOLLOWING, min(some.stop / max(count, 1), 1.0))
+        progress(FOLLOWING, some.stop / count)
     return found
 
 

@@ -314,6 +314,15 @@ def test_more_paths_are_taken_where_few_find_light(rng):
     assert spread[1] < 0.3 * spread[0]
 
 
+def test_no_path_starts_on_hidden_hair(rng):
+    """Samples of hair that a wall hides start no path, and raise nothing."""
+    grid = grid_of(strands_in_a_box(rng, 200), WHITE, voxel_count=500)
+    seen = seen_rays.seen_by(grid, surroundings().corners, ALONG_Y, 400)
+    wall = surroundings([(-9, -2, -9), (9, -2, -9), (0, -2, 19)], [(0.5, 0.5, 0.5)], world=1.0)
+    sums, taken = gathered(grid, wall, seen, len(seen.segments), most_paths=8 * len(seen.segments))
+    assert taken == 0 and not sums[..., :6].any() and sums[..., 9:].any()
+
+
 def test_as_many_more_paths_are_taken_as_are_wanted(rng, monkeypatch):
     """For an error a tenth above the target, a fifth more paths reach it: their number is not doubled."""
     grid = grid_of(strands_in_a_box(rng, 1500), (0.1, 0.3, 1.0), voxel_count=2_500)
