@@ -114,7 +114,12 @@ def test_hair_is_where_it_should_be_and_nowhere_else(walk, step):
     places = np.stack([columns + left, rows + bottom], axis=-1)
     assert len(places) > 5000
     least, most = np.array(facts["least"]), np.array(facts["most"])
-    assert (places >= least - 3.0).all() and (places <= most + 3.0).all()
+    # Around the strands their shadow darkens the head.
+    is_inside = ((places >= least - 3.0) & (places <= most + 3.0)).all(axis=1)
+    outside = tuple(places[~is_inside].T[::-1])
+    assert (shown[outside] <= bare[outside] + 1.0 / 255.0).all()
+    assert (~is_inside).mean() < 0.3
+    places = places[is_inside]
     # And it fills what its strands span: they hang down all around.
     np.testing.assert_allclose(np.ptp(places, axis=0), most - least, rtol=0.1)
 
@@ -186,7 +191,7 @@ def test_selected_hair_is_outlined_by_its_silhouette(walk):
     red, green, blue = outlined[is_line].T
     assert ((red > green) & (green > blue)).mean() > 0.9
     assert np.count_nonzero(is_line) > 500
-    distance = distance_transform_edt(np.abs(plain - bare).max(axis=-1) <= 2.0 / 255.0)
+    distance = distance_transform_edt(np.load(walk.folder / "not_outlined_hair.npy") < 0.01)
     # Before the head hair that it hides is outlined too, and hair that is seen there has gaps.
     is_background = np.abs(bare - np.median(bare, axis=(0, 1))).max(axis=-1) <= 2.0 / 255.0
     assert distance[is_line & is_background].max() < 8.0

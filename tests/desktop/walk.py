@@ -234,6 +234,7 @@ def click():
     screen("selected")
     area.spaces.active.overlay.show_outline_selected = False
     show("not_outlined")
+    np.save(OUT / "not_outlined_hair.npy", offscreen_light(addon(), has_shadow=False)[..., 3])
 
 
 def write_files():

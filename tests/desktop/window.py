@@ -192,10 +192,10 @@ def press(key, in_window, area):
     yield
 
 
-def offscreen_light(blender):
+def offscreen_light(blender, has_shadow=True):
     """(height, width, 4) linear premultiplied light of what the 3-D view shows of hair, 16 samples a pixel.
 
-    blender: the add-on's package of this name.
+    blender: the add-on's package of this name; has_shadow: with the shadow of hair on its surface.
     """
     import gpu
 
@@ -211,7 +211,10 @@ def offscreen_light(blender):
     record = drawing.pass_record(*matrices, size)
     buffer = blender.gpu.visibility_buffer.VisibilityBuffer(*size)
     with buffer.surfaces():
-        blender.render.scene_drawing.draw_hiding(drawn, record)
+        draw_surfaces = blender.render.scene_drawing.draw_viewport_shadow
+        if not has_shadow or space.shading.type != "SOLID":
+            draw_surfaces = blender.render.scene_drawing.draw_hiding
+        draw_surfaces(drawn, record)
     blender.render.scene_drawing.draw_hair(drawn, record, buffer)
     resolved = gpu.types.GPUTexture((region.width, region.height), format="RGBA32F")
     target = gpu.types.GPUFrameBuffer(color_slots=resolved)

@@ -133,7 +133,8 @@ class World:
 
 def world_of_hdri(hdri):
     """The `World` of a `viewport_shading.Hdri`. Raises `HairError`."""
-    to_image = np.array(Matrix.Rotation(hdri.rotation, 4, "Z"), np.float64)
+    to_image = np.eye(4)
+    to_image[:3, :3] = hdri.to_image
     return World(np.full(3, hdri.strength), image_of(hdri.path), to_image)
 
 

@@ -4,6 +4,7 @@
 After an event nothing is drawn or computed from values that were cached before it.
 """
 
+from ..data.pictures import root_colors
 from ..gpu import world_texture
 from ..groom.guides import guide_states
 from ..render import hair_cache, modified_hair
@@ -41,3 +42,4 @@ def surface_moved(surface_object):
 def image_changed():
     """Pixels of images or a world may have changed: check the world's light. Each render checks by itself."""
     world_texture.check_image()
+    root_colors.sample_cache.clear()

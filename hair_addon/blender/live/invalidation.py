@@ -5,7 +5,7 @@
 """
 
 from ..data import guide_map_readers, scene, subdivided_surfaces, usable_surfaces
-from ..data.pictures import drawn_meshes
+from ..data.pictures import drawn_meshes, root_colors
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
 from ..gpu import (
@@ -22,7 +22,7 @@ from ..groom import bindings, copied_hair, edited_faces, followed_names, frame_f
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..groom.guides import guide_states
 from ..host import notices
-from ..render import hair_cache, modified_hair
+from ..render import hair_cache, modified_hair, solid_hair
 from ..render.frames import composite
 from ..render.viewport import region_pictures, viewport
 from ..settings import animated
@@ -37,6 +37,7 @@ COPIES = (
     bindings.binding_cache,
     bindings.kept_cache,
     guide_states.state_cache,
+    root_colors.sample_cache,
     world_texture.light_cache,
     lights.frame_cache,
     animated.value_cache,
@@ -65,6 +66,8 @@ OTHERS = (
     subdivided_surfaces.smooth_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,
+    solid_hair.tint_cache,
+    root_colors.corner_cache,
     solid_shading.shading_cache,
     studio_lights.image_cache,
     studio_lights.texture_cache,

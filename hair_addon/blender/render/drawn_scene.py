@@ -53,6 +53,7 @@ class DrawnScene:
     renewal: ambient_visibility.Renewal | None = None  # of the visibility textures, while hair moves
     light: viewport_shading.ViewportLight = viewport_shading.SCENE_LIGHT
     is_wire: bool = False  # whether strands are thin lines
+    is_shadowed: tuple = ()  # whether hair darkens each of `surfaces` in viewports; (): all of them
     hair_lights: np.ndarray | None = None  # uniforms.LIGHTS of each hair; None: `lights` for all
     surface_lights: np.ndarray | None = None  # the same for `surfaces`, then for `clear`
 
@@ -99,15 +100,18 @@ def read(
     if viewport is not None and is_hair_only and not hair:
         # Scenes without hair cost nothing.
         return _EMPTY
-    is_shaded = viewport is None or not is_hair_only
+    is_shaded, grown_on = viewport is None or not is_hair_only, _surface_uids(places)
     if before is None or before.shadow_maps is None:
         has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # for the shadow of hair on surfaces
+        if not has_normals and not shown.is_wire:
+            has_normals = grown_on
         meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
         if is_shaded:
             meshes = drawn_meshes.split_clear(meshes)
         surroundings = _upload(meshes, is_shaded, has_paths=viewport is None)
         if shown.light.kind != viewport_shading.SCENE:
-            surroundings["blockers"] = _below_hair(surroundings["blockers"], places)
+            below = tuple(blocker for blocker in surroundings["blockers"] if blocker.owner[1] in grown_on)
+            surroundings["blockers"] = below  # in Solid shading other surfaces cast no shadows
         world, lamps, maps = _world_of(shown.light, blender_scene, view_layer), None, None
     else:
         surroundings = {name: getattr(before, name) for name in _SURROUNDINGS}
@@ -129,6 +133,8 @@ def read(
         maps = last.shadow_maps
     renewal = None
     drawn = replace(_EMPTY, hair=hair, world=world, light=shown.light, is_wire=shown.is_wire, **surroundings)
+    if shown.light.kind != viewport_shading.SCENE:
+        drawn = replace(drawn, is_shadowed=tuple(owner[0] in grown_on for owner in drawn.surface_owners))
     if is_draft and last is not None and _have_same_places(last, drawn):
         seen = last.hair_visibility, last.surface_visibility
         if are_made:
@@ -151,11 +157,10 @@ def read(
     return _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
 
 
-def _below_hair(blockers, places):
-    """The `Blocker`s that hair grows on: in Solid shading other surfaces cast no shadows."""
+def _surface_uids(places):
+    """{session_uid} of the objects that hair grows on."""
     surfaces = {place.hair_object.data.surface for place in places} - {None}
-    uids = {surface.session_uid for surface in surfaces}
-    return tuple(blocker for blocker in blockers if blocker.owner[1] in uids)
+    return {surface.session_uid for surface in surfaces}
 
 
 def relit(drawn, blender_scene, view_layer, depsgraph, light, maps=None, is_wide=False):
@@ -405,14 +410,21 @@ def _read_hair(places, viewport, refused, shown, depsgraph):
 
 def _drawn_hair(hair_object, depsgraph, is_viewport, shown):
     """(`StrandsOnGPU`, shading) of an object, as Blender evaluates it if an artist has added modifiers."""
-    is_neutral = solid_hair.is_tinted(shown)
-    if modified_hair.is_modified(hair_object):
+    is_modified, datablock = modified_hair.is_modified(hair_object), hair_object.data
+    if is_modified:
         strands = modified_hair.strands_on_gpu(hair_object, depsgraph)
-        shading = hair_cache.shading_of(hair_object.data, strands, is_neutral)
     else:
         modified_hair.forget(hair_object)
-        strands, shading = hair_cache.hair_on_gpu(hair_object.data, is_viewport, is_neutral)
-    return strands, strands and solid_hair.shown_as(shading, shown, hair_object)
+        strands = hair_cache.drawn_strands(datablock, is_viewport)
+    if strands is None:
+        return None, None
+    tints = None
+    if solid_hair.has_root_colors(shown):
+        places = modified_hair.places(hair_object, depsgraph) if is_modified else hair_cache.places_of(datablock)
+        tints = solid_hair.strand_tints(shown, hair_object, depsgraph, strands, places)
+    is_neutral = tints is not None or solid_hair.is_tinted(shown)
+    shading = hair_cache.shading_of(datablock, strands, is_neutral)
+    return strands, solid_hair.shown_as(shading, shown, hair_object, tints)
 
 
 def _have_same_places(drawn, other):

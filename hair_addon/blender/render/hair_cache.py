@@ -61,17 +61,21 @@ shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
 
 
 @memory_as_sentence()
-def hair_on_gpu(datablock, is_viewport=True, is_neutral=False):
-    """(`StrandsOnGPU`, `Shading`) of a hair Curves datablock. Raises `HairError`.
+def drawn_strands(datablock, is_viewport=True):
+    """`StrandsOnGPU` of a hair Curves datablock; None if it was refused. Raises `HairError`.
 
-    is_viewport: whether hair may be drawn without its styles while it is combed; is_neutral: as for `shading_of`.
+    is_viewport: whether hair may be drawn without its styles while it is combed.
     """
     bound = bindings.of(datablock)
     if is_viewport or bound is None or bound.straight is None:
-        strands_there = strands_on_gpu(datablock)
-    else:
-        strands_there = _upload_styled(datablock, bound)
-    return strands_there, strands_there and shading_of(datablock, strands_there, is_neutral)
+        return strands_on_gpu(datablock)
+    return _upload_styled(datablock, bound)
+
+
+def places_of(datablock):
+    """(root vertices, barycentric coordinates), each (S, 3), of the strands of `strands_on_gpu`; None without roots."""
+    cached = _strands_of(datablock.session_uid)
+    return cached and cached.places
 
 
 def _upload_styled(datablock, bound):
@@ -325,6 +329,7 @@ def _shown_strands(datablock):
     return replace(read, points=simulated, radii=even)
 
 
+@memory_as_sentence()
 def shading_of(datablock, strands=None, is_neutral=False):
     """The `Shading` of a hair Curves datablock, or a `MixedShading` if strands differ in wetness. Raises `HairError`.
 

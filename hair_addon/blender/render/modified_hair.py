@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..data.strands import delivered_hair
+from ..data.strands import delivered_hair, stored_roots
 from ..gpu import strand_textures
 from ..gpu.strand_textures import StrandsOnGPU
 from ..host.caches import Cache
@@ -48,6 +48,11 @@ def strands_on_gpu(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph
         hair_object.session_uid, hair_object.data.session_uid, read.arrays, strand_textures.upload_strands(*read.arrays)
     )
     return modified_cache.keep(hair_object.session_uid, made).on_gpu
+
+
+def places(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple | None:
+    """(root vertices, barycentric coordinates), each (S, 3), of evaluated strands; None if modifiers drop them."""
+    return stored_roots.places(hair_object.evaluated_get(depsgraph).data, np.inf)
 
 
 def forget(hair_object: bpy.types.Object) -> None:

@@ -128,7 +128,8 @@ def _shade_behind_hair(drawn, view, buffer, picture, is_transparent):
 def draw_arrival(drawn, view, buffer):
     """Return a texture of light visibility for the content of a `VisibilityBuffer`, after its hair was added."""
     with buffer.surfaces_of_part(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_by_lights(drawn, view, "light/surface_irradiance.frag", are_holdouts_left_out=True)
+        is_holdout = [parts is None for _surface, parts in drawn.surfaces]
+        _draw_by_lights(drawn, view, "light/surface_irradiance.frag", is_holdout)
     return buffer.part_by(picture_programs.strand_arrival_program())
 
 
@@ -142,16 +143,22 @@ def draw_hair_shadow(drawn, view, buffer):
 
 def draw_viewport_shadow(drawn, view):
     """Like `draw_hiding`, with black over Blender's drawing, whose alpha is the fraction of light that hair blocks."""
+    is_left_out = [not is_shadowed for is_shadowed in drawn.is_shadowed] or None
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_by_lights(drawn, view, "shadows/hair_shadow_view.frag")
+        _draw_by_lights(drawn, view, "shadows/hair_shadow_view.frag", is_left_out)
 
 
-def _draw_by_lights(drawn, view, fragment, are_holdouts_left_out=False):
-    """Draw the fraction of light that reaches surfaces; are_holdouts_left_out: leave the picture empty at holdouts."""
+def _draw_by_lights(drawn, view, fragment, is_left_out=None):
+    """Draw the fraction of light that reaches surfaces.
+
+    is_left_out: whether the picture is left empty at each surface; None: at no surface.
+    """
     _see_through_hair(drawn, view)
     program = surface_programs.arrival_program(fragment)
-    for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
-        if parts is None and are_holdouts_left_out:
+    is_left_out = is_left_out or [False] * len(drawn.surfaces)
+    lit = zip(drawn.surfaces, *_light_of(drawn, solid=True), is_left_out, strict=True)
+    for (surface, _parts), lights, samplers, is_empty in lit:
+        if is_empty:
             surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag")
             continue
         surface_textures.draw_lit(surface, program, view, lights, samplers)

@@ -100,7 +100,7 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
     """A `DrawnMesh` for every mesh, including instances, that a 3D viewport shows as a surface; None: a render.
 
     is_moving: reuse the last triangulation of polygons if their corners are the same; has_normals: whether normals are
-    needed, which Blender computes for each pose.
+    needed, which Blender computes for each pose, or the session_uids of objects whose normals are.
     """
     meshes, override = [], depsgraph.view_layer_eval.material_override
     for instance in depsgraph.object_instances:
@@ -109,7 +109,10 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
             matrix = np.array(instance.matrix_world, np.float64)
             if not can_be_drawn(instance.object, matrix):
                 continue
-            mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, has_normals, override)
+            needs_normals = has_normals
+            if not isinstance(has_normals, bool):
+                needs_normals = instance.object.original.session_uid in has_normals
+            mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, needs_normals, override)
             rays = {} if viewport is not None else _rays_of(instance, depsgraph.view_layer)
             meshes.append(replace(mesh, owner=owner_of(instance), **rays))
     return [mesh for mesh in meshes if len(mesh.triangles)]

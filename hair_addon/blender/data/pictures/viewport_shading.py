@@ -9,6 +9,9 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+# From directions of an image that follows the view to those of the view.
+_AHEAD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+
 SCENE, STUDIO, MATCAP, FLAT = "SCENE", "STUDIO", "MATCAP", "FLAT"  # kinds of light
 _EVEN = (1.0, 1.0, 1.0)  # ambient radiance without lights: surfaces have the radiance of their color
 
@@ -32,11 +35,25 @@ class StudioLight:
 
 @dataclass(frozen=True)
 class Hdri:
-    """A studio light that surrounds the scene. path: of its image; rotation: about Z [radians]."""
+    """A studio light that surrounds the scene. path: of its image; rotation: about Z [radians].
+
+    axes: of the view, from its directions to world space, row by row, for a light that follows the view; else ().
+    """
 
     path: str
     strength: float = 1.0
     rotation: float = 0.0
+    axes: tuple = ()
+
+    @property
+    def to_image(self):
+        """(3, 3) from directions in world space to those of the image."""
+        cosine, sine = np.cos(self.rotation), np.sin(self.rotation)
+        turned = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        if not self.axes:
+            return turned
+        # The image's +Y is ahead, and its +Z is up on the screen.
+        return turned @ (np.reshape(self.axes, (3, 3)) @ _AHEAD).T
 
 
 @dataclass(frozen=True)
@@ -106,7 +123,7 @@ def read(viewport, scene, world_to_view):
     if shading.type == "WIREFRAME":
         color = _WIRE_COLORS.get(shading.wireframe_color_type) or _theme_color()
         return ViewportShading(ViewportLight(FLAT, ambient=_EVEN), color, True, NO_SETTINGS)
-    light = _scene_light(shading)
+    light = _scene_light(shading, world_to_view)
     return ViewportShading(light, management=ALL if light.has_lights or light.has_world else VIEW_TRANSFORM)
 
 
@@ -118,7 +135,7 @@ def _theme_color():
     return HairColor("SINGLE", tuple(map(float, wire)))
 
 
-def _scene_light(shading):
+def _scene_light(shading, world_to_view):
     """The `ViewportLight` of Material Preview or Rendered shading."""
     is_rendered = shading.type == "RENDERED"
     has_lights = shading.use_scene_lights_render if is_rendered else shading.use_scene_lights
@@ -126,8 +143,15 @@ def _scene_light(shading):
     hdri = None
     studio = None if has_world else shading.selected_studio_light
     if studio is not None and studio.type == "WORLD":
-        hdri = Hdri(studio.path, shading.studiolight_intensity, shading.studiolight_rotate_z)
+        is_fixed = shading.use_studiolight_view_rotation
+        axes = () if is_fixed else tuple(_view_axes(world_to_view).ravel())
+        hdri = Hdri(studio.path, shading.studiolight_intensity, shading.studiolight_rotate_z, axes)
     return ViewportLight(has_lights=has_lights, has_world=has_world, hdri=hdri)
+
+
+def _view_axes(world_to_view):
+    """(3, 3) from directions of a view to world space."""
+    return np.linalg.inv(world_to_view[:3, :3])
 
 
 def _solid(shading, world_to_view, management):
@@ -157,13 +181,24 @@ _NEAR = np.cos(np.radians(5.0))  # a turn of lights that is hardly visible while
 
 
 def is_near(light, other):
-    """Whether two `ViewportLight`s differ in a small turn of studio lights only."""
-    if replace(light, lights=()) != replace(other, lights=()) or len(light.lights) != len(other.lights):
+    """Whether two `ViewportLight`s differ in a small turn of lights that follow the view only."""
+    if _turnless(light) != _turnless(other) or len(light.lights) != len(other.lights):
         return False
+    if light.hdri is not None and light.hdri != other.hdri:
+        turn = np.reshape(light.hdri.axes, (3, 3)) @ np.reshape(other.hdri.axes, (3, 3)).T
+        if 0.5 * (np.trace(turn) - 1.0) < _NEAR:
+            return False
     return all(
         replace(one, direction=two.direction) == two and float(np.dot(one.direction, two.direction)) >= _NEAR
         for one, two in zip(light.lights, other.lights, strict=True)
     )
+
+
+def _turnless(light):
+    """A `ViewportLight` without directions, and whether its HDRI follows the view."""
+    hdri = light.hdri
+    follows = hdri is not None and bool(hdri.axes)
+    return replace(light, lights=(), hdri=hdri and replace(hdri, axes=())), follows
 
 
 def _studio_light(light, to_world):
@@ -179,6 +214,6 @@ _FROM_FRONT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 def _to_world(shading, world_to_view):
     """(3, 3) from the directions of studio lights to world space."""
     if not shading.use_world_space_lighting:
-        return np.linalg.inv(world_to_view[:3, :3])
+        return _view_axes(world_to_view)
     cosine, sine = np.cos(shading.studiolight_rotate_z), np.sin(shading.studiolight_rotate_z)
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]) @ _FROM_FRONT

@@ -79,7 +79,7 @@ class HairPicture:
             view, is_lit = self._view, is_shadowed and not is_see_through
             relight = functools.partial(scene_drawing.relight_viewport, drawn, view, self._pass, is_lit)
             self._history.follow_light(drawn, camera, self._pass, relight)
-            self._choose_detail(drawn, camera, is_shadowed)
+            self._choose_detail(drawn, camera, is_lit)
         self._view = view = self._detail.pass_record(camera, self.size, turn)
         is_outlined = outline is not None and not outline.is_fine
         if is_outlined:
@@ -104,10 +104,10 @@ class HairPicture:
         self._history.add(drawn, camera, view, samples, light, self.pass_count, part_left, is_shadowed)
 
     def _choose_detail(self, drawn, camera, is_shadowed):
-        """Sample small hair finely, unless the picture includes shadows on surfaces, which may be anywhere."""
+        """Sample small hair finely, unless the picture includes shadows on all surfaces, which may be anywhere."""
         detail = picture_detail.whole(self.size, self.per_side)
-        if not is_shadowed:
-            detail = picture_detail.of_hair(drawn, camera, self.size, self.per_side)
+        if not is_shadowed or drawn.is_shadowed:
+            detail = picture_detail.of_hair(drawn, camera, self.size, self.per_side, is_shadowed)
         self._detail = detail
         if self._pass.size != detail.buffer_size:
             self._pass = VisibilityBuffer(*detail.buffer_size)

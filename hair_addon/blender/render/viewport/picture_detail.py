@@ -56,24 +56,32 @@ def whole(size, per_side):
     return Detail(per_side, (0, 0, *size))
 
 
-def of_hair(drawn, camera, size, per_side):
+def of_hair(drawn, camera, size, per_side, is_shadowed=False):
     """`Detail` for the hair of a `DrawnScene`; of the whole picture if hair is large.
 
-    camera: (world to view, view to clip), each (4, 4); per_side: minimum samples along each side of a pixel.
+    camera: (world to view, view to clip), each (4, 4); per_side: minimum samples along each side of a pixel;
+    is_shadowed: contain the surfaces that hair darkens too.
     """
-    window = _window(drawn, camera, size)
+    window = _window(drawn, camera, size, is_shadowed)
     area = window[2] * window[3]
     samples = min(_WANTED_SAMPLES, _LARGEST_PART * size[0] * size[1] * per_side**2)
     finer = min(round(np.sqrt(samples / area)), _MOST_PER_SIDE) if area else 0
     return Detail(finer, _tile_around(window, size)) if finer > per_side else whole(size, per_side)
 
 
-def _window(drawn, camera, size):
-    """(left, bottom, width, height) [pixels] of the part of a picture that contains all hair."""
+def _window(drawn, camera, size, is_shadowed):
+    """(left, bottom, width, height) [pixels] of the part of a picture that contains all hair, and its surfaces."""
     view = drawing.pass_record(*camera, size)
+    found = [
+        windows.of_strands(strands, drawing.strand_record(strands, view, to_world), size)
+        for strands, _shading, to_world, *_ in drawn.hair
+    ]
+    if is_shadowed:
+        for (surface, _parts), is_darkened in zip(drawn.surfaces, drawn.is_shadowed, strict=True):
+            if is_darkened:
+                found.append(windows.of_box(surface.bounds, camera[1] @ camera[0] @ surface.to_world, size))
     low, high = np.array(size), np.zeros(2, int)
-    for strands, _shading, to_world, *_ in drawn.hair:
-        left, bottom, width, height = windows.of_strands(strands, drawing.strand_record(strands, view, to_world), size)
+    for left, bottom, width, height in found:
         if width and height:
             low, high = np.minimum(low, (left, bottom)), np.maximum(high, (left + width, bottom + height))
     return (*low.tolist(), *np.maximum(high - low, 0).tolist())

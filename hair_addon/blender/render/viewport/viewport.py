@@ -102,10 +102,10 @@ def _draw_hair(context):
     drawn = drawn_scene_of(context)
     if not drawn.hair:
         return
-    xray = _xray(viewport.shading)
+    xray = _xray(context)
     outlined = selected_hair.outlined(context, drawn, is_see_through=xray is not None)
-    is_shadowed = viewport.shading.type == "MATERIAL" and context.scene.vellus.has_preview_shadow
     clip_planes = _clip_planes(context)
+    is_shadowed = _is_shadowed(context, drawn) and clip_planes is None
     region_picture = _picture(drawn, context.region_data, region, xray is not None, outlined, is_shadowed, clip_planes)
     management = viewport_shading.read(viewport, context.scene, matrices_of(context.region_data)[0]).management
     region_picture.picture.show(
@@ -237,8 +237,9 @@ def _what_shows(viewport):
     )
 
 
-def _xray(shading):
+def _xray(context):
     """Opacity of the X-ray view, from 0 to 1; None if surfaces occlude."""
+    shading = context.space_data.shading
     if shading.type == "WIREFRAME":
         # The opacity of surfaces, whose wires are visible at 0 too.
         return (
@@ -246,7 +247,18 @@ def _xray(shading):
             if shading.show_xray_wireframe
             else None
         )
-    return shading.xray_alpha if shading.type == "SOLID" and shading.show_xray else None
+    if shading.type == "RENDERED" and not is_drawn_by_engine(context):
+        shading = context.scene.display.shading
+    elif shading.type != "SOLID":
+        return None
+    return shading.xray_alpha if shading.show_xray else None
+
+
+def _is_shadowed(context, drawn):
+    """Whether hair darkens surfaces: its own in Solid shading, and by a setting all of Material Preview."""
+    if context.space_data.shading.type == "MATERIAL":
+        return context.scene.vellus.has_preview_shadow
+    return not drawn.is_wire and any(drawn.is_shadowed)
 
 
 def _clip_planes(context):

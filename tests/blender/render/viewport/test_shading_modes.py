@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.pictures import viewport_shading
-from hair_addon.blender.gpu import studio_lights
-from hair_addon.blender.render import drawn_scene, solid_hair
+from hair_addon.blender.gpu import drawing, studio_lights
+from hair_addon.blender.gpu.visibility_buffer import VisibilityBuffer
+from hair_addon.blender.render import drawn_scene, scene_drawing, solid_hair
 from hair_addon.blender.render.viewport import hair_picture, viewport
 from tests.support.rendering import light_up
 from tests.support.viewports import context_of, view3d
@@ -166,6 +167,58 @@ def test_a_lamp_has_the_light_and_the_mean_direction_that_wrapping_gives(wrap):
     assert dull["highlight_excess"] == -1.0
 
 
+def test_an_hdri_may_follow_the_view():
+    """Its +Y is ahead and its +Z up on the screen, turned by its rotation; without a follow it stays in the world."""
+    space, rotation = view3d(), 0.3
+    space.shading.type, space.shading.studio_light, space.shading.studiolight_rotate_z = (
+        "MATERIAL",
+        "studio.exr",
+        rotation,
+    )
+    of_view = {}
+    for angle, is_above in ((0.0, False), (0.4, False), (0.0, True)):
+        to_view = facing(angle, is_above)[0]
+        found = {}
+        for is_fixed in (True, False):
+            space.shading.use_studiolight_view_rotation = is_fixed
+            found[is_fixed] = viewport_shading.read(space, bpy.context.scene, to_view).light
+        np.testing.assert_allclose(found[True].hdri.to_image, turned(rotation), atol=1e-6)
+        to_world = np.linalg.inv(to_view[:3, :3])
+        ahead, up, right = (
+            found[False].hdri.to_image @ to_world @ axis for axis in (-np.eye(3)[2], np.eye(3)[1], np.eye(3)[0])
+        )
+        np.testing.assert_allclose(ahead, turned(rotation)[:, 1], atol=1e-6)
+        np.testing.assert_allclose(up, (0.0, 0.0, 1.0), atol=1e-6)
+        np.testing.assert_allclose(right, turned(rotation)[:, 0], atol=1e-6)
+        of_view[angle, is_above] = found[False]
+    near = viewport_shading.read(space, bpy.context.scene, facing(0.05)[0]).light
+    assert viewport_shading.is_near(near, of_view[0.0, False])
+    assert not viewport_shading.is_near(of_view[0.4, False], of_view[0.0, False])
+    space.shading.use_studiolight_view_rotation = True
+    assert not viewport_shading.is_near(viewport_shading.read(space, bpy.context.scene, facing()[0]).light, near)
+
+
+def test_workbench_as_render_engine_shows_the_settings_of_the_scene(scene):
+    """Light, color and X-ray are those of the scene, with all of its color management."""
+    space = view3d()
+    scene.render.engine, space.shading.type = "BLENDER_WORKBENCH", "RENDERED"
+    settings = scene.display.shading
+    settings.light, settings.color_type, settings.single_color = "STUDIO", "SINGLE", (0.1, 0.5, 0.2)
+    solid(space, light="STUDIO", studio_light=settings.studio_light, color_type="SINGLE", single_color=(0.1, 0.5, 0.2))
+    space.shading.use_world_space_lighting = settings.use_world_space_lighting
+    as_solid = viewport_shading.read(space, scene, facing()[0])
+    space.shading.type, space.shading.light = "RENDERED", "FLAT"
+    rendered = viewport_shading.read(space, scene, facing()[0])
+    assert rendered == replace(as_solid, management="ALL")
+    context = context_of(space)
+    assert not viewport.is_drawn_by_engine(context)
+    assert viewport._xray(context) is None
+    settings.show_xray, settings.xray_alpha = True, 0.25
+    assert viewport._xray(context) == 0.25
+    settings.light = "FLAT"
+    assert viewport_shading.read(space, scene, facing()[0]).light.kind == "FLAT"
+
+
 # ------------------------------------------------------------------------------------------------- what is drawn
 
 
@@ -281,6 +334,43 @@ def test_other_surfaces_cast_no_shadow_in_solid_shading(ball):
     assert below < 0.9 * free
 
 
+@pytest.mark.parametrize("light", ["STUDIO", "FLAT"])
+def test_hair_darkens_the_surface_that_it_grows_on(ball, light):
+    """In Solid shading: black, whose alpha is the light that hair blocks; not other surfaces, in X-ray or as wires."""
+    hair, camera = bpy.data.objects["Hair"], facing()
+    hair.data.vellus.hair.strand_count, hair.data.vellus.hair.radius = 500, 0.01
+    bpy.ops.mesh.primitive_plane_add(size=8.0, location=(0.0, 1.2, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
+    bpy.context.view_layer.objects.active = hair
+    bpy.context.view_layer.update()
+    solid(ball, light=light)
+    drawn = read(ball, camera)[0]
+    assert viewport._is_shadowed(context_of(ball), drawn)
+    plain, dark, seen_through = (hair_picture.HairPicture((SIZE, SIZE), 2) for _ in range(3))
+    for _ in range(2):
+        plain.add_pass(drawn, *camera)
+        dark.add_pass(drawn, *camera, is_shadowed=True)
+        seen_through.add_pass(drawn, *camera, True, is_shadowed=True)
+    plain, dark, seen_through = (picture.read() for picture in (plain, dark, seen_through))
+    np.testing.assert_allclose(dark[..., :3], plain[..., :3], atol=2e-3)
+    y, x = (np.indices((SIZE, SIZE)) - 0.5 * (SIZE - 1)) / SIZE * 3.2
+    is_bare = plain[..., 3] < 1e-3
+    is_skin, is_plane = is_bare & (x**2 + y**2 < 0.8), is_bare & (x**2 + y**2 > 1.1)
+    assert is_skin.sum() > 100 and is_plane.sum() > 100
+    blocked = dark[..., 3][is_skin]
+    assert (dark[..., 3][is_plane] == 0.0).all()
+    assert 0.03 < blocked.mean() < 0.8 and blocked.max() <= 1.001, (blocked.mean(), blocked.max())
+    assert not seen_through[..., 3][is_plane].any()
+    # As much as the pass Hair Shadow of a render in these lights, which spreads light over more of the surface.
+    view = drawing.pass_record(*camera, (SIZE, SIZE))
+    buffer = VisibilityBuffer(SIZE, SIZE)
+    passed = np.array(scene_drawing.draw_hair_shadow(drawn, view, buffer).read(), np.float32).reshape(SIZE, SIZE, 4)
+    assert blocked.mean() == pytest.approx(1.0 - passed[is_skin][:, :3].mean(), rel=0.25)
+    ball.shading.type = "WIREFRAME"
+    assert not viewport._is_shadowed(context_of(ball), read(ball, camera)[0])
+    ball.shading.type = "MATERIAL"
+    assert not viewport._is_shadowed(context_of(ball), read(ball, camera)[0])
+
+
 def test_hair_turns_with_its_lights(ball):
     """The bright side of the ball, from above."""
     camera = facing(is_above=True)
@@ -389,6 +479,23 @@ def test_the_scene_lights_hair_as_far_as_the_viewport_asks(ball, kind):
     brightest = turned_light.lights["light"]["axis"][0, :3]
     # A direction turned by the rotation is the image's: light comes from the other side.
     np.testing.assert_allclose(brightest, turned(-0.4) @ suns[1][0, :3], atol=1e-4)
+
+
+def test_an_hdri_that_follows_the_view_lights_the_same_side_of_the_screen(ball):
+    """The ball's light side on the screen, from the front and from beside it; in a fixed one it is another."""
+    ball.shading.type, ball.shading.studio_light = "MATERIAL", "sunset.exr"
+    sides, drawn = {}, None
+    for is_fixed in (True, False):
+        ball.shading.use_studiolight_view_rotation = is_fixed
+        for angle in (0.0, 2.0):
+            camera = facing(angle)
+            light = viewport_shading.read(ball, bpy.context.scene, camera[0]).light
+            drawn = relit(drawn, light) if drawn else read(ball, camera)[0]
+            weights = picture_of(drawn, camera)[..., :3] @ LUMINANCE
+            y, x = (np.indices((SIZE, SIZE)) - 0.5 * (SIZE - 1)) / SIZE
+            sides[is_fixed, angle] = np.array([(weights * x).sum(), (weights * y).sum()]) / weights.sum()
+    apart = {is_fixed: np.abs(sides[is_fixed, 2.0] - sides[is_fixed, 0.0]).max() for is_fixed in (True, False)}
+    assert apart[False] < 0.02 and apart[True] > 3.0 * apart[False], sides
 
 
 def total_of(drawn):
