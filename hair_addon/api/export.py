@@ -26,9 +26,10 @@ def export_groom(
 ) -> list[str]:
     """Write hair and its guides for engines and other programs; returns warnings about their import.
 
-    path: .abc for Unreal's groom importer, .usd, .usdc and .usda for Unreal, Houdini and Omniverse; hair: hair Curves,
-    which become groups of the file, None for all; settings: `ExportSettings`; changes: its fields by name. Warnings
-    concern, for example, strands of zero length and missing UV coordinates.
+    path: .abc for Unreal's groom importer, .usd, .usdc and .usda for Unreal, Houdini and Omniverse, or .hair, .data,
+    .ply and .npz for other programs; hair: hair Curves, which become groups of the file, None for all; settings:
+    `ExportSettings`; changes: its fields by name. Warnings concern, for example, strands of zero length and missing UV
+    coordinates.
 
     >>> api.export_groom("hair.abc", [bpy.data.objects["Hair"]], has_color=False)
     []

@@ -137,11 +137,11 @@ def import_curves(
 ) -> "Found":
     """Read curves from a file, for `use_as_guides` and `use_as_hair`.
 
-    path: .abc, .usd, .usdc, .usda, .usdz, .npz or .blend; surface: the mesh object that the curves grow on, by which
-    missing unit and axis are inferred; kind: "GUIDES" or "HAIR", if a groom has both; name: of an object or a group, ""
-    for all; unit: m, cm, mm, in, ft, km or the number of meters in a unit; up: X, Y or Z; None for the file's own. The
-    result has `curves`, a curves object, `guides`, the file's guides of this hair or None, and `notes`, sentences about
-    assumptions and skipped curves.
+    path: .abc, .usd, .usdc, .usda, .usdz, .npz, .hair, .data, .bin, .ply, .obj, .tfx or .blend; surface: the mesh
+    object that the curves grow on, by which missing unit and axis are inferred; kind: "GUIDES" or "HAIR", if a groom
+    has both; name: of an object or a group, "" for all; unit: m, cm, mm, in, ft, km or the number of meters in a unit;
+    up: X, Y or Z; None for the file's own. The result has `curves`, a curves object, `guides`, the file's guides of
+    this hair or None, and `notes`, sentences about assumptions and skipped curves.
 
     >>> api.export_groom("groom.abc", [bpy.data.objects["Hair"]])
     []

@@ -3,7 +3,7 @@
 
 from ..core import lazy
 from ..core.errors import HairError
-from ..core.files.curve_file import UNITS, Convention, parsed_unit
+from ..core.files.curve_file import ENDINGS, UNITS, Convention, parsed_unit
 
 blender = lazy.Package("..blender", __package__)
 
@@ -20,7 +20,7 @@ def add_axis(parser):
 def add_curves(parser):
     """Add the options for curves from a file."""
     parser.add_argument(
-        "--guides-from", metavar="FILE", help="use the curves of a .blend, .usd*, .abc or .npz as guides"
+        "--guides-from", metavar="FILE", help=f"use the curves of a file as guides: {', '.join(['.blend', *ENDINGS])}"
     )
     parser.add_argument(
         "--hair-from",

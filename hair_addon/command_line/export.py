@@ -19,7 +19,7 @@ def add(verbs):
         "export",
         help="export hair to an engine or another program",
         description="Write the hair of a .blend file and its guides: .abc as Unreal imports grooms, in centimeters "
-        "with Z up, or USD for Unreal, Houdini and Omniverse.",
+        "with Z up, USD for Unreal, Houdini and Omniverse, or strands for other programs.",
     )
     parser.add_argument("input", help=".blend file")
     parser.add_argument("--out", required=True, metavar="FILE", help=f"file to write: {', '.join(ENDINGS)}")

@@ -20,7 +20,9 @@ def add(verbs):
         help="show the hair, settings or tables in a file, or list looks and style presets",
         description="Show the hair, settings or tables in a file. Without a file, list the looks and style presets.",
     )
-    parser.add_argument("input", nargs="?", help=".blend, a mesh, .npz, groom settings (.json) or a table (.exr)")
+    parser.add_argument(
+        "input", nargs="?", help=".blend, a mesh, .npz, a file of strands, groom settings (.json) or a table (.exr)"
+    )
     options.add_scripts(parser)
     options.add_common(parser)
     parser.set_defaults(run=run)
@@ -35,7 +37,9 @@ def run(given, console):
         console.result({"verb": "info", **values}, "\n".join(_in_lines(values)))
         return
     describe = {".npz": _arrays, ".json": _settings, ".exr": _tables}.get(given.input.suffix.lower())
-    if describe is None:
+    if given.input.suffix.lower() in blender.io.curve_files.OF_STRANDS:
+        values = {"curves": blender.io.curve_files.summary(given.input)}
+    elif describe is None:
         opening.open_file(given, console, has_curves=True)
         values = blender.io.inspection.open_file()
         if given.input.suffix.lower() in blender.io.curve_files.OF_OTHERS:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Import of curves as guides or hair: .blend, USD, Alembic, and .npz arrays of grooms."""
+"""Import of curves as guides or hair: .blend, USD, Alembic, .npz arrays, and strands of other programs."""
 
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -11,6 +11,7 @@ import numpy as np
 from ...core.errors import HairError, cause_of
 from ...core.files import alembic, array_grooms, curve_file, curve_units
 from ...core.files.curve_file import Convention, Motion
+from ...core.files.strands import counted_points, hair, obj_lines, ply_strands, tressfx
 from ...core.geometry.mesh import TriMesh
 from ...core.geometry.strands import curve_offsets
 from ..data import scene
@@ -24,8 +25,15 @@ _READERS = {
     **dict.fromkeys(_USD, usd_curves.read),
     ".abc": alembic.grooms.read,
     ".npz": array_grooms.read,
+    ".hair": hair.read,
+    ".data": counted_points.read_data,
+    ".bin": counted_points.read_bin,
+    ".ply": ply_strands.read,
+    ".obj": obj_lines.read,
+    ".tfx": tressfx.read,
 }
-ENDINGS = (".blend", *_READERS)
+ENDINGS = (".blend", *curve_file.ENDINGS)
+OF_STRANDS = (".hair", ".data", ".bin", ".tfx")  # files that hold nothing else
 OF_OTHERS = (*_USD, ".abc")  # also written by other programs
 
 _OTHER = {"GUIDES": "HAIR", "HAIR": "GUIDES"}

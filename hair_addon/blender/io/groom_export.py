@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair and guides → files for engines and other programs: Unreal's Alembic, USD."""
+"""Hair and guides → files for engines and other programs: Unreal's Alembic, USD, files of strands."""
 
 import contextlib
 import json
@@ -10,6 +10,7 @@ from ...core.errors import HairError, cause_of
 from ...core.files import export_settings, settings_file
 from ...core.files.alembic import unreal_groom
 from ...core.files.atomic_file import atomic_file, require_writable_path
+from ...core.files.strands import writers
 from ...core.long_work import Stage
 from ..groom.dynamics import frame_folders
 from ..groom.transfer import groom_settings
@@ -54,9 +55,12 @@ def exporting(path, chosen, settings, blender_scene):
     require_writable(path)
     if not chosen:
         raise HairError("There is no hair to export: add hair to the mesh.")
+    if _is_strands(path) and settings.animation != "NONE":
+        sentence = "{path} can hold one frame only: choose Nothing in Animation, or write .abc or .usd."
+        raise HairError(sentence, path=path)
     frames = [None] if settings.animation == "NONE" else list(scene_time.scene_frames())
     simulated = _simulated(chosen, frames)
-    per_metre = usd_groom.PER_METRE if _is_usd(path) else unreal_groom.PER_METRE
+    per_metre = _per_metre(path)
     remembered = [Remembered(hair) for hair in chosen]
     with contextlib.ExitStack() as stack:
         stack.callback(_go_to, blender_scene, None if frames == [None] else scene_time.time_of(blender_scene))
@@ -86,8 +90,18 @@ def exporting(path, chosen, settings, blender_scene):
     return Exported(path, *counts, path.stat().st_size, [*notes, *writer.notes()])
 
 
+def _is_strands(path):
+    return path.suffix.lower() in export_settings.OF_STRANDS
+
+
 def _is_usd(path):
-    return path.suffix.lower() != ".abc"
+    return path.suffix.lower() != ".abc" and not _is_strands(path)
+
+
+def _per_metre(path):
+    if _is_strands(path):
+        return writers.PER_METRE
+    return usd_groom.PER_METRE if _is_usd(path) else unreal_groom.PER_METRE
 
 
 def _go_to(blender_scene, time):
@@ -98,6 +112,8 @@ def _go_to(blender_scene, time):
 
 def _opened(partial, path, chosen, first_frame, blender_scene):
     """Return the context of a writer; first_frame: None without animation."""
+    if _is_strands(path):
+        return writers.writing(partial, path.suffix.lower())
     header = f"Vellus {paths.addon_version()}", _properties(chosen)
     rate = scene_time.frame_rate(blender_scene)
     if _is_usd(path):

@@ -138,12 +138,14 @@ def _in_curves_menu(menu, context):
 
 def _in_export_menu(menu, context):
     if hair_of(context.object) is not None:
-        menu.layout.operator("vellus.export_groom", text="Hair for Unreal, USD (.abc/.usd*)")
+        menu.layout.operator("vellus.export_groom", text="Hair (.abc/.usd*/.hair/.data/.ply/.npz)")
 
 
 def _in_import_menu(menu, context):
     if surface_of(context.object) is not None:
-        menu.layout.operator("vellus.import_groom", text="Hair on This Mesh (.abc/.usd*/.npz)")
+        menu.layout.operator(
+            "vellus.import_groom", text="Hair on This Mesh (.abc/.usd*/.npz/.hair/.data/.bin/.ply/.obj/.tfx)"
+        )
 
 
 _ENTRIES = (

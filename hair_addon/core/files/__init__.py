@@ -9,10 +9,12 @@ if TYPE_CHECKING:
     from . import (
         array_file,
         array_grooms,
+        array_layouts,
         atomic_file,
         curve_file,
         curve_units,
         file_lock,
+        flat_curves,
         frame_cache,
         frame_manifest,
         groom_curves,

@@ -6,6 +6,9 @@
     strand_counts (S,), guide_counts (G,)                           points of each curve if these differ, see below
     up                                                              the up axis: X, Y or Z
 
+    For export, also strand_ and guide_: ids (S,), root_uvs (S, 2), groups (S,), which index group_names (K,);
+    strand_guide_ids and strand_guide_weights (S, 3); strand_colors (S, P, 3), linear RGB, and strand_roughness (S, P)
+
 Only one of strand_points and guide_points is required. If curves have different numbers of points, the points of all
 curves are concatenated, (N, 3), with widths (N,) and the number of points of each curve in counts.
 """
@@ -15,8 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import HairError
-from . import untrusted_arrays
+from . import array_layouts, untrusted_arrays
 from .curve_file import TO_Z_UP, Convention, CurveFile, CurveSet
+from .flat_curves import curve_sets
 
 _POINTS = {"guide_points": True, "strand_points": False}
 _NAMES = {"guide_points": "Guides", "strand_points": "Hair"}
@@ -32,10 +36,8 @@ def _read(path, archive, axis):
     there = {*untrusted_arrays.names(archive)}
     names = [name for name in _POINTS if name in there]
     if not names:
-        raise HairError(
-            "{path} has no curves: an .npz file needs an array guide_points or strand_points, (G, P, 3).", path=path
-        )
-    sets = []
+        return CurveFile(array_layouts.read(path, archive), usual=Convention(1.0, axis))
+    sets: list[CurveSet] = []
     for name in names:
         points, counts = untrusted_arrays.array(archive, name), _counts(path, archive, there, name)
         shape = points.shape
@@ -56,21 +58,53 @@ def _read(path, archive, axis):
                 sentence = "{path}: {name} has shape {shape}, but must be {wanted}, as the points."
                 raise HairError(sentence, path=path, name=width_name, shape=widths.shape, wanted=shape[:-1])
             radii = widths.ravel() / np.asarray(2.0, widths.dtype)
-        sets.append(
-            CurveSet(
-                _NAMES[name],
-                points.reshape(-1, 3),
-                counts,
-                np.zeros(len(counts), bool),
-                radii,
-                is_guide=_POINTS[name] if len(names) > 1 else None,
-            )
+        is_guide = np.full(len(counts), _POINTS[name]) if len(names) > 1 or "group_names" in there else None
+        attributes = _attributes(archive, there, name.removesuffix("points"), len(counts))
+        sets += curve_sets(
+            _NAMES[name],
+            points.reshape(-1, 3),
+            counts,
+            radii=radii,
+            is_guide=is_guide,
+            group_names=_group_names(archive, there),
+            **attributes,
         )
     if "up" in there:
         axis = str(untrusted_arrays.array(archive, "up"))
         if axis not in TO_Z_UP:
             raise HairError("{path}: up is {axis}, but must be X, Y or Z.", path=path, axis=axis[:20])
     return CurveFile(sets, Convention(1.0, axis))
+
+
+# Attributes of curves: name of an array → (argument of `curve_sets`, numbers of a curve, type).
+_ATTRIBUTES = {
+    "ids": ("ids", (), np.int32),
+    "groups": ("group_ids", (), np.int32),
+    "root_uvs": ("root_uvs", (2,), np.float32),
+    "guide_ids": ("guide_ids", (3,), np.int32),
+    "guide_weights": ("guide_weights", (3,), np.float32),
+}
+
+
+def _attributes(archive, there, prefix, curve_count):
+    """Return {argument of `curve_sets`: array} of the attributes whose shape fits."""
+    found = {}
+    for name, (argument, width, kind) in _ATTRIBUTES.items():
+        if prefix + name in there:
+            values = untrusted_arrays.array(archive, prefix + name)
+            if values.shape == (curve_count, *width) and values.dtype.kind == np.dtype(kind).kind:
+                found[argument] = values.astype(kind)
+    return found
+
+
+def _group_names(archive, there):
+    """Return {ID: name} of the groups."""
+    if "group_names" not in there:
+        return {}
+    values = untrusted_arrays.array(archive, "group_names")
+    if values.ndim != 1 or values.dtype.kind != "U":
+        return {}
+    return {number: str(name)[:60] for number, name in enumerate(values[:1000])}
 
 
 def _counts_of(name):

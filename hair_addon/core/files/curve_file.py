@@ -13,6 +13,9 @@ import numpy as np
 from ..errors import HairError
 from ..geometry import bezier_segments
 
+# Extensions of files with curves, other than .blend.
+ENDINGS = (".abc", ".usd", ".usdc", ".usda", ".usdz", ".npz", ".hair", ".data", ".bin", ".ply", ".obj", ".tfx")
+
 # The warning for animated splines: Blender plays only polylines.
 SPLINES_MOVE = "{path} is animated: its Catmull-Rom splines become polylines."
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from ..params import Settings, param
 
-ENDINGS = (".abc", ".usd", ".usdc", ".usda")
+OF_STRANDS = (".hair", ".data", ".ply", ".npz")  # one frame, without the look
+ENDINGS = (".abc", ".usd", ".usdc", ".usda", *OF_STRANDS)
 
 
 @dataclass(frozen=True)

@@ -32,11 +32,13 @@ from hair_addon.core.files import (
     settings_file,
 )
 from hair_addon.core.files.frame_cache import FrameCache
+from hair_addon.core.files.strands import counted_points, hair, obj_lines, ply_strands, tressfx
 from hair_addon.core.imaging import picture_checks
 from hair_addon.core.kernels import compiled_kernels
 from hair_addon.core.styling.curl import Settings as CurlSettings
 from hair_addon.core.styling.kinds import KINDS
 from tests.support.cached_frames import frame_bytes, manifest
+from tests.support.exchange import strand_files
 from tests.support.exchange.alembic_files import File
 
 Check = Callable[[object, object], None]
@@ -272,6 +274,7 @@ def readers():
     stl = bytes(80) + (1).to_bytes(4, "little") + bytes(50)
     frames = {"manifest.json": manifest_data}
     groom, packed = (_archive(_groom_arrays(), save) for save in (np.savez, np.savez_compressed))
+    lines = strand_files.lines()
     style = b"radius=0.01,pitch=0.3,seed=4,shape=0.5,invert_mask=yes"
     return {
         "settings": Reader("core/files/settings_file.py", settings, settings_file.read, _can_be_written, is_text=True),
@@ -292,6 +295,30 @@ def readers():
         "arrays": Reader("core/files/array_grooms.py", groom, array_grooms.read, _are_the_arrays),
         "compressed arrays": Reader("core/files/untrusted_arrays.py", packed, array_grooms.read, _are_the_arrays),
         "list of arrays": Reader("command_line/info.py", groom, info._arrays, anything),
+        "foreign arrays": Reader("core/files/array_layouts.py", strand_files.npz(lines), array_grooms.read, are_curves),
+        "HAIR": Reader("core/files/strands/hair.py", strand_files.hair(lines), hair.read, are_curves),
+        "HairSalon": Reader(
+            "core/files/strands/counted_points.py", strand_files.data(lines), counted_points.read_data, are_curves
+        ),
+        "CT2Hair": Reader(
+            "core/files/strands/counted_points.py", strand_files.bin_file(lines), counted_points.read_bin, are_curves
+        ),
+        "TressFX": Reader("core/files/strands/tressfx.py", strand_files.tfx(lines), tressfx.read, are_curves),
+        "strands in PLY": Reader(
+            "core/files/strands/contents.py", strand_files.ply(lines), ply_strands.read, are_curves
+        ),
+        "strands in PLY as text": Reader(
+            "core/files/strands/ply_table.py", strand_files.ply_text(lines), ply_strands.read, are_curves, is_text=True
+        ),
+        "lists in PLY": Reader(
+            "core/files/strands/ply_table.py", strand_files.ply_lists(lines), ply_strands.read, are_curves
+        ),
+        "edges in PLY": Reader(
+            "core/files/strands/ply_strands.py", strand_files.ply_edges(lines), ply_strands.read, are_curves
+        ),
+        "lines in OBJ": Reader(
+            "core/files/strands/obj_lines.py", strand_files.obj(lines), obj_lines.read, are_curves, is_text=True
+        ),
         "Alembic": Reader("core/files/alembic/reader.py", abc, alembic.grooms.read, are_curves),
         "whole Alembic": Reader("core/files/alembic/reader.py", abc, alembic.reader.require_whole, anything),
         "language": Reader("blender/settings/translations.py", po, translations.read_po, _are_texts, is_text=True),

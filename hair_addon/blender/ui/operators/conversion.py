@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ....core.errors import HairError
-from ....core.files.curve_file import UNITS, Convention
+from ....core.files.curve_file import ENDINGS, UNITS, Convention
 from ....core.grooming import cost
 from ....core.grooming.derived_guides import DerivationSettings
 from ....core.grooming.groom import HairSettings
@@ -190,13 +190,13 @@ class _Imported:
 
 
 class VELLUS_OT_import_groom(BrowsedOperator, bpy.types.Operator):
-    """Read hair or guides for the active mesh from a file: Alembic, USD, or arrays"""
+    """Read hair or guides for the active mesh from a file: Alembic, USD, arrays, or strands of other programs"""
 
     bl_idname = "vellus.import_groom"
     bl_label = "Import Groom"
     __annotations__ = {
-        "filepath": properties.file("File to read, .abc, .usd, .usdc, .usda, .usdz or .npz"),
-        "filter_glob": properties.only_files("*.abc;*.usd;*.usdc;*.usda;*.usdz;*.npz"),
+        "filepath": properties.file("File to read, .abc, .usd*, .npz, .hair, .data, .bin, .ply, .obj or .tfx"),
+        "filter_glob": properties.only_files(";".join(f"*{ending}" for ending in ENDINGS)),
         "kind": properties.choice(
             "Import As",
             "Type of the imported curves. Hair of a groom that has both is imported with its guides",

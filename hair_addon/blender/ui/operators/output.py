@@ -6,7 +6,7 @@ import bpy
 from ....core.cards.card_settings import CardSettings, TubeSettings
 from ....core.errors import HairError
 from ....core.files import settings_file
-from ....core.files.export_settings import ExportSettings
+from ....core.files.export_settings import ENDINGS, ExportSettings
 from ....core.long_work import Stage
 from ...groom.selection import hair_of, make_active, object_of
 from ...groom.transfer import groom_settings
@@ -92,14 +92,14 @@ class VELLUS_OT_load_groom_settings(BrowsedOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_export_groom(BrowsedOperator, bpy.types.Operator):
-    """Write the hair on the active mesh and its guides to a file: Alembic for Unreal, or USD"""
+    """Write the hair on the active mesh and its guides to a file: Alembic for Unreal, USD, or strands"""
 
     bl_idname = "vellus.export_groom"
     bl_label = "Export Groom"
     bl_options = {"REGISTER"}
     __annotations__ = {
-        "filepath": properties.file("File to write, .abc or .usd, .usdc, .usda"),
-        "filter_glob": properties.only_files("*.abc;*.usd;*.usdc;*.usda"),
+        "filepath": properties.file("File to write, .abc, .usd, .usdc, .usda, .hair, .data, .ply or .npz"),
+        "filter_glob": properties.only_files(";".join(f"*{ending}" for ending in ENDINGS)),
         **setting_properties.annotations(ExportSettings),
     }
     asked = "filepath"
