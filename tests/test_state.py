@@ -47,6 +47,8 @@ PURE = {
     "core/geometry/bspline.py: _device_matrix",
     "core/geometry/bspline.py: _controls_matrix",
     "core/kernels/compiled_kernels.py: _fitting",
+    "core/maps/pixels.py: _linear_bytes",
+    "core/maps/varied_settings.py: all_varied",
     "core/params.py: _declared",
     "core/shading/appearance.py: _mean_reflectance",
     "core/shading/appearance.py: neutral",

@@ -33,6 +33,7 @@ class Param:
     choices: tuple[tuple[str, str, str], ...] = ()  # (value, label, tooltip) of an enumeration
     typical: float | None = None  # typical value of a setting that is computed from the surface unless given
     diameter: tuple[str, str] | None = None  # for a radius: property that shows the diameter in mm, its description
+    may_vary: bool = False  # whether a map may give each strand a value of its own
     is_structural: bool = False  # changes the grouping of strands: not animatable, because strands would jump
 
 

@@ -25,13 +25,7 @@ FibreLobes forward_lobes(vec2 at)
                       forward_channel(at, sigma_a.b));
 }
 
-// For the surrounding strands at the same position along the gradient.
-vec3 dual(float row, float theta_i)
-{
-  float step_count = float(textureSize(dual_table, 0).z);
-  vec3 at = vec3(theta_i / PI + 0.5, (row + 0.5) / 9.0, between_ends(this_gradient(), step_count));
-  return textureLod(dual_table, at, 0.0).rgb;
-}
+#include "fibre/dual_along.glsl"
 
 void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
 {

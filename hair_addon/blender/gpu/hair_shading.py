@@ -32,6 +32,7 @@ class Shading:
     forward: np.ndarray = field(default_factory=lambda: np.zeros(3))  # fraction passed on to strands behind
     reflectance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # of infinitely many strands
     is_varied: bool = False  # whether strands differ by their random numbers
+    is_mapped: bool = False  # whether strands have looks of their own
     # For the energy-conserving model: (`lookup_tables.Settings`, `strand_variation.Settings` or None).
     fibre: tuple | None = None
 
@@ -134,6 +135,36 @@ def marschner_strand_shading(tables):
     return replace(shading, fibre=_fibre(tables.settings, tables.variation))
 
 
+def kajiya_kay_look_shading(settings, variation, sigma_a):
+    """The `Shading` of strands with looks of their own; sigma_a (..., 3): of some of them."""
+    forward = 0.5 * kajiya_kay.mean_albedo_of_strands(settings, sigma_a)
+    blocks = {"settings": settings, "variation": variation}
+    return _shading("fibre/kajiya_kay_varied.comp", blocks, {}, forward, is_varied=True, is_mapped=True)
+
+
+def marschner_look_shading(tables):
+    """A function of sigma_a (..., 3) of some strands that returns the `Shading` of strands with looks of their own.
+
+    tables: `look_tables.LookTables`; the given strands define the light that strands pass on to others.
+    """
+    slices = tables.slices
+    blocks = {"settings": tables.settings, "variation": tables.variation, "slices": slices.range}
+    arrays = {"return_slices": tables.returned, "n_slices": slices.n}
+    if tables.settings.mode == "energy":
+        arrays |= {"n_g_slices": slices.n_g, "dual_table": tables.dual}
+    file = _VARIED[tables.settings.mode]
+    if slices.n_trt is not None:
+        file, arrays["n_trt_slices"] = "fibre/marschner_elliptic.comp", slices.n_trt
+    shading = _shading(file, blocks, arrays, np.zeros(3), is_varied=True, is_mapped=True)
+    shading = replace(shading, fibre=_fibre(tables.settings, tables.variation))
+
+    def fitted(sigma_a):
+        forward, reflectance = _deep(tables.settings, *tables.mean_parts(sigma_a))
+        return replace(shading, forward=forward, reflectance=np.array(reflectance))
+
+    return fitted
+
+
 def _fibre(settings, variation):
     return (settings, variation) if settings.mode == "energy" else None
 
@@ -146,18 +177,18 @@ def _deep(settings, forward, backward):
     return 1.0 - attenuation, reflectance
 
 
-def _shading(file, blocks, arrays, forward, reflectance=(0.0, 0.0, 0.0), is_varied=False):
+def _shading(file, blocks, arrays, forward, reflectance=(0.0, 0.0, 0.0), is_varied=False, is_mapped=False):
     """The `Shading` of a .comp with blocks {instance: settings} and tables {sampler: (H, W, C) or (D, H, W, C)}."""
     kinds = [(name, "FLOAT_2D" if array.ndim == 3 else "FLOAT_3D") for name, array in arrays.items()]
     if is_varied:
-        kinds.append(("strand_randoms", "FLOAT_2D"))
+        kinds.append(("strand_looks" if is_mapped else "strand_randoms", "FLOAT_2D"))
     classes = tuple((instance, type(settings)) for instance, settings in blocks.items())
-    wanted = file, classes, tuple(kinds)
+    wanted = file, classes, tuple(kinds), is_mapped
     program = scene_programs.shading_program(*wanted)
     variant = partial(scene_programs.shading_program, *wanted)
     buffers = {instance: uniforms.uniform_buffer(uniforms.fill(settings)) for instance, settings in blocks.items()}
     textures = {name: _table_texture(array) for name, array in arrays.items()}
-    return Shading(program, variant, buffers, textures, forward, np.array(reflectance), is_varied)
+    return Shading(program, variant, buffers, textures, forward, np.array(reflectance), is_varied, is_mapped)
 
 
 def _table_texture(array):

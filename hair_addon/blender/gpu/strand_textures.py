@@ -13,6 +13,7 @@ import gpu
 import numpy as np
 
 from ...core import geometry
+from ...core.shading.strand_looks import StrandLooks
 from . import driver_textures, shaders
 
 # Maximum width of textures; every driver supports 16384 texels.
@@ -60,6 +61,8 @@ class StrandsOnGPU:
     mean_radius: float
     greatest_radius: float
     randoms_here: np.ndarray | None = None  # (S,) on the CPU; None if all strands are average
+    looks: gpu.types.GPUTexture | None = None  # two texels per strand, see fibre/mapped_strand.glsl; None without maps
+    looks_here: StrandLooks | None = None  # (S,) on the CPU
     moved: Moved | None = None  # None if all points are as uploaded
     is_made: bool = False  # whether the GPU has computed or carried the strands
     has_points: bool = True  # whether `points` are current, and not only the texture
@@ -69,7 +72,7 @@ class StrandsOnGPU:
     def textures(self) -> list[gpu.types.GPUTexture]:
         """All textures."""
         own = [self.texture, self.radii_texture, self.randoms]
-        own += [] if self.wetness is None else [self.wetness]
+        own += [one for one in (self.wetness, self.looks) if one is not None]
         return own + ([] if self.moved is None else [self.moved.points, self.moved.rows])
 
     @cached_property
@@ -106,11 +109,11 @@ class StrandsOnGPU:
         return enough
 
 
-def upload_strands(points, radii, randoms=None, wetness=None):
+def upload_strands(points, radii, randoms=None, wetness=None, looks=None):
     """(S, P, 3) points and (S, P) radii, float32, in one coordinate system → `StrandsOnGPU`.
 
     randoms: (S,) numbers in [0, 1] for variation, None: all strands are average; wetness: (S,) in [0, 1], None if
-    strands do not differ.
+    strands do not differ; looks: `StrandLooks` (S,), None without maps.
     """
     strand_count, point_count, _xyz = points.shape
     row_strands = row_strands_of(point_count)
@@ -124,7 +127,7 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     # A sample of the strands is enough for the level of detail.
     some = slice(None, None, -(-strand_count // 1000))
     mean_length = float(np.linalg.norm(np.diff(points[some], axis=1), axis=2).sum(axis=1).mean())
-    return StrandsOnGPU(
+    uploaded = StrandsOnGPU(
         texture,
         *_radii_texture(radii, row_strands),
         strip,
@@ -142,6 +145,21 @@ def upload_strands(points, radii, randoms=None, wetness=None):
         float(radii.max()),
         randoms,
     )
+    return with_looks(uploaded, looks)
+
+
+def with_looks(strands, looks):
+    """`StrandsOnGPU` with other `StrandLooks`, or with None."""
+    if looks is None:
+        return strands if strands.looks is None else replace(strands, looks=None, looks_here=None)
+    count, row_strands = strands.strand_count, strands.row_strands
+    texels = np.zeros((-(-count // row_strands) * row_strands, 2, 4), np.float32)
+    for place, sigma_a in enumerate((looks.root, looks.tip)):
+        np.minimum(sigma_a, _MOST_HALF, out=texels[:count, place, :3])
+    np.minimum(looks.roughness, _MOST_HALF, out=texels[:count, 0, 3])
+    texels[:count, 1, 3] = 0.5 if strands.randoms_here is None else strands.randoms_here
+    texture = driver_textures.made((2 * row_strands, len(texels) // row_strands), "RGBA16F", texels)
+    return replace(strands, looks=texture, looks_here=looks)
 
 
 def _total_length(points):
@@ -180,7 +198,8 @@ def packed_texture(points, row_strands):
     return _texture("RG32F", row_strands * texel_count, texels)
 
 
-_TEXEL_BYTES = {"RG32F": 8, "R32F": 4, "R16": 2, "RGBA32F": 16}
+_TEXEL_BYTES = {"RG32F": 8, "R32F": 4, "R16": 2, "RGBA16F": 8, "RGBA32F": 16}
+_MOST_HALF = np.float32(60000.0)
 _MOST_OF_R16 = 65535  # steps from 0 to 1
 _SEEN_BYTES = 20  # per point in the visibility textures
 

@@ -360,7 +360,9 @@ class VisibilityBuffer:
             for name, value in (parts or {}).items():
                 program.uniform_float(name, value)
             textures, record = dict(shading.samplers), placed.record.copy()
-            if shading.is_varied:
+            if shading.is_mapped:
+                textures["strand_looks"] = placed.strands.looks
+            elif shading.is_varied:
                 textures["strand_randoms"] = placed.strands.randoms
             if mix is not None:
                 program.uniform_float("wetness_range", mix.wetness_range)

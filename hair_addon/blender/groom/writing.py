@@ -12,6 +12,7 @@ from ...core.geometry.strands import Strands, lengths
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
 from ..data import guide_map_readers, scene, surface_space
+from ..data.maps import strand_maps
 from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots
 from ..data.surfaces import Surface, cage_of
 from ..host.notices import name_of
@@ -107,7 +108,7 @@ def write_hair(target: Curves) -> None:
             normals=normals,
         )
         curves.write_clumps(target, bound.styles.clumps)
-        if curves.write_wetness(target, bound.styles.wetness):
+        if curves.write_wetness(target, bound.styles.wetness) or strand_maps.has_looks(state):
             looks.evaluate_shading(target)
     if not bound.is_map_written and not attributes.is_from_library(target):
         curves.write_guide_map(target, bound.guide_map if _is_map_wanted(target, bound.settings) else None)

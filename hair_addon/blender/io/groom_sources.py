@@ -12,6 +12,7 @@ from ...core.files.groom_curves import GroomCurves
 from ...core.geometry import strands
 from ...core.shading import strand_colors
 from ..data import scene
+from ..data.maps import strand_maps
 from ..data.strands import attributes, curves, exported_curves, simulated_guides
 from ..groom import guide_maps, hair_systems, selection
 from ..groom.dynamics import frame_folders
@@ -100,7 +101,8 @@ def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
     guide_map = guide_maps.of(hair, depsgraph) if guide_count and settings.has_guides else None
     ids, weights = (None, None) if guide_map is None else groom_curves.closest_guides(*guide_map, first_id)
     look, randoms = properties.look_of(hair.vellus), curves.read_randoms(hair)
-    colors, roughness = _shading_of(look, randoms, counts, shown) if settings.has_color else (None, None)
+    varied = strand_maps.read_looks(hair)
+    colors, roughness = _shading_of(look, randoms, varied, counts, shown) if settings.has_color else (None, None)
     return GroomCurves(
         group_id=group,
         group_name=name,
@@ -133,21 +135,30 @@ def _points_of(counts, some):
     return slice(first, first + int(counts[some].sum(dtype=np.int64)))
 
 
-def _shading_of(look, randoms, counts, shown):
-    """Return (colors, roughness): functions of a slice of curves that give values per point."""
+def _shading_of(look, randoms, varied, counts, shown):
+    """Return (colors, roughness): functions of a slice of curves that give values per point.
+
+    varied: `StrandLooks` by maps, or None.
+    """
+
+    def looks(some):
+        return None if varied is None else varied[some]
+
     if (counts == counts[0]).all():
         count = int(counts[0])
         return (
-            lambda some: strand_colors.colors(look, randoms[some], count).reshape(-1, 3),
-            lambda some: strand_colors.roughness(look, randoms[some], count).ravel(),
+            lambda some: strand_colors.colors(look, randoms[some], count, looks(some)).reshape(-1, 3),
+            lambda some: strand_colors.roughness(look, randoms[some], count, looks(some)).ravel(),
         )
     along = strands.places_along(exported_curves.points_kept(shown), strands.curve_offsets(counts))
 
     def colors(some):
-        return strand_colors.colors_at(look, np.repeat(randoms[some], counts[some]), along[_points_of(counts, some)])
+        of_points = np.repeat(np.arange(len(counts))[some], counts[some])
+        places = along[_points_of(counts, some)]
+        return strand_colors.colors_at(look, randoms[of_points], places, looks(of_points))
 
     def roughness(some):
-        return np.repeat(strand_colors.roughness(look, randoms[some], 1)[:, 0], counts[some])
+        return np.repeat(strand_colors.roughness(look, randoms[some], 1, looks(some))[:, 0], counts[some])
 
     return colors, roughness
 

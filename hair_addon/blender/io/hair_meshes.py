@@ -12,8 +12,10 @@ from ...core.geometry.mesh import TriMesh
 from ...core.long_work import Stage
 from ...core.shading import strand_colors
 from ...core.shading.appearance import Appearance
+from ...core.shading.strand_looks import StrandLooks
 from ..data import scene, whole_changes
 from ..data.made import armature_weights, made_meshes
+from ..data.maps import strand_maps
 from ..data.strands import curves, exported_curves
 from ..host import scene_time
 from ..host.datablocks import Remembered
@@ -39,11 +41,12 @@ class HairBeside:
     look: Appearance
     surface: TriMesh
     to_local: np.ndarray
+    looks: StrandLooks | None  # by maps
     notes: list[HairError]
 
     def colors(self) -> np.ndarray:
         """Linear RGB (S, P, 3)."""
-        return strand_colors.colors(self.look, self.randoms, self.points.shape[1])
+        return strand_colors.colors(self.look, self.randoms, self.points.shape[1], self.looks)
 
     def local(self, made: PolygonMesh) -> PolygonMesh:
         """Transform a mesh to the surface's local coordinates."""
@@ -65,6 +68,7 @@ def read_hair(hair):
     if not is_hair.any():
         raise HairError('"{name}" has no strands.', name=name_of(hair))
     surface = scene.read_surface(surface_object, scene.present_depsgraph())
+    looks = strand_maps.read_looks(hair)
     return HairBeside(
         name_of(hair),
         Remembered(surface_object),
@@ -74,6 +78,7 @@ def read_hair(hair):
         properties.look_of(hair.vellus),
         surface.posed_mesh,
         surface.to_local_axes,
+        None if looks is None else looks[is_hair],
         list(modified_strands.notes_of(hair)),
     )
 

@@ -4,6 +4,7 @@
 After an event nothing is drawn or computed from values that were cached before it.
 """
 
+from ..data.maps import image_pixels
 from ..data.pictures import root_colors
 from ..gpu import world_texture
 from ..groom.guides import guide_states
@@ -23,6 +24,11 @@ def curves_reported(datablock):
     guide_states.state_cache.invalidate(datablock.session_uid)
 
 
+def looks_written(datablock):
+    """Looks of strands by maps were written to hair Curves: cached strands get them."""
+    hair_cache.follow_looks(datablock)
+
+
 def hair_evaluated(hair_object):
     """Blender has evaluated an object of hair for another frame: its modifiers may have changed the strands."""
     modified_hair.invalidate(hair_object)
@@ -40,6 +46,10 @@ def surface_moved(surface_object):
 
 
 def image_changed():
-    """Pixels of images or a world may have changed: check the world's light. Each render checks by itself."""
+    """Pixels of images or a world may have changed: read maps again, and check the world's light.
+
+    Each render checks by itself.
+    """
+    image_pixels.pixel_cache.clear()
     world_texture.check_image()
     root_colors.sample_cache.clear()

@@ -92,6 +92,7 @@ def after_depsgraph_update(scene, depsgraph):
         events.image_changed()
     painted = {report.datablock for report in reports if report.is_of(bpy.types.Image)} - {None}
     _mark_painted(painted, depsgraph)
+    stale_marks.follow_mapped_surfaces({surface for surface in deformed if surface.data in changed})
     combed = {}
     for datablock in changed:
         if isinstance(datablock, bpy.types.Mesh):
@@ -165,6 +166,7 @@ def _mark_painted(images, depsgraph):
     """Mark guides and hair as stale if their images were painted: roots stay if the pixels did not change."""
     names = {name_of(image) for image in images}
     painting = set()
+    stale_marks.follow_mapped_images(images)
     for datablock in bpy.data.hair_curves:
         surface, used = datablock.surface, stale_marks.images_of(datablock)
         if surface is None or not used:
@@ -228,6 +230,7 @@ def _evaluate_hair(hair, depsgraph, combed):
         live_hair.follow_guides(hair, depsgraph, combed[state.guide_curves])
     if state.is_shading_stale:
         looks.evaluate_shading(hair)
+        events.looks_written(hair)
 
 
 def _is_surface_at_rest(curves):

@@ -5,6 +5,7 @@
 """
 
 from ..data import guide_map_readers, scene, subdivided_surfaces, usable_surfaces
+from ..data.maps import image_pixels, sources
 from ..data.pictures import drawn_meshes, root_colors
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
@@ -53,6 +54,7 @@ COPIES = (
     moving_surfaces.moved_cache,
     moving_surfaces.unchecked_cache,
     guide_map_readers.reading_cache,
+    image_pixels.pixel_cache,
 )
 
 # Values that are keyed by all of their inputs, or check by themselves whether they are up to date.
@@ -60,6 +62,7 @@ OTHERS = (
     hair_cache.shading_cache,
     scene.faces_cache,
     scene.surface_cache,
+    sources.texel_cache,
     drawn_meshes.layout_cache,
     edited_faces.left_cache,
     frame_faces.count_cache,

@@ -11,7 +11,7 @@ from ..data.strands import curves, drawn_lines
 from ..groom import applied_transforms, bindings, edited_surfaces, frame_faces, staleness
 from ..groom.edited_surfaces import Followed
 from ..host.notices import text_of
-from ..settings import style_items
+from ..settings import marks, style_items
 from . import events, reported
 
 
@@ -169,6 +169,23 @@ def follow_images(target, depsgraph):
     with _refusal_as_status(target):
         if staleness.has_other_mask(target, depsgraph):
             _mark(target)
+
+
+def follow_mapped_images(images):
+    """Mark hair whose settings vary by any of some images, which may have been painted."""
+    for datablock in bpy.data.hair_curves if images else ():
+        for item in datablock.vellus.maps:
+            if item.kind == "IMAGE" and item.image in images:
+                marks.mark_changed_map(item)
+
+
+def follow_mapped_surfaces(surfaces):
+    """Mark hair whose settings vary by weights or attributes of any of some surfaces, which may have been painted."""
+    for datablock in bpy.data.hair_curves if surfaces else ():
+        if datablock.surface in surfaces:
+            for item in datablock.vellus.maps:
+                if item.kind in {"GROUP", "ATTRIBUTE", "IMAGE"}:
+                    marks.mark_changed_map(item)
 
 
 def has_masks(state):

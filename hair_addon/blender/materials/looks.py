@@ -14,8 +14,8 @@ def evaluate_shading(target):
     target.vellus.is_shading_stale = False
     curves_objects.draw_natively(target, not target.vellus.is_drawn)
     try:
-        materials.write_hair_material(target)
-        target.vellus.shading_status = ""
+        errors = materials.write_hair_material(target)
+        target.vellus.shading_status = str(errors[0]) if errors else ""
     except HairError as error:
         target.vellus.shading_status = str(error)
 

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...core.shading import appearance
+from ...core.shading import appearance, strand_looks
+from ..data.maps import strand_maps
 from ..data.strands import curves as curve_data
 from ..host.notices import name_of
 from ..settings import properties, setting_properties, shared_wetness
@@ -17,11 +18,14 @@ _OURS = "is_vellus_hair"  # the custom property of materials created by Vellus
 def write_hair_material(curves):
     """Give Curves a Principled Hair material of their appearance; an artist's material is left alone.
 
+    Looks by maps are stored in the Curves. Returns [`HairError`] about missing sources of maps.
+
     Linked Curves keep their materials: undo does not restore assignments to linked data, so that they would keep a
     deleted material, which crashes Blender.
     """
     if curves.library is not None:
-        return
+        return []
+    errors = strand_maps.write_looks(curves)
     slot = next((slot for slot, m in enumerate(curves.materials) if m is not None), None)
     if slot is None:
         material = bpy.data.materials.new(name_of(curves))
@@ -37,15 +41,24 @@ def write_hair_material(curves):
         node = next(nodes, None)
         if node is not None:  # otherwise the user has edited it
             look = properties.look_of(curves.vellus)
-            if not appearance.strand_settings(look).is_even:
+            is_mapped = strand_maps.has(curves)
+            if is_mapped or not appearance.strand_settings(look).is_even:
                 curve_data.write_randoms(curves)  # older hair lacks this attribute
             if _has_places(curves):
-                _fill(node, material, properties.dry_look_of(curves.vellus))
+                _fill(node, material, properties.dry_look_of(curves.vellus), is_mapped)
                 wettest = wet_nodes.write(material.node_tree, node, shared_wetness.of_hair(curves.vellus))
-                _fill(wettest, material, look)
+                _fill(wettest, material, look, is_mapped)
             else:
                 wet_nodes.remove(material.node_tree, node)
-                _fill(node, material, look)
+                _fill(node, material, look, is_mapped)
+            if is_mapped:
+                _show_mean(material, look, strand_maps.read_looks(curves))
+    return errors
+
+
+def _show_mean(material, look, looks):
+    """Give a material the mean color of strands, for renderers without hair."""
+    material.diffuse_color = (*strand_looks.mean_color(look, looks), 1.0)
 
 
 def _has_places(curves):
@@ -72,6 +85,7 @@ def _shows_another_look(material, curves):
 def _values(curves):
     state = curves.vellus
     values = setting_properties.values_of(state.appearance, setting_properties.names_of(appearance.Appearance))
+    values["has_looks"] = strand_maps.has(curves)
     least, most = shared_wetness.of_hair(state)
     return values | {"wetness": (least if curve_data.has_wetness(curves) else most, most)}
 
@@ -91,7 +105,7 @@ def _hair_node(tree):
     tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
 
 
-def _fill(node, material, look):
+def _fill(node, material, look, is_mapped=False):
     color = (*appearance.mean_color(look), 1.0)
     # By identifier: sockets that the node's parametrization disables cannot be looked up by name.
     sockets = {socket.identifier: socket for socket in node.inputs}
@@ -100,8 +114,8 @@ def _fill(node, material, look):
         sockets[name].default_value = value
     material.diffuse_color = color
     variation, varied_color = appearance.strand_settings(look), None
-    if variation.is_even:
+    if variation.is_even and not is_mapped:
         strand_nodes.remove(material.node_tree)
     else:
-        varied_color = strand_nodes.write(material.node_tree, node, variation, eevee_nodes.falloff_of(look))
+        varied_color = strand_nodes.write(material.node_tree, node, variation, eevee_nodes.falloff_of(look), is_mapped)
     eevee_nodes.write(material.node_tree, node, look, varied_color)

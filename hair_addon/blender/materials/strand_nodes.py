@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shader nodes that vary the absorption between and along strands: `strand_variation` in Cycles.
 
-The strand's random number comes from the same attribute as in the viewport; for strands with evenly spaced points, Hair
-Info's intercept is the viewport's position along the strand.
+Where maps vary the look, attributes of the hair's Curves have the absorption at root and tip and a factor of the
+roughness, so that linked and exported hair keeps its colors. The strand's random number comes from the same attribute
+as in the viewport; for strands with evenly spaced points, Hair Info's intercept is the viewport's position along the
+strand.
 """
 
 import math
 
 from ...core.shading.fibre.pigment import LEAST_LIGHT
+from ..data.maps import strand_maps
 
 _PREFIX = "Vellus "  # of the names of our nodes, which identifies them
 
@@ -31,6 +34,19 @@ _NODES = {
     "Falloff": ("ShaderNodeVectorMath", {"operation": "SCALE"}, (10, 1)),
     "Color": ("ShaderNodeVectorMath", {"operation": "POWER"}, (11, 1)),  # for EEVEE
 }
+# The same with looks of strands by maps.
+_MAPPED_NODES = {
+    "Strands": ("NodeFrame", {"label": "Looks of strands by maps"}, (0, 0)),
+    "Random": ("ShaderNodeAttribute", {"attribute_name": "strand_random"}, (0, 0)),
+    "Root": ("ShaderNodeAttribute", {"attribute_name": strand_maps.ROOT}, (0, 1)),
+    "Tip": ("ShaderNodeAttribute", {"attribute_name": strand_maps.TIP}, (0, 2)),
+    "Position": ("ShaderNodeHairInfo", {}, (0, 3)),
+    "Roughness": ("ShaderNodeAttribute", {"attribute_name": strand_maps.ROUGHNESS}, (0, 4)),
+    "Gradient": ("ShaderNodeMapRange", {"interpolation_type": "SMOOTHSTEP"}, (1, 3)),
+    "Difference": ("ShaderNodeVectorMath", {"operation": "SUBTRACT"}, (1, 2)),
+    "Tip Part": ("ShaderNodeVectorMath", {"operation": "SCALE"}, (2, 2)),
+    **{name: _NODES[name] for name in ("Absorption", "Square Root", "Falloff", "Color")},
+}
 _SPACING = (180.0, -190.0)
 
 # (node, output, node, input); sockets by index where their names repeat.
@@ -51,20 +67,45 @@ _LINKS = (
     ("Square Root", 0, "Falloff", 0),
     ("Falloff", 0, "Color", 1),
 )
+_MAPPED_LINKS = (
+    ("Position", "Intercept", "Gradient", "Value"),
+    ("Tip", "Vector", "Difference", 0),
+    ("Root", "Vector", "Difference", 1),
+    ("Difference", 0, "Tip Part", 0),
+    ("Gradient", "Result", "Tip Part", "Scale"),
+    ("Root", "Vector", "Absorption", 0),
+    ("Tip Part", 0, "Absorption", 1),
+    *_LINKS[-3:],
+)
+_SCALED = "Scaled Roughness of "  # nodes that multiply the roughness of a hair node, by the name of it
 
 
-def write(tree, hair_node, variation, falloff):
-    """Vary the absorption of a Principled Hair node; returns the output of a color with this falloff, for EEVEE."""
+def write(tree, hair_node, variation, falloff, is_mapped=False):
+    """Vary the absorption of a Principled Hair node; returns the output of a color with this falloff, for EEVEE.
+
+    is_mapped: by the looks that the hair's Curves store.
+    """
     nodes = _ours(tree)
-    if set(nodes) != set(_NODES):
+    graph = (_MAPPED_NODES, _MAPPED_LINKS) if is_mapped else (_NODES, _LINKS)
+    if {name for name in nodes if not name.startswith(_SCALED)} != set(graph[0]):
         remove(tree)
-        nodes = _build(tree)
+        nodes = _build(tree, *graph)
         nodes["Strands"].location = (hair_node.location.x - 15 * _SPACING[0], hair_node.location.y)
     for name, inputs in _values(variation, falloff).items():
+        if name not in graph[0] or (is_mapped and name == "Tip"):
+            continue
         for socket, value in inputs.items():
             _input(nodes[name], socket).default_value = value
-    # Pigment without melanin varies directly, not through its concentration.
-    _link(tree, nodes["Concentration" if variation.melanin >= 1e-4 else "Factor"].outputs[0], nodes["Pigment"], "Scale")
+    if is_mapped:
+        _scale_roughness(tree, hair_node, nodes)
+    else:
+        # Pigment without melanin varies directly, not through its concentration.
+        _link(
+            tree,
+            nodes["Concentration" if variation.melanin >= 1e-4 else "Factor"].outputs[0],
+            nodes["Pigment"],
+            "Scale",
+        )
     _link(tree, nodes["Absorption"].outputs[0], hair_node, "Absorption Coefficient")
     _link(tree, _output(nodes["Random"], "Fac"), hair_node, "Random")
     return nodes["Color"].outputs[0]
@@ -80,9 +121,22 @@ def _ours(tree):
     return {node.name.removeprefix(_PREFIX): node for node in tree.nodes if node.name.startswith(_PREFIX)}
 
 
-def _build(tree):
+def _scale_roughness(tree, hair_node, nodes):
+    """Multiply the roughness of a hair node by the factor of each strand."""
+    name = f"{_SCALED}{hair_node.name}"
+    node = nodes.get(name)
+    if node is None:
+        node = tree.nodes.new("ShaderNodeMath")
+        node.operation, node.name, node.label, node.hide = "MULTIPLY", _PREFIX + name, "Roughness", True
+        node.location = (hair_node.location.x - _SPACING[0], hair_node.location.y - 80.0)
+        tree.links.new(_output(nodes["Roughness"], "Fac"), node.inputs[0])
+    node.inputs[1].default_value = _input(hair_node, "Roughness").default_value
+    _link(tree, node.outputs[0], hair_node, "Roughness")
+
+
+def _build(tree, wanted, links):
     nodes = {}
-    for name, (kind, properties, (column, row)) in _NODES.items():
+    for name, (kind, properties, (column, row)) in wanted.items():
         node = nodes[name] = tree.nodes.new(kind)
         node.name = _PREFIX + name
         node.label = name
@@ -92,7 +146,7 @@ def _build(tree):
             node.parent = nodes["Strands"]
             node.location = (column * _SPACING[0], row * _SPACING[1])
             node.hide = kind != "ShaderNodeAttribute"
-    for source, output, target, socket in _LINKS:
+    for source, output, target, socket in links:
         tree.links.new(_output(nodes[source], output), _input(nodes[target], socket))
     return nodes
 

@@ -375,7 +375,7 @@ def _read_rendered_hair(depsgraph, known, refused, noted):
             if read.note is not None:
                 noted(original, read.note)
             uid = hair_object.original.session_uid
-            if uid not in known or not all(map(np.array_equal, read.arrays, known[uid])):
+            if uid not in known or not read_strands.are_same(read.arrays, known[uid][:-1]):
                 known[uid] = (*read.arrays, strand_textures.upload_strands(*read.arrays))
             strands = known[uid][-1]
             shading = hair_cache.shading_of(original.evaluated_get(depsgraph), strands)  # settings may be keyed

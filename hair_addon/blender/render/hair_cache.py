@@ -15,8 +15,10 @@ import numpy as np
 from ...core.errors import HairError, memory_as_sentence
 from ...core.files import table_cache, table_exr
 from ...core.kernels.checks import require_count, require_indices
-from ...core.shading import appearance
-from ...core.shading.tables import lookup_tables, strand_tables
+from ...core.shading import appearance, strand_looks
+from ...core.shading.strand_looks import StrandLooks
+from ...core.shading.tables import look_tables, lookup_tables, strand_tables
+from ..data.maps import sources, strand_maps
 from ..data.strands import attributes, curves, posed_strands, simulated_guides, stored_roots
 from ..gpu import hair_shading, strand_textures
 from ..groom import bindings
@@ -38,6 +40,7 @@ class _CachedStrands:
     radii: np.ndarray  # (S, P) float32
     randoms: np.ndarray  # (S,) float32
     wetness: np.ndarray | None  # (S,) float32, None if strands do not differ
+    looks: StrandLooks | None  # (S,), None without maps
     places: tuple | None  # roots from `stored_roots.places`, or None
     rooted_on: tuple  # (session_uid of the surface, its topology)
     may_start_off_surface: bool  # whether strands may begin off the surface
@@ -53,6 +56,8 @@ class _CachedStrands:
         require_count("random numbers", len(self.randoms), len(self.points))
         if self.wetness is not None:
             require_count("wetness", len(self.wetness), len(self.points))
+        if self.looks is not None:
+            require_count("looks", len(self.looks), len(self.points))
 
 
 strand_cache = Cache()  # session_uid of Curves → _CachedStrands or Refused
@@ -83,7 +88,7 @@ def _upload_styled(datablock, bound):
     bound.update_points()
     styled = _read(datablock, bound, bound)
     return strand_textures.upload_strands(
-        _carried(styled, _pose_of(datablock.surface)), styled.radii, styled.randoms, styled.wetness
+        _carried(styled, _pose_of(datablock.surface)), styled.radii, styled.randoms, styled.wetness, styled.looks
     )
 
 
@@ -97,6 +102,8 @@ def strands_on_gpu(datablock):
         return None
     if cached is None or (cached.growing is not None and cached.growing.result() is not cached.points):
         cached = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
+    if cached.on_gpu is not None and cached.on_gpu.looks_here is not cached.looks:
+        cached.on_gpu = strand_textures.with_looks(cached.on_gpu, cached.looks)
     pose = _pose_of(datablock.surface)
     is_elsewhere = cached.on_gpu is None or cached.pose is not pose
     is_due = cached.generator.due is not None
@@ -111,7 +118,9 @@ def strands_on_gpu(datablock):
         cached.generator.carrier = None  # its strands at rest are outdated
     if cached.on_gpu is None or is_elsewhere or (moved and not cached.on_gpu.has_points):
         points = _carried(cached, pose)
-        cached.on_gpu = strand_textures.upload_strands(points, cached.radii, cached.randoms, cached.wetness)
+        cached.on_gpu = strand_textures.upload_strands(
+            points, cached.radii, cached.randoms, cached.wetness, cached.looks
+        )
         cached.pose = pose
     elif moved:
         chosen = np.unique(np.concatenate(moved))
@@ -251,6 +260,18 @@ def invalidate_unless_same(datablock):
     cached = _strands_of(uid)
     if cached is None or not _is_same(datablock, cached, bound):
         strand_cache.invalidate(uid)
+    else:
+        follow_looks(datablock)
+
+
+def follow_looks(datablock):
+    """Update the looks of cached strands, which maps may have changed; the next redraw uploads them."""
+    cached = _strands_of(datablock.session_uid)
+    if cached is None or len(cached.points) != len(datablock.curves):
+        return
+    looks = strand_maps.read_looks(datablock)
+    if not strand_looks.are_same(looks, cached.looks):
+        cached.looks = looks
 
 
 def _is_same(datablock, cached, bound):
@@ -301,12 +322,30 @@ def _read(datablock, bound, shown):
         return _CachedStrands(*read.arrays, *rooted, read.note)
     if bound.is_written or bound.has_moved_only:
         randoms, wetness = curves.read_randoms(datablock), curves.read_wetness(datablock)
+        looks = strand_maps.read_looks(datablock)
     else:
         (_identities, randoms), wetness = bound.binding.identities, bound.styles.wetness
+        looks = _unwritten_looks(datablock, bound)
     # Roots are taken from the binding too: the datablock may store the roots of earlier strands.
     places, rooted_on = bound.surface.places(bound.binding.roots), _rooted_on(datablock, bound.surface.topology)
     radii = _radii_of(datablock, bound, len(shown.points))
-    return _CachedStrands(shown.points, radii, randoms, wetness, places, rooted_on, False, growing=shown.growing)
+    return _CachedStrands(shown.points, radii, randoms, wetness, looks, places, rooted_on, False, growing=shown.growing)
+
+
+def _unwritten_looks(datablock, bound):
+    """The `StrandLooks` of bound hair that is not written yet."""
+    clumps = bound.styles.clumps
+    identities, randoms = bound.binding.identities
+    strands = sources.Strands(
+        datablock,
+        datablock.surface,
+        bound.surface,
+        bound.binding.roots,
+        identities,
+        randoms,
+        None if clumps is None else clumps[0],
+    )
+    return strand_maps.looks_of(datablock, strands)[0]
 
 
 def _radii_of(datablock, bound, count):
@@ -337,12 +376,12 @@ def shading_of(datablock, strands=None, is_neutral=False):
     """
     if is_neutral:
         return _neutral_shading_of(datablock)
-    state = datablock.vellus
-    wettest = _shading_of_look(state, properties.look_of(state))
+    state, looks = datablock.vellus, None if strands is None else strands.looks_here
+    wettest = _shading_of_look(state, properties.look_of(state), looks)
     least, most = shared_wetness.of_hair(state)
     if strands is None or strands.wetness is None or least == most:
         return wettest
-    driest = _shading_of_look(state, properties.dry_look_of(state))
+    driest = _shading_of_look(state, properties.dry_look_of(state), looks)
     return hair_shading.mixed(driest, wettest, strands.wetness_here, (least, most))
 
 
@@ -352,8 +391,10 @@ def _neutral_shading_of(datablock):
     return _cached_shading((settings,), lambda wanted: hair_shading.marschner_shading(_tables(wanted, "")))
 
 
-def _shading_of_look(state, look):
+def _shading_of_look(state, look, looks=None):
     variation = appearance.strand_settings(look)
+    if looks is not None:
+        return _shading_of_looks(state, look, look_tables.variation_of(variation), looks)
     if state.model == "KAJIYA_KAY":
         if variation.is_even:
             return _cached_shading((appearance.kajiya_kay_settings(look),), hair_shading.kajiya_kay_shading)
@@ -366,6 +407,21 @@ def _shading_of_look(state, look):
             (settings,), lambda wanted: hair_shading.marschner_shading(_tables(wanted, state.table_folder))
         )
     return _cached_shading((settings, variation), _strand_shading)
+
+
+def _shading_of_looks(state, look, variation, looks):
+    """The `Shading` of strands with `StrandLooks`."""
+    some = strand_looks.sample_sigma_a(look, looks)
+    if state.model == "KAJIYA_KAY":
+        settings = appearance.kajiya_kay_strand_settings(look)
+        return hair_shading.kajiya_kay_look_shading(settings, variation, some)
+    settings = replace(properties.table_settings_of(state, look), sigma_a=(0.0, 0.0, 0.0))
+    covered = look_tables.covering(*looks.absorption_range)
+    return _cached_shading((settings, variation, covered), _look_shading)(some)
+
+
+def _look_shading(settings, variation, covered):
+    return hair_shading.marschner_look_shading(look_tables.bake(settings, variation, covered, preferences.device()))
 
 
 def _strand_shading(settings, variation):

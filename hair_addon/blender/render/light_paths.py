@@ -93,8 +93,12 @@ def _strands_of(strands, shading, to_world, first):
         shares = appearance.wet_share(strands.wetness_here, *shading.wetness_range)
         is_wettest = (np.random.default_rng(0).random(count) < shares).astype(int)
     fibres = [layer.fibre for layer, _mix in layers]
+    looks = strands.looks_here
+    factors = 1.0 if looks is None else looks.roughness.astype(float)
     roughness = [
-        varied_roughness(settings.roughness, 0.0 if variation is None else variation.random_roughness, randoms)
+        varied_roughness(
+            settings.roughness * factors, 0.0 if variation is None else variation.random_roughness, randoms
+        )
         for settings, variation in fibres
     ]
 
@@ -105,6 +109,8 @@ def _strands_of(strands, shading, to_world, first):
         gradient = strand_variation.tip_gradient(variation.gradient_start, variation.gradient_end, places)
 
     def absorption(chosen):
+        if looks is not None:
+            return looks[chosen].sigma_a(ends[None])
         if variation is None:
             return np.broadcast_to(np.asarray(settings.sigma_a, float), (1, 2, 3))
         return strand_variation.sigma_a_along(variation, randoms[chosen, None], ends)

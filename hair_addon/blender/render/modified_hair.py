@@ -40,7 +40,7 @@ def strands_on_gpu(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph
     if known is not None and known.is_current:
         return known.on_gpu
     read = read_strands.read(hair_object.evaluated_get(depsgraph).data)
-    if known is not None and all(map(np.array_equal, read.arrays, known.arrays)):
+    if known is not None and read_strands.are_same(read.arrays, known.arrays):
         known.is_current = True
         return known.on_gpu
     forget_deleted()

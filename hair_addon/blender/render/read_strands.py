@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands of Curves for drawing: with the same point count, without strands that have invalid coordinates."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,9 @@ from ...core import geometry
 from ...core.errors import HairError
 from ...core.geometry import strands
 from ...core.grooming import groom
+from ...core.shading import strand_looks
+from ...core.shading.strand_looks import StrandLooks
+from ..data.maps import strand_maps
 from ..data.strands import attributes, curves
 from ..host import notices
 from ..host.notices import name_of
@@ -23,13 +27,21 @@ class ReadStrands:
     radii: np.ndarray  # (S, P) float32
     randoms: np.ndarray  # (S,) float32
     wetness: np.ndarray | None  # (S,) float32, None if strands do not differ
+    looks: StrandLooks | None  # (S,), None without maps
     is_sound: np.ndarray | None  # (N,) bool: whether each curve is valid, None if all are
     note: HairError | None  # about curves that are left out
 
     @property
-    def arrays(self) -> tuple[np.ndarray | None, ...]:
+    def arrays(self) -> tuple[np.ndarray | StrandLooks | None, ...]:
         """Arguments of `strand_textures.upload_strands`."""
-        return self.points, self.radii, self.randoms, self.wetness
+        return self.points, self.radii, self.randoms, self.wetness, self.looks
+
+
+def are_same(arrays: Sequence[Any], others: Sequence[Any]) -> bool:
+    """Whether the `arrays` of strands are equal to others."""
+    *numbers, looks = arrays
+    *their_numbers, their_looks = others
+    return all(map(np.array_equal, numbers, their_numbers)) and strand_looks.are_same(looks, their_looks)
 
 
 def read(datablock: Any) -> ReadStrands:
@@ -43,6 +55,7 @@ def read(datablock: Any) -> ReadStrands:
         raise HairError('"{name}" has no strands to draw.', name=name_of(datablock))
     points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
     wetness, is_smooth, note = curves.read_wetness(datablock), attributes.are_smooth(datablock), None
+    looks = strand_maps.read_looks(datablock)
     is_sound = _are_sound(points, counts)
     if is_sound is not None:
         note = _left_out(datablock, is_sound)
@@ -50,6 +63,7 @@ def read(datablock: Any) -> ReadStrands:
         points, radii = points[of_point], radii[of_point]
         counts, randoms, is_smooth = counts[is_sound], randoms[is_sound], is_smooth[is_sound]
         wetness = None if wetness is None else wetness[is_sound]
+        looks = None if looks is None else looks[is_sound]
     most = int(counts.max())
     if is_smooth.any():
         most = max(most, groom.POINT_COUNT)
@@ -59,7 +73,7 @@ def read(datablock: Any) -> ReadStrands:
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
         radii = strands.resample_values(radii, points, starts, most)
         points = geometry.resampling.resample(points, starts, most, is_smooth)
-    return ReadStrands(points, radii, randoms, wetness, is_sound, note)
+    return ReadStrands(points, radii, randoms, wetness, looks, is_sound, note)
 
 
 def _are_sound(points, counts):

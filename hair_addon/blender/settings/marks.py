@@ -16,6 +16,23 @@ def mark_shading(group, _context):
     group.id_data.update_tag()
 
 
+def mark_map(item, context):
+    """Mark what the map of a setting changes: the shading, or the strands."""
+    if item.setting.startswith("look."):
+        mark_shading(item, context)
+    elif item.setting:
+        mark_geometry(item, context)
+
+
+def mark_changed_map(item):
+    """Mark what a map changes whose source has changed, within the update that reports the source."""
+    state = item.id_data.vellus
+    if item.setting.startswith("look."):
+        state.is_shading_stale = True
+    elif item.setting:
+        state.is_stale = True
+
+
 def mark_shown(group, _context):
     """Redraw viewports without recomputing."""
     group.id_data.update_tag()

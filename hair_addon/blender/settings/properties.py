@@ -16,7 +16,7 @@ from ...core.imaging.pixel_sampling import PassSettings, RenderSettings
 from ...core.shading import appearance
 from ...core.shading.appearance import Appearance
 from ...core.shading.tables import lookup_tables
-from . import setting_properties, shared_wetness, style_items, style_keys
+from . import map_items, setting_properties, shared_wetness, style_items, style_keys
 from .marks import (
     mark_colliding,
     mark_dynamics,
@@ -176,6 +176,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     hair: bpy.props.PointerProperty(type=VellusHairSettings)
     styles: bpy.props.CollectionProperty(type=style_items.VellusStyle)
     active_style: bpy.props.IntProperty(min=0, options=set())
+    maps: bpy.props.CollectionProperty(type=map_items.VellusMap)
     model: bpy.props.EnumProperty(
         name="Shading Model",
         description="Scattering model that shades the hair in the viewport",
@@ -318,6 +319,7 @@ class VellusPassSettings(bpy.types.PropertyGroup):
 
 CLASSES = (
     *style_items.CLASSES,
+    *map_items.CLASSES,
     VellusGuideSettings,
     VellusHairSettings,
     VellusAppearance,

@@ -13,16 +13,16 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 def connected_components(mesh: TriMesh) -> np.ndarray:
     """Return the component (F,) int32 of each triangle; vertices at the same position count as one."""
-    found = _joined(mesh.checked_triangles, len(mesh.vertices))
+    found = joined(mesh.checked_triangles, len(mesh.vertices))
     if found.any():  # several: seams with unmerged vertices do not separate a surface
         _, welded = np.unique(mesh.vertices, axis=0, return_inverse=True)
-        found = _joined(welded.reshape(-1)[mesh.triangles], len(mesh.vertices))
+        found = joined(welded.reshape(-1)[mesh.triangles], len(mesh.vertices))
     _, numbers = np.unique(found, return_inverse=True)
     return numbers.reshape(-1).astype(np.int32)
 
 
-def _joined(triangles, vertex_count):
-    """Return (F,) int32: the lowest vertex of each triangle's component."""
+def joined(triangles: np.ndarray, vertex_count: int) -> np.ndarray:
+    """Return (F,) int32: the lowest vertex of the component of each triangle (F, 3) of valid vertices."""
     # Union-find is sequential, and therefore runs on the CPU.
     parents = wp.array(np.arange(vertex_count, dtype=np.int32), device="cpu")
     triangles = wp.array(triangles.astype(np.int32), dtype=int, device="cpu")

@@ -6,6 +6,6 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import appearance, fibre, light_paths, presets, strand_colors, tables
+    from . import appearance, fibre, light_paths, presets, strand_colors, strand_looks, tables
 else:
     __getattr__ = submodules(__name__)

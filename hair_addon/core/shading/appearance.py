@@ -65,17 +65,38 @@ class Appearance(Settings):
         ),
     )
     melanin: float = param(
-        0.34, "Amount of pigment; higher values are darker: 0.2 is blond, 0.66 brown, 1 black", low=0.0, high=1.0
+        0.34,
+        "Amount of pigment; higher values are darker: 0.2 is blond, 0.66 brown, 1 black",
+        low=0.0,
+        high=1.0,
+        may_vary=True,
     )
     redness: float = param(
-        0.3, "Proportion of red pigment; higher values are redder", label="Redness", low=0.0, high=1.0
+        0.3,
+        "Proportion of red pigment; higher values are redder",
+        label="Redness",
+        low=0.0,
+        high=1.0,
+        may_vary=True,
     )
-    tint: tuple = param(_WHITE, "Color of a dye over the melanin; white is no dye", low=0.0, high=1.0, subtype="COLOR")
+    tint: tuple = param(
+        _WHITE,
+        "Color of a dye over the melanin; white is no dye",
+        low=0.0,
+        high=1.0,
+        subtype="COLOR",
+        may_vary=True,
+    )
     color: tuple = param(
-        (0.017513, 0.005763, 0.002059), "Overall color of the hair", low=0.0, high=1.0, subtype="COLOR"
+        (0.017513, 0.005763, 0.002059),
+        "Overall color of the hair",
+        low=0.0,
+        high=1.0,
+        subtype="COLOR",
+        may_vary=True,
     )
     absorption: tuple = param_of(marschner.Settings, "sigma_a", (0.245531, 0.52, 1.365))
-    roughness: float = param_of(marschner.Settings, "roughness")
+    roughness: float = param_of(marschner.Settings, "roughness", may_vary=True)
     radial_roughness: float = param_of(marschner.Settings, "radial_roughness")
     coat: float = param_of(marschner.Settings, "coat")
     ior: float = param_of(marschner.Settings, "eta")
@@ -94,8 +115,16 @@ class Appearance(Settings):
         "Pigment at the tip relative to the root; values below 1 bleach the tips, values above 1 darken them",
         low=0.0,
         high=10.0,
+        may_vary=True,
     )
-    tip_tint: tuple = param(_WHITE, "Color of a dye at the tip; white is no dye", low=0.0, high=1.0, subtype="COLOR")
+    tip_tint: tuple = param(
+        _WHITE,
+        "Color of a dye at the tip; white is no dye",
+        low=0.0,
+        high=1.0,
+        subtype="COLOR",
+        may_vary=True,
+    )
     gradient_start: float = param(
         0.3,
         "Position along the strand where the tip color begins; 0 is the root, 1 the tip",
@@ -174,6 +203,11 @@ def mean_color(appearance: Appearance) -> np.ndarray:
     """
     sigma_a_everywhere = strand_variation.sample_sigma_a(strand_settings(appearance))
     color = color_from_sigma_a(sigma_a_everywhere, appearance.radial_roughness).reshape(-1, 3).mean(axis=0)
+    return dimmed(color, appearance)
+
+
+def dimmed(color: np.ndarray, appearance: Appearance) -> np.ndarray:
+    """Return the color (3,) of hair whose fibres reflect as much as those of a look, from that of dry fibres."""
     scattering = _mean_reflectance(shaded(appearance).ior) / _mean_reflectance(FITTED_IOR)
     return color_of_scattering(color, max(scattering, _LEAST_SCATTERING))
 

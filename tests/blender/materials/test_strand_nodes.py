@@ -5,8 +5,10 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon.blender.data.maps import strand_maps
+from hair_addon.blender.data.strands import attributes
 from hair_addon.blender.materials import strand_nodes
-from hair_addon.core.shading import appearance
+from hair_addon.core.shading import appearance, strand_looks
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.fibre import strand_variation
 
@@ -96,6 +98,32 @@ def test_nodes_compute_the_strands_absorption(patch, tmp_path, name):
     expected = strand_variation.strand_sigma_a(appearance.strand_settings(look), random, position[:, None])
     expected = expected.reshape(HEIGHT, 16, STRAND_COUNT, 3).mean(axis=1)  # over each pixel's height
     np.testing.assert_allclose(found, expected, rtol=5e-3, atol=2e-3 * expected.max())
+
+
+def test_nodes_compute_the_looks_of_maps(patch, tmp_path):
+    """Cycles shows the absorption that maps give each strand, from root to tip, and the factor of its roughness."""
+    look = Appearance(tip_absorption=0.4, random_color=0.5, gradient_start=0.2, roughness=0.4)
+    random = np.linspace(0.0, 1.0, STRAND_COUNT)
+    varied = {"melanin": np.linspace(0.1, 0.9, STRAND_COUNT), "roughness": np.linspace(0.1, 0.9, STRAND_COUNT)}
+    looks = strand_looks.strand_looks(look, varied, random)
+    kinds = ("FLOAT_VECTOR", "FLOAT_VECTOR", "FLOAT")
+    names = (strand_maps.ROOT, strand_maps.TIP, strand_maps.ROUGHNESS)
+    for name, kind, values in zip(names, kinds, (looks.root, looks.tip, looks.roughness), strict=True):
+        attributes.write(patch.data, name, kind, "CURVE", values)
+    assert strand_maps.read_looks(patch.data).is_same(looks)
+    material, node = varied_material(look)
+    node.inputs["Roughness"].default_value = look.roughness
+    strand_nodes.write(material.node_tree, node, appearance.strand_settings(look), 1.0, is_mapped=True)
+    patch.data.materials.append(material)
+    socket = emission_of(material)
+    position = (np.arange(16 * HEIGHT) + 0.5) / (16 * HEIGHT)
+    sigma_a = looks.sigma_a(strand_looks.gradient_of(look, position)[None]).transpose(1, 0, 2)
+    expected = sigma_a.reshape(HEIGHT, 16, STRAND_COUNT, 3).mean(axis=1)
+    rough = varied["roughness"][None, :, None]
+    for name, wanted in (("Absorption Coefficient", expected), ("Roughness", rough)):
+        material.node_tree.links.new(node.inputs[name].links[0].from_socket, socket)
+        found = render(tmp_path)
+        np.testing.assert_allclose(found, np.broadcast_to(wanted, found.shape), rtol=5e-3, atol=2e-3 * wanted.max())
 
 
 def test_a_dyed_part_looks_as_a_plain_node_of_that_absorption(patch, tmp_path):

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         albedo,
         cell_means,
         dual_scattering,
+        look_tables,
         lookup_tables,
         strand_tables,
         surface_albedo,

@@ -56,26 +56,26 @@ def bake(settings: lookup_tables.Settings, variation: strand_variation.Settings,
     random = (np.arange(_RANDOM_STEPS) + 0.5) / _RANDOM_STEPS if variation.random_color > 0.0 else np.array([0.5])
     gradient = np.linspace(0.0, 1.0, _GRADIENT_STEPS if variation.has_gradient else 1)
     around = strand_variation.sigma_a_along(variation, random, gradient[:, None])  # (G, R, 3)
-    dual = _dual(slices, around) if settings.mode == "energy" else None
+    dual = dual_among(slices, around) if settings.mode == "energy" else None
     weights = _part_of_length(variation, gradient)
     forward, backward = (
-        np.einsum("grc,g->c", _at_absorptions(part, slices, around), weights) / len(random)
+        np.einsum("grc,g->c", at_absorptions(part, slices, around), weights) / len(random)
         for part in albedo.mean_parts(slices.lobes, settings)  # (K,) each
     )
-    return StrandTables(slices, variation, dual, _returned(slices), forward, backward)
+    return StrandTables(slices, variation, dual, returned(slices), forward, backward)
 
 
-def _dual(slices, around):
+def dual_among(slices: absorption_slices.Slices, around: np.ndarray) -> np.ndarray:
     """Return `StrandTables.dual` among strands with sigma_a (G, R, 3)."""
     theta = dual_scattering.light_inclinations()
     parts = np.stack(dual_scattering.lobe_parts(slices.lobes, slices.settings, theta))  # (2, 4, T, K)
-    means = _at_absorptions(parts, slices, around).mean(axis=-2)  # (2, 4, T, G, 3)
+    means = at_absorptions(parts, slices, around).mean(axis=-2)  # (2, 4, T, G, 3)
     return np.stack(
         [dual_scattering.quantities(ahead, behind, slices.settings) for ahead, behind in means.transpose(3, 0, 1, 2, 4)]
     )
 
 
-def _returned(slices):
+def returned(slices: absorption_slices.Slices) -> np.ndarray:
     """Return `StrandTables.returned`."""
     moments = albedo.fibre_moments(slices.lobes, slices.settings)  # (4, T, K)
     roots = np.linspace(slices.range.low, slices.range.high, _RETURN_STEPS)
@@ -85,7 +85,7 @@ def _returned(slices):
     return np.ascontiguousarray(mixed.transpose(2, 1, 0), np.float32)
 
 
-def _at_absorptions(values, slices, sigma_a):
+def at_absorptions(values: np.ndarray, slices: absorption_slices.Slices, sigma_a: np.ndarray) -> np.ndarray:
     """Return values (..., K) of the slices interpolated to sigma_a (...), whose axes are appended."""
     below, fraction = absorption_slices.slice_of(sigma_a, slices.range.low, slices.range.high, len(slices.n))
     return absorption_slices.geometric_mix(values[..., below], values[..., below + 1], fraction)

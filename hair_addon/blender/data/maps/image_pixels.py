@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pixels of images and of their UDIM tiles, as core/maps/pixels.py takes them."""
+
+import hashlib
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ....core.errors import HairError
+from ....core.maps import pixels
+from ...host.caches import Cache
+from ...host.notices import name_of
+
+# (session_uid of an image, whether as colors) → (digest, {tile: (H, W, C) float32}); cleared if any image changes.
+pixel_cache = Cache(capacity=16)
+
+
+def read(image, is_color):
+    """{UDIM tile, or None without tiles: (H, W, C) float32 masks or colors of an image}. Raises `HairError`."""
+    key, digest = (image.session_uid, is_color), _digest(image)
+    known = pixel_cache.get(key)
+    if known is None or known[0] != digest:
+        known = pixel_cache.keep(key, (digest, _read(image, is_color)))
+    return known[1]
+
+
+def _digest(image):
+    """What the pixels depend on; of the pixels themselves if they may be painted, which Blender may not report."""
+    kinds = image.source, image.filepath_raw, image.colorspace_settings.name, image.alpha_mode, tuple(image.size)
+    if not (image.is_dirty or image.source == "GENERATED") or not all(image.size):
+        return kinds
+    return *kinds, hashlib.sha1(_raw(image).data, usedforsecurity=False).digest()
+
+
+def _raw(image):
+    width, height = image.size
+    values = np.empty((height, width, image.channels), np.float32)
+    image.pixels.foreach_get(values.ravel())
+    return values
+
+
+def _read(image, is_color):
+    if image.source != "TILED":
+        return {None: _pixels_of(image, image, is_color)}
+    numbers = [tile.number for tile in image.tiles]
+    if numbers == [1001]:
+        return {1001: _pixels_of(image, image, is_color)}
+    return _tiles(image, numbers, is_color)
+
+
+def _tiles(image, numbers, is_color):
+    """Pixels of several tiles: Blender gives access to the first alone, so tiles are read from their files."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = bpy.path.abspath(image.filepath_raw, library=image.library)
+        if image.is_dirty or not all(Path(_named(path, number)).is_file() for number in numbers):
+            path = str(Path(folder) / f"tile.<UDIM>{Path(path).suffix or '.png'}")
+            image.save(filepath=path, save_copy=True)
+        found = {}
+        for number in numbers:
+            file = _named(path, number)
+            if not Path(file).is_file():
+                continue  # a tile without pixels
+            tile = bpy.data.images.load(file, check_existing=False)
+            try:
+                tile.colorspace_settings.name = image.colorspace_settings.name
+                tile.alpha_mode = image.alpha_mode
+                found[number] = _pixels_of(tile, image, is_color)
+            finally:
+                bpy.data.images.remove(tile)
+    if not found:
+        raise _without_pixels(image)
+    return found
+
+
+def _named(path, number):
+    return path.replace("<UDIM>", str(number))
+
+
+def _pixels_of(image, named, is_color):
+    width, height = image.size
+    if not (width and height and image.channels):
+        raise _without_pixels(named)
+    convert = pixels.colors if is_color else pixels.masks
+    return convert(
+        _raw(image),
+        # Blender converts floating-point images while it loads them.
+        is_srgb=not image.is_float and image.colorspace_settings.name == "sRGB",
+        has_alpha=image.alpha_mode in {"STRAIGHT", "PREMUL"},
+        is_premultiplied=image.is_float or image.alpha_mode == "PREMUL",
+    )
+
+
+def _without_pixels(image):
+    return HairError('The image "{name}" has no pixels: reload it, or pick another image.', name=name_of(image))

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Looks of strands by maps: one function makes the arrays, which the hair's Curves store for all who show the hair."""
+
+import numpy as np
+
+from ....core.errors import HairError
+from ....core.maps import combination, varied_settings
+from ....core.shading.strand_looks import StrandLooks, strand_looks
+from ...settings import map_items, properties
+from ..strands import attributes
+from . import sources
+
+ROOT, TIP, ROUGHNESS = "root_absorption", "tip_absorption", "strand_roughness"  # attributes of the hair's Curves
+_LAYOUT = ((ROOT, "FLOAT_VECTOR"), (TIP, "FLOAT_VECTOR"), (ROUGHNESS, "FLOAT"))
+
+
+def has_looks(state) -> bool:
+    """Whether maps vary the look of a hair."""
+    return any(
+        item.setting.startswith("look.") and varied_settings.is_used(item.setting, state.appearance.parametrization)
+        for item in state.maps
+    )
+
+
+def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLooks | None, list[HairError]]:
+    """(`StrandLooks` of hair Curves, errors about missing sources); None without maps of the look.
+
+    strands: that the looks are for; None: those that are stored. A setting with a missing source keeps its value.
+    """
+    if not has_looks(hair.vellus):
+        return None, []
+    if strands is None:
+        strands = sources.stored_strands(hair)
+    look, errors = properties.own_look_of(hair.vellus), []
+    varied = {}
+    for item in hair.vellus.maps:
+        section, _, name = item.setting.partition(".")
+        if section != "look" or item.setting not in varied_settings.all_varied():
+            continue
+        if not varied_settings.is_used(item.setting, look.parametrization):
+            continue
+        try:
+            varied[name] = _varied(strands, item, getattr(look, name))
+        except HairError as error:
+            errors.append(error)
+    return strand_looks(look, varied, strands.randoms), errors
+
+
+def _varied(strands, item, value):
+    """(S,) or (S, 3) of a setting by its map."""
+    settings, details = map_items.settings_of(item), varied_settings.all_varied()[item.setting][1]
+    if varied_settings.is_color(item.setting):
+        found = sources.colors(strands, settings, item.image)
+        return combination.varied_color(value, *found, settings.combination, details)
+    mask = sources.masks(strands, settings, item.image)
+    return combination.varied_number(value, mask, settings.combination, details)
+
+
+def write_looks(hair) -> list[HairError]:
+    """Store the looks of strands in their Curves, or remove them; returns errors about missing sources."""
+    looks, errors = looks_of(hair) if len(hair.curves) else (None, [])
+    if looks is None:
+        if has(hair):
+            for name, _data_type in _LAYOUT:
+                hair.attributes.remove(hair.attributes[name])
+        return errors
+    for (name, data_type), values in zip(_LAYOUT, (looks.root, looks.tip, looks.roughness), strict=True):
+        attributes.write(hair, name, data_type, "CURVE", values)
+    return errors
+
+
+def has(hair) -> bool:
+    """Whether Curves, possibly evaluated or linked, store looks of strands."""
+    return all(attributes.has(hair, name, data_type, "CURVE") for name, data_type in _LAYOUT)
+
+
+def read_looks(hair) -> StrandLooks | None:
+    """The stored `StrandLooks` of Curves, possibly evaluated or linked; None without them. Invalid values are 0."""
+    if not has(hair):
+        return None
+    found = [attributes.read(hair, name, data_type, "CURVE") for name, data_type in _LAYOUT]
+    return StrandLooks(*(np.clip(np.where(np.isfinite(values), values, 0.0), 0.0, 1e3) for values in found))

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings that vary over a head: values of maps at the roots of strands, and their combination with a setting."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        box_filter,
+        combination,
+        map_settings,
+        pixels,
+        uv_islands,
+        varied_settings,
+    )
+else:
+    __getattr__ = submodules(__name__)

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Values of images at roots: the mean over each strand's share of the surface, so that fine patterns do not alias."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from ..geometry.mesh import SurfacePoints, TriMesh
+from ..kernels import parallel
+from ..kernels.checks import require_indices
+from . import uv_islands
+
+# No gradients are needed. Without fused multiply-add all devices round alike.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+_TAPS = 4  # texels along each side of a strand's share, at the level at which the share has 3 or less
+
+
+@dataclass(frozen=True, eq=False)
+class _Taps:
+    """Texels of some strands in one image and its halvings, one after the other.
+
+    strands: (N,) indices; texels: (N, K) int32; weights: (N, K) float32, rows of which sum to one.
+    """
+
+    strands: np.ndarray
+    texels: np.ndarray
+    weights: np.ndarray
+    size: tuple[int, int]  # (width, height)
+
+
+@dataclass(frozen=True, eq=False)
+class RootTexels:
+    """Texels of images at roots; depends on roots, UV map and sizes of images, not on pixels.
+
+    tiles: {UDIM tile, or None for an image without tiles: the taps of its strands}.
+    """
+
+    strand_count: int
+    tiles: Mapping[int | None, _Taps]
+
+    def sample(self, pixels: Mapping[int | None, np.ndarray]) -> np.ndarray:
+        """Return (S, C) float32 means; pixels: {tile: (H, W, C) float32, bottom row first}. NaN without a tile."""
+        channels = next(iter(pixels.values())).shape[2] if pixels else 1
+        found = np.full((self.strand_count, channels), np.nan, np.float32)
+        for tile, taps in self.tiles.items():
+            if tile in pixels:
+                found[taps.strands] = _means(taps, _levels(pixels[tile], taps.size))
+        return found
+
+
+def _levels(pixels, size):
+    """Return the texels (N, C) of an image and its halvings, one after the other."""
+    if pixels.shape[1::-1] != tuple(size):
+        raise ValueError(f"pixels of size {pixels.shape[1::-1]} at places for {size}")
+    levels = [np.ascontiguousarray(pixels, np.float32)]
+    while max(levels[-1].shape[:2]) > 1:
+        levels.append(halved(levels[-1]))
+    return np.concatenate([level.reshape(-1, pixels.shape[2]) for level in levels])
+
+
+def halved(pixels: np.ndarray) -> np.ndarray:
+    """Return the means of two by two texels of (H, W, C); a last odd row or column stands alone."""
+    height, width = pixels.shape[:2]
+    if height % 2 or width % 2:
+        pixels = np.pad(pixels, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    # A quarter of each, as sums of large floats overflow.
+    quarter = np.float32(0.25)
+    rows = quarter * pixels[::2] + quarter * pixels[1::2]
+    return rows[:, ::2] + rows[:, 1::2]
+
+
+def _means(taps, texels):
+    require_indices("texels", taps.texels, len(texels))
+    sources, cells, weights, found = (
+        wp.array(values, dtype=kind, ndim=2, device="cpu", copy=False)
+        for values, kind in (
+            (texels, float),
+            (taps.texels, int),
+            (taps.weights, float),
+            (np.empty((len(taps.texels), texels.shape[1]), np.float32), float),
+        )
+    )
+    rows = [parallel.Rows(cells), parallel.Rows(weights)]
+    parallel.launch(_weigh, len(taps.texels), inputs=[sources, *rows], outputs=[found], device="cpu")
+    return found.numpy()
+
+
+@wp.kernel
+def _weigh(
+    texels: wp.array2d[float],
+    taps: wp.array2d[int],
+    weights: wp.array2d[float],
+    # outputs
+    out_means: wp.array2d[float],
+):
+    root = wp.tid()
+    for channel in range(texels.shape[1]):
+        # Weights sum to one up to rounding: the mean of differences is exact for equal texels.
+        first = texels[taps[root, 0], channel]
+        total = float(0.0)
+        for tap in range(1, taps.shape[1]):
+            total += weights[root, tap] * (texels[taps[root, tap], channel] - first)
+        out_means[root, channel] = first + total
+
+
+def root_texels(
+    mesh: TriMesh,
+    corner_uvs: np.ndarray,
+    roots: SurfacePoints,
+    sizes: Mapping[int | None, tuple[int, int]],
+) -> RootTexels:
+    """Return the `RootTexels` of roots (S,) on a mesh with a UV map (F, 3, 2).
+
+    sizes: {UDIM tile: (width, height)}, or {None: ...} of an image that repeats. The share of a strand is a square
+    around its root with the mesh's area divided by the number of strands. Texels that another UV island touches do not
+    take part.
+    """
+    require_indices("triangles", roots.triangle, len(corner_uvs))
+    uvs = np.einsum("nc,ncu->nu", roots.barycentric.astype(np.float64), corner_uvs[roots.triangle].astype(np.float64))
+    uvs = np.where(np.isfinite(uvs) & (np.abs(uvs) < 1e6), uvs, 0.0)
+    side = _sides(mesh, corner_uvs, len(roots))[roots.triangle]
+    islands_of = uv_islands.islands(corner_uvs, mesh.triangles)
+    tiles = {}
+    for tile, size in sizes.items():
+        inside = np.arange(len(uvs)) if tile is None else np.flatnonzero(_tiles_of(uvs) == tile)
+        if len(inside):
+            covered = uv_islands.coverage(corner_uvs, islands_of, size, tile)
+            texels, weights = _taps(
+                np.mod(uvs[inside], 1.0), side[inside], covered.islands[roots.triangle[inside]], covered, tile is None
+            )
+            tiles[tile] = _Taps(inside, texels, weights, tuple(size))
+    return RootTexels(len(uvs), tiles)
+
+
+def _tiles_of(uvs):
+    """Return UDIM tiles (N,); 0 outside of all."""
+    column, row = np.floor(uvs).astype(np.int64).T
+    return np.where((column >= 0) & (column < 10) & (row >= 0), 1001 + column + 10 * row, 0)
+
+
+def _sides(mesh, corner_uvs, strand_count):
+    """Return (F,) the side of a strand's share in each triangle, in the unit of UVs."""
+    edges = corner_uvs[:, 1:].astype(np.float64) - corner_uvs[:, :1]
+    uv_areas = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    areas = mesh.areas
+    share = areas.sum() / max(strand_count, 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        side = np.sqrt(share * uv_areas / areas)
+    return np.where(np.isfinite(side), side, 0.0)
+
+
+def _taps(uvs, sides, islands_of, covered, repeats):
+    """Return (texels (N, K), weights (N, K)) in the levels of one image; uvs (N, 2) within the image."""
+    shapes = [low.shape for low in covered.lows]
+    firsts = np.concatenate([[0], np.cumsum([height * width for height, width in shapes])])
+    size = np.array(shapes[0][::-1])
+    levels = np.ceil(np.log2(np.maximum(sides * size.max() / (_TAPS - 1), 1.0))).astype(int)
+    levels = np.minimum(levels, len(shapes) - 1)
+    count = len(uvs)
+    texels, weights = np.zeros((count, _TAPS**2), np.int64), np.zeros((count, _TAPS**2))
+    due = np.arange(count)
+    while len(due):
+        for level in np.unique(levels[due]):
+            some = due[levels[due] == level]
+            found = _on_level(uvs[some], sides[some], islands_of[some], covered, level, repeats)
+            texels[some], weights[some] = firsts[level] + found[0], found[1]
+        # Where other islands touch the share at this level, a smaller share within the island is left.
+        due = due[weights[due].sum(axis=1) <= 0.0]
+        at_last = due[levels[due] == 0]
+        own = np.minimum((uvs[at_last] * size).astype(np.int64), size - 1)
+        texels[at_last], weights[at_last, 0] = (own[:, 1] * size[0] + own[:, 0])[:, None], 1.0
+        due = due[levels[due] > 0]
+        levels[due] -= 1
+    weights /= weights.sum(axis=1, keepdims=True)
+    heaviest = np.take_along_axis(texels, weights.argmax(axis=1)[:, None], axis=1)
+    return np.where(weights > 0.0, texels, heaviest).astype(np.int32), weights.astype(np.float32)
+
+
+def _on_level(uvs, sides, islands_of, covered, level, repeats):
+    height, width = covered.lows[level].shape
+    full = covered.lows[0].shape[::-1]
+    columns, rows = (
+        _along(uvs[:, axis] * full[axis] / 2**level, 0.5 * np.clip(sides * full[axis] / 2**level, 1.0, _TAPS - 1))
+        for axis in (0, 1)
+    )
+    cells = []
+    for (places, parts), count in ((columns, width), (rows, height)):
+        is_inside = (places >= 0) & (places < count)
+        cells.append((places % count, parts if repeats else parts * is_inside))
+    texels = (cells[1][0][:, :, None] * width + cells[0][0][:, None, :]).reshape(len(uvs), -1)
+    weights = (cells[1][1][:, :, None] * cells[0][1][:, None, :]).reshape(len(uvs), -1)
+    return texels, weights * covered.is_of(level, texels, islands_of[:, None])
+
+
+def _along(centre, half):
+    """Return (texels (N, K), their parts (N, K)) of the interval from centre - half to centre + half."""
+    texels = np.floor(centre - half).astype(np.int64)[:, None] + np.arange(_TAPS)
+    ends = np.minimum((centre + half)[:, None], texels + 1), np.maximum((centre - half)[:, None], texels)
+    return texels, np.maximum(ends[0] - ends[1], 0.0)

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Values of a map at strands, combined with the value of a setting."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..params import Param
+from ..styling.random_numbers import random_numbers
+
+_PURPOSE = 512  # unlike any purpose of styles
+
+
+@dataclass(frozen=True)
+class Combination:
+    """How a map changes a setting: numbers are multiplied by low to high, colors are mixed by an amount."""
+
+    low: float = 0.0
+    high: float = 1.0
+    is_inverted: bool = False
+    amount: float = 1.0
+
+
+def varied_number(value: float, mask: np.ndarray, how: Combination, details: Param) -> np.ndarray:
+    """Return (S,) float64: value × lerp(low, high, mask) of masks (S,), within the range of the setting.
+
+    Infinite masks count as 0; NaN, a strand without a map, keeps the value.
+    """
+    mask = np.where(np.isinf(mask), 0.0, np.asarray(mask, float))
+    if how.is_inverted:
+        mask = 1.0 - mask
+    factor = (1.0 - mask) * how.low + mask * how.high
+    least = details.low if details.above == -np.inf else max(details.low, np.nextafter(details.above, np.inf))
+    return np.clip(np.where(np.isnan(factor), value, value * factor), least, details.high)
+
+
+def varied_color(value: tuple, colors: np.ndarray, alpha: np.ndarray, how: Combination, details: Param) -> np.ndarray:
+    """Return (S, 3) float64: mix(value, color, amount × alpha) of colors (S, 3) and alpha (S,), within the range.
+
+    Infinite colors count as 0; NaN, a strand without a map, keeps the value.
+    """
+    colors = np.where(np.isinf(colors), 0.0, np.asarray(colors, float))
+    if how.is_inverted:
+        colors = 1.0 - colors
+    share = (how.amount * np.asarray(alpha, float))[:, None]
+    mixed = np.where(share == 1.0, colors, (1.0 - share) * np.asarray(value, float) + share * colors)
+    is_known = np.isfinite(colors).all(axis=1, keepdims=True) & np.isfinite(share)
+    return np.clip(np.where(is_known, mixed, np.asarray(value, float)), details.low, details.high)
+
+
+def random_masks(identities: np.ndarray, seed: int) -> np.ndarray:
+    """Return (S,) float32 in [0, 1) by the IDs (S,) int32 of strands or clumps; equal IDs have equal numbers."""
+    return random_numbers(np.asarray(identities).astype(np.int32), seed, _PURPOSE)

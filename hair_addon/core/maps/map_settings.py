@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings of a map: what it varies, where its values come from, and how they are combined with the setting."""
+
+from dataclasses import dataclass
+
+from ..params import Settings, param
+from .combination import Combination
+
+KINDS = (
+    ("IMAGE", "Image", "Image through a UV map of the surface; each strand has the mean of its share of the surface"),
+    ("GROUP", "Vertex Group", "Weights of a vertex group of the surface"),
+    ("ATTRIBUTE", "Attribute", "Attribute of the surface: numbers or colors"),
+    ("CURVES", "Hair Attribute", "Attribute of the hair's own curves"),
+    ("STRAND", "Random per Strand", "A random number for each strand"),
+    ("CLUMP", "Random per Clump", "A random number for each clump of the hair's styles"),
+)
+NAMED = ("GROUP", "ATTRIBUTE", "CURVES")  # kinds with the name of a source; images have their own
+
+
+@dataclass(frozen=True)
+class MapSettings(Settings):
+    """A map of one setting."""
+
+    setting: str = param("", "Setting that the map varies, such as look.color")
+    kind: str = param("IMAGE", "Source of the map's values", choices=KINDS)
+    name: str = param("", "Name of the image, vertex group or attribute")
+    uv: str = param("", "UV map for the image. Leave empty to use the active UV map", label="UV map")
+    low: float = param(0.0, "Factor of the setting where the map is black", label="From", high=1e6, low=-1e6)
+    high: float = param(1.0, "Factor of the setting where the map is white", label="To", high=1e6, low=-1e6)
+    is_inverted: bool = param(False, "Exchange black and white", label="Invert")
+    amount: float = param(1.0, "Share of the map in a color", low=0.0, high=1.0, subtype="FACTOR")
+    seed: int = param(0, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
+
+    @property
+    def combination(self) -> Combination:
+        """How the map changes its setting."""
+        return Combination(self.low, self.high, self.is_inverted, self.amount)

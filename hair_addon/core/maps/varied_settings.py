@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings that a map may vary, as declared where each setting is."""
+
+from functools import cache
+from typing import Any
+
+from ..errors import HairError
+from ..params import Param, declared
+from ..shading.appearance import COLOR_FIELDS, Appearance
+
+SECTIONS = {"look": Appearance}  # sections of settings files: their settings
+
+# Way to set the color that a setting needs.
+_PARAMETRIZATION = {f"look.{name}": way for way, names in COLOR_FIELDS.items() for name in names}
+
+
+@cache
+def all_varied() -> dict[str, tuple[Any, Param]]:
+    """Return {"section.setting": (default, its `Param`)} of all settings that may vary."""
+    return {
+        f"{section}.{name}": (default, details)
+        for section, settings_class in SECTIONS.items()
+        for name, default, details in declared(settings_class)
+        if details.may_vary
+    }
+
+
+def require_varied(setting: str) -> None:
+    """Raise `HairError` unless a map may vary a setting such as "look.color"."""
+    if setting not in all_varied():
+        known = ", ".join(all_varied())
+        raise HairError('No map can vary "{setting}": use one of {known}.', setting=setting, known=known)
+
+
+def is_color(setting: str) -> bool:
+    """Return whether a setting is a color."""
+    return isinstance(all_varied()[setting][0], tuple)
+
+
+def is_used(setting: str, parametrization: str) -> bool:
+    """Return whether a setting takes part in the color that is set in a way of `Appearance.parametrization`."""
+    return _PARAMETRIZATION.get(setting, parametrization) == parametrization

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Looks of strands that differ by maps: absorption at root and tip, and a factor of the roughness."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from . import appearance
+from .appearance import Appearance
+from .fibre import principled, strand_variation
+from .fibre.pigment import color_from_sigma_a, sigma_a_from_color, sigma_a_from_melanin
+
+_BLACK = 64.0  # absorption beyond which no light is left
+
+
+@dataclass(frozen=True, eq=False)
+class StrandLooks:
+    """Absorption per radius at root and tip (S, 3) float32 with all variation, and factors (S,) of the roughness."""
+
+    root: np.ndarray
+    tip: np.ndarray
+    roughness: np.ndarray
+
+    @cached_property
+    def some(self) -> "StrandLooks":
+        """At most a thousand of the looks, evenly chosen."""
+        return self[:: -(-len(self) // 1000)]
+
+    @cached_property
+    def absorption_range(self) -> tuple[float, float]:
+        """(least, greatest) absorption of any channel."""
+        return float(min(self.root.min(), self.tip.min())), float(max(self.root.max(), self.tip.max()))
+
+    def __len__(self) -> int:
+        return len(self.root)
+
+    def __getitem__(self, selection: slice | np.ndarray) -> "StrandLooks":
+        """Return the looks of a slice, a mask or an index array."""
+        return StrandLooks(self.root[selection], self.tip[selection], self.roughness[selection])
+
+    def is_same(self, others: "StrandLooks | None") -> bool:
+        """Return whether the looks are bit-identical to others."""
+        return others is not None and all(
+            map(np.array_equal, (self.root, self.tip, self.roughness), (others.root, others.tip, others.roughness))
+        )
+
+    def sigma_a(self, gradient: np.ndarray) -> np.ndarray:
+        """Return sigma_a (S, ..., 3) where the tip's color is reached by a part (S, ...) or (...)."""
+        gradient = np.asarray(gradient, float)[..., None]
+        shape = (len(self.root), *(1,) * (max(gradient.ndim, 2) - 2), 3)
+        root, tip = self.root.astype(float).reshape(shape), self.tip.astype(float).reshape(shape)
+        return root + (tip - root) * gradient
+
+
+def are_same(looks: StrandLooks | None, others: StrandLooks | None) -> bool:
+    """Return whether looks, each possibly None, are bit-identical."""
+    return looks is others if looks is None else looks.is_same(others)
+
+
+def strand_looks(look: Appearance, varied: Mapping[str, np.ndarray], randoms: np.ndarray) -> StrandLooks:
+    """Return the `StrandLooks` of strands with random numbers (S,).
+
+    varied: {field of `Appearance`: (S,) or (S, 3)} in place of the look's value. The same equations as
+    `appearance.strand_settings` and `strand_variation`, for each strand.
+    """
+    count = len(randoms)
+
+    def value(name):
+        found = np.asarray(varied.get(name, getattr(look, name)), float)
+        return found if name in varied else np.broadcast_to(found, (count, *found.shape))
+
+    randoms = np.asarray(randoms, float)
+    deviation = 1.0 + 2.0 * (randoms - 0.5) * look.random_color
+    if look.parametrization == "MELANIN":
+        melanin = value("melanin")
+        # pigment × `pigment_factor` is the pigment of the deviating melanin.
+        root = sigma_a_from_melanin(melanin * deviation, value("redness"))
+        root = root + _dyes(value("tint"), look.radial_roughness)
+    elif look.parametrization == "COLOR":
+        root = sigma_a_from_color(value("color"), look.radial_roughness) * deviation[:, None]
+    else:
+        root = value("absorption") * deviation[:, None]
+    tip = root * value("tip_absorption")[:, None] + _dyes(value("tip_tint"), look.radial_roughness)
+    factor = np.ones(count)
+    if "roughness" in varied and look.roughness > 0.0:
+        factor = value("roughness") / look.roughness
+    return StrandLooks(
+        np.clip(root, 0.0, _BLACK).astype(np.float32),
+        np.clip(tip, 0.0, _BLACK).astype(np.float32),
+        factor.astype(np.float32),
+    )
+
+
+def _dyes(tints, radial_roughness):
+    """Return sigma_a (S, 3) of dyes; zero for white."""
+    return np.where(tints >= 1.0, 0.0, sigma_a_from_color(tints, radial_roughness))
+
+
+def gradient_of(look: Appearance, positions: np.ndarray) -> np.ndarray:
+    """Return the part (...) of the tip's color at positions (...) from root 0 to tip 1."""
+    settings = appearance.strand_settings(look)
+    return strand_variation.tip_gradient(settings.gradient_start, settings.gradient_end, positions)
+
+
+def roughness_of(look: Appearance, looks: StrandLooks, randoms: np.ndarray) -> np.ndarray:
+    """Return the longitudinal roughness (S,) float64 of strands."""
+    base = appearance.shaded(look).roughness * looks.roughness.astype(float)
+    return principled.varied_roughness(base, look.random_roughness, randoms)
+
+
+def sample_sigma_a(look: Appearance, looks: StrandLooks, count: int = 8) -> np.ndarray:
+    """Return sigma_a (N, count, 3) of some strands, at places evenly chosen along them."""
+    return looks.some.sigma_a(gradient_of(look, (np.arange(count) + 0.5) / count)[None])
+
+
+def mean_color(look: Appearance, looks: StrandLooks) -> np.ndarray:
+    """Return the mean color RGB (3,) of a head of hair with these looks."""
+    color = color_from_sigma_a(sample_sigma_a(look, looks), look.radial_roughness)
+    return appearance.dimmed(color.reshape(-1, 3).mean(axis=0), look)
