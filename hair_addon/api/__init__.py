@@ -52,6 +52,7 @@ from .grooms import (
 from .guide_tools import change_guides
 from .imports import DerivationSettings, TransferSettings, import_curves, transfer_groom, use_as_guides, use_as_hair
 from .library import apply_groom, groom_names, save_groom
+from .maps import MapSettings, clear_map, maps_of, set_map
 from .pictures import draw, render
 from .styles import (
     Bend,
@@ -87,6 +88,7 @@ __all__ = [
     "HairError",
     "HairSettings",
     "Lean",
+    "MapSettings",
     "Smooth",
     "TransferSettings",
     "Trim",
@@ -100,6 +102,7 @@ __all__ = [
     "bake_dynamics",
     "bake_tables",
     "change_guides",
+    "clear_map",
     "delete_hair",
     "deliver_dynamics",
     "distribute_guides",
@@ -114,12 +117,14 @@ __all__ = [
     "look_names",
     "make_hair_cards",
     "make_hair_tubes",
+    "maps_of",
     "points",
     "remove_delivery",
     "render",
     "save_groom",
     "save_settings",
     "set_dynamics",
+    "set_map",
     "set_styles",
     "settings_of",
     "shade",

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from .groom import hair_systems
-from .settings import preferences, properties, style_items
+from .settings import map_items, preferences, properties, style_items
 from .ui import operators, picture_menus
 
 # Page → the classes whose properties it explains, unless a property has its own entry below.
@@ -19,7 +19,7 @@ _CLASSES = {
     "strands": (properties.VellusHairSettings, properties.VellusCurves),
     "dynamics": (properties.VellusDynamicsSettings, properties.VellusCollider),
     "styles": style_items.CLASSES,
-    "shading": (properties.VellusAppearance, picture_menus.VellusPictures),
+    "shading": (properties.VellusAppearance, picture_menus.VellusPictures, *map_items.CLASSES),
     "lookup_tables": (properties.VellusMarschnerSettings,),
     "rendering": (properties.VellusRenderSettings, properties.VellusPassSettings),
     "index": (preferences.VellusPreferences,),
@@ -54,7 +54,15 @@ _OPERATORS = {
         *("paint_style_mask", "mask_from_selection"),
         *("apply_style_preset", "apply_saved_style", "save_style_preset", "remove_style_preset"),
     ),
-    "shading": ("apply_preset", "apply_saved_look", "save_look", "remove_look", "toggle_drawing"),
+    "shading": (
+        "apply_preset",
+        "apply_saved_look",
+        "save_look",
+        "remove_look",
+        "toggle_drawing",
+        "edit_map",
+        "remove_map",
+    ),
     "lookup_tables": ("bake_tables",),
     "systems": ("delete_system",),
     "groom_library": ("save_groom", "apply_groom"),

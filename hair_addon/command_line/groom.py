@@ -12,7 +12,7 @@ from ..core.grooming.groom import GuideSettings, HairSettings
 from ..core.long_work import run_now
 from ..core.params import declared
 from ..core.shading.presets import PRESETS
-from . import curve_options, import_mesh, opening, options, style_options
+from . import curve_options, import_mesh, map_options, opening, options, style_options
 
 blender = lazy.Package("..blender", __package__)
 
@@ -38,6 +38,7 @@ def add(verbs):
         "--from-library", metavar="FILE[:NAME]", help="put on a groom that was saved to an asset library's .blend"
     )
     style_options.add_styles(parser, has_surface=True)
+    map_options.add_maps(parser)
     options.add_scripts(parser)
     options.add_groom_settings(parser)
     options.add_common(parser)
@@ -62,7 +63,7 @@ def run(given, console):
     blender.io.groom_files.require_writable(given.out)
     file_axes = opening.open_file(given, console)
     surface = blender.io.mesh_files.find_surface(given.surface)
-    settings = _styled(given, settings, surface)
+    settings = map_options.mapped(given, _styled(given, settings, surface))
     started = time.perf_counter()
     if given.from_library:
         guides, hair = _from_library(given, surface, console)

@@ -2,10 +2,10 @@
 """Maps of a hair ↔ Blender's properties: a list with at most one map for each setting."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import bpy
 
-from ...core.errors import HairError
 from ...core.maps import varied_settings
 from ...core.maps.map_settings import MapSettings
 from ..host.notices import name_of
@@ -13,16 +13,19 @@ from . import setting_properties
 from .marks import mark_map
 from .translations import CONTEXT
 
-_SKIPPED = ("name",)
+
+def _mark_image(item, context):
+    """Remember the name of a map's image, which a status shows if the image is deleted; an `update`."""
+    item.source = "" if item.image is None else name_of(item.image)
+    mark_map(item, context)
 
 
 class VellusMap(bpy.types.PropertyGroup):
     """A map that varies a setting over the hair"""
 
     __annotations__ = {
-        **setting_properties.annotations(MapSettings, mark_map, skip=_SKIPPED),
-        # Blender shows items of lists by this name.
-        "name": bpy.props.StringProperty(
+        **setting_properties.annotations(MapSettings, mark_map, skip=("source",)),
+        "source": bpy.props.StringProperty(
             name="Name",
             description="Name of the vertex group or attribute",
             translation_context=CONTEXT,
@@ -33,7 +36,7 @@ class VellusMap(bpy.types.PropertyGroup):
             description="Image whose pixels vary the setting",
             translation_context=CONTEXT,
             type=bpy.types.Image,
-            update=mark_map,
+            update=_mark_image,
         ),
     }
 
@@ -46,8 +49,7 @@ def settings_of(item: VellusMap) -> MapSettings:
     found = setting_properties.to_settings(item, MapSettings)
     if found.kind != "IMAGE":
         return found
-    values = {name: getattr(found, name) for name in setting_properties.names_of(MapSettings)}
-    return MapSettings(**values | {"name": "" if item.image is None else name_of(item.image)})
+    return found if item.image is None else replace(found, source=name_of(item.image))
 
 
 def maps_of(state) -> tuple[MapSettings, ...]:
@@ -65,17 +67,26 @@ def images_of(state) -> set[bpy.types.Image]:
     return {item.image for item in state.maps if item.kind == "IMAGE"} - {None}
 
 
+def is_set(item: VellusMap) -> bool:
+    """Return whether a map has a source: new maps in the panel have none, and change nothing."""
+    return item.kind in {"STRAND", "CLUMP"} or item.source != "" or (item.kind == "IMAGE" and item.image is not None)
+
+
+def add(state, setting: str) -> VellusMap:
+    """Add a map without a source for a setting without a map; returns the item."""
+    item = state.maps.add()
+    item.setting = setting
+    return item
+
+
 def keep(state, settings: MapSettings) -> VellusMap:
     """Add a map, or replace that of its setting; returns the item. Raises `HairError` before anything changes."""
     varied_settings.require_varied(settings.setting)
-    image = _image_of(settings)
     item = item_of(state, settings.setting) or state.maps.add()
     item.setting = settings.setting
-    values = {name: getattr(settings, name) for name in setting_properties.names_of(MapSettings)}
-    for name, value in values.items():
-        if name != "name" or settings.kind != "IMAGE":
-            setattr(item, name, value)
-    item.image = image
+    item.image = bpy.data.images.get(settings.source) if settings.kind == "IMAGE" else None
+    for name in setting_properties.names_of(MapSettings):
+        setattr(item, name, getattr(settings, name))
     return item
 
 
@@ -93,19 +104,9 @@ def assign(state, maps: Sequence[MapSettings]) -> None:
     """Replace all maps. Raises `HairError` before anything changes."""
     for settings in maps:
         varied_settings.require_varied(settings.setting)
-        _image_of(settings)
     wanted = {settings.setting for settings in maps}
     for setting in [item.setting for item in state.maps]:
         if setting not in wanted:
             remove(state, setting)
     for settings in maps:
         keep(state, settings)
-
-
-def _image_of(settings):
-    if settings.kind != "IMAGE" or not settings.name:
-        return None
-    image = bpy.data.images.get(settings.name)
-    if image is None:
-        raise HairError('There is no image "{name}": pick another image, or clear the field.', name=settings.name)
-    return image

@@ -378,6 +378,11 @@ def text(name, description, is_remembered=False):
     return bpy.props.StringProperty(name=name, description=description, options=options, translation_context=CONTEXT)
 
 
+def hidden_text():
+    """Return a text property of an operator that only its button sets."""
+    return bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+
 def choice(name, description, labels, tooltips=None):
     """An enumeration that is not a setting; labels: {identifier: label}; tooltips: {identifier: tooltip}, or None."""
     items = [(identifier, label, (tooltips or {}).get(identifier, "")) for identifier, label in labels.items()]

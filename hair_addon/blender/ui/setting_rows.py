@@ -5,12 +5,14 @@ import bpy
 
 from ...core.dynamics.rod.settings import DynamicsSettings
 from ...core.grooming.groom import GuideSettings, HairSettings
+from ...core.maps import varied_settings
 from ...core.params import declared
 from ...core.styling.base import ProfiledSettings, StyleSettings
 from ...core.styling.kinds import KINDS
 from ..host.notices import text_of
 from ..settings import fitted_sizes, length_steps, setting_properties, style_items
 from ..settings.translations import interface_text
+from . import map_rows
 
 # Blender's own property split gives labels 40 % of the width, which truncates them at the default sidebar width.
 NAME_SHARE = 0.54
@@ -44,20 +46,23 @@ _CONTACT = ("collision_distance", "friction", "keeps_hair_outside")
 _VOLUME = ("hair_friction", "hair_pressure", "cell_size")
 
 
-def row(layout, owner, name, size=""):
+def row(layout, owner, name, size="", map_of=""):
     """Draw a row of a property with its label in a separate column.
 
-    size: for a property that can be fitted to the surface, the name that identifies its flag.
+    size: for a property that can be fitted to the surface, the name that identifies its flag; map_of: the setting whose
+    map has a button at the right, empty for none.
     """
     value_side = _below_name(layout, owner, name) if name in WIDE else _value_side(layout, owner, name)
     shown, flag = length_steps.shown_name(owner, name), fitted_sizes.flag_of(size or name)
     has_flag, is_coarse = flag in owner.bl_rna.properties, shown != name
-    sides = value_side.row(align=True) if has_flag or is_coarse else value_side
+    sides = value_side.row(align=True) if has_flag or is_coarse or map_of else value_side
     sides.prop(owner, shown, text="")
     if has_flag:
         sides.prop(owner, flag, text="", icon="LINKED")
     if is_coarse:
         sides.prop_decorator(owner, name)  # to key it
+    if map_of:
+        map_rows.button(sides, owner.id_data.vellus, map_of)
 
 
 def _below_name(layout, owner, name):
@@ -86,7 +91,9 @@ def rows(layout, owner, settings_class, names):
     """Draw a row for each of these settings of a class, in the order of declaration."""
     for name, _default, details in declared(settings_class):
         if name in names:
-            row(layout, owner, details.diameter[0] if details.diameter else name, name)
+            varied = varied_settings.name_of(settings_class, name) if details.may_vary else ""
+            map_of = varied if isinstance(owner.id_data, bpy.types.Curves) else ""  # not in redo panels
+            row(layout, owner, details.diameter[0] if details.diameter else name, name, map_of)
 
 
 def all_rows(layout, owner, settings_class):

@@ -14,6 +14,8 @@ from typing import Any, TypeVar, get_type_hints
 from ..dynamics.rod.settings import DynamicsSettings
 from ..errors import HairError
 from ..grooming.groom import GuideSettings, HairSettings
+from ..maps import varied_settings
+from ..maps.map_settings import MapSettings
 from ..params import Param, Settings, declared, described, given, is_text, label_of, like, require_class, unit_of
 from ..shading.appearance import TABLE_FIELDS, Appearance
 from ..shading.tables import lookup_tables
@@ -40,6 +42,7 @@ class GroomSettings:
     styles: tuple[StyleSettings, ...] = ()  # in the order of application; a list is converted to a tuple
     style_names: tuple[str, ...] = ()  # one for each style, "" for unnamed; empty if no style has a name
     dynamics: DynamicsSettings = field(default_factory=DynamicsSettings)
+    maps: tuple[MapSettings, ...] = ()  # at most one for each setting; a list is converted to a tuple
 
     def __post_init__(self) -> None:
         for name, settings_class in SECTIONS.items():
@@ -47,6 +50,19 @@ class GroomSettings:
         styles, names = require_styles(self.styles, self.style_names)
         object.__setattr__(self, "styles", styles)  # the class is frozen
         object.__setattr__(self, "style_names", names)
+        object.__setattr__(self, "maps", _require_maps(self.maps))
+
+
+def _require_maps(maps):
+    """Return maps as a tuple. Raises `HairError`."""
+    if not isinstance(maps, list | tuple):
+        raise HairError(f"maps must be a list of maps, not {described(maps)}.")
+    for one in maps:
+        require_class(one, MapSettings, "maps")
+        varied_settings.require_varied(one.setting)
+    if len({one.setting for one in maps}) < len(maps):
+        raise HairError("maps must have at most one map for each setting.")
+    return tuple(maps)
 
 
 def require_styles(styles: object, names: object = ()) -> tuple[tuple[StyleSettings, ...], tuple[str, ...]]:
@@ -68,7 +84,9 @@ def require_styles(styles: object, names: object = ()) -> tuple[tuple[StyleSetti
 
 # Sections with a single `Settings` class.
 SECTIONS: dict[str, type[Settings]] = {
-    name: found for name, found in get_type_hints(GroomSettings).items() if not name.startswith("style")
+    name: found
+    for name, found in get_type_hints(GroomSettings).items()
+    if not name.startswith("style") and name != "maps"
 }
 
 
@@ -85,7 +103,16 @@ def write(path: str | Path, settings: GroomSettings) -> None:
 
 def to_object(settings: GroomSettings) -> dict[str, Any]:
     """Convert `GroomSettings` to the JSON object of a file."""
-    return {"format": FORMAT, "version": VERSION, **sections_of(settings), "styles": list_of_styles(settings)}
+    lists = {"styles": list_of_styles(settings), "maps": list_of_maps(settings)}
+    return {"format": FORMAT, "version": VERSION, **sections_of(settings), **lists}
+
+
+def list_of_maps(settings: GroomSettings) -> list[dict[str, Any]]:
+    """Return [{name: value}] of the maps of `GroomSettings`."""
+    return [{_MAP_KEYS.get(name, name): value for name, value in given(one).items()} for one in settings.maps]
+
+
+_MAP_KEYS = {"source": "name", "low": "from", "high": "to"}  # fields of `MapSettings`: keys in files
 
 
 def sections_of(settings: GroomSettings) -> dict[str, dict[str, Any]]:
@@ -113,11 +140,13 @@ class PartialSettings:
     values: dict[str, dict[str, Any]]  # {section: {name: value}}
     styles: tuple[StyleSettings, ...] | None = None  # None: unchanged
     style_names: tuple[str, ...] = ()
+    maps: tuple[MapSettings, ...] | None = None  # None: unchanged
 
     def changed(self, settings: GroomSettings) -> GroomSettings:
         """Return `GroomSettings` with these settings applied."""
         sections = {name: replace(getattr(settings, name), **values) for name, values in self.values.items()}
         settings = replace(settings, **sections)
+        settings = settings if self.maps is None else replace(settings, maps=self.maps)
         return settings if self.styles is None else self._styled(settings, self.styles)
 
     def _styled(self, settings, styles):
@@ -145,6 +174,7 @@ def partial_of_object(found: dict[str, Any], path: str | Path) -> PartialSetting
     styles, names = None, ()
     if "styles" in sections:
         styles, names = _styles(sections.pop("styles"), path)
+    maps = _maps(sections.pop("maps"), path) if "maps" in sections else None
     result = {}
     for name, values in sections.items():
         if name not in SECTIONS:
@@ -153,7 +183,24 @@ def partial_of_object(found: dict[str, Any], path: str | Path) -> PartialSetting
             raise HairError('{path}: "{key}" must be a group of settings.', path=path, key=name)
         settings = to_settings(values, SECTIONS[name], path, f"{name}.", declared_in(name))
         result[name] = {setting: getattr(settings, setting) for setting in values}
-    return PartialSettings(result, styles, names)
+    return PartialSettings(result, styles, names, maps)
+
+
+def _maps(found, path):
+    """Return the maps of a file's list."""
+    if not isinstance(found, list):
+        raise HairError('{path}: "maps" must be a list of maps.', path=path)
+    fields = {key: name for name, key in _MAP_KEYS.items()}
+    read = []
+    for place, values in enumerate(found):
+        if not isinstance(values, dict):
+            raise HairError('{path}: "{key}" must be a group of settings.', path=path, key=f"maps[{place}]")
+        unknown = [key for key in values if key in _MAP_KEYS]
+        if unknown:
+            raise HairError('{path}: unknown setting "{key}".', path=path, key=f"maps[{place}].{unknown[0]}")
+        renamed = {fields.get(key, key): value for key, value in values.items()}
+        read.append(to_settings(renamed, MapSettings, path, f"maps[{place}]."))
+    return _require_maps(read)
 
 
 def _styles(found, path):
@@ -307,7 +354,19 @@ def schema() -> dict[str, Any]:
             "version": {"const": VERSION},
             **sections,
             "styles": _style_schema(),
+            "maps": _map_schema(),
         },
+    }
+
+
+def _map_schema():
+    keys = {_MAP_KEYS.get(setting[0], setting[0]): _property(*setting) for setting in declared(MapSettings)}
+    keys["setting"] |= {"enum": list(varied_settings.all_varied())}
+    item = {"type": "object", "required": ["setting"], "additionalProperties": False, "properties": keys}
+    return {"title": "Maps, at most one for each setting", "type": "array"} | {
+        "minItems": 0,
+        "maxItems": len(varied_settings.all_varied()),
+        "items": item,
     }
 
 

@@ -23,7 +23,7 @@ class MapSettings(Settings):
 
     setting: str = param("", "Setting that the map varies, such as look.color")
     kind: str = param("IMAGE", "Source of the map's values", choices=KINDS)
-    name: str = param("", "Name of the image, vertex group or attribute")
+    source: str = param("", "Name of the image, vertex group or attribute")
     uv: str = param("", "UV map for the image. Leave empty to use the active UV map", label="UV map")
     low: float = param(0.0, "Factor of the setting where the map is black", label="From", high=1e6, low=-1e6)
     high: float = param(1.0, "Factor of the setting where the map is white", label="To", high=1e6, low=-1e6)

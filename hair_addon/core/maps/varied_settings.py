@@ -5,8 +5,9 @@ from functools import cache
 from typing import Any
 
 from ..errors import HairError
-from ..params import Param, declared
+from ..params import Param, Settings, declared
 from ..shading.appearance import COLOR_FIELDS, Appearance
+from . import map_settings
 
 SECTIONS = {"look": Appearance}  # sections of settings files: their settings
 
@@ -25,11 +26,28 @@ def all_varied() -> dict[str, tuple[Any, Param]]:
     }
 
 
+def name_of(settings_class: type[Settings], name: str) -> str:
+    """Return "section.setting" of a class's setting; "" if no map can vary it."""
+    found = next((section for section, known in SECTIONS.items() if known is settings_class), "")
+    return f"{found}.{name}" if f"{found}.{name}" in all_varied() else ""
+
+
 def require_varied(setting: str) -> None:
     """Raise `HairError` unless a map may vary a setting such as "look.color"."""
     if setting not in all_varied():
         known = ", ".join(all_varied())
         raise HairError('No map can vary "{setting}": use one of {known}.', setting=setting, known=known)
+
+
+def parsed_source(text: str) -> tuple[str, str]:
+    """Return (kind, name) of a map's source such as "image:Coat", "group:dark" or "strand". Raises `HairError`."""
+    kind, _, name = text.partition(":")
+    known = {identifier.lower(): identifier for identifier, *_ in map_settings.KINDS}
+    found = known.get(kind.strip().lower())
+    if found is None or (found in (*map_settings.NAMED, "IMAGE") and not name):
+        sources = "image:NAME, group:NAME, attribute:NAME, curves:NAME, strand or clump"
+        raise HairError('"{source}" is no source of a map: use {sources}.', source=text, sources=sources)
+    return found, name
 
 
 def is_color(setting: str) -> bool:

@@ -15,6 +15,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.files import settings_file
 from hair_addon.core.files.settings_file import SECTIONS, GroomSettings, declared_in
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
+from hair_addon.core.maps.map_settings import MapSettings
 from hair_addon.core.params import declared
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.styling import curl, frizz
@@ -272,3 +273,17 @@ def test_a_file_that_cannot_be_replaced_stays(tmp_path):
 def test_settings_of_a_file_are_what_the_stages_take(tmp_path):
     settings_file.write(tmp_path / "groom.json", GroomSettings(replace(GuideSettings(), guide_count=9)))
     assert settings_file.read(tmp_path / "groom.json").guides.guide_count == 9
+
+
+def test_maps_are_a_list_of_one_for_each_setting(tmp_path):
+    """Maps are read as they were written, with the keys name, from and to; two maps of a setting are refused."""
+    one = MapSettings(setting="look.melanin", kind="GROUP", source="dark", low=0.2, high=0.9)
+    settings = settings_file.GroomSettings(maps=(one,))
+    settings_file.write(tmp_path / "maps.json", settings)
+    written = settings_file.to_object(settings)["maps"][0]
+    assert (written["name"], written["from"], written["to"]) == ("dark", 0.2, 0.9)
+    assert settings_file.read(tmp_path / "maps.json") == settings
+    with pytest.raises(HairError, match="one map"):
+        settings_file.GroomSettings(maps=(one, one))
+    with pytest.raises(HairError, match="No map can vary"):
+        settings_file.GroomSettings(maps=[MapSettings(setting="look.ior")])

@@ -26,6 +26,14 @@ def read(image, is_color):
     return known[1]
 
 
+def load(path):
+    """Load an image file, if it is not loaded yet; returns the image's name. Raises `HairError`."""
+    try:
+        return name_of(bpy.data.images.load(str(Path(path).resolve()), check_existing=True))
+    except RuntimeError as error:
+        raise HairError('"{path}" cannot be read as an image.', path=path) from error
+
+
 def _digest(image):
     """What the pixels depend on; of the pixels themselves if they may be painted, which Blender may not report."""
     kinds = image.source, image.filepath_raw, image.colorspace_settings.name, image.alpha_mode, tuple(image.size)

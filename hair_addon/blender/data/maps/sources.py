@@ -85,12 +85,12 @@ def _read(strands, settings, image, is_color):
             raise HairError("There are no clumps for a random map: add the style Clump.")
         return _as(combination.random_masks(strands.clumps, settings.seed)[:, None], is_color)
     if settings.kind == "CURVES":
-        return _as(_finite(_of_curves(strands.curves, settings.name)), is_color)
+        return _as(_finite(_of_curves(strands.curves, settings.source)), is_color)
     _require_roots(strands)
     if settings.kind == "GROUP":
-        corners = _of_group(strands, settings.name)
+        corners = _of_group(strands, settings.source)
     else:
-        corners = _of_attribute(strands, settings.name)
+        corners = _of_attribute(strands, settings.source)
     at_roots = np.einsum("nck,nc->nk", corners[strands.roots.triangle], strands.roots.barycentric)
     # Barycentric coordinates sum to one up to rounding.
     owned = corners[strands.roots.triangle]
@@ -136,7 +136,8 @@ texel_cache = Cache(capacity=16)
 
 def _of_image(strands, settings, image, is_color):
     if image is None:
-        raise HairError("A map has no image: pick an image.")
+        sentence = 'There is no image "{name}": pick another image, or clear the field.'
+        raise HairError(sentence, name=settings.source)
     _require_roots(strands)
     found = image_pixels.read(image, is_color)
     uvs = _corner_uvs(strands, settings.uv)

@@ -17,7 +17,9 @@ _LAYOUT = ((ROOT, "FLOAT_VECTOR"), (TIP, "FLOAT_VECTOR"), (ROUGHNESS, "FLOAT"))
 def has_looks(state) -> bool:
     """Whether maps vary the look of a hair."""
     return any(
-        item.setting.startswith("look.") and varied_settings.is_used(item.setting, state.appearance.parametrization)
+        item.setting.startswith("look.")
+        and map_items.is_set(item)
+        and varied_settings.is_used(item.setting, state.appearance.parametrization)
         for item in state.maps
     )
 
@@ -35,7 +37,7 @@ def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLook
     varied = {}
     for item in hair.vellus.maps:
         section, _, name = item.setting.partition(".")
-        if section != "look" or item.setting not in varied_settings.all_varied():
+        if section != "look" or item.setting not in varied_settings.all_varied() or not map_items.is_set(item):
             continue
         if not varied_settings.is_used(item.setting, look.parametrization):
             continue

@@ -11,7 +11,7 @@ from ....core.shading.appearance import TABLE_FIELDS, Appearance
 from ...data import scene, whole_changes
 from ...data.strands import curves
 from ...materials import looks
-from ...settings import fitted_sizes, properties, setting_properties, style_items
+from ...settings import fitted_sizes, map_items, properties, setting_properties, style_items
 from .. import pipeline, writing
 from ..foreign import hand_made_guides
 
@@ -23,7 +23,8 @@ def settings_of(hair: Curves) -> GroomSettings:
     look, tables = properties.own_look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
     styles, names = style_items.styles_of(hair.vellus), style_items.names_of(hair.vellus)
     dynamics = properties.own_dynamics_of(guides.vellus)
-    return GroomSettings(guide_settings, hair_settings, look, tables, styles, names, dynamics)
+    maps = map_items.maps_of(hair.vellus)
+    return GroomSettings(guide_settings, hair_settings, look, tables, styles, names, dynamics, maps)
 
 
 def apply_settings(hair: Curves, settings: GroomSettings) -> None:
@@ -92,5 +93,6 @@ def using_as_guides(
 
 
 def _assign_shading(hair, settings):
+    map_items.assign(hair.vellus, settings.maps)
     setting_properties.assign(hair.vellus.marschner, settings.tables, skip=TABLE_FIELDS)
     assign_look(hair, settings.appearance)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All operators, one file per subject. An operator reads, computes and writes."""
 
-from . import conversion, dynamics, guide_tools, library, looks, output, pictures, styles, surface, systems
+from . import conversion, dynamics, guide_tools, library, looks, maps, output, pictures, styles, surface, systems
 
-SUBJECTS = (systems, surface, conversion, guide_tools, styles, dynamics, looks, library, pictures, output)
+SUBJECTS = (systems, surface, conversion, guide_tools, styles, dynamics, looks, maps, library, pictures, output)
 CLASSES = tuple(cls for subject in SUBJECTS for cls in subject.CLASSES)

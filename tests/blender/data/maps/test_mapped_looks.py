@@ -5,9 +5,12 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon import api
 from hair_addon.blender.data.maps import strand_maps
 from hair_addon.blender.render import offscreen
 from hair_addon.blender.settings import map_items
+from hair_addon.command_line import map_options
+from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from hair_addon.core.maps.map_settings import MapSettings
 from hair_addon.core.shading import appearance
@@ -50,7 +53,7 @@ def test_a_constant_map_is_the_constant(coat):
     pixels = np.ones((4, 4, 4))
     pixels[..., :3] = RED
     image_of(pixels)
-    looks = vary(coat, "look.color", name="coat")
+    looks = vary(coat, "look.color", source="coat")
     stored = np.float32(RED)
     look = appearance.Appearance(parametrization="COLOR", color=tuple(map(float, stored)))
     np.testing.assert_array_equal(looks.root, np.tile(np.float32(appearance.sigma_a(look)), (len(looks), 1)))
@@ -64,7 +67,7 @@ def test_two_looks_are_the_two_grooms(coat):
     material = bpy.data.materials.new("Painted")  # Blender reports changes of images that a material shows
     material.node_tree.nodes.new("ShaderNodeTexImage").image = image
     bpy.data.objects["Sphere"].data.materials.append(material)
-    both = vary(coat, "look.color", name="coat")
+    both = vary(coat, "look.color", source="coat")
     found = np.zeros(len(both), int)
     for color in (RED, BLUE):
         pixels = np.ones((8, 64, 4))
@@ -82,13 +85,13 @@ def test_numbers_are_factors(hair):
     group = bpy.data.objects["Sphere"].vertex_groups["top"]
     curves = hair.data
     curves.vellus.appearance.melanin, curves.vellus.appearance.redness = 0.5, 0.0
-    dark = vary(curves, "look.melanin", kind="GROUP", name=group.name).root[:, 0]
+    dark = vary(curves, "look.melanin", kind="GROUP", source=group.name).root[:, 0]
     whole = appearance.sigma_a(appearance.Appearance(melanin=0.5, redness=0.0))[0]
     assert dark.min() == 0.0
     assert dark.max() == np.float32(whole)
-    light = vary(curves, "look.melanin", kind="GROUP", name=group.name, is_inverted=True).root[:, 0]
+    light = vary(curves, "look.melanin", kind="GROUP", source=group.name, is_inverted=True).root[:, 0]
     np.testing.assert_array_equal(np.sort(light[(dark == 0.0) | (dark == dark.max())])[[0, -1]], [0.0, dark.max()])
-    rough = vary(curves, "look.roughness", kind="GROUP", name=group.name, low=0.5, high=2.0).roughness
+    rough = vary(curves, "look.roughness", kind="GROUP", source=group.name, low=0.5, high=2.0).roughness
     np.testing.assert_allclose([rough.min(), rough.max()], [0.5, 2.0], rtol=1e-6)
 
 
@@ -104,9 +107,9 @@ def test_every_source_is_read(coat):
         appearance.sigma_a(appearance.Appearance(parametrization="COLOR", color=tuple(map(float, np.float32(RED)))))
     )
     for domain in ("POINT", "EDGE", "FACE", "CORNER"):
-        looks = vary(curves, "look.color", kind="ATTRIBUTE", name=f"of {domain}")
+        looks = vary(curves, "look.color", kind="ATTRIBUTE", source=f"of {domain}")
         np.testing.assert_allclose(looks.root, np.tile(wanted, (len(looks), 1)), rtol=1e-5)
-    looks = vary(curves, "look.color", kind="CURVES", name="own")
+    looks = vary(curves, "look.color", kind="CURVES", source="own")
     np.testing.assert_array_equal(looks.root, np.tile(wanted, (len(looks), 1)))
     random = vary(curves, "look.color", kind="STRAND", seed=3)
     assert len(np.unique(random.root[:, 0])) > 0.9 * len(random)
@@ -118,12 +121,12 @@ def test_a_missing_source_is_a_status_and_the_value_is_used(coat):
     """Hair with a map whose source is missing has its value, and a status with the name of the source."""
     coat.vellus.appearance.color = RED
     for kind in ("GROUP", "ATTRIBUTE", "CURVES"):
-        looks = vary(coat, "look.color", kind=kind, name="lost")
+        looks = vary(coat, "look.color", kind=kind, source="lost")
         assert "lost" in coat.vellus.shading_status
         look = appearance.Appearance(parametrization="COLOR", color=tuple(coat.vellus.appearance.color))
         np.testing.assert_allclose(looks.root, np.tile(appearance.sigma_a(look), (len(looks), 1)), rtol=1e-6)
     image_of(halves())
-    vary(coat, "look.color", name="coat")
+    vary(coat, "look.color", source="coat")
     assert coat.vellus.shading_status == ""
     bpy.data.images.remove(bpy.data.images["coat"])
     vary(coat, "look.roughness", kind="STRAND")
@@ -133,7 +136,7 @@ def test_a_missing_source_is_a_status_and_the_value_is_used(coat):
 def test_maps_follow_a_moved_turned_and_scaled_surface(coat):
     """Looks belong to roots: an object that is moved, turned, mirrored or scaled keeps each strand's look."""
     image_of(halves())
-    before = vary(coat, "look.color", name="coat")
+    before = vary(coat, "look.color", source="coat")
     sphere = bpy.data.objects["Sphere"]
     for scale in ((0.01, 0.01, 0.01), (-1.0, 1.0, 1.0), (1.0, 2.0, 0.5)):
         sphere.location, sphere.rotation_euler, sphere.scale = (3.0, 1.0, 0.0), (0.3, 0.2, 1.0), scale
@@ -149,12 +152,12 @@ def test_maps_follow_a_moved_turned_and_scaled_surface(coat):
 def test_maps_are_saved_with_their_images(coat, tmp_path):
     """A saved and loaded file has the same maps and looks; a renamed image stays the map's image."""
     image_of(halves()).pack()
-    before = vary(coat, "look.color", name="coat")
+    before = vary(coat, "look.color", source="coat")
     bpy.data.images["coat"].name = "renamed"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "maps.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "maps.blend"))
     hair = bpy.data.objects["Hair"].data
-    assert [settings.name for settings in map_items.maps_of(hair.vellus)] == ["renamed"]
+    assert [settings.source for settings in map_items.maps_of(hair.vellus)] == ["renamed"]
     assert strand_maps.read_looks(hair).is_same(before)
     hair.vellus.maps[0].is_inverted = hair.vellus.maps[0].is_inverted
     bpy.context.view_layer.update()
@@ -186,10 +189,28 @@ def test_a_constant_map_draws_the_constant(lit, model, mode):
     pixels = np.ones((4, 4, 4))
     pixels[..., :3] = RED
     image_of(pixels)
-    vary(lit.data, "look.color", name="coat")
+    vary(lit.data, "look.color", source="coat")
     mapped = picture()
     np.testing.assert_allclose(mapped, plain, atol=1.5 / 255.0)
     map_items.remove(state, "look.color")
     state.appearance.color = RED
     bpy.context.view_layer.update()
     np.testing.assert_array_equal(picture(), plain)
+
+
+def test_a_map_is_set_by_panel_script_and_command_line(coat):
+    """A new map in the panel changes nothing until it has a source; scripts and options give the same map."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
+    bpy.ops.vellus.edit_map(setting="look.color")
+    bpy.context.view_layer.update()
+    assert strand_maps.read_looks(coat) is None
+    assert coat.vellus.shading_status == ""
+    with pytest.raises(HairError, match="No map can vary"):
+        api.set_map(coat, "look.ior", "strand")
+    wanted = api.set_map(coat, "look.color", "strand", seed=5, amount=0.5)
+    assert api.maps_of(coat) == (wanted,) == (map_options.one_map("look.color=strand,seed=5,amount=0.5"),)
+    bpy.context.view_layer.update()
+    assert strand_maps.read_looks(coat) is not None
+    bpy.ops.vellus.remove_map(setting="look.color")
+    bpy.context.view_layer.update()
+    assert strand_maps.read_looks(coat) is None

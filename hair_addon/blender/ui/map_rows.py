@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rows of a map: its kind, the picker of this kind, and how it changes its setting."""
+
+from ...core.maps import varied_settings
+from ..settings import map_items
+
+
+def button(layout, state, setting):
+    """Draw the button of a setting that a map may vary; its icon is colored where there is a map."""
+    item = map_items.item_of(state, setting)
+    has_map = item is not None and map_items.is_set(item)
+    icon = "NODE_TEXTURE" if has_map else "DOT"
+    layout.operator("vellus.edit_map", text="", icon=icon, emboss=False).setting = setting
+
+
+def draw(layout, item, hair):
+    """Draw the rows of a map of hair Curves."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.prop(item, "kind")
+    surface = hair.surface
+    if item.kind == "IMAGE":
+        layout.template_ID(item, "image", new="image.new", open="image.open")
+        if surface is not None:
+            layout.prop_search(item, "uv", surface.data, "uv_layers")
+    elif item.kind == "GROUP" and surface is not None:
+        layout.prop_search(item, "source", surface, "vertex_groups")
+    elif item.kind == "ATTRIBUTE" and surface is not None:
+        layout.prop_search(item, "source", surface.data, "attributes")
+    elif item.kind == "CURVES":
+        layout.prop_search(item, "source", hair, "attributes")
+    elif item.kind in {"STRAND", "CLUMP"}:
+        layout.prop(item, "seed")
+    if varied_settings.is_color(item.setting):
+        layout.prop(item, "amount")
+    else:
+        layout.prop(item, "low")
+        layout.prop(item, "high")
+    layout.prop(item, "is_inverted")
+    layout.operator("vellus.remove_map", icon="X").setting = item.setting

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators of maps: a popover with the map of a setting, and its removal."""
+
+import bpy
+
+from ....core.maps import varied_settings
+from ...data.strands.curves import require_editable
+from ...groom.selection import hair_of
+from ...settings import map_items, properties
+from .. import map_rows
+from .base.hair_operator import HairOperator, needs_hair
+
+
+def setting_property():
+    """Return the property with the setting of a map."""
+    return properties.hidden_text()
+
+
+class VELLUS_OT_edit_map(HairOperator, bpy.types.Operator):
+    """Vary this setting over the hair by an image, a vertex group, an attribute or random numbers"""
+
+    bl_idname = "vellus.edit_map"
+    bl_label = "Edit Map"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+    applies = needs_hair
+    __annotations__ = {"setting": setting_property()}
+
+    def invoke(self, context, _event):
+        """Show the map of the setting in a popover."""
+        if self.execute(context) == {"CANCELLED"}:
+            return {"CANCELLED"}
+        return context.window_manager.invoke_popup(self, width=280)
+
+    def change(self, context):
+        """Add a map without a source if the setting has none."""
+        hair = hair_of(context.object)
+        require_editable(hair)
+        varied_settings.require_varied(self.setting)
+        if map_items.item_of(hair.vellus, self.setting) is None:
+            map_items.add(hair.vellus, self.setting)
+
+    def draw(self, context):
+        """Draw the map."""
+        hair = hair_of(context.object)
+        item = None if hair is None else map_items.item_of(hair.vellus, self.setting)
+        if item is not None:
+            map_rows.draw(self.layout, item, hair)
+
+
+class VELLUS_OT_remove_map(HairOperator, bpy.types.Operator):
+    """Remove the map: all strands have the value of the setting"""
+
+    bl_idname = "vellus.remove_map"
+    bl_label = "Remove Map"
+    applies = needs_hair
+    __annotations__ = {"setting": setting_property()}
+
+    def change(self, context):
+        """Remove the map of the setting."""
+        hair = hair_of(context.object)
+        require_editable(hair)
+        varied_settings.require_varied(self.setting)
+        map_items.remove(hair.vellus, self.setting)
+
+
+CLASSES = (VELLUS_OT_edit_map, VELLUS_OT_remove_map)
