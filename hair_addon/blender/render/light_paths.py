@@ -31,7 +31,8 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     """A `DrawnScene` whose hair is lit by `count` paths through a grid, for a view with these (4, 4) matrices.
 
     Returns the scene unchanged, for dual scattering of all hair, if `count` is 0, no hair with an area is in view, no
-    path starts in sight, any light is linked, or any hair is not shaded by the energy-conserving model.
+    path starts in sight, hair is too large for its width, any light is linked, or any hair is not shaded by the
+    energy-conserving model.
     """
     if not count or not drawn.hair:
         return drawn
@@ -48,6 +49,8 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     device = preferences.device()
     progress(light_paths.gather.FOLLOWING, 0.0)
     grid = light_paths.strand_grid.build(systems, fibres, device=device)
+    if not grid.is_resolved:
+        return drawn
     progress(light_paths.gather.FOLLOWING, 0.15)
     seen = seen_strands.find(drawn, grid, (world_to_view, view_to_clip), window, _SAMPLES_A_PATH * count, seed)
     if not len(seen.segments):

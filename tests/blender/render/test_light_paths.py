@@ -10,6 +10,7 @@ from mathutils import Vector
 
 from hair_addon import api
 from hair_addon.core.shading import presets
+from hair_addon.core.shading.light_paths import gather
 
 WHITE = replace(
     presets.PRESETS["WHITE"][1],
@@ -104,6 +105,15 @@ def test_other_models_take_dual_scattering(scene, rng, shading):
 
 def test_hair_without_any_area_takes_dual_scattering(scene, rng):
     hair_of(scene, rng.uniform(-0.5, 0.5, (50, 3)), BROWN, radius=0.0)
+    light(scene, world=0.3, sun=2.0)
+    np.testing.assert_array_equal(picture(scene, "GRID"), picture(scene, "DUAL"))
+
+
+def test_hair_that_is_too_large_for_its_width_takes_dual_scattering(scene, monkeypatch):
+    """No path is followed where the rounding of places is a thousand times the width of hair."""
+    monkeypatch.setattr(gather, "gather", None)
+    middles = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 1e8, 0.0]])
+    hair_of(scene, middles, BROWN)
     light(scene, world=0.3, sun=2.0)
     np.testing.assert_array_equal(picture(scene, "GRID"), picture(scene, "DUAL"))
 

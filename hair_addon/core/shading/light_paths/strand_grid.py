@@ -27,6 +27,7 @@ CELLS_ALONG_VOXEL = 3  # at most: cells are wider than strands
 _SIZES_AN_OCTAVE = 4  # of voxels
 _LEAST_SEGMENTS = 8  # of a strand, that it can bend
 _AT_ONCE = 1000  # strands that are looked at for any area
+_MOST_ROUNDING = 100.0  # of places, in radii: that of ten kilometers for hair of a head
 _MOST_PARTS, _LEAST_PART = 4096, 256  # of all points that are measured, and points of a part
 
 
@@ -82,6 +83,15 @@ class StrandGrid:
     def origin(self) -> tuple[int, int, int]:
         """Numbers along X, Y, Z of the first voxel, of all that fill the world."""
         return tuple(np.rint(self.corner / self.voxel).astype(int).tolist())
+
+    @property
+    def is_resolved(self) -> bool:
+        """Whether places in single precision are exact to some radii of the widest strand.
+
+        Elsewhere paths meet the strands that they leave again and again, a thousand times in minutes.
+        """
+        rounding = max(self.shape) * self.voxel * float(np.finfo(np.float32).eps)
+        return bool(rounding <= _MOST_ROUNDING * self.cells.widths[0])
 
     @property
     def device(self) -> wp.Device:
