@@ -29,6 +29,14 @@ def require_evaluated(surface_object):
         raise HairError(sentence, name=name_of(surface_object))
 
 
+def is_in(surface_object, depsgraph):
+    """Whether an object is not only in other scenes than a depsgraph, which has its mesh without modifiers there."""
+    if surface_object.evaluated_get(depsgraph).is_evaluated:
+        return True
+    scenes = surface_object.users_scene
+    return not scenes or depsgraph.scene in scenes
+
+
 def require_object_mode(surface_object):
     """Raise `HairError` for a mesh object in Edit Mode, whose edited mesh is stored elsewhere."""
     if surface_object.mode == "EDIT":

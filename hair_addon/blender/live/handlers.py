@@ -111,6 +111,7 @@ def after_depsgraph_update(scene, depsgraph):
     if running.job() is None:
         stored_guide_maps.follow(reports, depsgraph)
         live_hair.follow_masks(_painted(reports), depsgraph)
+        _evaluate_other_scenes(scene)
     if separated:  # last: the update of the view layer calls this handler again
         copied_faces.follow(separated, scene.view_layers[depsgraph.view_layer.name])
 
@@ -211,7 +212,7 @@ def _evaluate(depsgraph, combed):
 def _evaluate_guides(guides, depsgraph, combed):
     if guides.vellus.is_shading_stale:
         looks.evaluate_guides(guides)
-    if guides.vellus.is_stale and guides.vellus.is_live and _is_surface_at_rest(guides):
+    if guides.vellus.is_stale and guides.vellus.is_live and _is_ready(guides, depsgraph):
         pipeline.evaluate(guides, depsgraph)
         events.strands_made(guides)
         stale_marks.follow_mask(guides, depsgraph)
@@ -221,7 +222,7 @@ def _evaluate_guides(guides, depsgraph, combed):
 def _evaluate_hair(hair, depsgraph, combed):
     state = hair.vellus
     follows = state.guide_curves in combed
-    if not (state.is_live and _is_surface_at_rest(hair)):
+    if not (state.is_live and _is_ready(hair, depsgraph)):
         # Guides that are reported for the first time may be the guides that the hair was made with.
         state.is_stale = state.is_stale or (follows and staleness.is_left_by_undo(hair))
     elif state.is_stale and not live_hair.is_ahead(hair):
@@ -233,9 +234,27 @@ def _evaluate_hair(hair, depsgraph, combed):
         events.looks_written(hair)
 
 
-def _is_surface_at_rest(curves):
-    """Whether the surface is in Object Mode or missing: hair waits until edit and paint modes are left."""
-    return curves.surface is None or curves.surface.mode == "OBJECT"
+def _is_ready(curves, depsgraph):
+    """Whether the surface is missing, or in Object Mode and evaluated.
+
+    Hair waits until edit and paint modes are left, and hair of another scene until that scene is evaluated.
+    """
+    return curves.surface is None or (
+        curves.surface.mode == "OBJECT" and usable_surfaces.is_in(curves.surface, depsgraph)
+    )
+
+
+def _evaluate_other_scenes(scene):
+    """Regenerate outdated hair of scenes that are not shown: their updates call `after_depsgraph_update`."""
+    if scene != bpy.context.scene or len(bpy.data.scenes) == 1:
+        return
+    outdated = {c.surface for c in bpy.data.hair_curves if c.vellus.is_stale and c.vellus.is_live} - {None}
+    for surface_object in outdated:
+        scenes = surface_object.users_scene
+        layers = [] if scene in scenes else [layer for its in scenes for layer in its.view_layers]
+        layer = next((layer for layer in layers if surface_object.name in layer.objects), None)
+        if layer is not None:
+            layer.update()
 
 
 @persistent

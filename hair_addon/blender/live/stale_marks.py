@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import bpy
 
 from ...core.errors import HairError
-from ..data import masks, scene
+from ..data import masks, scene, usable_surfaces
 from ..data.strands import curves, drawn_lines
 from ..groom import applied_transforms, bindings, edited_surfaces, frame_faces, staleness
 from ..groom.edited_surfaces import Followed
@@ -75,7 +75,9 @@ def follow_applied():
     due = {datablock.surface for datablock in bpy.data.hair_curves if applied_transforms.is_due(datablock)}
     for surface_object in due:
         if surface_object.type == "MESH" and surface_object.mode == "OBJECT":
-            follow_surface(surface_object, scene.present_depsgraph(), False)
+            depsgraph = scene.present_depsgraph()
+            if usable_surfaces.is_in(surface_object, depsgraph):
+                follow_surface(surface_object, depsgraph, False)
 
 
 @contextmanager
