@@ -6,6 +6,7 @@ import contextlib
 import bpy
 import numpy as np
 
+from hair_addon.blender.data import scene
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import strands
@@ -51,6 +52,8 @@ def _drawn(kinds, is_in_world):
             continue
         if one.data.vellus.status or one.data.vellus.is_stale:
             continue
+        if is_in_world and _is_stretched(one.data.surface):
+            continue
         with contextlib.suppress(HairError):
             points = hair_cache.strands_on_gpu(one.data).points.astype(np.float64)
             if is_in_world:
@@ -58,3 +61,16 @@ def _drawn(kinds, is_in_world):
                 points = points @ place[:3, :3].T + place[:3, 3]
             found[one.name] = strands.lengths(points), float(abs(points).max())
     return found
+
+
+def _is_stretched(surface_object):
+    """Whether a surface is deformed in stretched coordinates.
+
+    Tools keep the lengths of guides at rest. The pose rotates guides in local coordinates, where a guide that points
+    another way is stretched by another factor.
+    """
+    try:
+        surface = scene.read_surface(surface_object, bpy.context.evaluated_depsgraph_get())
+    except HairError:
+        return False
+    return surface.is_deformed and surface.shape is None
