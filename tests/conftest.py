@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fixtures that every suite shares."""
 
+import atexit
 import gc
 import os
 
 import numpy as np
 import pytest
+from hypothesis.internal.conjecture import providers
 
 from hair_addon.core.kernels import compiled_kernels
 from tests.support.devices import DEVICE
 from tools import build_extension, compile_kernels
 
 # Files of few tests that take long. Processes take files one after another: begun last, these would hold up the end.
-LONG_FILES = {"test_install.py", "test_any_operation.py", "test_kernel_cache.py", "test_compiled_kernels.py"}
+LONG_FILES = {
+    *("test_install.py", "test_any_operation.py", "test_kernel_cache.py", "test_compiled_kernels.py"),
+    *("test_sequence.py", "test_interruption.py", "test_api.py", "test_engine.py", "test_history.py"),
+}
 
 
 def pytest_configure():
@@ -28,26 +33,28 @@ def pytest_configure():
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():
-    """Collect tests without looking for garbage meanwhile, of which there is none; nor later in all that it makes.
+    """Collect tests without looking for garbage meanwhile, of which there is little; nor later in all that it makes.
 
-    A million objects, through which Python would look a dozen times, a tenth of the time of collecting.
+    A million objects, through which Python would look a dozen times, and pytest five times at its end. At the end they
+    are released: a Blender in which tests ran would say that it was not freed.
     """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.enable()
-        gc.collect()
         gc.freeze()
+        atexit.register(gc.unfreeze)  # before Blender's own end, as Blender is loaded by now
 
 
-def pytest_unconfigure():
-    """Let go what was frozen: a Blender in which tests ran would say at its end that it was not freed."""
-    gc.unfreeze()
-
-
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Begin with the files that take longest."""
+    """Begin with the files that take longest.
+
+    Hypothesis does not look for numbers in the sources of all loaded modules, which takes seconds: the examples of a
+    test would depend on what other tests load.
+    """
+    providers._get_local_constants = lambda: providers._local_constants
     items.sort(key=lambda item: item.path.name not in LONG_FILES)
 
 

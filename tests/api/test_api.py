@@ -33,6 +33,7 @@ from hair_addon.core.kernels import compiled_kernels
 from hair_addon.core.long_work import Stopped
 from hair_addon.core.placement import cvt
 from hair_addon.core.shading import appearance
+from tests.support.commands import PYTHONPATH
 from tests.support.dynamics.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
@@ -83,7 +84,7 @@ def test_examples_of_functions_run(scalp, coarse_shadows, tmp_path, monkeypatch)
 
 def run_python(program, folder):
     kept = {name: os.environ[name] for name in (compiled_kernels.VARIABLE,) if name in os.environ}
-    line, environment = [sys.executable, "-c", program], kept | {"PYTHONPATH": str(ROOT)}
+    line, environment = [sys.executable, "-c", program], kept | {"PYTHONPATH": PYTHONPATH}
     done = subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout

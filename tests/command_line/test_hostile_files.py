@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.support.commands import HEAD, TETRAHEDRON, command, largest_file, run_here, write_obj
+from tests.support.commands import HEAD, PYTHONPATH, TETRAHEDRON, command, largest_file, run_here, write_obj
 
 SMALL = ("--guides", 5, "--strands", 20)
 
@@ -229,7 +229,7 @@ needs_mounts = pytest.mark.skipif(not CAN_MOUNT, reason="only root may mount")
 def run_mounted(mounting, words, folder):
     """Run a command that alone sees what is mounted."""
     script = f'{mounting}; cd "$0"; "$@"; status=$?; ls -A "$0" > "$0.left"; exit $status'
-    environment = os.environ | {"PYTHONPATH": str(HEAD.parents[1])}
+    environment = os.environ | {"PYTHONPATH": PYTHONPATH}
     words = ["unshare", "--mount", "sh", "-c", script, str(folder), *command(*words)]
     done = subprocess.run(words, capture_output=True, text=True, env=environment, timeout=300)
     return done, folder.with_name(folder.name + ".left").read_text().split()

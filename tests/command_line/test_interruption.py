@@ -15,10 +15,10 @@ from hair_addon import api
 from hair_addon.command_line import helpers, render
 from hair_addon.command_line.interruption import Interruption
 from hair_addon.core.long_work import Stopped
-from tests.support.commands import HEAD, ROOT, command, run_here
+from tests.support.commands import HEAD, PYTHONPATH, command, run_here
 
 LONG = ("groom", HEAD, "--guides", 4000, "--relax-iterations", 1000, "--strands", 100)
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
+ENVIRONMENT = os.environ | {"PYTHONPATH": PYTHONPATH}
 
 
 class Terminal:
@@ -118,7 +118,7 @@ def test_frames_of_a_killed_worker_are_rendered_by_the_other(lit, tmp_path, monk
 
     monkeypatch.setattr(helpers.subprocess, "Popen", started)
     monkeypatch.setattr(render, "_sentence", told)
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setenv("PYTHONPATH", PYTHONPATH)
     words = ("render", tmp_path / "shot.blend", "--frames", "1-4", "--width", 64, "--height", 48, "--samples", 1)
     ended = run_here(*words, "--jobs", 2, "--out", tmp_path / "out" / "f_##.png")
     frames = sorted(path.name for path in (tmp_path / "out").iterdir() if not path.name.startswith("."))

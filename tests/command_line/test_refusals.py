@@ -15,7 +15,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.files import settings_file
 from hair_addon.core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME
 from tests.command_line.test_hostile_files import SMALL, mesh, refuse  # noqa: F401 (a fixture)
-from tests.support.commands import ROOT, TETRAHEDRON, command, run_here, write_obj
+from tests.support.commands import PYTHONPATH, TETRAHEDRON, command, run_here, write_obj
 
 LONG = "x" * 300
 
@@ -233,7 +233,7 @@ def test_lost_output_is_a_failure(tmp_path, words, redirected):
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {line}"],
         cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        env=os.environ | {"PYTHONPATH": PYTHONPATH},
         capture_output=True,
         text=True,
         timeout=60,

@@ -22,6 +22,8 @@ from hair_addon.command_line.interruption import Interruption
 
 ROOT = Path(__file__).resolve().parents[2]
 HEAD = ROOT / "blend_samples" / "head.obj"
+# For processes that import the add-on from the checkout and draw small pictures.
+PYTHONPATH = os.pathsep.join([str(ROOT), str(Path(__file__).with_name("child_processes"))])
 
 TETRAHEDRON = (
     np.array([[0.1, 0.2, 0.3], [1.1, 0.2, 0.4], [0.2, 2.4, 0.5], [0.4, 0.6, 3.7]]),
@@ -50,7 +52,7 @@ def command(*arguments):
 
 def run(*arguments, **details):
     """Run a command in a separate process."""
-    details = {"cwd": ROOT, "timeout": 300, "env": os.environ | {"PYTHONPATH": str(ROOT)}} | details
+    details = {"cwd": ROOT, "timeout": 300, "env": os.environ | {"PYTHONPATH": PYTHONPATH}} | details
     done = subprocess.run(command(*arguments), capture_output=True, text=True, check=False, **details)
     return Ended(done.returncode, done.stdout, done.stderr)
 

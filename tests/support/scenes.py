@@ -17,7 +17,9 @@ from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, scene_lights
 from hair_addon.blender.host import running
 from hair_addon.core.grooming.groom import GuideSettings
+from hair_addon.core.imaging import ambient_cube
 from tests.support import remembered
+from tests.support.child_processes import sitecustomize as coarse
 from tests.support.exchange.imported import curves_object, lines_on
 from tests.support.guide_tools import wave
 from tests.support.reading import vertex_positions
@@ -95,14 +97,19 @@ def scene_files(blender, tmp_path_factory):
     return files
 
 
-# Side of the maps of world light in texels, and the least number of strands drawn into them: coarse maps resolve fewer.
-FINE_WORLD, COARSE_WORLD = (ambient_visibility._SIZE, ambient_visibility._LEAST_STRANDS), (32, 300)
+# Side of the maps of world light in texels, the least number of strands drawn into them, as coarse maps resolve fewer,
+# and the number of maps: the first six face the sides of a cube.
+FINE_WORLD = (ambient_visibility._SIZE, ambient_visibility._LEAST_STRANDS, len(ambient_cube.DIRECTIONS))
+COARSE_WORLD = (coarse.WORLD_SIZE, coarse.WORLD_STRANDS, coarse.WORLD_MAPS)
+_DIRECTIONS, _WEIGHTS = ambient_cube.DIRECTIONS, ambient_cube.WEIGHTS
 
 
-def set_world_maps(patch, size, least_strands):
-    """Set the size of these maps; patch: a `pytest.MonkeyPatch`."""
+def set_world_maps(patch, size, least_strands, map_count):
+    """Set the size and the number of these maps; patch: a `pytest.MonkeyPatch`."""
     patch.setattr(ambient_visibility, "_SIZE", size)
     patch.setattr(ambient_visibility, "_LEAST_STRANDS", least_strands)
+    patch.setattr(ambient_cube, "DIRECTIONS", _DIRECTIONS[:map_count])
+    patch.setattr(ambient_cube, "WEIGHTS", _WEIGHTS[:map_count] / _WEIGHTS[:map_count].sum())
 
 
 @pytest.fixture
@@ -111,7 +118,7 @@ def scene(scene_files, request, monkeypatch):
 
     The nodes that deform hair are in memory, as after deleting hair; use `read_homefile` for a scene without them. The
     data of the test's other fixtures of this file is loaded already, as in an opened file. The maps of world light are
-    as small as the pictures of tests, as larger ones would take most of the time.
+    as small as the pictures of tests, and fewer, as others would take most of the time.
     """
     set_world_maps(monkeypatch, *COARSE_WORLD)
     wanted = [*takewhile(request.fixturenames.__contains__, STAGES)]
@@ -208,7 +215,7 @@ def coarse_shadows(monkeypatch):
 def shrink_shadows(patch):
     """Set small maps of both kinds, also for pictures that several tests share; patch: a `pytest.MonkeyPatch`."""
     set_world_maps(patch, *COARSE_WORLD)
-    patch.setattr(scene_lights, "_MAP_SIZE", 128)
+    patch.setattr(scene_lights, "_MAP_SIZE", coarse.LAMP_SIZE)
 
 
 @pytest.fixture

@@ -20,7 +20,8 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.files import file_lock
 from hair_addon.core.files.atomic_file import atomic_file, partial_of
 from hair_addon.core.files.file_lock import claim, claim_of
-from tests.support.commands import ROOT, command, largest_file, run, run_here
+from tests.support.commands import PYTHONPATH, ROOT, command, largest_file, run_here
+from tests.support.scenes import shrink_shadows
 
 COUNT = 5
 
@@ -33,7 +34,15 @@ with claim(sys.argv[1]):
     time.sleep(2)
     Path(sys.argv[2]).touch()
 """
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
+ENVIRONMENT = os.environ | {"PYTHONPATH": PYTHONPATH}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def shadows_of_child_processes():
+    """Shadow maps as small as in the processes that this file starts: pictures must be equal."""
+    with pytest.MonkeyPatch.context() as patch:
+        shrink_shadows(patch)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +167,7 @@ def test_processes_share_the_frames(turning, whole, tmp_path):
     assert hidden(tmp_path) == [".f_###.png.json"]
 
 
-def test_frames_of_another_sequence_are_kept(turning, coarse_shadows, tmp_path):
+def test_frames_of_another_sequence_are_kept(turning, tmp_path):
     with contextlib.chdir(tmp_path):
         assert run_here(*words(turning, tmp_path)).status == 0
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
@@ -176,7 +185,7 @@ def test_frames_of_another_sequence_are_kept(turning, coarse_shadows, tmp_path):
     assert frame_numbers(run_here(*words(turning, tmp_path, "--width", 32))) == []
 
 
-def test_a_full_disk_keeps_complete_frames(turning, coarse_shadows, tmp_path):
+def test_a_full_disk_keeps_complete_frames(turning, tmp_path):
     """The error is that of a file that may not grow further."""
     with largest_file(4096):
         ended = run_here(*words(turning, tmp_path, ending="exr"))
@@ -198,12 +207,13 @@ def test_a_folder_without_space_is_reported(turning, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_failing_worker_reports_its_error_once(turning, tmp_path):
+def test_a_failing_worker_reports_its_error_once(turning, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", PYTHONPATH)
     bpy.ops.wm.open_mainfile(filepath=str(turning))
     bpy.data.objects.remove(bpy.context.scene.camera)
     blind = tmp_path / "blind.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blind))
-    ended = run("render", blind, "--frames", "1-4", "--out", tmp_path / "f_##.png", "--jobs", 2)
+    ended = run_here("render", blind, "--frames", "1-4", "--out", tmp_path / "f_##.png", "--jobs", 2)
     assert ended.status == 1 and len(ended.errors.splitlines()) == 1
     assert ended.errors == "vellus: The scene has no camera: add one.\n"
     assert not list(tmp_path.glob("f_*.png")) and hidden(tmp_path) == [".f_##.png.json"]
@@ -244,7 +254,7 @@ def spoil(folder, ending):
 
 
 @pytest.mark.parametrize("more", [("--out", "f_###.png"), ("--out", "f_###.exr", "--passes")])
-def test_unreadable_pictures_are_rendered_again(turning, coarse_shadows, tmp_path, monkeypatch, more):
+def test_unreadable_pictures_are_rendered_again(turning, tmp_path, monkeypatch, more):
     monkeypatch.chdir(tmp_path)
     line = ("render", turning, "--frames", "1-3", "--width", 32, "--samples", 1, "--json", *more)
     assert frame_numbers(run_here(*line)) == [1, 2, 3]

@@ -12,6 +12,7 @@ import json
 import math
 import os
 import re
+import runpy
 import sys
 from pathlib import Path
 
@@ -20,6 +21,7 @@ import gpu
 import numpy as np
 
 MODULE = "bl_ext.user_default.vellus"
+COARSE = Path(__file__).resolve().parents[1] / "child_processes" / "sitecustomize.py"
 SCRIPTS = Path(__file__).resolve().parents[3] / "docs" / "scripts.md"
 # In the order of `tests/api/test_api.py`: later examples use what earlier ones made.
 API_FILES = (
@@ -46,6 +48,7 @@ def use(_zip_path, folder):
     """Run operators, then scripts, in one Blender: each start unpacks the wheels of the extension for four seconds."""
     gpu.init()
     bpy.ops.preferences.addon_enable(module=MODULE)
+    _draw_coarse_shadows()
     return {"operators": _operators(folder), "scripts": _scripts(folder)}
 
 
@@ -102,7 +105,6 @@ def _scripts(folder):
     import warp  # there since the extension was enabled
 
     warp.config.log_level = warp.LOG_WARNING  # what it says of loaded kernels is no part of an example
-    _draw_coarse_shadows()
     os.chdir(folder)
     ran = 0
     for block in re.findall(r"```python\n(.*?)```", SCRIPTS.read_text(encoding="utf-8"), re.DOTALL):
@@ -128,11 +130,10 @@ def _scripts(folder):
 
 
 def _draw_coarse_shadows():
-    """As `scenes.shrink_shadows`: examples are small pictures, and their maps take longer than all else."""
-    gpu_package = f"{MODULE}.hair_addon.blender.gpu"
-    world = importlib.import_module(f"{gpu_package}.ambient_visibility")
-    world._SIZE, world._LEAST_STRANDS = 32, 300
-    importlib.import_module(f"{gpu_package}.scene_lights")._MAP_SIZE = 128
+    """As in other processes that tests start: the pictures are small, and their maps take longer than all else."""
+    coarse = runpy.run_path(str(COARSE))
+    for name, change in coarse["CHANGES"].items():
+        change(importlib.import_module(f"{MODULE}.{name}"))
 
 
 def _examples(api):

@@ -16,7 +16,7 @@ from hair_addon.blender.render.viewport import hair_picture, viewport
 from tests.support.rendering import light_up
 from tests.support.viewports import context_of, view3d
 
-SIZE = 64
+SIZE = 40
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 STUDIO_LIGHTS = ("Default", "basic.sl", "outdoor.sl", "paint.sl", "rim.sl", "studio.sl")
 
@@ -39,7 +39,7 @@ def facing(angle=0.0, is_above=False):
 
 
 @pytest.fixture
-def ball(hair):
+def ball(hair, coarse_shadows):
     """A ball of short, dense hair without lamps: the space in which it is shown."""
     hair.data.vellus.hair.strand_count, hair.data.vellus.hair.radius = 1500, 0.016
     bpy.data.hair_curves["Guides"].vellus.guides.length = 0.25
@@ -371,7 +371,7 @@ def test_hair_darkens_the_surface_that_it_grows_on(ball, light):
     assert not viewport._is_shadowed(context_of(ball), read(ball, camera)[0])
 
 
-def test_hair_turns_with_its_lights(ball):
+def test_hair_turns_with_its_lights(ball, fine_world):
     """The bright side of the ball, from above."""
     camera = facing(is_above=True)
     solid(ball, light="STUDIO", studio_light="studio.sl", use_world_space_lighting=True)
