@@ -62,7 +62,7 @@ def sums(rng):
     return sides[:, :4], z, surface, channels, color
 
 
-def test_bytes_keep_what_strands_see(scene, rng):
+def test_bytes_keep_what_strands_see(fine_world, rng):
     """Every sum to half a step of its root, ratios too, the direction of surfaces to a third of a degree."""
     given = sums(rng)
     names = dict(zip(("x_y", "z", "surface", "channels", "tint"), given, strict=True))

@@ -35,6 +35,7 @@ API_FILES = (
     "imports",
     "pictures",
     "cards",
+    "systems",
 )
 
 
@@ -106,10 +107,12 @@ def _scripts(folder):
 
     warp.config.log_level = warp.LOG_WARNING  # what it says of loaded kernels is no part of an example
     os.chdir(folder)
-    ran = 0
+    ran, names = 0, {}
     for block in re.findall(r"```python\n(.*?)```", SCRIPTS.read_text(encoding="utf-8"), re.DOTALL):
-        bpy.ops.wm.read_homefile(use_empty=True)
-        exec(block.replace("from hair_addon import api", f"from {MODULE}.hair_addon import api"), {})
+        if "import " in block:  # others continue the block before
+            bpy.ops.wm.read_homefile(use_empty=True)
+            names = {}
+        exec(block.replace("from hair_addon import api", f"from {MODULE}.hair_addon import api"), names)
         ran += 1
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
