@@ -21,6 +21,14 @@ def film_depth_program():
     return _film("picture/film_depth.comp", samplers, (("VEC4", "view_to_clip"),))
 
 
+@shaders.cached
+def film_mattes_program():
+    """The compute program that adds the coverage of pixels by labels: see picture/film_mattes.comp."""
+    samplers = (("segments", "UINT_2D"), ("matte_ranges", "FLOAT_2D"))
+    names = ("range_count", "range_columns", "slot_count", "layer_columns", "tile_width", "tile_height")
+    return _film("picture/film_mattes.comp", samplers, tuple(("INT", name) for name in names))
+
+
 def _film(file, samplers, constants=()):
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)

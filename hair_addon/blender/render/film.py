@@ -7,7 +7,7 @@ import numpy as np
 from ...core.imaging import pixel_sampling
 from ..gpu import drawing, picture_programs, surface_programs
 from ..gpu.visibility_buffer import VisibilityBuffer
-from . import motion_vectors, scene_drawing
+from . import mattes, motion_vectors, scene_drawing
 
 _MOST_SAMPLES = 4096  # along a tile's side: textures take 340 MB, 870 MB with all passes
 
@@ -35,6 +35,8 @@ LOBES = {
 
 def channels_of(name):
     """(names of channels, type) of a pass in Blender's terms."""
+    if mattes.is_matte(name):
+        return ("RGBA", "COLOR") if name.startswith("Crypto") else ("X", "VALUE")
     return _CHANNELS.get(name, ("RGB", "COLOR"))
 
 
@@ -43,10 +45,11 @@ class Film:
 
     border: extra samples around the tile; passes: names out of "Combined", "Depth", "Hair Mask", "Hair Shadow",
     "Shadow", "Vector" and `LOBES`; is_transparent: leave the background empty; filter_width: of
-    `pixel_sampling.filter_weights` [pixels]. The attribute `motion` is the `Motion` for the pass "Vector".
+    `pixel_sampling.filter_weights` [pixels]; labels: `mattes.Labels` if mattes are wanted. The attribute
+    `motion` is the `Motion` for the pass "Vector".
     """
 
-    def __init__(self, size, per_side, passes, is_transparent, filter_width=0.0, border=BORDER):
+    def __init__(self, size, per_side, passes, is_transparent, filter_width=0.0, border=BORDER, labels=None):
         self.size, self._per_side, self.is_transparent = size, per_side, is_transparent
         self._filter_width, self._margin = filter_width, pixel_sampling.filter_margin(per_side, filter_width)
         self._border = border
@@ -54,6 +57,7 @@ class Film:
         self.samples = VisibilityBuffer(*sides, is_coarse=per_side > 1)
         self._sums = {name: self._texture() for name in passes if name not in {"Depth", "Hair Mask"}}
         self._depth = self._texture() if {"Depth", "Hair Mask", "Vector"} & set(passes) else None
+        self._mattes = None if labels is None else mattes.MatteFilm(size, labels)
         self._passes, self.motion = passes, None
         self.clear()
 
@@ -67,6 +71,8 @@ class Film:
             texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
         if self._depth is not None:
             self._depth.clear(format="FLOAT", value=(0.0, FAR, 0.0, 0.0))
+        if self._mattes is not None:
+            self._mattes.clear()
 
     def add_pass(self, drawn, world_to_view, view_to_clip, size, turn, place=(0, 0), lens=None):
         """Draw a `DrawnScene` once; returns the `uniforms.VIEW` record of the pass.
@@ -95,6 +101,8 @@ class Film:
             program.uniform_float("view_to_clip", view_to_clip[2:, 2:].ravel())
             samplers = {"segments": self.samples.segments, "depths": self.samples.nearest_depths()}
             self._add(program, {**samplers, "filter_weights": weighting}, self._depth)
+        if self._mattes is not None:
+            self._mattes.add(drawn, self.samples, weighting, self._per_side, self._margin, self._border)
         self.pass_count += 1
         self._weight_sum += float(weights[0].sum() * weights[1].sum())
         return view
@@ -152,6 +160,10 @@ class Film:
             if "Vector" in found:  # of objects, not of the background
                 found["Vector"] *= self._weight_sum / np.maximum(covered, 1e-6)
         return {name: found[name][..., : len(channels_of(name)[0])] for name in self._passes}
+
+    def read_mattes(self):
+        """Return (labels, coverages), each (height, width, slots), bottom row first; None without labels."""
+        return None if self._mattes is None else self._mattes.read(self._weight_sum)
 
     def _read(self, texture):
         return np.array(texture.read(), np.float32).reshape(self.size[1], self.size[0], 4)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials of the surfaces drawn around hair: base color, roughness, reflectance, and images of these."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -54,6 +54,8 @@ class SurfaceMaterial:
     color_image: ImageMap | None = None
     roughness_image: ImageMap | None = None
     normal_image: ImageMap | None = None
+    name: str = ""  # of the Blender material, "" for none
+    index: int = 0  # its pass index
 
     @property
     def is_invisible(self):
@@ -76,8 +78,10 @@ def read_material(material):
         return SurfaceMaterial(roughness=0.5, reflectance=_reflectance(1.5, 0.5))
     shader = shown_shader(material.node_tree, _READERS)
     if shader is None:
-        return SurfaceMaterial(tuple(material.diffuse_color[:3]))
-    return _READERS[shader.type](shader, material)
+        found = SurfaceMaterial(tuple(material.diffuse_color[:3]))
+    else:
+        found = _READERS[shader.type](shader, material)
+    return replace(found, name=material.name, index=material.pass_index)
 
 
 def _read_principled(sockets, material):

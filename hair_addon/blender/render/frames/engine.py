@@ -16,7 +16,7 @@ from ...groom.dynamics import frame_folders
 from ...host import scene_time
 from ...settings import setting_properties
 from ...settings.translations import error_text, interface_text
-from .. import drawn_scene, film, light_paths, motion_vectors
+from .. import drawn_scene, film, light_paths, mattes, motion_vectors
 from ..viewport import rendered_view, viewport
 from . import composite, frame_progress
 from .frame_progress import FrameProgress
@@ -102,12 +102,14 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         views = self._views(view_layer)
         offsets = _offsets(blender_scene.render, blender_scene.vellus.motion_steps)
         sample_count = view_layer.samples or blender_scene.vellus.sample_count
-        passes = _passes(view_layer, blender_scene.render.use_motion_blur)
+        wanted = _passes(view_layer, blender_scene.render.use_motion_blur)
+        passes = [name for name in wanted if not mattes.is_matte(name)]
+        labels = mattes.Labels(view_layer.pass_cryptomatte_depth) if len(passes) < len(wanted) else None
         film_settings = passes, blender_scene.render.film_transparent, blender_scene.render.filter_size
         has_lens = cameras.read_lens(blender_scene, depsgraph, self.camera_override) is not None
         lens_passes = -(-pixel_sampling.LENS_PASSES // len(offsets)) if has_lens else 1
         path_count = -(-light_paths.path_count(blender_scene, size) // len(offsets))
-        film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count
+        film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count, labels
         frames = {view: self._frame(depsgraph, view, size, window, film_settings) for view in views}
         progress = FrameProgress(self, frame_progress.share_of(depsgraph), _listener)
         before = _NEIGHBOURS if "Vector" in passes else 0.0
@@ -132,8 +134,12 @@ class VellusRenderEngine(bpy.types.RenderEngine):
                         moving = motion_vectors.Motion(around[0], now, around[1], size)
                 first, last = (drawn_from + (end - drawn_from) * (number + n) / len(frames) for n in (0, 1))
                 frame.expose(drawn, *camera, moving, lens, part_of(progress, first, last))
-                if index + 1 == len(offsets) or not bpy.app.background:
-                    self._show(view_layer, view, window, frame.arrays())
+                is_last = index + 1 == len(offsets)
+                if is_last or not bpy.app.background:
+                    arrays = frame.arrays()
+                    if labels is not None and is_last:
+                        arrays |= labels.passes(frame.mattes(), view_layer)
+                    self._show(view_layer, view, window, arrays, labels if is_last else None)
             progress(_EVALUATING, end)
         # Errors come last, after a picture of everything else. A command that renders to a file fails: a picture
         # without some of the hair is not a valid result.
@@ -175,6 +181,10 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             return Frame(size, window, *settings)
         if self.use_spherical_stereo(camera):
             raise HairError("Vellus cannot render spherical stereo: turn off Spherical Stereo of the camera.")
+        if settings[-1] is not None:
+            raise HairError(
+                "Panoramic cameras have no mattes: turn off the passes Cryptomatte, Object Index and Material Index."
+            )
         if "Vector" in settings[1]:
             raise HairError("Panoramic cameras have no motion vectors: turn off the pass Vector.")
         clip = camera.data.clip_start, camera.data.clip_end
@@ -193,12 +203,14 @@ class VellusRenderEngine(bpy.types.RenderEngine):
                     places.append(motion_vectors.places(drawn, *self._camera(depsgraph, view, size)))
         return found
 
-    def _show(self, view_layer, view, window, arrays):
-        """Pass the current picture of a view to Blender."""
+    def _show(self, view_layer, view, window, arrays, labels=None):
+        """Pass the current picture of a view to Blender; labels: of its mattes, for the metadata of files."""
         result = self.begin_result(0, 0, *window[2:], layer=view_layer.name, view=view)
         for render_pass in result.layers[0].passes:
             if render_pass.name in arrays:
                 render_pass.rect.foreach_set(np.ascontiguousarray(arrays[render_pass.name]).ravel())
+        for name, text in ({} if labels is None else labels.metadata(view_layer)).items():
+            self.get_result().stamp_data_add_field(name, text)
         self.end_result(result)
 
 
@@ -222,7 +234,7 @@ def _passes(view_layer, is_blurred):
         names += film.LOBES
     if wanted.has_hair_shadow:
         names.append("Hair Shadow")
-    return names
+    return names + mattes.pass_names(view_layer)
 
 
 def _offsets(render, count):

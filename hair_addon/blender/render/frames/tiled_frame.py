@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ....core.imaging import pixel_sampling
+from ....core.imaging import cryptomatte, pixel_sampling
 from ....core.long_work import no_progress, part_of
 from ...gpu import drawing
 from .. import film, light_paths
@@ -17,18 +17,31 @@ class Frame:
 
     size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of the rendered part;
     sample_count: per pixel in each motion step; passes, is_transparent, filter_width: of `film.Film`; lens_passes:
-    minimum passes per motion step, for depth of field; path_count: paths through the light grid in each, 0: none.
+    minimum passes per motion step, for depth of field; path_count: paths through the light grid in each, 0: none;
+    labels: `mattes.Labels` if mattes are wanted.
     """
 
     def __init__(
-        self, size, window, sample_count, passes, is_transparent, filter_width=0.0, lens_passes=1, path_count=0
+        self,
+        size,
+        window,
+        sample_count,
+        passes,
+        is_transparent,
+        filter_width=0.0,
+        lens_passes=1,
+        path_count=0,
+        labels=None,
     ):
         self._size, self._window, self._path_count = size, window, path_count
         self._per_side = pixel_sampling.samples_per_side(sample_count, lens_passes)
         self._turns = sample_count // self._per_side**2
         self._tiles = pixel_sampling.tiles(window, film.largest_tile(self._per_side, filter_width))
-        self._new_film = lambda tile: film.Film(tile[2:], self._per_side, passes, is_transparent, filter_width)
+        self._new_film = lambda tile: film.Film(
+            tile[2:], self._per_side, passes, is_transparent, filter_width, labels=labels
+        )
         self._film, self._moment_count, self._sums = None, 0, {}
+        self._mattes = None
 
     @property
     def _passes_of_moment(self):
@@ -62,6 +75,7 @@ class Frame:
                 drawing_passes(_PASS.format(number=done, count=self._passes_of_moment), done / self._passes_of_moment)
             with drawing.ALONE:
                 self._add(tile, self._film.read())
+                self._add_mattes(tile, self._film.read_mattes())
         self._moment_count += 1
 
     def free_film(self):
@@ -80,6 +94,22 @@ class Frame:
                 np.minimum(part, values, out=part)
             else:
                 part += values
+
+    def _add_mattes(self, tile, mattes):
+        if mattes is None:
+            return
+        left, bottom, width, height = tile
+        left, bottom = left - self._window[0], bottom - self._window[1]
+        if self._mattes is None:
+            shape = (self._window[3], self._window[2], mattes[0].shape[-1])
+            self._mattes = np.zeros(shape, np.int32), np.zeros(shape, np.float32)
+        part = tuple(whole[bottom : bottom + height, left : left + width] for whole in self._mattes)
+        cryptomatte.added(part, mattes)
+
+    def mattes(self):
+        """Mattes of the motion steps so far: (labels, coverages), each (height, width, slots)."""
+        labels, coverages = self._mattes
+        return labels, coverages / np.float32(self._moment_count)
 
     def arrays(self):
         """{pass: array}: means over the motion steps so far, and the nearest depths."""
