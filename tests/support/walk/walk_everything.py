@@ -143,7 +143,9 @@ class Everyone(Artist):
 
     @step(steps=st.integers(1, 3))
     def undo_and_redo(self, steps):
-        """Check that undo and redo restore the state."""
+        """Check that undo and redo restore the state, outside Edit Mode: there Blender's steps hold only the mesh."""
+        if bpy.context.mode.startswith("EDIT"):
+            return
         before = state()
         bpy.ops.ed.undo_push(message="here")
         for _ in range(steps):
