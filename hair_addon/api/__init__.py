@@ -49,6 +49,7 @@ from .grooms import (
     settings_of,
     shade,
 )
+from .guide_layers import add_layer, apply_layers, layers, set_layer
 from .guide_tools import change_guides
 from .imports import DerivationSettings, TransferSettings, import_curves, transfer_groom, use_as_guides, use_as_hair
 from .library import apply_groom, groom_names, save_groom
@@ -95,8 +96,10 @@ __all__ = [
     "TubeSettings",
     "Wet",
     "add_hair",
+    "add_layer",
     "add_style",
     "apply_groom",
+    "apply_layers",
     "apply_settings",
     "apply_style_preset",
     "bake_dynamics",
@@ -113,6 +116,7 @@ __all__ = [
     "hair_systems",
     "import_curves",
     "interpolate_hair",
+    "layers",
     "load_settings",
     "look_names",
     "make_hair_cards",
@@ -124,6 +128,7 @@ __all__ = [
     "save_groom",
     "save_settings",
     "set_dynamics",
+    "set_layer",
     "set_map",
     "set_styles",
     "settings_of",

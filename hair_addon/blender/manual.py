@@ -10,12 +10,12 @@ from pathlib import Path
 import bpy
 
 from .groom import hair_systems
-from .settings import map_items, preferences, properties, style_items
+from .settings import layer_items, map_items, preferences, properties, style_items
 from .ui import operators, picture_menus
 
 # Page → the classes whose properties it explains, unless a property has its own entry below.
 _CLASSES = {
-    "guides": (properties.VellusGuideSettings,),
+    "guides": (properties.VellusGuideSettings, *layer_items.CLASSES),
     "strands": (properties.VellusHairSettings, properties.VellusCurves),
     "dynamics": (properties.VellusDynamicsSettings, properties.VellusCollider),
     "styles": style_items.CLASSES,
@@ -39,7 +39,11 @@ _OPERATORS = {
         "make_own_guides",
         "flip_normals",
     ),
-    "guides": ("distribute_guides", "draw_flow"),
+    "guides": (
+        *("distribute_guides", "draw_flow"),
+        *("freeze_selected", "unfreeze_all", "invert_frozen"),
+        *("add_layer", "remove_layer", "duplicate_layer", "move_layer", "merge_layer_down", "apply_layers"),
+    ),
     "guide_tools": (
         *("guide_length", "trim_guides", "change_guide_count", "mirror_guides", "copy_guide_shape"),
         *("smooth_guides", "lift_guides", "attract_guides", "drape_guides"),

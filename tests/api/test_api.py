@@ -20,6 +20,7 @@ from hair_addon.api import (
     dynamics,
     export,
     grooms,
+    guide_layers,
     guide_tools,
     imports,
     library,
@@ -38,7 +39,21 @@ from tests.support.dynamics.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULES = (api, grooms, dynamics, guide_tools, styles, tables, export, library, imports, pictures, cards, systems)
+MODULES = (
+    api,
+    grooms,
+    dynamics,
+    guide_tools,
+    guide_layers,
+    styles,
+    tables,
+    export,
+    library,
+    imports,
+    pictures,
+    cards,
+    systems,
+)
 WITHOUT_BLENDER = "import sys\nfor name in ('bpy', 'gpu', 'mathutils', 'imbuf'): sys.modules[name] = None\n"
 
 

@@ -32,7 +32,7 @@ def documented():
         elif issubclass(cls, (bpy.types.PropertyGroup, bpy.types.AddonPreferences)):
             found |= {f"{cls.__name__}.{entry.identifier}": entry.name for entry in entries}
     # Blender looks up the name of any item in a list as that of a PropertyGroup.
-    return {doc_id: label for doc_id, label in found.items() if doc_id != "VellusStyle.name"}
+    return {doc_id: label for doc_id, label in found.items() if doc_id not in {"VellusStyle.name", "VellusLayer.name"}}
 
 
 def address(doc_id):

@@ -16,6 +16,7 @@ from ..data.maps import strand_maps
 from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots
 from ..data.surfaces import Surface, cage_of
 from ..host.notices import name_of
+from ..layers import carried_layers
 from ..materials import looks
 from ..settings import animated, setting_properties, style_items
 from . import bindings, hair_outside, size_fitting, staleness
@@ -49,11 +50,14 @@ def write_guides(
     size_fitting.keep(target, fits)
     target.vellus.status = grown.status
     target.vellus.root_key, target.vellus.flow_key = key, flow_key
+    before = carried_layers.read(target, surface)
     radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * (settings.length or 0.0) / surface.scale, np.float32)
     points = Future()
     points.set_result(surface.to_local(guides.numpy()))
     rooted_on = curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
     curves.write_points(target, points)
+    if before is not None:
+        carried_layers.write(target, surface, before, guides.roots)
     surface_space.keep_surface(target, rooted_on)
     return target
 

@@ -24,12 +24,14 @@ from . import (
     hidden_previews,
     invalidation,
     live_hair,
+    live_layers,
     moving_surfaces,
     refused_hair,
     reported,
     simulated_hair,
     stale_marks,
     stored_guide_maps,
+    stroke_limits,
     unbaked_renders,
     unlocked_renders,
     updates,
@@ -100,7 +102,7 @@ def after_depsgraph_update(scene, depsgraph):
         if isinstance(datablock, bpy.types.Curves):
             events.curves_reported(datablock)
             if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):
-                combed[datablock] = reported.points_of(datablock)
+                combed[datablock] = stroke_limits.limited(datablock, reported.points_of(datablock))
     for hair in _of_kind("HAIR"):
         if hair.vellus.is_stale and hair.vellus.is_live:
             hidden_previews.hair_changed(hair, is_seen)
@@ -207,6 +209,7 @@ def _evaluate(depsgraph, combed):
             stack.callback(_evaluate_hair, hair, depsgraph, combed)
         for guides in reversed(_of_kind("GUIDES")):
             stack.callback(_evaluate_guides, guides, depsgraph, combed)
+        stack.callback(live_layers.follow, combed, depsgraph)
 
 
 def _evaluate_guides(guides, depsgraph, combed):
@@ -282,9 +285,10 @@ def after_frame_change(scene, depsgraph):
         return
     is_render = scene_time.is_rendered(depsgraph)
     try:
-        if animated.follow(depsgraph):
+        moved = live_layers.follow_frame(depsgraph)
+        if animated.follow(depsgraph) or moved:
             # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
-            _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, {})
+            _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, moved)
             if is_render:
                 live_hair.write_all()
     finally:
@@ -304,6 +308,7 @@ def before_reading(*_args):
     """Write hair before a save or a render reads its Curves, and update the hair scene that a render composites."""
     _show_hidden()
     stale_marks.follow_applied()
+    live_layers.record_all()
     live_hair.write_all()
     file_changes.follow(bpy.data.scenes)
     if bpy.app.background:  # in a window a timer repairs, as a render runs in parallel
@@ -348,6 +353,7 @@ def after_load(*_args):
     _is_undone = True  # does not affect a file that was saved during a stroke
     after_import()
     live_hair.cancel_writing()
+    live_layers.cancel()
     invalidation.clear()
     file_changes.accept_state()
     stale_marks.follow_applied()
@@ -377,6 +383,7 @@ def after_undo(*_args):
     global _is_undone
     _is_undone = True
     live_hair.cancel_writing()
+    live_layers.cancel()
     _show_hidden()  # the undo step may have been saved while hair was hidden
     invalidation.data_replaced()
     file_changes.accept_state()

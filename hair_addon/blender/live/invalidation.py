@@ -45,6 +45,7 @@ COPIES = (
     usable_surfaces.inside_out_cache,
     simulated_guides.point_cache,
     reported.guide_cache,
+    reported.former_cache,
     reported.painting_cache,
     reported.place_cache,
     hidden_hair.paused_cache,

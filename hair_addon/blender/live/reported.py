@@ -12,6 +12,9 @@ from ..host.caches import Cache
 # transform of their surface changed.
 guide_cache = Cache()
 
+# session_uid of guide Curves → their (N, 3) points before they moved the last time.
+former_cache = Cache()
+
 # session_uid of a surface in Texture Paint mode → True. Blender may not report painting before that mode ends.
 painting_cache = Cache()
 
@@ -25,7 +28,19 @@ def have_guides_moved(guide_curves):
     points = curves.read_points(guide_curves)
     before = guide_cache.get(guide_curves.session_uid)
     guide_cache.keep(guide_curves.session_uid, points)
+    if before is not None:
+        former_cache.keep(guide_curves.session_uid, before)
     return before is None or not np.array_equal(before, points)
+
+
+def note_points(guide_curves, points):
+    """Note (N, 3) points that were written to guides, so that they do not count as moved."""
+    guide_cache.keep(guide_curves.session_uid, points)
+
+
+def former_points_of(guide_curves):
+    """(N, 3) local points of guides before they moved the last time, or None."""
+    return former_cache.get(guide_curves.session_uid)
 
 
 def points_of(guide_curves):

@@ -16,7 +16,7 @@ from ...core.imaging.pixel_sampling import PassSettings, RenderSettings
 from ...core.shading import appearance
 from ...core.shading.appearance import Appearance
 from ...core.shading.tables import lookup_tables
-from . import map_items, setting_properties, shared_wetness, style_items, style_keys
+from . import layer_items, map_items, setting_properties, shared_wetness, style_items, style_keys
 from .marks import (
     mark_colliding,
     mark_dynamics,
@@ -177,6 +177,10 @@ class VellusCurves(bpy.types.PropertyGroup):
     styles: bpy.props.CollectionProperty(type=style_items.VellusStyle)
     active_style: bpy.props.IntProperty(min=0, options=set())
     maps: bpy.props.CollectionProperty(type=map_items.VellusMap)
+    layers: bpy.props.CollectionProperty(type=layer_items.VellusLayer)
+    active_layer: bpy.props.IntProperty(min=0, options=set())
+    layered: bpy.props.StringProperty(description="Fingerprint of the points that layers give", options={"HIDDEN"})
+    is_base_grown: bpy.props.BoolProperty(description="Whether settings grow the base of layers", options={"HIDDEN"})
     model: bpy.props.EnumProperty(
         name="Shading Model",
         description="Scattering model that shades the hair in the viewport",
@@ -320,6 +324,7 @@ class VellusPassSettings(bpy.types.PropertyGroup):
 CLASSES = (
     *style_items.CLASSES,
     *map_items.CLASSES,
+    *layer_items.CLASSES,
     VellusGuideSettings,
     VellusHairSettings,
     VellusAppearance,

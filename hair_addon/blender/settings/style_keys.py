@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Update of keys and drivers when styles are moved, removed or renamed.
+"""Update of keys and drivers when styles, or layers of guides, are moved, removed or renamed.
 
 Blender keys a style's setting by its index, as vellus.styles[0].curl.radius, and does not update the index.
 """
@@ -8,13 +8,18 @@ import re
 
 import bpy
 
-_PATH = re.compile(r'vellus\.styles\[(?:(\d{1,6})|"((?:[^"\\]|\\.)*)")\](.*)', re.DOTALL)
+_PATH = r'vellus\.{owner}\[(?:(\d{{1,6}})|"((?:[^"\\]|\\.)*)")\](.*)'
 
 
 class Rearrangement:
-    """A change of a hair's styles: old `names`, their new indices `places` (None: removed), and `new_names`."""
+    """A change of a hair's styles: old `names`, their new indices `places` (None: removed), and `new_names`.
 
-    def __init__(self, names, places, new_names):
+    owner: name of the list, "styles" or "layers".
+    """
+
+    def __init__(self, names, places, new_names, owner="styles"):
+        self.start = f"vellus.{owner}["
+        self._pattern = re.compile(_PATH.format(owner=owner), re.DOTALL)
         self._names, self._places, self._new_names = list(names), list(places), list(new_names)
 
     @property
@@ -25,7 +30,7 @@ class Rearrangement:
 
     def path(self, path):
         """Return the new data path: unchanged if it is not of a style, None if its style was removed."""
-        match = _PATH.fullmatch(path)
+        match = self._pattern.fullmatch(path)
         place = None if match is None else self._place_of(match)
         if place is None:
             return path
@@ -33,15 +38,15 @@ class Rearrangement:
         if to is None:
             return None
         key = to if match[1] else f'"{bpy.utils.escape_identifier(self._new_names[to])}"'
-        return f"vellus.styles[{key}]{match[3]}"
+        return f"{self.start}{key}]{match[3]}"
 
     def path_of_target(self, path):
         """Like `path` for a driver's target: the path of a removed style becomes invalid, as in Blender."""
         now = self.path(path)
         if now is not None:
             return now
-        match = _PATH.fullmatch(path)
-        return f'vellus.styles["{bpy.utils.escape_identifier(self._names[self._place_of(match)])}"]{match[3]}'
+        match = self._pattern.fullmatch(path)
+        return f'{self.start}"{bpy.utils.escape_identifier(self._names[self._place_of(match)])}"]{match[3]}'
 
     def _place_of(self, match):
         """Return the old index of the style in a matched path, None if there is none."""
@@ -62,7 +67,7 @@ def follow(curves, rearrangement):
     for other in _all_animation():
         for curve in other.drivers:
             for target in (target for variable in curve.driver.variables for target in variable.targets):
-                if target.id == curves and target.data_path.startswith("vellus.styles["):
+                if target.id == curves and target.data_path.startswith(rearrangement.start):
                     target.data_path = rearrangement.path_of_target(target.data_path)
 
 

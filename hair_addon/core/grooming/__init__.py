@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         guide_tool_settings,
         guide_trim,
         hair_styles,
+        layer_kernels,
         layer_transfer,
         rooted_curves,
         transfer_settings,

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..geometry.strands import curve_offsets
+from .. import geometry
 from .guide_layers import GuideLayers, added, without_layers
 from .guide_shapes import rotations
 
@@ -39,7 +39,7 @@ def transferred(
     for _layer in layers.turns:
         found = added(found)
     found = replace(found, weights=np.einsum("mk,lmk->lm", weights, layers.weights[:, indices]).astype(np.float32))
-    starts, other_starts = curve_offsets(layers.counts), curve_offsets(others.counts)
+    starts, other_starts = geometry.strands.curve_offsets(layers.counts), geometry.strands.curve_offsets(others.counts)
     vectors = _root_vectors(layers)
     axes, other_axes = _axes(layers), _axes(others)
     for count in np.unique(others.counts[others.counts > 1]):
@@ -76,7 +76,7 @@ def transferred(
 
 def chosen_guides(layers: GuideLayers, kept: np.ndarray) -> GuideLayers:
     """Return the layers of some guides; kept (M,): their indices."""
-    starts, counts = curve_offsets(layers.counts), np.asarray(layers.counts)[kept]
+    starts, counts = geometry.strands.curve_offsets(layers.counts), np.asarray(layers.counts)[kept]
     of_points = np.concatenate([np.zeros(0, int), *(np.arange(starts[g], starts[g + 1]) for g in kept)])
     some = without_layers(layers.base[of_points], counts, layers.normals[kept])
     return replace(

@@ -96,6 +96,7 @@ def test_the_tab_follows_the_pipeline():
         "Hair Systems",
         "Surface",
         "Guides",
+        "Layers",
         "Strands",
         "Dynamics",
         "Styles",

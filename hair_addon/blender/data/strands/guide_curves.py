@@ -28,6 +28,18 @@ def selection(curves, starts):
     return None
 
 
+def selected_points(curves, starts):
+    """(N,) bool: the points that are at least half selected; None if all or none are. starts (S+1,): as above."""
+    for data_type in ("BOOLEAN", "FLOAT"):
+        for domain in (_POINTS, _CURVES):
+            values = attributes.read(curves, _SELECTION, data_type, domain)
+            if values is not None:
+                found = values.astype(np.float32) >= 0.5
+                found = np.repeat(found, np.diff(starts)) if domain == _CURVES else found
+                return found if found.any() and not found.all() else None
+    return None
+
+
 def remove(curves, indices):
     """Remove some curves. At least one must remain: an empty list of curves would crash Blender's nodes."""
     if len(indices) >= len(curves.curves):

@@ -7,7 +7,7 @@ Stored as points in an attribute, so that files, undo and brushes that remove cu
 import numpy as np
 
 from ....core import geometry
-from . import attributes, curves
+from . import attributes, curves, layer_attributes
 
 _SHAPE = "kept_position"
 
@@ -58,7 +58,11 @@ def move(datablock, function, of_shape=None):
     present, shape = curves.read_points(datablock), read(datablock)
     was_written = datablock.vellus.kept_written != "" and not is_edited(datablock, present)
     moved = np.ascontiguousarray(function(present), np.float32)
+    had_layers = datablock.vellus.layered == geometry.fingerprint.fingerprint(present)
+    layer_attributes.move(datablock, function)
     curves.write_moved(datablock, moved)
+    if had_layers:
+        datablock.vellus.layered = geometry.fingerprint.fingerprint(moved)
     if shape is not None:
         keep(datablock, (of_shape or function)(shape))
     if was_written:

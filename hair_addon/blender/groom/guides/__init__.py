@@ -8,10 +8,12 @@ from ....core.lazy import submodules
 if TYPE_CHECKING:
     from . import (
         brushes,
+        frozen_guides,
         guide_additions,
         guide_regions,
         guide_states,
         guide_tools,
+        layer_changes,
         line_drawing,
     )
 else:

@@ -27,9 +27,11 @@ from ....core.grooming.guide_tool_settings import (
     TrimSettings,
 )
 from ...data import scene
-from ...data.strands import attributes, curves, cutters, guide_curves, posed_strands
+from ...data.strands import attributes, curves, cutters, frozen_points, guide_curves, posed_strands
 from ...data.surfaces import Surface
 from ...host.notices import name_of
+from ...layers import recording
+from ...settings import layer_items
 
 _FARTHEST = 1e14  # [m] from the surface's origin: squares of such lengths are still finite
 
@@ -116,6 +118,8 @@ def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
 def read(datablock: Curves, settings: ToolSettings, depsgraph: Depsgraph) -> CombedGuides:
     """Return the `CombedGuides` of guide Curves, weighted by selection and mask. Raises `HairError`."""
     curves.require_editable(datablock)
+    layer_items.require_combable(datablock.vellus)
+    recording.update(datablock, depsgraph)
     guides = open_guides(datablock, depsgraph)
     weights = guides.weights.copy()
     selected = guide_curves.selection(datablock, guides.starts) if settings.selected_only else None
@@ -167,6 +171,7 @@ def write_shapes(guides: CombedGuides, after: np.ndarray) -> int:
     """Write points (N, 3) [m] of guides; returns the number changed. Raises `HairError`."""
     if not np.abs(after).max() < _FARTHEST:  # also refuses NaN
         raise HairError("The guides would extend too far from their surface: use smaller values.")
+    after = frozen_points.restored(guides.datablock, guides.points, after)
     is_moved = (after != guides.points).any(axis=1)
     local = guides.local.copy()
     local[is_moved] = guides.surface.to_local(after[is_moved][:, None])[:, 0]
@@ -228,6 +233,8 @@ def attract(datablock: Curves, settings: AttractSettings, depsgraph: Depsgraph) 
 def copy_shape(datablock: Curves, settings: CopySettings, depsgraph: Depsgraph) -> int:
     """Copy the shape of guides of one region to those of another; returns and raises as `change_lengths`."""
     curves.require_editable(datablock)
+    layer_items.require_combable(datablock.vellus)
+    recording.update(datablock, depsgraph)
     guides = open_guides(datablock, depsgraph)
     is_source, weights = _regions(guides, settings, depsgraph)
     guides = replace(guides, weights=weights)

@@ -1,7 +1,35 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All operators, one file per subject. An operator reads, computes and writes."""
 
-from . import conversion, dynamics, guide_tools, library, looks, maps, output, pictures, styles, surface, systems
+from . import (
+    conversion,
+    dynamics,
+    freezing,
+    guide_layers,
+    guide_tools,
+    library,
+    looks,
+    maps,
+    output,
+    pictures,
+    styles,
+    surface,
+    systems,
+)
 
-SUBJECTS = (systems, surface, conversion, guide_tools, styles, dynamics, looks, maps, library, pictures, output)
+SUBJECTS = (
+    systems,
+    surface,
+    conversion,
+    guide_tools,
+    guide_layers,
+    freezing,
+    styles,
+    dynamics,
+    looks,
+    maps,
+    library,
+    pictures,
+    output,
+)
 CLASSES = tuple(cls for subject in SUBJECTS for cls in subject.CLASSES)

@@ -6,6 +6,7 @@ from . import (
     dynamics,
     guides,
     interpolation,
+    layers,
     output,
     progress,
     rendering,
@@ -16,13 +17,14 @@ from . import (
     tables,
 )
 
-LISTS = (*systems.LISTS, *styles.LISTS)
+LISTS = (*systems.LISTS, *layers.LISTS, *styles.LISTS)
 
 CLASSES = (
     *progress.CLASSES,
     *systems.CLASSES,
     *surface.CLASSES,
     *guides.CLASSES,
+    *layers.CLASSES,
     *interpolation.CLASSES,
     *dynamics.CLASSES,
     *styles.CLASSES,

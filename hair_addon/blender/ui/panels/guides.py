@@ -50,7 +50,8 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
         if guides_to_regenerate(context.object) is not None:
             column = layout.column(align=True)  # one line would be clipped at the default sidebar width
             column.operator("vellus.distribute_guides", text="Regenerate Guides", icon="FILE_REFRESH")
-            column.label(text="(Discards Combing)", icon="BLANK1")
+            if not len(guides_to_regenerate(context.object).vellus.layers):
+                column.label(text="(Discards Combing)", icon="BLANK1")
         else:
             layout.operator("vellus.distribute_guides", text="New Guide Set", icon="ADD")
 
@@ -136,4 +137,29 @@ class VELLUS_PT_guides_tools(HairTab, bpy.types.Panel):
         menus.draw_guide_tools(self.layout.column(align=True))
 
 
-CLASSES = (VELLUS_PT_guides, VELLUS_PT_guides_growth, VELLUS_PT_guides_placement, VELLUS_PT_guides_tools)
+class VELLUS_PT_guides_frozen(HairTab, bpy.types.Panel):
+    """Guides that are not combed"""
+
+    bl_label = "Freeze"
+    bl_idname = "VELLUS_PT_guides_frozen"
+    bl_parent_id = "VELLUS_PT_guides"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return guides_of(context.object) is not None
+
+    def draw(self, _context):
+        column = self.layout.column(align=True)
+        column.operator("vellus.freeze_selected", icon="FREEZE")
+        column.operator("vellus.unfreeze_all")
+        column.operator("vellus.invert_frozen")
+
+
+CLASSES = (
+    VELLUS_PT_guides,
+    VELLUS_PT_guides_growth,
+    VELLUS_PT_guides_placement,
+    VELLUS_PT_guides_tools,
+    VELLUS_PT_guides_frozen,
+)

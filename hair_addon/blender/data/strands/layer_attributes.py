@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Layers of guides ↔ attributes of their Curves.
+
+The base and the frames of roots are layer_base, layer_normal and layer_tangent; each layer has layer_<id>_turn and
+layer_<id>_stretch per point. All are in local coordinates.
+"""
+
+import numpy as np
+
+from ....core.grooming import guide_layers
+from ....core.grooming.guide_layers import GuideLayers
+from . import attributes, curves
+
+_BASE, _NORMAL, _TANGENT = "layer_base", "layer_normal", "layer_tangent"
+
+
+def has_base(datablock):
+    """Whether guides store what layers need besides turns."""
+    return attributes.has(datablock, _BASE, "FLOAT_VECTOR", "POINT")
+
+
+def read(datablock, identities, weights):
+    """Return the `GuideLayers` of guides; identities: of the layers, weights (L, G). Missing values count as none."""
+    counts, point_count = curves.point_counts(datablock), len(datablock.points)
+
+    def values(name, data_type, domain, shape):
+        found = attributes.read(datablock, name, data_type, domain)
+        if found is None:
+            return np.zeros(shape, np.float32)
+        return np.where(np.isfinite(found), found, np.float32(0.0)).reshape(shape)
+
+    base = values(_BASE, "FLOAT_VECTOR", "POINT", (point_count, 3))
+    axes = (values(name, "FLOAT_VECTOR", "CURVE", (len(counts), 3)) for name in (_NORMAL, _TANGENT))
+    turns = [values(_turn(i), "QUATERNION", "POINT", (point_count, 4)) for i in identities]
+    stretches = [values(_stretch(i), "FLOAT", "POINT", (point_count,)) for i in identities]
+    return GuideLayers(
+        base,
+        counts,
+        *axes,
+        np.array(turns, np.float32).reshape(len(identities), point_count, 4),
+        np.array(stretches, np.float32).reshape(len(identities), point_count),
+        np.asarray(weights, np.float32).reshape(len(identities), len(counts)),
+    )
+
+
+def write(datablock, layers, identities):
+    """Write the base, the frames and all turns of `GuideLayers`; identities: of the layers."""
+    attributes.write(datablock, _BASE, "FLOAT_VECTOR", "POINT", layers.base)
+    attributes.write(datablock, _NORMAL, "FLOAT_VECTOR", "CURVE", layers.normals)
+    attributes.write(datablock, _TANGENT, "FLOAT_VECTOR", "CURVE", layers.tangents)
+    for place, identity in enumerate(identities):
+        write_layer(datablock, layers, identity, place)
+
+
+def write_layer(datablock, layers, identity, place):
+    """Write the turns and stretches of one of the `GuideLayers`."""
+    attributes.write(datablock, _turn(identity), "QUATERNION", "POINT", layers.turns[place])
+    attributes.write(datablock, _stretch(identity), "FLOAT", "POINT", layers.stretches[place])
+
+
+def forget(datablock, identity=None):
+    """Remove the attributes of a layer, or of all layers and their base."""
+    names = [_turn(identity), _stretch(identity)]
+    if identity is None:
+        names = [one.name for one in datablock.attributes if one.name.startswith("layer_")]
+    for name in names:
+        if name in datablock.attributes:
+            datablock.attributes.remove(datablock.attributes[name])
+
+
+def move(datablock, function):
+    """Let layers follow a function that moves the points (N, 3) of guides."""
+    identities = [item.identity for item in datablock.vellus.layers]
+    if not identities or not has_base(datablock) or not len(datablock.points):
+        return
+    ones = np.ones((len(identities), len(datablock.curves)))
+    write(datablock, guide_layers.moved(read(datablock, identities, ones), function), identities)
+
+
+def _turn(identity):
+    return f"layer_{identity}_turn"
+
+
+def _stretch(identity):
+    return f"layer_{identity}_stretch"

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Layers that are carried to guides that are grown again: with other settings, at other roots, on other faces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from bpy.types import Curves
+
+from ...core.geometry import mesh as mesh_math
+from ...core.geometry import strands
+from ...core.geometry.mesh import SurfacePoints
+from ...core.geometry.strands import Strands
+from ...core.grooming import groom, guide_layers, layer_transfer
+from ...core.grooming.groom import HairSettings
+from ...core.grooming.guide_layers import GuideLayers
+from ..data import scene
+from ..data.strands import attributes, curves, layer_attributes, partings
+from ..data.surfaces import Surface
+from ..settings import layer_items, setting_properties
+from . import recording
+
+
+@dataclass(frozen=True)
+class LayersBefore:
+    """Layers of guides before these are grown again: their roots on the surface, and partings between them."""
+
+    layers: GuideLayers
+    guides: Strands
+    settings: HairSettings
+    parting: partings.Partings
+
+
+def read(guides: Curves | None, surface: Surface) -> LayersBefore | None:
+    """Return the `LayersBefore` of guides on a `Surface`; None if they have no layers."""
+    if guides is None or not len(guides.vellus.layers) or not layer_attributes.has_base(guides):
+        return None
+    if not len(guides.curves) or attributes.is_from_library(guides):
+        return None
+    depsgraph = scene.present_depsgraph()
+    recording.update(guides, depsgraph)
+    followers = curves.followers(guides)
+    settings = HairSettings()
+    if followers:
+        settings = setting_properties.to_settings(followers[0].vellus.hair, HairSettings)
+    parting = partings.read(guides.surface, surface, guides, settings, depsgraph)
+    its_guides = curves.read_guides(guides, surface, "cpu")
+    return LayersBefore(recording.read(guides, depsgraph), its_guides, settings, parting)
+
+
+def write(guides: Curves, surface: Surface, before: LayersBefore, roots: SurfacePoints) -> None:
+    """Give guides that were grown again at `roots` the layers that they had."""
+    counts, local = curves.point_counts(guides), curves.read_points(guides)
+    normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots))
+    bare = guide_layers.without_layers(local, counts, normals)
+    indices, weights, apart = _weights(surface, before, roots)
+    layers = layer_transfer.transferred(before.layers, bare, indices, weights, apart)
+    layer_attributes.write(guides, layers, layer_items.identities_of(guides.vellus))
+    guides.vellus.is_base_grown = True
+    layer_items.note_shown(guides.vellus)
+    recording.show(guides, guide_layers.composed(layers))
+
+
+def _weights(surface, before, roots):
+    """Return guides (M, k) that new guides follow, their weights, and relative distances (M,) of the first."""
+    own = before.guides.roots
+    if own.is_same(roots):
+        indices = np.arange(len(roots), dtype=np.int32)[:, None]
+        return indices, np.ones(indices.shape), np.zeros(len(roots))
+    binding = groom.bind_hair(
+        surface.mesh,
+        strands.from_numpy(before.guides.numpy(), own, "cpu"),
+        before.settings,
+        regions=before.parting.regions,
+        lines=before.parting.lines,
+        drawn_on=surface.drawn_on,
+        roots=roots,
+        is_mirrored=surface.has_flipped_winding,
+    )
+    indices, weights = binding.guide_weights.indices.numpy(), binding.guide_weights.weights.numpy()
+    first = mesh_math.positions(surface.mesh, own)[np.maximum(indices[:, 0], 0)]
+    apart = np.linalg.norm(first - mesh_math.positions(surface.mesh, roots), axis=1)
+    return indices, weights, apart / (surface.extent * surface.scale)

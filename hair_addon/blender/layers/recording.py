@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Combing of guides becomes their active layer, and changed weights become points.
+
+Guides store a fingerprint of the points that their layers give. Points with another one were edited: by brushes, in
+Edit Mode, by guide tools or scripts.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from bpy.types import Curves, Depsgraph
+
+from ...core import geometry
+from ...core.errors import HairError
+from ...core.geometry import mesh as mesh_math
+from ...core.grooming import guide_layers
+from ...core.grooming.guide_layers import GuideLayers
+from ..data import scene
+from ..data.strands import attributes, curves, layer_attributes
+from ..host.notices import text_of
+from ..settings import layer_items
+
+
+def is_outdated(guides: Curves) -> bool:
+    """Whether guides were edited, or their weights changed, since they were composed."""
+    state = guides.vellus
+    if not len(state.layers) or attributes.is_from_library(guides):
+        return False
+    return layer_items.is_reweighed(state) or is_edited(guides)
+
+
+def is_edited(guides: Curves) -> bool:
+    """Whether points of guides differ from what their layers give."""
+    return guides.vellus.layered != geometry.fingerprint.fingerprint(curves.read_points(guides))
+
+
+def update(guides: Curves, depsgraph: Depsgraph) -> bool:
+    """Record edited points in the active layer, and compose guides with their present weights.
+
+    Returns whether points were written. Points that the active layer cannot have, because it is hidden or has no weight
+    there, return to where layers put them; the reason becomes the status of the guides.
+    """
+    if not is_outdated(guides):
+        return False
+    state, points = guides.vellus, curves.read_points(guides)
+    identities = layer_items.identities_of(state)
+    state.status = ""
+    layers = read(guides, depsgraph, is_shown=True)
+    is_recorded = is_edited(guides) and np.isfinite(points).all()
+    if is_recorded:
+        layers, refusal = _recorded(layers, state, points)
+        state.status = refusal
+        layer_attributes.write(guides, layers, identities)
+    if layer_items.is_reweighed(state):
+        layers = read(guides, depsgraph)
+        layer_items.note_shown(state)
+        shape = guide_layers.composed(layers)
+    else:
+        shape = guide_layers.composed(layers)
+        # Edited guides keep their exact points, unless layers cannot have them.
+        is_other = np.repeat(guide_layers.is_other(layers, points, shape), layers.counts)
+        shape = np.where(is_other[:, None], shape, points)
+    return show(guides, shape)
+
+
+def _recorded(layers, state, points):
+    """Return (`GuideLayers` with edited points in the active layer, refusal or an empty text)."""
+    refusal, place = "", state.active_layer
+    try:
+        layer_items.require_combable(state)
+    except HairError as error:
+        refusal = str(error)
+    if refusal or place >= len(layers.turns):
+        # Guides that were added, and roots that were moved, are still followed.
+        weights = layers.weights.copy()
+        weights[0] = 0.0
+        found, _changed = guide_layers.recorded(layers.weighted(weights), 0, points)
+        return replace(found, weights=layers.weights), refusal
+    return guide_layers.recorded(layers, place, points)[0], refusal
+
+
+def show(guides: Curves, shape: np.ndarray) -> bool:
+    """Write points (N, 3) that layers give, if they differ; returns whether they do."""
+    is_other = not np.array_equal(shape, curves.read_points(guides))
+    if is_other:
+        attributes.write(guides, "position", "FLOAT_VECTOR", "POINT", shape)
+        guides.update_tag()
+    note_shape(guides)
+    return is_other
+
+
+def note_shape(guides: Curves) -> None:
+    """Note that layers give the present points; settings of guides still apply to the base unless it was edited."""
+    state = guides.vellus
+    state.layered = geometry.fingerprint.fingerprint(curves.read_points(guides))
+    if state.is_base_grown and not curves.is_hand_made(guides):
+        state.written = state.layered
+
+
+def read(guides: Curves, depsgraph: Depsgraph, is_shown: bool = False) -> GuideLayers:
+    """Return the `GuideLayers` of guides with their weights; is_shown: weights of the present points."""
+    state = guides.vellus
+    weights = np.zeros((len(state.layers), len(guides.curves)), np.float32)
+    for row, item in zip(weights, state.layers, strict=True):
+        weight, mask = (item.shown_weight, text_of(item, "shown_mask")) if is_shown else layer_items.wanted(item)
+        row[:] = weight
+        if mask and weight:
+            row *= _mask(guides, mask, depsgraph)
+    return layer_attributes.read(guides, layer_items.identities_of(state), weights)
+
+
+def _mask(guides, name, depsgraph):
+    """Return (G,) weights of a vertex group at the roots; 1 if there is no such group or surface."""
+    if guides.surface is None:
+        return 1.0
+    try:
+        weights = scene.read_vertex_group(guides.surface, depsgraph, name)
+    except HairError as error:
+        guides.vellus.status = str(error)
+        return 1.0
+    if weights is None:
+        return 1.0
+    surface = scene.read_surface(guides.surface, depsgraph)
+    roots = curves.read_roots(guides, surface, surface.from_local(curves.first_points(guides)))
+    return np.clip(mesh_math.interpolate(weights, surface.mesh, roots), 0.0, 1.0)
+
+
+def begin(guides: Curves, base: np.ndarray, is_grown: bool) -> None:
+    """Store the base (N, 3) of guides, in local coordinates; is_grown: whether settings have grown it."""
+    normals = attributes.read(guides, "surface_normal", "FLOAT_VECTOR", "CURVE")
+    normals = np.zeros((len(guides.curves), 3), np.float32) if normals is None else normals
+    layer_attributes.write(guides, guide_layers.without_layers(base, curves.point_counts(guides), normals), ())
+    guides.vellus.is_base_grown = is_grown
+
+
+def end(guides: Curves) -> None:
+    """Forget all layers; points stay."""
+    state = guides.vellus
+    layer_attributes.forget(guides)
+    state.layers.clear()
+    state.active_layer, state.layered = 0, ""
