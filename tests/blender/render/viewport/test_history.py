@@ -15,7 +15,7 @@ from tests.support.pairs import share_of
 from tests.support.reading import points, write_points
 from tests.support.scenes import even_guides
 
-SIZE = 60
+SIZE = 80
 FRAMES, WARM_UP = 4, 2
 
 
