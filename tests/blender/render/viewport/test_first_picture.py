@@ -18,6 +18,7 @@ from tests.support.viewports import view3d
 
 SIZE = (240, 150)
 HEAD = Path(__file__).resolve().parents[4] / "blend_samples" / "head.obj"
+MOST = {1: 0.12, 2: 0.08}  # FLIP by samples along each side of a pixel
 BACKGROUND = 0.22  # display value behind hair
 MODES = {
     "solid": {"type": "SOLID", "light": "STUDIO", "studio_light": "Default"},
@@ -102,7 +103,7 @@ LONG = pytest.mark.long  # each takes ten seconds of a core
     [("cube", "lights"), pytest.param("monkey", "solid", marks=LONG), pytest.param("head", "preview", marks=LONG)],
 )
 def test_the_first_picture_looks_like_the_picture_at_rest(name, mode, blender):
-    """With one sample per pixel and with four: FLIP on hair of 0.08 at most, and no speck."""
+    """With four samples per pixel FLIP on hair is 0.08 at most, with one 0.12; neither has a speck."""
     model(name)
     scene = drawn_in(mode)
     last, found = picture_of(*scene, 2, 8), {}
@@ -112,7 +113,7 @@ def test_the_first_picture_looks_like_the_picture_at_rest(name, mode, blender):
         first = picture_of(*scene, per_side, 1)
         specks = ((first > 3.0 * last) & (first > last + 0.2)).any(axis=-1)
         found[per_side] = float(flip(last, first)[is_hair].mean()), int(specks.sum())
-    assert all(error <= 0.08 and not specks for error, specks in found.values()), found
+    assert all(error <= MOST[per_side] and not specks for per_side, (error, specks) in found.items()), found
 
 
 def test_flip_is_a_difference_that_is_seen(rng):
