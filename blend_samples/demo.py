@@ -27,7 +27,7 @@ from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import ambient_visibility, drawing, visibility_buffer
 from hair_addon.blender.render import drawn_scene, hair_cache, offscreen, scene_drawing
-from hair_addon.core.geometry import bspline
+from hair_addon.core.geometry.curves import bspline
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
 STYLE = "CURLY"  # of styled.png

@@ -348,6 +348,14 @@ def test_files_stay_below_700_lines(path):
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 700
 
 
+FOLDERS = sorted({path.parent for path in CODE if path.suffix == ".py"})
+
+
+@each_file(FOLDERS)
+def test_folders_have_25_modules_at_most(folder):
+    assert len(list(folder.glob("*.py"))) <= 25
+
+
 # [Key] or [Key, section]; after a word or a bracket it would be a subscript.
 KEY = re.compile(r"(?<![\w\])])\[([A-Z][A-Za-z]+\d\d[a-z]?)(?:, [^\]]+)?\]")
 

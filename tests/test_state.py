@@ -33,7 +33,7 @@ STATE = {
 # Functions of their arguments alone, and of what the extension was installed with: what they return is never stale.
 PURE = {
     "blender/gpu/drawing.py: _parts",
-    "blender/gpu/uniforms.py: settings_block",
+    "blender/gpu/programs/uniforms.py: settings_block",
     "blender/host/paths.py: addon_version",
     "blender/host/system_memory.py: _host",
     "blender/settings/setting_properties.py: _settings_of",
@@ -43,9 +43,9 @@ PURE = {
     "blender/settings/translations.py: _taken_apart",
     "blender/live/updates.py: _collection_of",
     "core/dynamics/rod/stiffness_advice.py: tip_sink",
-    "core/geometry/bspline.py: basis_matrix",
-    "core/geometry/bspline.py: _device_matrix",
-    "core/geometry/bspline.py: _controls_matrix",
+    "core/geometry/curves/bspline.py: basis_matrix",
+    "core/geometry/curves/bspline.py: _device_matrix",
+    "core/geometry/curves/bspline.py: _controls_matrix",
     "core/kernels/compiled_kernels.py: _fitting",
     "core/maps/pixels.py: _linear_bytes",
     "core/maps/varied_settings.py: all_varied",

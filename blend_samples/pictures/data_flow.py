@@ -20,7 +20,7 @@ BOXES = {
         "Guide placement  (§2.3)",
         ["core/placement/domain.py", "core/placement/exact_cells.py", "core/placement/voronoi.py"],
     ),
-    "growth": (2, 0, "Guide growth  (Eq. 1-5)", ["core/grooming/guide_growth.py", "core/geometry/bspline.py"]),
+    "growth": (2, 0, "Guide growth  (Eq. 1-5)", ["core/grooming/guide_growth.py", "core/geometry/curves/bspline.py"]),
     "guides": (3, 0, "Guides: Curves to comb", ["blender/data/strands/curves.py"]),
     "dynamics": (
         4,
@@ -29,7 +29,12 @@ BOXES = {
         ["core/dynamics/rod/rod_solver.cpp", "core/dynamics/collision/colliders.py"],
     ),
     "roots": (1, 1, "Strand roots  (Eq. 6)", ["core/geometry/sampling.py"]),
-    "search": (2, 1, "Nearest guides  (§2.4)", ["core/geometry/hash_grid.py", "core/interpolation/part_lines.py"]),
+    "search": (
+        2,
+        1,
+        "Nearest guides  (§2.4)",
+        ["core/geometry/search/hash_grid.py", "core/interpolation/part_lines.py"],
+    ),
     "weights": (3, 1, "Weights  (Eq. 8-9)", ["core/interpolation/guide_weights.py"]),
     "sum": (4, 1, "Weighted offsets  (Eq. 7, 10)", ["core/interpolation/interpolation.py"]),
     "styles": (4, 2, "Styles", ["core/styling/steps.py", "core/styling/program.py"]),

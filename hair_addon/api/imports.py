@@ -81,7 +81,7 @@ def _guides_of_arrays(curves, mesh, every):
     rooted = grooming.rooted_curves.root(mesh, points, starts, every)
     points = points[rooted.point_order(starts)]
     starts = curve_offsets(np.diff(starts)[rooted.kept])
-    return from_numpy(geometry.resampling.resample(points, starts, groom.POINT_COUNT), rooted.roots)
+    return from_numpy(geometry.curves.resampling.resample(points, starts, groom.POINT_COUNT), rooted.roots)
 
 
 def use_as_hair(

@@ -55,14 +55,14 @@ def render(
 
     path, engine, progress = (
         path_of(path),
-        choice(engine, "engine", blender.io.frames.ENGINES),
+        choice(engine, "engine", blender.io.pictures.frames.ENGINES),
         checked_progress(progress),
     )
-    sampling, settings = imaging.pixel_sampling, blender.io.frames.scene_size() | settings
+    sampling, settings = imaging.pixel_sampling, blender.io.pictures.frames.scene_size() | settings
     wanted = changed(sampling.PictureSettings, None, settings, sampling.DRAWING_FIELDS)
     frame = plain_value("frame", blender.host.scene_time.present_frame() if frame is None else frame, 1, _FRAMES)
-    blender.io.frames.require_pattern(path, 1)
-    target = blender.io.frames.path_of(path, frame)
+    blender.io.pictures.frames.require_pattern(path, 1)
+    target = blender.io.pictures.frames.path_of(path, frame)
     allows_missing = plain_value("allow_missing", allow_missing, False, _IS_ALLOWED)
-    blender.io.frames.write_frame(target, frame, engine, wanted, None, progress, allows_missing)
+    blender.io.pictures.frames.write_frame(target, frame, engine, wanted, None, progress, allows_missing)
     return target

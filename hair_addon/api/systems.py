@@ -22,8 +22,8 @@ def hair_systems(surface: MeshObject | None = None) -> list[Curves]:
     """
     view_layer = blender.data.scene.present_depsgraph().view_layer
     if surface is not None:
-        return blender.groom.hair_systems.systems_of(blender.data.arguments.surface_object(surface), view_layer)
-    return blender.groom.hair_systems.all_systems(view_layer)
+        return blender.groom.systems.hair_systems.systems_of(blender.data.arguments.surface_object(surface), view_layer)
+    return blender.groom.systems.hair_systems.all_systems(view_layer)
 
 
 def delete_hair(system: Curves) -> None:
@@ -39,8 +39,8 @@ def delete_hair(system: Curves) -> None:
     """
     target = blender.data.arguments.curves_of(system)
     followers = blender.data.strands.curves.followers(target) if target.vellus.kind == "GUIDES" else []
-    parts = [*followers, target] if followers else blender.groom.hair_systems.parts_of_system(target)
-    blender.groom.edits.delete(parts)
+    parts = [*followers, target] if followers else blender.groom.systems.hair_systems.parts_of_system(target)
+    blender.groom.systems.edits.delete(parts)
 
 
 def look_names() -> list[str]:

@@ -8,7 +8,7 @@ import bpy
 
 from ..core.errors import HairError
 from . import manual
-from .groom import hair_systems
+from .groom.systems import hair_systems
 from .host import running
 from .live import first_setup, handlers, invalidation
 from .render.frames import engine

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from .groom import hair_systems
+from .groom.systems import hair_systems
 from .settings import layer_items, map_items, preferences, properties, style_items
 from .ui import operators, picture_menus
 

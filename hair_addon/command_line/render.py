@@ -66,41 +66,41 @@ def run(given, console):
     """Open the file and render its frames, in this process or in several."""
     blender.io.mesh_files.require_blend(given.input)
     known_count = len(given.frames) if isinstance(given.frames, range) else 1
-    blender.io.frames.require_pattern(given.out, known_count, given.passes)
+    blender.io.pictures.frames.require_pattern(given.out, known_count, given.passes)
     opening.open_file(given, console)
     numbers = blender.host.scene_time.scene_frames() if given.frames == "all" else given.frames
     numbers = list(numbers or [blender.host.scene_time.present_frame()])
-    blender.io.frames.require_pattern(given.out, len(numbers))
-    blender.io.frames.require_view_layer()
+    blender.io.pictures.frames.require_pattern(given.out, len(numbers))
+    blender.io.pictures.frames.require_view_layer()
     blender.groom.dynamics.frame_folders.require_baked(numbers, blender.host.scene_time.present_scene())
-    without = blender.io.frames.missing_files(numbers, given.allow_missing)
+    without = blender.io.pictures.frames.missing_files(numbers, given.allow_missing)
     if without:
         console.warn(without)
-    settings = _frame_settings(given, blender.io.frames.scene_size())
+    settings = _frame_settings(given, blender.io.pictures.frames.scene_size())
     if given.dry_run:
         _plan(given, console, numbers, settings)
         return
-    blender.io.frames.bind_simulated()
-    if blender.io.frames.is_sequence(given.out):
+    blender.io.pictures.frames.bind_simulated()
+    if blender.io.pictures.frames.is_sequence(given.out):
         _make_sequence(given, console, numbers, settings)
     else:
         started = time.perf_counter()
-        write = blender.io.frames.write_frame
+        write = blender.io.pictures.frames.write_frame
         write(given.out, numbers[0], given.engine, settings, None, console.progress, given.allow_missing)
         _report(given, console, numbers[0], given.out, started)
 
 
 def _plan(given, console, numbers, settings):
     """Print what the command would render; raises `HairError` where it would fail before the first frame."""
-    blender.io.frames.require_camera(blender.host.scene_time.present_scene())
+    blender.io.pictures.frames.require_camera(blender.host.scene_time.present_scene())
     left = numbers
-    if blender.io.frames.is_sequence(given.out) and not given.overwrite:
+    if blender.io.pictures.frames.is_sequence(given.out) and not given.overwrite:
         described = _description(given, settings)
-        blender.io.sequence.require_continuable(given.out, numbers, described)
-        left = blender.io.sequence.unrendered_frames(given.out, numbers)
+        blender.io.pictures.sequence.require_continuable(given.out, numbers, described)
+        left = blender.io.pictures.sequence.unrendered_frames(given.out, numbers)
     values = {"verb": "render", "input": str(given.input), "dry_run": True, "engine": given.engine}
     values |= {"out": str(given.out), "width": settings.width, "height": settings.height}
-    values |= {"samples": settings.sample_count or blender.io.frames.scene_samples(given.engine)}
+    values |= {"samples": settings.sample_count or blender.io.pictures.frames.scene_samples(given.engine)}
     values |= {"frames": numbers, "to_render": left, "hair": blender.io.inspection.rendered_hair()}
     console.result(values, _plan_in_words(values))
 
@@ -118,21 +118,23 @@ def _description(given, settings):
     """Return what identifies the sequence that a command renders."""
     names = [name for name, _default, _details in declared(PictureSettings) if name not in DRAWING_FIELDS]
     values = {name: getattr(settings, name) for name in names}
-    return blender.io.sequence.description(given.input, given.engine, values | {"scripts": given.enable_scripts})
+    return blender.io.pictures.sequence.description(
+        given.input, given.engine, values | {"scripts": given.enable_scripts}
+    )
 
 
 def _make_sequence(given, console, numbers, settings):
-    blender.io.sequence.begin(given.out, numbers, _description(given, settings), given.overwrite)
+    blender.io.pictures.sequence.begin(given.out, numbers, _description(given, settings), given.overwrite)
     if given.jobs > 1:
         _run_jobs(given, console, numbers, settings)
         return
 
     def write(path, number):
         settled = settings, partial_of(path), console.progress, given.allow_missing
-        blender.io.frames.write_frame(path, number, given.engine, *settled)
+        blender.io.pictures.frames.write_frame(path, number, given.engine, *settled)
 
     started = time.perf_counter()
-    for number, path in blender.io.sequence.make(given.out, numbers, write, console.progress):
+    for number, path in blender.io.pictures.sequence.make(given.out, numbers, write, console.progress):
         _report(given, console, number, path, started)
         started = time.perf_counter()
 
@@ -141,7 +143,7 @@ def _run_jobs(given, console, numbers, settings):
     """Render in several processes. If one fails, the others render its frames; only missing frames are an error."""
     words = [*blender.host.cli_command.words(), *_words(given, numbers, settings)]
     failed = helpers.run([words] * given.jobs, console, lambda values: console.result(values, _sentence(values)))
-    missing = blender.io.sequence.missing_frames(given.out, numbers)
+    missing = blender.io.pictures.sequence.missing_frames(given.out, numbers)
     if missing:
         raise HairError(str(failed[0]) if failed else f"Frame {missing[0]} was not rendered.")
     for one in failed:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The nearest triangle that a ray hits, as `wp.mesh_query_ray` finds it: through a tree of boxes
-// (core/geometry/triangle_tree.py) at given.boxes_first, with its triangles from given.corners_first on.
+// (core/geometry/search/triangle_tree.py) at given.boxes_first, with its triangles from given.corners_first on.
 
 struct MeshQueryRay {
   bool result;

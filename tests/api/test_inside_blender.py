@@ -6,7 +6,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.settings.style_keys import Rearrangement
-from tests.support.rendering import add_orthographic_camera, configure
+from tests.support.pictures.rendering import add_orthographic_camera, configure
 
 
 @pytest.fixture

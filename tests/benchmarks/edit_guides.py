@@ -35,8 +35,8 @@ from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.blender.settings import preferences, style_items
 from hair_addon.core.styling.kinds import KINDS
 from tests.benchmarks.draw_frames import Frame
-from tests.support import drawn_strands
 from tests.support.counting import Traffic
+from tests.support.pictures import drawn_strands
 
 REPETITIONS = 50
 ACTIONS = ("stroke", "slider", "surface", "bending", "playback")

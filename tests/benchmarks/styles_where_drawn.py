@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from hair_addon.blender.gpu.strand_textures import upload_strands
 from hair_addon.blender.gpu.strands import style_maker
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, smooth, trim, wet
-from tests.support import drawn_strands
+from tests.support.pictures import drawn_strands
 from tests.support.strands.styled import head
 
 STACKS = {

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from hair_addon.core.geometry import bspline
+from hair_addon.core.geometry.curves import bspline
 
 
 def medians(ways, repetitions=200):

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.core.geometry import hash_grid
 from hair_addon.core.geometry.mesh import TriMesh
+from hair_addon.core.geometry.search import hash_grid
 from hair_addon.core.grooming import cost, groom
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from tests.support.meshes import flat_grid

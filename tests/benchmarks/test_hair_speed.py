@@ -24,9 +24,9 @@ import hair_addon
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.live import invalidation, live_hair
-from hair_addon.core.geometry import hash_grid
 from hair_addon.core.geometry.mesh import positions
 from hair_addon.core.geometry.sampling import sample_surface
+from hair_addon.core.geometry.search import hash_grid
 from hair_addon.core.grooming import groom
 from hair_addon.core.interpolation import guide_weights
 from tests.benchmarks import hair_peers

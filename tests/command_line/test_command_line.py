@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.io import frames
+from hair_addon.blender.io.pictures import frames
 from hair_addon.core.files import settings_file, style_presets, table_exr
 from hair_addon.core.files.settings_file import GroomSettings
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings

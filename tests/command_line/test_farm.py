@@ -8,7 +8,7 @@ import bpy
 import pytest
 
 from hair_addon import command_line
-from hair_addon.blender.io import frames
+from hair_addon.blender.io.pictures import frames
 from hair_addon.command_line import options
 from hair_addon.core.errors import HairError
 from tests.blender.io.test_sequence import turning  # noqa: F401 (a fixture)

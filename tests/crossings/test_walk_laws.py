@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from hair_addon.blender.groom import diagnostics
 from hair_addon.blender.groom.selection import parts_of
+from hair_addon.blender.groom.systems import diagnostics
 from hair_addon.blender.render import hair_cache
 from tests.support import rooted
 from tests.support.reading import points, write_points

@@ -329,11 +329,11 @@ def twins():
 
 def break_shader():
     """A driver that refuses the shader that lays hair over the viewport: twice, and mended again."""
-    shaders = addon().gpu.shaders
+    shaders = addon().gpu.programs.shaders
     file = shaders.FOLDER / "picture" / "display_transform.glsl"
     text = file.read_text()
     file.write_text(text.replace("return log2", "return nonsense + log2"))
-    shaders.program_cache.invalidate((addon().gpu.scene_programs.display_program.__wrapped__, ()))
+    shaders.program_cache.invalidate((addon().gpu.programs.scene_programs.display_program.__wrapped__, ()))
     screen("broken")
     screen("broken_again")
     file.write_text(text)

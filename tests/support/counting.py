@@ -6,7 +6,7 @@ import numpy as np
 
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import strand_textures
-from hair_addon.core.geometry import hash_grid
+from hair_addon.core.geometry.search import hash_grid
 
 _COUNTED = {
     "searches": [(hash_grid, "neighbours")],

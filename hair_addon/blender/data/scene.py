@@ -8,8 +8,8 @@ from mathutils import Matrix
 
 from ...core import geometry
 from ...core.errors import HairError
+from ...core.geometry.faces.uv_maps import Texture
 from ...core.geometry.mesh import Faces, TriMesh, interpolate
-from ...core.geometry.uv_maps import Texture
 from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn, name_of

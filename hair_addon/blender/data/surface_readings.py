@@ -96,7 +96,7 @@ def _cage_of(read, cage_corners, undivided, own):
     loop_uvs = read.loop_uvs
     own_faces, own_uvs = own or (None, None)
     if undivided:
-        found = geometry.cages.cage_faces(read.faces, undivided, own_faces)
+        found = geometry.faces.cages.cage_faces(read.faces, undivided, own_faces)
         if found is None:
             return None
         faces, first_faces = found
@@ -115,11 +115,11 @@ def _cage_of(read, cage_corners, undivided, own):
 
 def _triangle_corners(faces, rest):
     """(T, 3) int32 corners of the triangulated faces of a cage."""
-    corners, sizes = geometry.cages.triangle_corners(faces, rest), np.diff(faces.starts)
+    corners, sizes = geometry.faces.cages.triangle_corners(faces, rest), np.diff(faces.starts)
     large = np.flatnonzero(sizes > 4)
     if not len(large):
         return corners
-    cut, owners = bmesh.new(use_operators=False), geometry.face_places.owners(faces)
+    cut, owners = bmesh.new(use_operators=False), geometry.faces.face_places.owners(faces)
     try:
         for face in large:
             places = rest[faces.corner_vertices[faces.starts[face] : faces.starts[face + 1]]]
@@ -135,7 +135,7 @@ def _triangle_corners(faces, rest):
 
 def turned_back(corners, faces, undivided):
     """(T, 3) corners of triangles in their order before the faces, or those of the cage, were flipped."""
-    turned = geometry.flipped_faces.turned_cage(faces, undivided) if undivided else None
+    turned = geometry.faces.flipped_faces.turned_cage(faces, undivided) if undivided else None
     if turned is None:
         return corners[_turned_order(faces)]
     quads = turned.corners.reshape(-1, 4)

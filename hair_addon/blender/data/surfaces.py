@@ -246,14 +246,14 @@ class Surface:
     def turned(self):
         """The `FlippedFaces` of the faces, or of the cage's faces, as Blender flips them."""
         count = self.undivided_corners
-        found = geometry.flipped_faces.turned_cage(self.faces, count) if count else None
-        return geometry.flipped_faces.turned(self.faces) if found is None else found
+        found = geometry.faces.flipped_faces.turned_cage(self.faces, count) if count else None
+        return geometry.faces.flipped_faces.turned(self.faces) if found is None else found
 
     @cached_property
     def turned_topology(self):
         """`topology` with each face flipped, as by Blender when it applies a mirroring scale."""
         faces = Faces(self.turned.before(self.faces.corner_vertices), self.faces.starts)
-        of_cage = geometry.cages.cage_vertices(faces, self.undivided_corners)
+        of_cage = geometry.faces.cages.cage_vertices(faces, self.undivided_corners)
         return _half_key(of_cage) + _half_key(faces.corner_vertices, faces.starts)
 
     @cached_property
@@ -268,7 +268,7 @@ class Surface:
     @cached_property
     def cage_vertices(self):
         """(C,) int32: the vertices at the corners of faces before subdivision, face after face."""
-        return geometry.cages.cage_vertices(self.faces, self.undivided_corners)
+        return geometry.faces.cages.cage_vertices(self.faces, self.undivided_corners)
 
     @property
     def cage_size(self):
@@ -278,7 +278,7 @@ class Surface:
 
     def points_at(self, polygons, vertices, barycentric):
         """(`SurfacePoints`, (N,) bool: whether invalid) of places, as from `places`, in `triangulated` polygons."""
-        return geometry.face_places.on_triangles(self.mesh, self.triangulated, polygons, vertices, barycentric)
+        return geometry.faces.face_places.on_triangles(self.mesh, self.triangulated, polygons, vertices, barycentric)
 
     def to_local_normals(self, normals):
         """(N, 3) unit normals → unit normals in local coordinates, by the inverse transpose of `to_local`."""

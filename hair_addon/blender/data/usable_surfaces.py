@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
-from ...core.geometry import orientation
+from ...core.geometry.faces import orientation
 from ..host.caches import Cache
 from ..host.notices import name_of
 from . import scene

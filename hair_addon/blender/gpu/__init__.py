@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shader programs, textures and passes on the GPU."""
+"""Hair on the GPU: textures, lights, drawing, shadows, visibility."""
 
 from ...core.lazy import submodules
 

@@ -8,7 +8,8 @@ on lights or the view.
 import numpy as np
 
 from ...core.imaging import ambient_cube
-from . import drawing, driver_textures, scene_programs, seen_programs, shadows, uniforms
+from . import drawing, driver_textures, shadows
+from .programs import scene_programs, seen_programs, uniforms
 from .strand_textures import seen_points
 
 # Environment light is soft: its maps are coarser than a lamp's, and drawn with as many strands as they can resolve.

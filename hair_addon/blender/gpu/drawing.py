@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
-from . import scene_programs, shaders, uniforms, windows
+from . import windows
+from .programs import scene_programs, shaders, uniforms
 from .strand_textures import bare_vertices, run_for_each, vertex_count
 
 

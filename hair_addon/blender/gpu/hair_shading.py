@@ -11,7 +11,7 @@ import numpy as np
 from ...core.shading.appearance import wet_share
 from ...core.shading.fibre import kajiya_kay, strand_variation
 from ...core.shading.tables import albedo, dual_scattering
-from . import scene_programs, uniforms
+from .programs import scene_programs, uniforms
 
 # Files and tables of the two modes of the Marschner model; the energy-conserving mode evaluates M.
 _TABLES = {

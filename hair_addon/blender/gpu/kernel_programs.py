@@ -14,9 +14,10 @@ import gpu
 import numpy as np
 import warp as wp
 
-from ...core.geometry import triangle_tree
+from ...core.geometry.search import triangle_tree
 from ...core.kernels import glsl_text
-from . import driver_textures, shaders, uniforms
+from . import driver_textures
+from .programs import shaders, uniforms
 from .strand_textures import TEXTURE_WIDTH, run_for_each
 
 _GROUP_SIZE = 64

@@ -14,7 +14,7 @@ from ..data.pictures.shader_sockets import ShaderInput, shown_shader
 from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn
-from . import uniforms
+from .programs import uniforms
 from .studio_lights import StudioImage, image_of
 
 KINDS = {"SUN": lamps.SUN, "POINT": lamps.POINT, "SPOT": lamps.SPOT, "AREA": lamps.AREA}

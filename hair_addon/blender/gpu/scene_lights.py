@@ -7,7 +7,8 @@ import numpy as np
 
 from ...core.imaging import lamps
 from ..data.pictures.light_linking import ALL
-from . import uniforms, world_texture
+from . import world_texture
+from .programs import uniforms
 from .shadows import ShadowMaps
 
 _MAP_SIZE = 512  # texels along each side of a light's map: 0.8 mm on a head

@@ -6,7 +6,8 @@ from dataclasses import replace
 import gpu
 import numpy as np
 
-from . import drawing, scene_programs, shadow_programs, surface_textures, uniforms
+from . import drawing, surface_textures
+from .programs import scene_programs, shadow_programs, uniforms
 
 SUN = 0  # LIGHT_SUN of shaders/light/lights.glsl
 

@@ -8,8 +8,8 @@ import gpu
 import numpy as np
 
 from ..host.caches import Cache
-from . import uniforms
 from .hair_shading import MixedShading
+from .programs import uniforms
 from .studio_lights import StudioImage
 from .surface_shading import white
 

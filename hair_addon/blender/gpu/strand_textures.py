@@ -14,7 +14,8 @@ import numpy as np
 
 from ...core import geometry
 from ...core.shading.strand_looks import StrandLooks
-from . import driver_textures, shaders
+from . import driver_textures
+from .programs import shaders
 
 # Maximum width of textures; every driver supports 16384 texels.
 TEXTURE_WIDTH = 16384

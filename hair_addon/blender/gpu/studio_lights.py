@@ -12,7 +12,7 @@ from ...core.errors import HairError
 from ...core.files import light_images
 from ...core.imaging import lamps
 from ..host.caches import Cache
-from . import uniforms
+from .programs import uniforms
 
 _MOST_WRAP = 0.5  # the greatest softness of a lamp: of softer lights a part is ambient light
 _DIMMED_BEHIND = 0.85  # hair lets light from behind through, which the opaque surfaces that lights are made for do not

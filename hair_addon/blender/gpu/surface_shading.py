@@ -8,7 +8,8 @@ import numpy as np
 
 from ...core.shading.tables import surface_albedo
 from ..host.caches import Cache
-from . import drawing, scene_programs, surface_programs, uniforms, windows
+from . import drawing, windows
+from .programs import scene_programs, surface_programs, uniforms
 
 texture_cache = Cache()  # textures shared by all surfaces
 

@@ -15,7 +15,8 @@ from ...core import geometry
 from ...core.imaging.texture_sides import avoid_powers_of_two
 from ...core.kernels.checks import require_count, require_indices
 from ..host.caches import Cache
-from . import drawing, surface_programs, uniforms
+from . import drawing
+from .programs import surface_programs, uniforms
 from .strand_textures import TEXTURE_WIDTH, bare_vertices
 
 _ROW_VERTICES = TEXTURE_WIDTH // 3  # maximum per row; each is three texels

@@ -12,8 +12,9 @@ import gpu
 import numpy as np
 
 from ...core.errors import HairError
-from . import drawing, light_grid, scene_programs, uniforms, visibility_programs, windows
+from . import drawing, light_grid, windows
 from .hair_shading import MixedShading, Shading
+from .programs import scene_programs, uniforms, visibility_programs
 from .strand_textures import StrandsOnGPU, seen_points
 
 NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index

@@ -10,7 +10,8 @@ from ...core import geometry
 from ...core.errors import HairError
 from ...core.imaging import environment
 from ..host.caches import Cache
-from . import drawing, scene_programs, uniforms
+from . import drawing
+from .programs import scene_programs, uniforms
 from .studio_lights import StudioImage
 
 _HEIGHT = 64  # pixels of the picture that is decomposed

@@ -7,9 +7,9 @@ import numpy as np
 
 from ...core import dynamics
 from ...core.errors import HairError
+from ...core.geometry.faces.uv_maps import Texture
 from ...core.geometry.mesh import SurfacePoints
 from ...core.geometry.strands import Strands
-from ...core.geometry.uv_maps import Texture
 from ...core.grooming import cost, groom, groom_defaults
 from ...core.grooming.groom import GuideSettings
 from ...core.long_work import Progress, part_of

@@ -13,8 +13,8 @@ from bpy.types import Curves, Depsgraph, Object
 
 from ...core.errors import HairError, memory_as_sentence
 from ...core.geometry import strands
+from ...core.geometry.faces.uv_maps import Texture
 from ...core.geometry.mesh import TriMesh
-from ...core.geometry.uv_maps import Texture
 from ...core.grooming import following, groom, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding

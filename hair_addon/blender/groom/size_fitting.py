@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from bpy.types import Curves
 
-from ...core.geometry.uv_maps import Texture
+from ...core.geometry.faces.uv_maps import Texture
 from ...core.grooming import groom_defaults
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import Settings

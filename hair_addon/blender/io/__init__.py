@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Import and export: meshes, curves, grooms, frames, tables."""
+"""Import and export: meshes, curves, grooms, tables."""
 
 from ...core.lazy import submodules
 

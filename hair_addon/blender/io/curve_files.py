@@ -16,7 +16,8 @@ from ...core.geometry.mesh import TriMesh
 from ...core.geometry.strands import curve_offsets
 from ..data import scene
 from ..host import scene_time
-from . import curve_objects, strand_arrays, usd_curves
+from . import curve_objects, strand_arrays
+from .usd import usd_curves
 
 _USD = (".usd", ".usdc", ".usda", ".usdz")
 

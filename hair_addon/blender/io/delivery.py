@@ -20,7 +20,8 @@ from ..host import running, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..live import live_hair
-from . import hair_file, strand_arrays
+from . import strand_arrays
+from .usd import hair_file
 
 
 @dataclass(frozen=True)

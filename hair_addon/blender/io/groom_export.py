@@ -17,7 +17,8 @@ from ..groom.transfer import groom_settings
 from ..host import paths, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
-from . import delivery, groom_sources, hair_file, strand_arrays, usd_groom
+from . import delivery, groom_sources, strand_arrays
+from .usd import hair_file, usd_groom
 
 
 @dataclass(frozen=True)

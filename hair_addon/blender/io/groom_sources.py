@@ -14,8 +14,9 @@ from ...core.shading import strand_colors
 from ..data import scene
 from ..data.maps import strand_maps
 from ..data.strands import attributes, curves, exported_curves, simulated_guides
-from ..groom import guide_maps, hair_systems, selection
+from ..groom import guide_maps, selection
 from ..groom.dynamics import frame_folders
+from ..groom.systems import hair_systems
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import properties

@@ -10,7 +10,7 @@ from ...core.cards.polygon_mesh import PolygonMesh
 from ...core.errors import HairError
 from ...core.files import file_names
 from ...core.files.atomic_file import require_writable_path
-from ...core.geometry import clusters
+from ...core.geometry.search import clusters
 from ...core.long_work import Stage, part_of
 from ..data import whole_changes
 from ..data.made import armature_weights, card_images, made_meshes

@@ -11,8 +11,8 @@ from ...core.grooming.groom import GuideSettings, HairSettings
 from ..data import scene
 from ..data.strands import curves, delivered_hair
 from ..data.strands.curves import followers
-from ..groom import diagnostics
 from ..groom.dynamics import frame_folders, guide_baking
+from ..groom.systems import diagnostics
 from ..host import scene_time
 from ..host.notices import name_of
 from ..render import hair_places

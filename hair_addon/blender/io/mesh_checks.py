@@ -8,7 +8,7 @@ import bpy
 from ...core.errors import HairError
 from ...core.files import alembic
 from ..data import usable_surfaces
-from . import usd_stage
+from .usd import usd_stage
 
 # The keyword of an .obj line, and the number of values that must follow.
 _OBJ_WORDS = {"v": 3, "vn": 3, "vt": 1, "f": 3}

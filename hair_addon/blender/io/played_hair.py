@@ -11,7 +11,8 @@ from ..data.strands import curves, delivered_hair
 from ..groom import selection
 from ..host import scene_time
 from ..host.notices import name_of
-from . import hair_file, strand_arrays
+from . import strand_arrays
+from .usd import hair_file
 
 
 def path_beside(blend_path, hair):

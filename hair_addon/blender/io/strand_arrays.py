@@ -164,4 +164,4 @@ def _at_rest(datablock):
     if len(points) == strand_count * most:
         return points.reshape(-1, most, 3)
     starts, is_smooth = curves.curve_offsets(datablock), attributes.are_smooth(datablock)
-    return geometry.resampling.resample(points, starts, most, is_smooth)
+    return geometry.curves.resampling.resample(points, starts, most, is_smooth)

@@ -2,7 +2,8 @@
 """Changes around hair by commands of Blender: scenes that show it, new names, copies, other files."""
 
 from ..data import thin_hair
-from ..groom import copied_hair, followed_names
+from ..groom import followed_names
+from ..groom.systems import copied_hair
 from ..settings import animated
 
 

@@ -9,19 +9,13 @@ from ..data.maps import image_pixels, sources
 from ..data.pictures import drawn_meshes, root_colors
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
-from ..gpu import (
-    light_grid,
-    lights,
-    shaders,
-    solid_shading,
-    studio_lights,
-    surface_shading,
-    surface_textures,
-    world_texture,
-)
-from ..groom import bindings, copied_hair, edited_faces, followed_names, frame_faces, hidden_hair
+from ..gpu import light_grid, lights, solid_shading, studio_lights, surface_shading, surface_textures, world_texture
+from ..gpu.programs import shaders
+from ..groom import bindings, followed_names, frame_faces, hidden_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..groom.guides import guide_states
+from ..groom.surfaces import edited_faces
+from ..groom.systems import copied_hair
 from ..host import notices
 from ..render import hair_cache, modified_hair, solid_hair
 from ..render.frames import composite

@@ -15,10 +15,11 @@ import numpy as np
 from ...core.errors import HairError
 from ..data import scene
 from ..data.strands import curves, simulated_guides
-from ..groom import applied_transforms, bindings, hair_outside
+from ..groom import bindings, hair_outside
 from ..groom.dynamics import broken_guides, frame_folders, guide_baking, guide_simulation
 from ..groom.dynamics.broken_guides import Broken
 from ..groom.dynamics.guide_simulation import GuideSimulation, simulated
+from ..groom.surfaces import applied_transforms
 from ..host import running, scene_time
 from ..host.caches import Cache
 from ..settings import properties

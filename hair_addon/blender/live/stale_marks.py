@@ -8,8 +8,9 @@ import bpy
 from ...core.errors import HairError
 from ..data import masks, scene, usable_surfaces
 from ..data.strands import curves, drawn_lines
-from ..groom import applied_transforms, bindings, edited_surfaces, frame_faces, staleness
-from ..groom.edited_surfaces import Followed
+from ..groom import bindings, frame_faces, staleness
+from ..groom.surfaces import applied_transforms, edited_surfaces
+from ..groom.surfaces.edited_surfaces import Followed
 from ..host.notices import text_of
 from ..settings import marks, style_items
 from . import events, reported

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.cards.texels import NO_STRAND
-from ..gpu import drawing, strand_textures, uniforms
+from ..gpu import drawing, strand_textures
+from ..gpu.programs import uniforms
 from ..gpu.visibility_buffer import NO_SEGMENT, VisibilityBuffer
 from . import offscreen
 

@@ -8,17 +8,9 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.long_work import no_progress, part_of
 from ..data.pictures import drawn_meshes, viewport_shading
-from ..gpu import (
-    ambient_visibility,
-    drawing,
-    scene_lights,
-    strand_textures,
-    studio_lights,
-    surface_textures,
-    uniforms,
-    windows,
-)
+from ..gpu import ambient_visibility, drawing, scene_lights, strand_textures, studio_lights, surface_textures, windows
 from ..gpu import lights as blender_lights
+from ..gpu.programs import uniforms
 from ..gpu.shadows import ShadowMaps
 from ..host.notices import can_be_drawn
 from . import gpu_strands, hair_cache, hair_places, modified_hair, read_strands, solid_hair

@@ -5,7 +5,8 @@ import gpu
 import numpy as np
 
 from ...core.imaging import pixel_sampling
-from ..gpu import drawing, picture_programs, surface_programs
+from ..gpu import drawing
+from ..gpu.programs import picture_programs, surface_programs
 from ..gpu.visibility_buffer import VisibilityBuffer
 from . import mattes, motion_vectors, scene_drawing
 

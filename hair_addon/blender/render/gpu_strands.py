@@ -13,7 +13,8 @@ import numpy as np
 from ...core.errors import HairError
 from ..data.strands import attributes
 from ..data.strands.posed_strands import Pose
-from ..gpu import shaders, strand_textures
+from ..gpu import strand_textures
+from ..gpu.programs import shaders
 from ..gpu.strands import device_choice, strand_carrier, strand_maker, style_maker
 from ..groom.bindings import BoundHair
 from ..groom.styled_hair import StyledHair

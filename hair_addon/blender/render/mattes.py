@@ -8,7 +8,8 @@ import gpu
 import numpy as np
 
 from ...core.imaging import cryptomatte
-from ..gpu import drawing, picture_programs
+from ..gpu import drawing
+from ..gpu.programs import picture_programs
 from ..gpu.visibility_buffer import NO_SEGMENT
 
 NAME = "Mattes"  # of the film's pass

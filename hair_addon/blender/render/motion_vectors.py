@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..gpu import drawing, picture_programs, uniforms
+from ..gpu import drawing
+from ..gpu.programs import picture_programs, uniforms
 
 
 @dataclass(frozen=True)

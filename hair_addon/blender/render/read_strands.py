@@ -72,7 +72,7 @@ def read(datablock: Any) -> ReadStrands:
     else:
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
         radii = strands.resample_values(radii, points, starts, most)
-        points = geometry.resampling.resample(points, starts, most, is_smooth)
+        points = geometry.curves.resampling.resample(points, starts, most, is_smooth)
     return ReadStrands(points, radii, randoms, wetness, looks, is_sound, note)
 
 

@@ -3,16 +3,8 @@
 
 from dataclasses import replace
 
-from ..gpu import (
-    ambient_visibility,
-    drawing,
-    level_of_detail,
-    picture_programs,
-    surface_programs,
-    surface_shading,
-    surface_textures,
-    world_texture,
-)
+from ..gpu import ambient_visibility, drawing, level_of_detail, surface_shading, surface_textures, world_texture
+from ..gpu.programs import picture_programs, surface_programs
 
 
 def draw_hiding(drawn, view, clip_planes=None):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import HairError
-from ..geometry import clusters
+from ..geometry.search import clusters
 from .outlines import Outlines
 
 _BORDER = 2.0  # empty texels around a picture

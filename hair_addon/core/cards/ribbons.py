@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import geometry
-from ..geometry import clusters
 from ..geometry.mesh import TriMesh, interpolate
+from ..geometry.search import clusters
 from . import curve_frames
 
 _OUTWARD = 2.0  # weight of facing away from the surface, relative to following the spread of a clump

@@ -13,11 +13,11 @@ import numpy as np
 import warp as wp
 
 from .. import grooming
-from ..geometry import resampling
+from ..geometry.curves import resampling
+from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import TriMesh, positions
 from ..geometry.mirror import ACROSS_X, Mirror
 from ..geometry.strands import Strands, from_numpy
-from ..geometry.uv_maps import Texture
 from ..grooming import groom_defaults
 from ..grooming.groom import GuideSettings, distribute_guides
 from ..kernels import kernel_setup

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import HairError
-from ..geometry import bezier_segments
+from ..geometry.curves import bezier_segments
 
 # Extensions of files with curves, other than .blend.
 ENDINGS = (".abc", ".usd", ".usdc", ".usda", ".usdz", ".npz", ".hair", ".data", ".bin", ".ply", ".obj", ".tfx")

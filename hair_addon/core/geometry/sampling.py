@@ -7,8 +7,8 @@ import warp as wp
 from ..errors import HairError
 from ..kernels import parallel
 from ..kernels.parallel import Rows
-from . import counting_sort
 from .mesh import SurfacePoints, TriMesh
+from .search import counting_sort
 
 wp.set_module_options({"enable_backward": False})
 

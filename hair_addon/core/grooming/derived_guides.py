@@ -7,8 +7,8 @@ import numpy as np
 
 from .. import grooming, interpolation
 from ..errors import HairError
-from ..geometry import clusters
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
+from ..geometry.search import clusters
 from ..geometry.strands import Strands, from_numpy, lengths
 from ..interpolation.hair_binding import HairBinding
 from ..long_work import Progress, no_progress, part_of

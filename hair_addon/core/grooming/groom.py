@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import geometry, grooming, interpolation, placement, styling
+from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, check_points, positions
 from ..geometry.mirror import ACROSS_X, Mirror
 from ..geometry.strands import Strands
-from ..geometry.uv_maps import Texture
 from ..interpolation.hair_binding import HairBinding
 from ..interpolation.regions import Regions
 from ..kernels import kernel_setup
@@ -281,7 +281,7 @@ def distribute_guides(
     )
     if settings.symmetric:
         controls = grooming.guide_growth.mirrored(controls, positions(mesh, roots), mirror)
-    return Strands(geometry.bspline.evaluate(controls, POINT_COUNT, device), roots)
+    return Strands(geometry.curves.bspline.evaluate(controls, POINT_COUNT, device), roots)
 
 
 def bind_hair(
@@ -356,8 +356,8 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         interpolation.guide_weights,
         interpolation.interpolation,
         grooming.guide_growth,
-        geometry.bspline,
-        geometry.hash_grid,
+        geometry.curves.bspline,
+        geometry.search.hash_grid,
         geometry.root_frames,
         placement.sampled_cells,
         placement.preconditioner,
@@ -367,8 +367,8 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
     on_processor = [
         placement.farthest,
         geometry.fingerprint,
-        geometry.connected_components,
-        geometry.counting_sort,
+        geometry.faces.connected_components,
+        geometry.search.counting_sort,
         interpolation.clump_centers,
         geometry.sampling,
     ]

@@ -16,8 +16,8 @@ import numpy as np
 
 from .. import geometry
 from ..errors import HairError
+from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, interpolate
-from ..geometry.uv_maps import Texture
 from ..params import Settings, from_surface
 
 S = TypeVar("S", bound=Settings)

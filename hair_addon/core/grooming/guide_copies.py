@@ -7,10 +7,10 @@ import numpy as np
 import warp as wp
 
 from ..errors import HairError
-from ..geometry import hash_grid
 from ..geometry.closest_point import SurfaceQuery
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
 from ..geometry.mirror import Mirror
+from ..geometry.search import hash_grid
 from ..geometry.strands import lengths as lengths_of
 from .guide_shapes import blended, only, rotations, unit
 from .guide_tool_settings import CopySettings

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import grooming, placement
+from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
 from ..geometry.strands import Strands
-from ..geometry.uv_maps import Texture
 from ..interpolation.regions import Regions
 from . import following, groom
 from .groom import HairSettings

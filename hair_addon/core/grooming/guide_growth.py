@@ -7,8 +7,8 @@ The arc starts along the normal, along flow lines, or, for draped guides, downhi
 import numpy as np
 import warp as wp
 
-from ..geometry.bspline import controls_through, greville_abscissae
 from ..geometry.closest_point import SurfaceQuery, normal_and_offset
+from ..geometry.curves.bspline import controls_through, greville_abscissae
 from ..geometry.mesh import SurfacePoints, TriMesh, normals, positions
 from ..geometry.mirror import Mirror
 from ..kernels import kernel_cache

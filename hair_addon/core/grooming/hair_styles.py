@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import placement, styling
+from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import SurfacePoints, TriMesh
 from ..geometry.strands import Strands
-from ..geometry.uv_maps import Texture
 from ..interpolation.hair_binding import HairBinding
 from ..interpolation.regions import Regions
 from ..interpolation.root_binder import RootBinder

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import warp as wp
 
-from ..geometry import hash_grid
+from ..geometry.search import hash_grid
 from ..kernels import kernel_cache, parallel
 from ..kernels.checks import require_count
 from ..kernels.parallel import Rows

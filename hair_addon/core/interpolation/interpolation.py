@@ -25,7 +25,7 @@ from collections.abc import Callable
 
 import warp as wp
 
-from ..geometry.hash_grid import LIMIT
+from ..geometry.search.hash_grid import LIMIT
 from ..kernels import native_code, parallel
 from ..kernels.checks import require_count
 from ..kernels.parallel import Rows

@@ -40,7 +40,7 @@ def load(module: "wp.Module", device: "wp.Device") -> bool:
 
 
 def short_name(module: "wp.Module") -> str:
-    """Return the name of a Warp module relative to the add-on, such as core.geometry.bspline."""
+    """Return the name of a Warp module relative to the add-on, such as core.geometry.curves.bspline."""
     return module.name.removeprefix(_PACKAGE)
 
 

@@ -25,7 +25,7 @@ def islands(corner_uvs: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     _, places = np.unique(uvs.reshape(-1, 2).view(np.uint64)[:, 0], return_inverse=True)
     keys = places.astype(np.int64) * (int(triangles.max(initial=0)) + 1) + triangles.reshape(-1)
     found, corners = np.unique(keys, return_inverse=True)
-    joined = geometry.connected_components.joined(corners.reshape(-1, 3), len(found))
+    joined = geometry.faces.connected_components.joined(corners.reshape(-1, 3), len(found))
     _, numbers = np.unique(joined, return_inverse=True)
     return numbers.reshape(-1).astype(np.int32)
 

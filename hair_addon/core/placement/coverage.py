@@ -24,8 +24,10 @@ def coverage(mesh: TriMesh, roots: np.ndarray) -> np.ndarray | None:
         return None
     places, vertices = (wp.array(positions, dtype=wp.vec3, device="cpu") for positions in (roots, mesh.vertices))
     anywhere = 4.0 * float(np.ptp(mesh.vertices, axis=0).max())
-    _indices, apart = geometry.hash_grid.neighbours(places, places, anywhere, _NEIGHBOURS + 1)
-    nearest, distance = (found.numpy()[:, 0] for found in geometry.hash_grid.neighbours(places, vertices, anywhere, 1))
+    _indices, apart = geometry.search.hash_grid.neighbours(places, places, anywhere, _NEIGHBOURS + 1)
+    nearest, distance = (
+        found.numpy()[:, 0] for found in geometry.search.hash_grid.neighbours(places, vertices, anywhere, 1)
+    )
     reach = np.maximum(apart.numpy()[nearest, -1], _longest_edges(mesh))
     weights = np.clip((_END - distance / np.maximum(reach, 1e-12)) / (_END - 1.0), 0.0, 1.0)
     weights = (np.ceil(weights * LEVELS) / LEVELS).astype(np.float32)

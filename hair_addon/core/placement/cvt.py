@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
 from ..geometry.mirror import Mirror
-from ..geometry.uv_maps import Texture
 from .domain import Domain
 from .exact_cells import CutCells
 from .farthest import farthest

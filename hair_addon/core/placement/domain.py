@@ -9,11 +9,11 @@ import warp as wp
 
 from ..errors import HairError
 from ..geometry.closest_point import SurfaceQuery
-from ..geometry.connected_components import connected_components
+from ..geometry.faces.connected_components import connected_components
+from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import SurfacePoints, TriMesh, interpolate, positions
 from ..geometry.mirror import Mirror
 from ..geometry.sampling import check_density, corner_masses
-from ..geometry.uv_maps import Texture
 
 GRID_SIZE = 32  # cells along each axis of the grid of sites; distant cells wrap around
 LONGEST_EDGE = 2.5  # of a piece, in spacings of sites: few cells share a piece

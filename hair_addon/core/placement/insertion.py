@@ -6,8 +6,8 @@ The energy is that of cvt.py, including the cells of fixed sites.
 
 import numpy as np
 
+from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
-from ..geometry.uv_maps import Texture
 from .domain import Domain
 from .farthest import farthest
 from .sampled_cells import SampledCells

@@ -3,9 +3,9 @@
 
 import numpy as np
 
+from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import SurfacePoints, TriMesh, interpolate
 from ..geometry.sampling import check_density, corner_masses, sample_surface
-from ..geometry.uv_maps import Texture
 from .domain import Parts, cut
 
 PIECE_COUNT = 10_000  # least number of pieces of a surface: finer details on a large triangle are missed

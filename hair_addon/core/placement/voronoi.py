@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..geometry.hash_grid import CELLS_PER_RADIUS, NO_KEY, key_of, point_of, square_of
 from ..geometry.mesh import SurfacePoints, positions
+from ..geometry.search.hash_grid import CELLS_PER_RADIUS, NO_KEY, key_of, point_of, square_of
 from ..kernels import parallel
 from ..kernels.parallel import Rows
 from .domain import Domain

@@ -137,7 +137,7 @@ class FollowedGuides:
         if own_count != self._point_count and count:
             starts = np.arange(count + 1) * own_count
             is_smooth = np.ones(count, bool)
-            points = geometry.resampling.resample(points.reshape(-1, 3), starts, self._point_count, is_smooth)
+            points = geometry.curves.resampling.resample(points.reshape(-1, 3), starts, self._point_count, is_smooth)
         for style in self._leans:
             x = np.cumsum(lengths_of(points), axis=1)
             x = np.concatenate([np.zeros((count, 1)), x / np.maximum(x[:, -1:], 1e-20)], axis=1)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import SurfacePoints
-from ..geometry.uv_maps import Texture
 from ..interpolation.hair_binding import HairBinding
 from ..kernels.checks import require_count, require_indices
 

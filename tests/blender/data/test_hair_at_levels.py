@@ -10,9 +10,9 @@ from mathutils import Vector
 from hair_addon import api
 from hair_addon.blender.data import scene as scene_data
 from hair_addon.blender.data.simulation import guide_poses
-from tests.support import render_probe
 from tests.support.dynamics.following import drawn_points, update
 from tests.support.exchange.imported import select
+from tests.support.pictures import render_probe
 from tests.support.reading import attribute, evaluated_points, points, vertex_positions, write_points
 
 RENDERED = (1, 2, 3)

@@ -8,7 +8,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.data import scene, usable_surfaces
 from hair_addon.blender.host import notices
-from hair_addon.core.geometry import orientation as sides
+from hair_addon.core.geometry.faces import orientation as sides
 from tests.support.commands import TETRAHEDRON, run_here, write_obj
 from tests.support.reading import points
 

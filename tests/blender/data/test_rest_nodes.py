@@ -9,7 +9,7 @@ from mathutils import Matrix
 from mathutils.bvhtree import BVHTree
 
 from hair_addon.blender.data import rest_nodes
-from hair_addon.blender.groom import diagnostics
+from hair_addon.blender.groom.systems import diagnostics
 from tests.support.dynamics.following import grow, update
 from tests.support.reading import evaluated_points, points, write_points
 

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.groom import diagnostics
+from hair_addon.blender.groom.systems import diagnostics
 from tests.support.dynamics.following import assert_follows, grow, update
 from tests.support.reading import evaluated_points, points
 

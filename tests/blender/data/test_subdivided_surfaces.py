@@ -9,8 +9,8 @@ from mathutils import Matrix
 from hair_addon.blender.data import scene
 from hair_addon.core.geometry import closest_point
 from hair_addon.core.geometry.mesh import positions
-from tests.support import render_probe
 from tests.support.dynamics.following import assert_follows, drawn_points, grow, update
+from tests.support.pictures import render_probe
 from tests.support.reading import evaluated_points, points, vertex_positions, write_points
 
 

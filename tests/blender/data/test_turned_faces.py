@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import scene
-from hair_addon.core.geometry import flipped_faces
+from hair_addon.core.geometry.faces import flipped_faces
 from tests.support.exchange.imported import select
 
 

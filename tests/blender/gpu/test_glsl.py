@@ -4,12 +4,13 @@
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import hair_shading, strand_textures, uniforms
+from hair_addon.blender.gpu import hair_shading, strand_textures
+from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.core.shading import appearance
 from hair_addon.core.shading.fibre import angles, energy_conserving, kajiya_kay, longitudinal, marschner
 from hair_addon.core.shading.fibre.principled import variance_from_roughness
 from hair_addon.core.shading.tables import dual_scattering, lookup_tables
-from tests.support import drawn_strands, glsl
+from tests.support.pictures import drawn_strands, glsl
 
 AXES = ["ANGLES", "COSINES"]  # in the order of AXES_ANGLES and AXES_COSINES in fibre/marschner.glsl
 

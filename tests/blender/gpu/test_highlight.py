@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from hair_addon.blender.gpu import drawing, hair_shading, scene_programs, strand_textures, uniforms, visibility_buffer
+from hair_addon.blender.gpu import drawing, hair_shading, strand_textures, visibility_buffer
+from hair_addon.blender.gpu.programs import scene_programs, uniforms
 from hair_addon.core.shading.fibre import kajiya_kay
 from hair_addon.core.shading.fibre.angles import FibreAngles
 from hair_addon.core.shading.tables import lookup_tables

@@ -7,10 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import drawing, level_of_detail, strand_textures, uniforms
+from hair_addon.blender.gpu import drawing, level_of_detail, strand_textures
+from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture
-from tests.support import glsl
+from tests.support.pictures import glsl
 
 SIZE = 96
 

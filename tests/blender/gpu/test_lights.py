@@ -9,9 +9,9 @@ import pytest
 from mathutils import Euler, Matrix
 
 from hair_addon.blender.gpu import lights as door
-from hair_addon.blender.gpu import uniforms
+from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.core.imaging import lamps
-from tests.support import glsl
+from tests.support.pictures import glsl
 
 SIZE = 17  # pixels along a side of the picture
 WALL = 4.0  # metres along a side of the picture

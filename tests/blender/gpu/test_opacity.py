@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from tests.support import glsl
+from tests.support.pictures import glsl
 
 LAYER_ENDS = np.array([0.007, 0.058, 0.205, 0.5])  # as in shadows/opacity.glsl, which the next test holds them to
 

@@ -10,7 +10,7 @@ from hair_addon.blender.gpu import lights, world_texture
 from hair_addon.blender.live import events, invalidation
 from hair_addon.core.errors import HairError
 from tests.blender.gpu.test_world_texture import environment_node
-from tests.support.rendering import rendered
+from tests.support.pictures.rendering import rendered
 
 SIZE = (16, 8)
 GREY, BLUE = (0.5, 0.5, 0.5, 1.0), (0.05, 0.1, 0.9, 1.0)

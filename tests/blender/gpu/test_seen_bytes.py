@@ -5,11 +5,12 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import ambient_visibility, seen_programs, shaders, strand_textures
+from hair_addon.blender.gpu import ambient_visibility, strand_textures
+from hair_addon.blender.gpu.programs import seen_programs, shaders
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging import ambient_cube
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
-from tests.support import glsl
+from tests.support.pictures import glsl
 
 COUNT = 500
 STEP = 0.5 / 255.0 + 1e-5  # the largest error of a number between zero and one

@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import ambient_visibility, drawing, shadows, strand_textures, surface_textures, uniforms
+from hair_addon.blender.gpu import ambient_visibility, drawing, shadows, strand_textures, surface_textures
+from hair_addon.blender.gpu.programs import uniforms
 
 
 def tuft(rng, strand_count=3000):

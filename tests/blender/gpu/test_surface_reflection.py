@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from tests.support import glsl
+from tests.support.pictures import glsl
 
 
 @pytest.mark.parametrize("half_radius, alpha", [(0.09, 0.002), (0.05, 0.01), (0.03, 0.03)])

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from tests.support import glsl
+from tests.support.pictures import glsl
 
 TEXT = "fibre/zonal_light.glsl"
 COUNT = 500

@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import uniforms
+from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.core.params import declared
 from hair_addon.core.shading.fibre import kajiya_kay, strand_variation
 from hair_addon.core.shading.tables import lookup_tables
-from tests.support import glsl
+from tests.support.pictures import glsl
 
 NESTED = uniforms.Block("Nested", {"first": "float", "turn": "mat4", "last": "int"})
 PROBED = [

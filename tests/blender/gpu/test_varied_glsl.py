@@ -6,14 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import hair_shading, strand_textures, uniforms
+from hair_addon.blender.gpu import hair_shading, strand_textures
+from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.core.shading import appearance
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.fibre import angles, elliptic_section, kajiya_kay, marschner, pigment, strand_variation
 from hair_addon.core.shading.fibre.principled import varied_roughness
 from hair_addon.core.shading.tables import absorption_slices, lookup_tables, strand_tables
 from tests.blender.gpu.test_glsl import doubles, fibres, unit  # noqa: F401 (a fixture)
-from tests.support import glsl
+from tests.support.pictures import glsl
 
 # Each differs in something of its own; the last is a little melanin, whose logarithm loses digits.
 LOOKS = [

@@ -5,16 +5,8 @@ import gpu
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import (
-    drawing,
-    hair_shading,
-    scene_programs,
-    strand_textures,
-    surface_textures,
-    uniforms,
-    visibility_buffer,
-    windows,
-)
+from hair_addon.blender.gpu import drawing, hair_shading, strand_textures, surface_textures, visibility_buffer, windows
+from hair_addon.blender.gpu.programs import scene_programs, uniforms
 from hair_addon.core.shading.fibre import kajiya_kay
 
 SIZE = (160, 96)

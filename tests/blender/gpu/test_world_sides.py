@@ -4,8 +4,9 @@
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import ambient_visibility, shaders, strand_textures, surface_textures, uniforms
-from tests.support import glsl
+from hair_addon.blender.gpu import ambient_visibility, strand_textures, surface_textures
+from hair_addon.blender.gpu.programs import shaders, uniforms
+from tests.support.pictures import glsl
 
 COUNT = 200
 

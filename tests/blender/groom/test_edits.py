@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hair_addon.blender.groom import edits
+from hair_addon.blender.groom.systems import edits
 from hair_addon.blender.settings import preferences, saved_looks
 from hair_addon.core.errors import HairError
 from hair_addon.core.shading.appearance import Appearance

@@ -4,8 +4,8 @@
 import bpy
 import pytest
 
-from hair_addon.blender.groom.hair_systems import systems_of
 from hair_addon.blender.groom.selection import object_of, surface_of
+from hair_addon.blender.groom.systems.hair_systems import systems_of
 from hair_addon.blender.materials import looks
 from tests.blender.groom.test_edits import activate
 from tests.support.interface.layout import draw, draw_all

@@ -5,8 +5,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.groom import hair_systems
 from hair_addon.blender.groom.guides import line_drawing
+from hair_addon.blender.groom.systems import hair_systems
 from hair_addon.blender.ui import panels
 from tests.support.interface.layout import draw
 from tests.support.reading import points, write_points

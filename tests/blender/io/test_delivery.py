@@ -18,8 +18,8 @@ from tests.support.dynamics.following import grow
 from tests.support.dynamics.swung import simulate
 from tests.support.exchange.delivered import without_addon
 from tests.support.interface.modal import Operator, drive
+from tests.support.pictures.rendering import light_up
 from tests.support.reading import evaluated_points, everything, read_picture
-from tests.support.rendering import light_up
 
 pytestmark = pytest.mark.usefixtures("coarse_shadows")
 

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.io import frames, sequence
+from hair_addon.blender.io.pictures import frames, sequence
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import file_lock
 from hair_addon.core.files.atomic_file import atomic_file, partial_of

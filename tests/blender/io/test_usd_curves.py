@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
-from hair_addon.blender.io import usd_curves, usd_stage
+from hair_addon.blender.io.usd import usd_curves, usd_stage
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.strands import curve_offsets
 

@@ -7,7 +7,7 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon.blender.data.strands import curves
-from hair_addon.blender.io import usd_groom
+from hair_addon.blender.io.usd import usd_groom
 from hair_addon.core.files.groom_curves import GroomCurves
 from tests.support.dynamics.following import update
 from tests.support.exchange import alembic_reader

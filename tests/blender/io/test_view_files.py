@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.io import frames, sequence
+from hair_addon.blender.io.pictures import frames, sequence
 from hair_addon.core.errors import HairError
 from hair_addon.core.files.atomic_file import partial_of
 from hair_addon.core.imaging.pixel_sampling import PictureSettings

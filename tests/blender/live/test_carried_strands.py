@@ -18,7 +18,7 @@ from hair_addon.core.geometry import vertex_turns
 from hair_addon.core.imaging import ambient_cube
 from hair_addon.core.styling import curl, lean
 from tests.support.counting import counts_of
-from tests.support.gpu_strands import CLOSE, comb, drawn, grown
+from tests.support.pictures.gpu_strands import CLOSE, comb, drawn, grown
 from tests.support.reading import points, write_points
 
 

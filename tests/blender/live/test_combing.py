@@ -16,8 +16,8 @@ from hair_addon.blender.live import handlers, invalidation, live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.grooming import following
 from hair_addon.core.interpolation.guide_weights import reach
-from tests.support import drawn_strands
 from tests.support.counting import counts_of
+from tests.support.pictures import drawn_strands
 from tests.support.reading import attribute, points, write_points
 
 pytestmark = pytest.mark.usefixtures("made_anew")

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.strands import curves
-from hair_addon.blender.gpu import ambient_visibility, shaders, strand_textures, surface_textures
+from hair_addon.blender.gpu import ambient_visibility, strand_textures, surface_textures
+from hair_addon.blender.gpu.programs import shaders
 from hair_addon.blender.gpu.strands import device_choice, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time
@@ -19,11 +20,11 @@ from hair_addon.blender.render.viewport import viewport
 from hair_addon.blender.settings import preferences
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import following
-from tests.support import drawn_strands
 from tests.support.counting import counts_of
-from tests.support.gpu_strands import CLOSE, comb, drawn, grown, prepare
+from tests.support.pictures import drawn_strands
+from tests.support.pictures.gpu_strands import CLOSE, comb, drawn, grown, prepare
+from tests.support.pictures.viewports import context_of, view3d
 from tests.support.reading import points
-from tests.support.viewports import context_of, view3d
 
 
 def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, monkeypatch):

@@ -9,8 +9,8 @@ from hair_addon.blender.groom.dynamics import guide_baking
 from hair_addon.blender.live import dynamics_state
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.long_work import run_now
-from tests.support import drawn_strands
 from tests.support.dynamics.swung import simulate
+from tests.support.pictures import drawn_strands
 from tests.support.reading import evaluated_points, points
 
 RADIUS, LAST = 0.15, 8

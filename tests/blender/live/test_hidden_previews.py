@@ -12,7 +12,7 @@ from hair_addon.blender.live import handlers, hidden_previews, live_hair, moving
 from hair_addon.blender.render.viewport import viewport
 from tests.blender.live.test_carried_strands import bend
 from tests.blender.live.test_moving_surfaces import is_left_out, objects, view_space
-from tests.support.gpu_strands import CLOSE, drawn
+from tests.support.pictures.gpu_strands import CLOSE, drawn
 from tests.support.reading import evaluated_points
 
 

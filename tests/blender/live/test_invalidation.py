@@ -19,8 +19,8 @@ from hair_addon.blender.render.viewport import hair_picture, viewport
 from tests.blender.gpu.test_world_texture import environment_node
 from tests.blender.ui.test_own_modifiers import add_asset
 from tests.support.invariants import changed
+from tests.support.pictures.viewports import context_of, view3d
 from tests.support.reading import points, write_points
-from tests.support.viewports import context_of, view3d
 from tests.test_conventions import ADDON, MODULES
 
 SIZE = 24

@@ -5,16 +5,16 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import shaders, uniforms
+from hair_addon.blender.gpu.programs import shaders, uniforms
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.blender.settings import style_items
 from hair_addon.core.grooming import following
 from hair_addon.core.styling import bend, clump, curl, frizz, lean, wet
-from tests.support import drawn_strands
 from tests.support.counting import counts_of
-from tests.support.gpu_strands import CLOSE, comb, drawn, grown, prepare
+from tests.support.pictures import drawn_strands
+from tests.support.pictures.gpu_strands import CLOSE, comb, drawn, grown, prepare
 from tests.support.reading import points
 from tests.support.scenes import even_guides
 

@@ -9,8 +9,8 @@ from hair_addon.blender.gpu import strand_textures
 from hair_addon.blender.render import drawn_scene, modified_hair
 from tests.blender.live.test_carried_strands import bend
 from tests.blender.ui.test_own_modifiers import add_asset
-from tests.support import drawn_strands
-from tests.support.gpu_strands import CLOSE
+from tests.support.pictures import drawn_strands
+from tests.support.pictures.gpu_strands import CLOSE
 from tests.support.reading import evaluated_points, points, write_points
 
 

@@ -12,7 +12,7 @@ from hair_addon.blender.live import handlers, live_hair, moving_surfaces
 from hair_addon.blender.render import hair_cache
 from tests.blender.live.test_carried_strands import bend
 from tests.support.counting import Traffic, counts_of
-from tests.support.gpu_strands import CLOSE, drawn
+from tests.support.pictures.gpu_strands import CLOSE, drawn
 from tests.support.reading import evaluated_points, points, write_points
 
 

@@ -9,7 +9,7 @@ from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
-from tests.support import drawn_strands
+from tests.support.pictures import drawn_strands
 from tests.support.reading import points, write_points
 
 

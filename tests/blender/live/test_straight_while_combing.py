@@ -12,8 +12,8 @@ from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.blender.settings import style_items
 from hair_addon.core.styling import clump, curl, lean, steps
-from tests.support import drawn_strands
 from tests.support.counting import counts_of
+from tests.support.pictures import drawn_strands
 from tests.support.reading import points, write_points
 
 

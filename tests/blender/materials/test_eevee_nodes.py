@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.support.rendering import configure, light_up
+from tests.support.pictures.rendering import configure, light_up
 from tests.support.scenes import even_guides
 
 SIZE = 40

@@ -10,10 +10,10 @@ from hair_addon.blender.render import motion_vectors
 from hair_addon.core.files import frame_cache
 from hair_addon.core.geometry import packed_strands
 from hair_addon.core.long_work import run_now
-from tests.support import drawn_strands
 from tests.support.dynamics.swung import simulate, swing
+from tests.support.pictures import drawn_strands
+from tests.support.pictures.rendering import rendered
 from tests.support.reading import points
-from tests.support.rendering import rendered
 
 FRAME = 8
 FRAME_RATE = 24

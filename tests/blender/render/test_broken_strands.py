@@ -12,7 +12,7 @@ from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.core.errors import HairError
 from tests.support.commands import run_here
 from tests.support.interface.layout import draw
-from tests.support.rendering import add_orthographic_camera, configure, rendered
+from tests.support.pictures.rendering import add_orthographic_camera, configure, rendered
 
 SENTENCE = '"Hair" is drawn without the strands that have non-finite coordinates'
 BROKEN, POINT = 7, 17

@@ -14,7 +14,7 @@ from hair_addon.blender.render import drawn_scene, offscreen
 from hair_addon.blender.render.viewport import region_pictures, rendered_view, viewport
 from hair_addon.blender.render.viewport.view_film import ViewFilm
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
-from tests.support.rendering import rendered
+from tests.support.pictures.rendering import rendered
 
 DISTANCE, FOCUS = 5.0, 3.0
 SAMPLES = 1024

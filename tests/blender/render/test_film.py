@@ -10,8 +10,8 @@ import pytest
 from hair_addon.blender.data.scene import read_camera
 from hair_addon.blender.render import film
 from tests.support.pairs import pairs
+from tests.support.pictures.rendering import configure, layers_of, light_up, rendered
 from tests.support.reading import evaluated_points
-from tests.support.rendering import configure, layers_of, light_up, rendered
 
 MODELS = [("KAJIYA_KAY", "energy"), ("MARSCHNER", "energy"), ("MARSCHNER", "classic")]
 

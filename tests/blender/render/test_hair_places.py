@@ -9,8 +9,8 @@ from hair_addon import api
 from hair_addon.blender.live import invalidation
 from hair_addon.blender.render import drawn_scene, hair_cache, hair_places
 from tests.support.counting import counts_of
+from tests.support.pictures.viewports import view3d
 from tests.support.reading import points
-from tests.support.viewports import view3d
 
 pytestmark = pytest.mark.usefixtures("coarse_shadows")
 

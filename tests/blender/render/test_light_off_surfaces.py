@@ -12,7 +12,7 @@ from hair_addon import api
 from hair_addon.core.shading import appearance, presets
 from hair_addon.core.shading.fibre.angles import fibre_angles
 from hair_addon.core.shading.tables import lookup_tables
-from tests.support import glsl
+from tests.support.pictures import glsl
 
 SUN = 3.0  # [W/m²]
 BLACK = replace(presets.PRESETS["BLACK"][1], random_color=0.0, roughness=0.3)

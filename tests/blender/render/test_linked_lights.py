@@ -7,10 +7,10 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import uniforms
+from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
-from tests.support.rendering import rendered
+from tests.support.pictures.rendering import rendered
 
 NAMES = ("Hair", "Sphere")
 

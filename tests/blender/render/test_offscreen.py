@@ -16,10 +16,10 @@ from hair_addon.blender.gpu import (
     lights,
     shadows,
     strand_textures,
-    uniforms,
     visibility_buffer,
 )
 from hair_addon.blender.gpu.lights import World
+from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.render import drawn_scene, hair_cache, offscreen, scene_drawing
 from hair_addon.blender.settings import preferences

@@ -10,7 +10,7 @@ import pytest
 from hair_addon.blender.gpu import lights
 from hair_addon.blender.render import drawn_scene, offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
-from tests.support.rendering import add_orthographic_camera
+from tests.support.pictures.rendering import add_orthographic_camera
 
 SIZE = 48
 MIDDLE = slice(SIZE // 2 - 2, SIZE // 2 + 2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.pairs import share_of
-from tests.support.rendering import rendered
+from tests.support.pictures.rendering import rendered
 
 
 def moving_square(scene):

@@ -14,7 +14,7 @@ from hair_addon.blender.host import notices
 from hair_addon.blender.render import drawn_scene, offscreen, scene_drawing
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support.pairs import pairs
-from tests.support.rendering import add_orthographic_camera
+from tests.support.pictures.rendering import add_orthographic_camera
 
 SIZE = 48
 

@@ -13,7 +13,7 @@ from hair_addon.blender.settings import style_items
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from hair_addon.core.styling import wet
 from tests.support.pairs import share_of
-from tests.support.rendering import light_up, rendered
+from tests.support.pictures.rendering import light_up, rendered
 from tests.support.scenes import even_guides
 
 AMOUNT = 0.8

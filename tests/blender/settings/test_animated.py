@@ -12,8 +12,8 @@ from hair_addon.blender.live import handlers
 from hair_addon.blender.materials import looks, materials
 from hair_addon.core.shading import appearance
 from tests.support.guide_tools import grown_from_nothing, lengths_of
+from tests.support.pictures.rendering import add_orthographic_camera
 from tests.support.reading import points
-from tests.support.rendering import add_orthographic_camera
 
 
 @pytest.fixture

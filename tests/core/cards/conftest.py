@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from hair_addon.core.cards import atlas, outlines, ribbons
-from hair_addon.core.geometry import clusters
 from hair_addon.core.geometry.mesh import TriMesh
+from hair_addon.core.geometry.search import clusters
 
 COUNT, SEGMENTS, SIZE = 40, 6, 512
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
-from hair_addon.core.geometry import bezier_segments
+from hair_addon.core.geometry.curves import bezier_segments
 from hair_addon.core.geometry.strands import curve_offsets
 
 CUBIC = [(basis, wrap) for basis in bezier_segments.BASES for wrap in ("nonperiodic", "pinned", "periodic")]

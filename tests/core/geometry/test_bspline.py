@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from hair_addon.core.geometry import bspline
+from hair_addon.core.geometry.curves import bspline
 
 degrees_and_counts = st.integers(1, 5).flatmap(lambda p: st.tuples(st.just(p), st.integers(p + 1, 12)))
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry import clusters
+from hair_addon.core.geometry.search import clusters
 
 
 @pytest.mark.parametrize("count", [1, 7, 64, 300])

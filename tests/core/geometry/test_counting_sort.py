@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry import counting_sort
+from hair_addon.core.geometry.search import counting_sort
 
 
 @given(

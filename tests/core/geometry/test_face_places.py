@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.geometry import face_places
 from hair_addon.core.geometry.closest_point import SurfaceQuery
+from hair_addon.core.geometry.faces import face_places
 from hair_addon.core.geometry.mesh import Faces, TriMesh, positions
 
 # A square and a pentagon beside it, flat, so that no way to cut them moves a place.

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry import hash_grid
+from hair_addon.core.geometry.search import hash_grid
 from tests.support.devices import DEVICE
 
 

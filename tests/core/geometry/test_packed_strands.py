@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import packed_strands
-from tests.support import drawn_strands
+from tests.support.pictures import drawn_strands
 
 
 def packed(points):

@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry import resampling, strands
+from hair_addon.core.geometry import strands
+from hair_addon.core.geometry.curves import resampling
 
 COUNTS = st.lists(st.integers(1, 12), min_size=1, max_size=6)
 

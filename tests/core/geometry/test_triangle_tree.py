@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.geometry import triangle_tree
+from hair_addon.core.geometry.search import triangle_tree
 
 
 @pytest.mark.parametrize("count", [1, 4, 5, 1000])

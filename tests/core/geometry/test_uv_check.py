@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
+from hair_addon.core.geometry.faces.uv_maps import misleading_fraction
 from hair_addon.core.geometry.mesh import TriMesh
-from hair_addon.core.geometry.uv_maps import misleading_fraction
 
 
 def squares(count):

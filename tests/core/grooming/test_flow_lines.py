@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry import bspline
 from hair_addon.core.geometry import mesh as mesh_math
+from hair_addon.core.geometry.curves import bspline
 from hair_addon.core.geometry.mesh import TriMesh
 from hair_addon.core.geometry.sampling import sample_surface
 from hair_addon.core.grooming import flow_lines, groom, guide_growth

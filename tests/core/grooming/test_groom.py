@@ -10,9 +10,10 @@ import pytest
 import warp as wp
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry import hash_grid, strands
 from hair_addon.core.geometry import mesh as mesh_math
+from hair_addon.core.geometry import strands
 from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh
+from hair_addon.core.geometry.search import hash_grid
 from hair_addon.core.geometry.strands import Strands
 from hair_addon.core.grooming import following, groom
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
+from hair_addon.core.geometry.faces.uv_maps import Texture
 from hair_addon.core.geometry.mesh import TriMesh
-from hair_addon.core.geometry.uv_maps import Texture
 from hair_addon.core.grooming import groom, groom_defaults
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.params import from_surface, given

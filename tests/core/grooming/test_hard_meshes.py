@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry.connected_components import connected_components
+from hair_addon.core.geometry.faces.connected_components import connected_components
 from hair_addon.core.geometry.mesh import TriMesh, check_mesh, positions
 from hair_addon.core.geometry.sampling import sample_surface
 from hair_addon.core.grooming import groom

@@ -8,10 +8,11 @@ import pytest
 import warp as wp
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry import hash_grid, root_frames, strands, surface_deform, transform
+from hair_addon.core.geometry import root_frames, strands, surface_deform, transform
 from hair_addon.core.geometry.closest_point import SurfaceQuery
-from hair_addon.core.geometry.connected_components import connected_components
+from hair_addon.core.geometry.faces.connected_components import connected_components
 from hair_addon.core.geometry.mesh import Faces, SurfacePoints, TriMesh
+from hair_addon.core.geometry.search import hash_grid
 from hair_addon.core.grooming import following, groom
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.interpolation import clump_centers, guide_weights, interpolation

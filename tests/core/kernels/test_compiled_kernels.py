@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 import warp as wp
 
-from hair_addon.core.geometry import bspline
+from hair_addon.core.geometry.curves import bspline
 from hair_addon.core.kernels import compiled_kernels
 from tests.support import any_processor
 from tools import build_extension, compile_kernels
@@ -199,7 +199,7 @@ def test_another_compiler(folder, part):
 
 
 def test_other_sources(folder):
-    change_index(folder, lambda index: index["modules"]["core.geometry.bspline"].update(hash="0" * 64))
+    change_index(folder, lambda index: index["modules"]["core.geometry.curves.bspline"].update(hash="0" * 64))
     assert not loads()
 
 
@@ -227,7 +227,7 @@ def test_a_lesser_processor(folder):
 
 def test_a_damaged_file(folder):
     processor, _modules = compiled_kernels._fitting(folder)
-    binary, _meta = compiled_kernels.file_names("core.geometry.bspline", processor)
+    binary, _meta = compiled_kernels.file_names("core.geometry.curves.bspline", processor)
     content = bytearray((folder / binary).read_bytes())
     content[len(content) // 2] ^= 1
     (folder / binary).write_bytes(content)

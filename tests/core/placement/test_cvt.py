@@ -11,10 +11,10 @@ from scipy.spatial import cKDTree
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import mesh as mesh_math
 from hair_addon.core.geometry.curvature import bend_density
+from hair_addon.core.geometry.faces.uv_maps import Texture
 from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh
 from hair_addon.core.geometry.mirror import Mirror
 from hair_addon.core.geometry.sampling import sample_surface
-from hair_addon.core.geometry.uv_maps import Texture
 from hair_addon.core.placement import cvt, voronoi
 from hair_addon.core.placement.domain import Domain
 from hair_addon.core.placement.exact_cells import CutCells

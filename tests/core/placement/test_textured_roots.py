@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
+from hair_addon.core.geometry.faces.uv_maps import Texture
 from hair_addon.core.geometry.mesh import positions
-from hair_addon.core.geometry.uv_maps import Texture
 from hair_addon.core.placement.textured_roots import sample_textured
 from tests.core.grooming.test_groom_defaults import plane
 

@@ -6,7 +6,7 @@ import pytest
 
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import mesh as mesh_math
-from hair_addon.core.geometry.uv_maps import Texture
+from hair_addon.core.geometry.faces.uv_maps import Texture
 from hair_addon.core.styling.masks import Mask
 from tests.support.strands.styled import straight
 

@@ -9,7 +9,7 @@ import warp as wp
 
 from hair_addon.core import placement
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry import hash_grid
+from hair_addon.core.geometry.search import hash_grid
 from hair_addon.core.geometry.strands import from_numpy
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.interpolation import guide_weights

@@ -69,7 +69,8 @@ def _reader(name, path):
     """Return (read function, check of its result against that of the intact file)."""
     import bpy
 
-    from hair_addon.blender.io import mesh_files, usd_curves
+    from hair_addon.blender.io import mesh_files
+    from hair_addon.blender.io.usd import usd_curves
     from hair_addon.core.files import table_exr
 
     def same_tables(found, whole):

@@ -2,7 +2,7 @@
 """All readers of the add-on in pure Python, each with a file to damage and a check of the values read.
 
 For a damaged file, a reader must raise a `HairError` or return values that could have been written. Every new reader
-needs a `Reader` here, or `tests/crossings/test_mutants.py` fails.
+needs a `Reader` here, or `tests/crossings/damage/test_mutants.py` fails.
 """
 
 import argparse
@@ -19,7 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hair_addon.blender.io import asset_catalogs, mesh_checks, sequence
+from hair_addon.blender.io import asset_catalogs, mesh_checks
+from hair_addon.blender.io.pictures import sequence
 from hair_addon.blender.settings import translations
 from hair_addon.command_line import info, setting_pairs
 from hair_addon.core.errors import HairError
@@ -331,7 +332,7 @@ def readers():
             is_text=True,
         ),
         "record of a sequence": Reader(
-            "blender/io/sequence.py", json.dumps(_RECORD).encode(), _record, _record_is_the_same, is_text=True
+            "blender/io/pictures/sequence.py", json.dumps(_RECORD).encode(), _record, _record_is_the_same, is_text=True
         ),
         "index of kernels": Reader(
             "core/kernels/compiled_kernels.py",

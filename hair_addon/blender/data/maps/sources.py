@@ -219,10 +219,10 @@ def _corner_values(strands, name):
     _require_same(strands, domain in sizes and len(values) == sizes[domain])
     if domain == "POINT":
         return values[triangles]
-    owners = geometry.face_places.owners(faces)
+    owners = geometry.faces.face_places.owners(faces)
     if domain == "FACE":
         return np.repeat(values[owners][:, None], 3, axis=1)
-    return values[faces.starts[owners][:, None] + geometry.face_places.corners_of(faces, owners, triangles)]
+    return values[faces.starts[owners][:, None] + geometry.faces.face_places.corners_of(faces, owners, triangles)]
 
 
 def _of_edges(mesh, values):

@@ -76,7 +76,7 @@ def _places_on(surface_object, depsgraph, faces, vertex_count, places, firsts):
     vertices, barycentric = places[:2]
     is_lost = ~barycentric.any(axis=1) | (vertices >= vertex_count).any(axis=1)
     wanted = np.where(is_lost[:, None], -1, vertices)
-    lost = np.flatnonzero(is_lost | (geometry.face_places.polygons_with(faces, vertex_count, wanted) < 0))
+    lost = np.flatnonzero(is_lost | (geometry.faces.face_places.polygons_with(faces, vertex_count, wanted) < 0))
     if len(lost):
         surface = scene.read_surface(surface_object, depsgraph)
         if len(surface.rest) != vertex_count:
@@ -91,8 +91,8 @@ def _corners(hair_object, faces, vertex_count, vertices):
     key = hair_object.session_uid
     known = corner_cache.get(key)
     if known is None or known.faces is not faces or not np.array_equal(known.vertices, vertices):
-        polygons = np.maximum(geometry.face_places.polygons_with(faces, vertex_count, vertices), 0)
-        corners = np.maximum(geometry.face_places.corners_of(faces, polygons, vertices), 0)
+        polygons = np.maximum(geometry.faces.face_places.polygons_with(faces, vertex_count, vertices), 0)
+        corners = np.maximum(geometry.faces.face_places.corners_of(faces, polygons, vertices), 0)
         known = corner_cache.keep(key, _Corners(faces, vertices, faces.starts[polygons][:, None] + corners))
     return known.corners
 

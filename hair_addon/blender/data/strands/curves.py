@@ -347,7 +347,7 @@ def even_points(points, offsets, are_smooth):
     """
     if (np.diff(offsets) == groom.POINT_COUNT).all():
         return points.reshape(-1, groom.POINT_COUNT, 3)
-    return geometry.resampling.resample(points, offsets, groom.POINT_COUNT, are_smooth())
+    return geometry.curves.resampling.resample(points, offsets, groom.POINT_COUNT, are_smooth())
 
 
 def even_local_points(curves):

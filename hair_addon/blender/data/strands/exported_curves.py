@@ -3,7 +3,8 @@
 
 import numpy as np
 
-from ....core.geometry import bezier_segments, strands
+from ....core.geometry import strands
+from ....core.geometry.curves import bezier_segments
 from ....core.grooming import groom
 from . import attributes, curves
 

@@ -66,7 +66,7 @@ def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):
         if domain == "POINT":
             corners = numbers[surface.mesh.triangles]
         else:
-            corners = np.repeat(numbers[geometry.face_places.owners(surface.faces)][:, None], 3, axis=1)
+            corners = np.repeat(numbers[geometry.faces.face_places.owners(surface.faces)][:, None], 3, axis=1)
     attribute = None if guide_curves is None else guide_curves.attributes.get(name)
     if attribute is not None:
         guides = _whole_numbers(attribute, name_of(guide_curves), ("CURVE",))

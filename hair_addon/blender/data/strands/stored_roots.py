@@ -36,7 +36,7 @@ def points(curves, surface, is_complete=False):
         cut_otherwise = np.flatnonzero(known & is_other & are_vertices)
         known &= are_vertices
         if len(cut_otherwise):
-            polygons = geometry.face_places.owners(surface.triangulated)[triangle[cut_otherwise]]
+            polygons = geometry.faces.face_places.owners(surface.triangulated)[triangle[cut_otherwise]]
             stored_places = vertices[cut_otherwise], barycentric[cut_otherwise]
             present, are_none = surface.points_at(polygons, *stored_places)
             found.triangle[cut_otherwise], found.barycentric[cut_otherwise] = present.triangle, present.barycentric

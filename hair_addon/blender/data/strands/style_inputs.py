@@ -93,10 +93,10 @@ def _read_surface_attribute(surface_object, surface, name, depsgraph):
     _require_same(len(values) == sizes[domain], surface_object)
     if domain == "POINT":
         return values[triangles]
-    owners = geometry.face_places.owners(faces)
+    owners = geometry.faces.face_places.owners(faces)
     if domain == "FACE":
         return np.repeat(values[owners][:, None], 3, axis=1)
-    return values[faces.starts[owners][:, None] + geometry.face_places.corners_of(faces, owners, triangles)]
+    return values[faces.starts[owners][:, None] + geometry.faces.face_places.corners_of(faces, owners, triangles)]
 
 
 def _require_same(is_same, surface_object):

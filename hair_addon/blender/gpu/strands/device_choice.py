@@ -11,7 +11,8 @@ import gpu
 import numpy as np
 
 from ....core.errors import HairError
-from .. import shaders, strand_textures
+from .. import strand_textures
+from ..programs import shaders
 from . import strand_maker
 
 _STRANDS, _GUIDES, _POINTS, _SLOTS = 4096, 64, 41, 8

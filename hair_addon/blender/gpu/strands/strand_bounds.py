@@ -10,7 +10,8 @@ from itertools import pairwise
 import gpu
 import numpy as np
 
-from .. import driver_textures, shaders
+from .. import driver_textures
+from ..programs import shaders
 from ..strand_textures import TEXTURE_WIDTH
 
 _GROUP_SIZE = 64

@@ -12,7 +12,7 @@ import gpu
 import numpy as np
 
 from ....core.kernels.checks import require_count, require_indices
-from .. import shaders
+from ..programs import shaders
 from ..strand_textures import StrandsOnGPU, run_for_each
 from . import vertex_turner
 from .strand_changes import StrandChanges, declare_written, new_changes, rows_texture

@@ -12,7 +12,7 @@ import numpy as np
 
 from ....core.interpolation.hair_binding import HairBinding
 from ....core.kernels.checks import require_count, require_indices
-from .. import shaders, uniforms
+from ..programs import shaders, uniforms
 from ..strand_textures import TEXTURE_WIDTH, StrandsOnGPU, row_strands_of, run_for_each
 from .strand_changes import StrandChanges, declare_written, empty_rows, new_changes, rows_texture
 

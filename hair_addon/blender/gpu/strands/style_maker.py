@@ -16,7 +16,7 @@ from ....core.interpolation.hair_binding import HairBinding
 from ....core.kernels.checks import require_count
 from ....core.styling import kinds, style_text
 from ....core.styling.program import CHOICES, NUMBERS, Program
-from .. import shaders, uniforms
+from ..programs import shaders, uniforms
 from ..strand_textures import TEXTURE_WIDTH, StrandsOnGPU, row_strands_of, run_for_each
 from . import strand_changes, strand_maker
 from .strand_changes import StrandChanges

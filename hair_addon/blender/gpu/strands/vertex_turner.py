@@ -12,7 +12,7 @@ import numpy as np
 
 from ....core.errors import HairError
 from ....core.kernels.checks import require_count
-from .. import shaders
+from ..programs import shaders
 from ..strand_textures import MOST_GROUPS, TEXTURE_WIDTH
 from .strand_changes import empty_rows, rows_texture
 

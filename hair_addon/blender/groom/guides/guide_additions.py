@@ -109,7 +109,7 @@ def _between(guides, count, mask, depsgraph):
     point_count = max(int(np.bincount(guides.counts).argmax()), 2)
     if point_count != POINT_COUNT:
         starts = np.arange(len(points) + 1) * POINT_COUNT
-        points = geometry.resampling.resample(points.reshape(-1, 3), starts, point_count)
+        points = geometry.curves.resampling.resample(points.reshape(-1, 3), starts, point_count)
     return points, nearest, roots
 
 

@@ -75,7 +75,7 @@ class CombedGuides:
         """Return (G, point_count, 3) float32 [m] guides, unchanged if all have that many points, else resampled."""
         if (self.counts == point_count).all():
             return self.points.reshape(-1, point_count, 3)
-        return geometry.resampling.resample(
+        return geometry.curves.resampling.resample(
             self.points, self.starts, point_count, attributes.are_smooth(self.datablock)
         )
 

@@ -160,6 +160,6 @@ def _grown_base(guides, depsgraph):
         some = grown[chosen]
         if count != grown.shape[1]:
             own = np.arange(len(chosen) + 1) * grown.shape[1]
-            some = geometry.resampling.resample(some.reshape(-1, 3), own, max(int(count), 2))[:, :count]
+            some = geometry.curves.resampling.resample(some.reshape(-1, 3), own, max(int(count), 2))[:, :count]
         base[starts[chosen][:, None] + np.arange(count)] = surface.to_local(some)
     return base

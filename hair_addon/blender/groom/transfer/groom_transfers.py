@@ -151,7 +151,7 @@ def _places(source: TransferSurface, target: TransferSurface, roots, warp, setti
 
 
 def _has_overlap(surface):
-    return geometry.uv_maps.misleading_fraction(surface.mesh, surface.corner_uvs) > _OVERLAPPING
+    return geometry.faces.uv_maps.misleading_fraction(surface.mesh, surface.corner_uvs) > _OVERLAPPING
 
 
 def _through_landmarks(own, others):

@@ -96,7 +96,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         if self.is_animation or composite.is_in_sequence(blender_scene):
             frame_folders.require_baked([scene_time.frame_of(blender_scene)], blender_scene)
         frame_folders.require_readable([scene_time.frame_of(blender_scene)], blender_scene)
-        if bpy.app.background and _listener is no_progress:  # `io.frames` checks by itself
+        if bpy.app.background and _listener is no_progress:  # `io.pictures.frames` checks by itself
             rendered_files.require(blender_scene.original, [scene_time.frame_of(blender_scene)])
         size, window = scene.picture_size(blender_scene.render)
         views = self._views(view_layer)

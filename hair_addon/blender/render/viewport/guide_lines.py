@@ -8,7 +8,8 @@ import numpy as np
 
 from ....core.errors import HairError
 from ...data import scene
-from ...gpu import drawing, scene_programs, uniforms
+from ...gpu import drawing
+from ...gpu.programs import scene_programs, uniforms
 from ...host.notices import name_of
 from ...materials import looks
 from .. import hair_cache

@@ -6,16 +6,14 @@ import functools
 import gpu
 import numpy as np
 
-from ...gpu import drawing, scene_programs
+from ...gpu import drawing
+from ...gpu.programs import scene_programs
 from ...gpu.visibility_buffer import VisibilityBuffer
 from .. import scene_drawing
 from . import picture_detail
 from .history import History
 
 SAMPLE_COUNT = 32  # per pixel, in all passes of a picture
-
-# With one sample per pixel, the first pass shares each with the pixels around: the least share that leaves no specks.
-_SPREAD = 0.15
 
 
 def samples_per_side():
@@ -120,7 +118,6 @@ class HairPicture:
         program.bind()
         program.uniform_int("samples_per_side", self._detail.per_side)
         program.uniform_int("first_place", self._detail.corner)
-        program.uniform_float("spread", _SPREAD if self._detail.per_side == 1 and self.pass_count == 0 else 0.0)
         program.uniform_sampler("picture", self._pass.color)
         program.uniform_sampler("depths", self._pass.depths)
         program.uniform_sampler("surface_depth", self._pass.surface_depth)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
-from ...gpu import drawing, picture_programs, strand_textures, uniforms
+from ...gpu import drawing, strand_textures
+from ...gpu.programs import picture_programs, uniforms
 from .. import motion_vectors
 
 _COLOR, _PASSES = "RGBA16F", "R16F"

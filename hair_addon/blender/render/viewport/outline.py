@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
-from ...gpu import drawing, shaders
+from ...gpu import drawing
+from ...gpu.programs import shaders
 from .. import scene_drawing
 
 # Passes after which the line no longer changes: each pass finds only some samples of thin strands.

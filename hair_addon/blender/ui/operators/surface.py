@@ -3,8 +3,9 @@
 
 import bpy
 
-from ...groom import attached_hair, edits
 from ...groom.selection import mesh_to_attach_to, parts_of, surface_of
+from ...groom.surfaces import attached_hair
+from ...groom.systems import edits
 from ...live import reported
 from .base.hair_operator import HairOperator
 

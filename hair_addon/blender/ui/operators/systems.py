@@ -8,9 +8,8 @@ from ....core.grooming import cost
 from ....core.grooming.groom import GuideSettings, HairSettings
 from ...data import scene
 from ...data.strands.curves import followers, require_editable
-from ...groom import copied_hair, edits, mask_suggestions, pipeline
+from ...groom import pipeline
 from ...groom.guides import brushes, line_drawing
-from ...groom.hair_systems import edited_system, name_guides, parts_of_system
 from ...groom.selection import (
     active_of_kind,
     guides_of,
@@ -22,6 +21,8 @@ from ...groom.selection import (
     reveal,
     surface_of,
 )
+from ...groom.systems import copied_hair, edits, mask_suggestions
+from ...groom.systems.hair_systems import edited_system, name_guides, parts_of_system
 from ...live.live_hair import update_once
 from ...render.viewport import viewport
 from ...settings import fitted_sizes, setting_properties

@@ -7,8 +7,8 @@ from ....core.grooming import cost
 from ...data.scene import triangle_count
 from ...data.strands.curves import is_hand_made
 from ...groom import hair_memory
-from ...groom.diagnostics import parting_warnings, sharing_note
 from ...groom.selection import active_of_kind, guides_of, hair_of
+from ...groom.systems.diagnostics import parting_warnings, sharing_note
 from ...host import memory
 from ...render import hair_cache
 from ...settings.translations import error_text, interface_text

@@ -6,8 +6,8 @@ import bpy
 from ....core.shading import appearance
 from ....core.shading.appearance import Appearance
 from ....core.shading.presets import PRESETS
-from ...groom.diagnostics import modifier_notes
 from ...groom.selection import active_of_kind, hair_of, object_of
+from ...groom.systems.diagnostics import modifier_notes
 from ...settings import saved_looks
 from .. import look_previews, picture_menus
 from ..setting_rows import others, row, rows

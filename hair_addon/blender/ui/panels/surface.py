@@ -3,11 +3,11 @@
 
 import bpy
 
-from ...groom.diagnostics import warnings_of
 from ...groom.foreign import particle_hair
 from ...groom.foreign.foreign_curves import chosen, is_foreign
 from ...groom.guides import line_drawing
 from ...groom.selection import active_of_kind, guides_of, hair_of, parts_of, surface_of
+from ...groom.systems.diagnostics import warnings_of
 from ...host.notices import name_of, text_of
 from ...settings.translations import interface_text
 from ..operators.systems import is_combing

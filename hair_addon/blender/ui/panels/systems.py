@@ -3,8 +3,8 @@
 
 import bpy
 
-from ...groom.hair_systems import edited_system, guides_of_system, systems_of
 from ...groom.selection import object_of, surface_of
+from ...groom.systems.hair_systems import edited_system, guides_of_system, systems_of
 from .. import setting_rows
 from ..operators.systems import is_combing
 from .tab import HairTab, draw_combing

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ...geometry.connected_components import connected_components
+from ...geometry.faces.connected_components import connected_components
 from ...geometry.mesh import TriMesh
 
 _MOST_SAMPLES = 16  # vertices of a part that are tested for being inside another part

@@ -16,7 +16,7 @@ import numpy as np
 import warp as wp
 
 from ...errors import HairError
-from ...geometry import resampling
+from ...geometry.curves import resampling
 from ...kernels import parallel
 from ...kernels.checks import require_count
 from ...kernels.parallel import Rows

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry import bezier_segments
-from ...geometry.bezier_segments import each
+from ...geometry.curves import bezier_segments
+from ...geometry.curves.bezier_segments import each
 from ...geometry.strands import curve_offsets
 from .reader import Archive, Damaged, Property
 from .transforms import values_at

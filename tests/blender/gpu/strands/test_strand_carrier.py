@@ -10,7 +10,7 @@ from hair_addon.blender.gpu.strands import strand_carrier
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import surface_deform, vertex_turns
 from hair_addon.core.geometry.mesh import Faces
-from tests.support import drawn_strands
+from tests.support.pictures import drawn_strands
 
 SIDE, STRANDS, POINTS = 9, 700, 7
 CLOSE = 4e-6  # [m] beside places of 1 m

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.blender.gpu import shaders, strand_textures
+from hair_addon.blender.gpu import strand_textures
+from hair_addon.blender.gpu.programs import shaders
 from hair_addon.blender.gpu.strands import device_choice, strand_bounds, strand_changes, strand_maker
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import strands
@@ -17,7 +18,7 @@ from hair_addon.core.geometry.mesh import SurfacePoints
 from hair_addon.core.grooming import following
 from hair_addon.core.interpolation import hair_binding
 from hair_addon.core.interpolation.guide_weights import find_candidates
-from tests.support import drawn_strands
+from tests.support.pictures import drawn_strands
 
 # Of a strand's length, by which it may differ: sums in single precision, in another order.
 CLOSE = 1e-5

@@ -7,14 +7,15 @@ import gpu
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import shaders, strand_textures, uniforms
+from hair_addon.blender.gpu import strand_textures
+from hair_addon.blender.gpu.programs import shaders, uniforms
 from hair_addon.blender.gpu.strands import style_maker
 from hair_addon.core.geometry.strands import from_numpy
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
 from hair_addon.core.styling.base import Cutter
 from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.style_inputs import Inputs
-from tests.support import drawn_strands
+from tests.support.pictures import drawn_strands
 from tests.support.strands.styled import head
 
 # Of a strand's length, by which it may differ: sums in single precision, in another order.

@@ -10,8 +10,8 @@ from hair_addon.core.geometry import vertex_turns
 from hair_addon.core.geometry.mesh import Faces
 from tests.core.geometry.test_nearest_rotation import by_decomposition
 from tests.core.geometry.test_surface_deform import deformations, faces_of, rotation
-from tests.support import glsl
 from tests.support.meshes import subdivided_sphere
+from tests.support.pictures import glsl
 
 CLOSE = 2e-6  # of axes, which are unit vectors
 

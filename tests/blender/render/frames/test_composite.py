@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon.blender.data.strands import curves_objects
 from hair_addon.blender.render.frames import composite
-from tests.support.rendering import configure, light_up, rendered
+from tests.support.pictures.rendering import configure, light_up, rendered
 
 RAYS = [f"visible_{ray}" for ray in curves_objects._RAYS]
 

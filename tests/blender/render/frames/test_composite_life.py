@@ -9,7 +9,7 @@ import hair_addon
 from hair_addon.blender.live import handlers, refused_hair
 from hair_addon.blender.ui import menus
 from tests.support.interface.layout import draw
-from tests.support.rendering import configure
+from tests.support.pictures.rendering import configure
 
 
 @pytest.fixture

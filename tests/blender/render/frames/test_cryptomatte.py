@@ -8,7 +8,7 @@ import pytest
 
 from hair_addon.blender.render import film
 from tests.support.cryptomatte_reader import mattes
-from tests.support.rendering import configure, rendered
+from tests.support.pictures.rendering import configure, rendered
 
 KINDS = ("object", "material", "asset")
 

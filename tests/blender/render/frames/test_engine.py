@@ -14,7 +14,7 @@ from hair_addon.blender.gpu import drawing
 from hair_addon.blender.render import film, offscreen
 from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
-from tests.support.rendering import configure, layers_of, light_up, read_layers, rendered
+from tests.support.pictures.rendering import configure, layers_of, light_up, read_layers, rendered
 
 ROOT = Path(__file__).resolve().parents[4]
 

@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon.blender.render.frames import engine
 from hair_addon.blender.render.frames.frame_progress import FrameProgress
-from tests.support.rendering import configure
+from tests.support.pictures.rendering import configure
 
 
 class Recorder:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.pairs import share_of
-from tests.support.rendering import light_up, rendered
+from tests.support.pictures.rendering import light_up, rendered
 
 WIDTH, HEIGHT = 72, 48
 

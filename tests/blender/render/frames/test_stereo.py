@@ -7,7 +7,7 @@ import OpenEXR
 import pytest
 
 from hair_addon.blender.render.frames import composite
-from tests.support.rendering import configure, rendered
+from tests.support.pictures.rendering import configure, rendered
 
 WIDTH, HEIGHT = 96, 72
 

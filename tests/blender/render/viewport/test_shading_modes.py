@@ -13,8 +13,8 @@ from hair_addon.blender.gpu import drawing, studio_lights
 from hair_addon.blender.gpu.visibility_buffer import VisibilityBuffer
 from hair_addon.blender.render import drawn_scene, scene_drawing, solid_hair
 from hair_addon.blender.render.viewport import hair_picture, viewport
-from tests.support.rendering import light_up
-from tests.support.viewports import context_of, view3d
+from tests.support.pictures.rendering import light_up
+from tests.support.pictures.viewports import context_of, view3d
 
 SIZE = 40
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])

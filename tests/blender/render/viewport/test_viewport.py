@@ -16,15 +16,16 @@ from scipy.ndimage import map_coordinates
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.pictures import drawn_meshes
 from hair_addon.blender.data.strands import curves_objects
-from hair_addon.blender.gpu import display_transform, scene_programs, shaders
+from hair_addon.blender.gpu import display_transform
+from hair_addon.blender.gpu.programs import scene_programs, shaders
 from hair_addon.blender.host import notices
 from hair_addon.blender.host.caches import Cache
 from hair_addon.blender.live import invalidation
 from hair_addon.blender.render import drawn_scene, scene_drawing
 from hair_addon.blender.render.viewport import hair_picture, region_pictures, viewport
 from hair_addon.core.errors import HairError
-from tests.support import glsl
-from tests.support.rendering import rendered
+from tests.support.pictures import glsl
+from tests.support.pictures.rendering import rendered
 
 SIZE = 96
 

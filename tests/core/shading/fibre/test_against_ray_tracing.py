@@ -8,8 +8,8 @@ from hair_addon.core.shading.fibre import marschner, paths
 from hair_addon.core.shading.fibre.fresnel import bravais_indices
 from hair_addon.core.shading.fibre.pigment import sigma_a_from_melanin
 from hair_addon.core.shading.tables import lookup_tables
-from tests.support import cylinder_tracer
 from tests.support.pairs import share_of
+from tests.support.pictures import cylinder_tracer
 
 ETA = 1.55
 SIZE = 256

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scene setting for EEVEE's strand width, in each scene to which hair is added."""
+
+import bpy
+import pytest
+
+from hair_addon.blender.data import thin_hair
+from tests.support.pictures.rendering import add_orthographic_camera
+
+
+@pytest.fixture
+def character(hair, tmp_path):
+    """The file of a collection with hair."""
+    collection = bpy.data.collections.new("Character")
+    for part in (bpy.data.objects[name] for name in ("Sphere", "Guides", "Hair")):
+        bpy.context.scene.collection.objects.unlink(part)
+        collection.objects.link(part)
+    bpy.context.scene.collection.children.link(collection)
+    path = tmp_path / "character.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+@pytest.fixture
+def rendered_type():
+    """A function that renders a scene in the background; returns how that render draws hair."""
+    seen = []
+
+    class Look(bpy.types.RenderEngine):
+        bl_idname, bl_label = "VELLUS_TEST_LOOK", "Look"
+
+        def render(self, depsgraph):
+            seen.append(depsgraph.scene_eval.render.hair_type)
+
+    def render(scene):
+        scene.render.engine = Look.bl_idname
+        scene.render.resolution_x = scene.render.resolution_y = 8
+        if scene.camera is None:
+            add_orthographic_camera(scene)
+        bpy.ops.render.render(scene=scene.name)
+        return seen[-1]
+
+    bpy.utils.register_class(Look)
+    yield render
+    bpy.utils.unregister_class(Look)
+
+
+def bring(way, path):
+    """Bring the character to the scene of an empty file, as a script does, which updates nothing."""
+    scene, within = bpy.context.scene, {"directory": f"{path}/Collection/", "filename": "Character"}
+    if way == "appended":
+        bpy.ops.wm.append(**within)
+    elif way == "linked":
+        bpy.ops.wm.link(**within, instance_collections=False)
+    elif way == "instanced":
+        bpy.ops.wm.link(**within, instance_collections=True)
+    elif way == "overridden":
+        bpy.ops.wm.link(**within, instance_collections=False)
+        bpy.data.collections["Character"].override_hierarchy_create(scene, bpy.context.view_layer)
+    else:
+        with bpy.data.libraries.load(str(path), link=False) as (_there, here):
+            here.collections = ["Character"]
+        scene.collection.children.link(bpy.data.collections["Character"])
+
+
+@pytest.mark.parametrize("way", ["appended", "linked", "instanced", "overridden", "loaded"])
+def test_a_shot_draws_a_character_that_it_brings_in_as_thin_as_it_is(character, rendered_type, way):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bring(way, character)
+    scene = bpy.context.scene
+    assert rendered_type(scene) == "STRIP"
+    scene.render.hair_type = "STRAND"  # as the artist wants it from now on
+    bpy.context.view_layer.update()
+    assert rendered_type(scene) == "STRAND"
+    bpy.ops.wm.save_as_mainfile(filepath=str(character.with_name("shot.blend")))
+    bpy.ops.wm.open_mainfile(filepath=str(character.with_name("shot.blend")))
+    assert rendered_type(bpy.context.scene) == "STRAND"
+
+
+def test_scenes_beside_it_draw_the_same_hair_as_thin(character, rendered_type):
+    new, behind, without = (bpy.data.scenes.new(name) for name in ("New", "Set", "Without"))
+    new.collection.children.link(bpy.data.collections["Character"])
+    behind.background_set = new
+    assert rendered_type(new) == "STRIP"
+    assert [scene.render.hair_type for scene in (behind, without)] == ["STRIP", "STRAND"]
+    new.render.hair_type = "CYLINDER"
+    bpy.context.window.scene = new
+    bpy.ops.scene.new(type="FULL_COPY")
+    assert rendered_type(bpy.context.scene) == "CYLINDER"
+
+
+def test_it_is_set_at_the_next_update(character):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bring("loaded", character)
+    bpy.context.view_layer.update()
+    assert bpy.context.scene.render.hair_type == "STRIP"
+
+
+def test_shots_of_older_files_are_drawn_so_when_they_are_opened(character, monkeypatch):
+    with monkeypatch.context() as older:
+        older.setattr(thin_hair, "follow", lambda _scenes: None)
+        del bpy.context.scene["vellus_thin_hair"]
+        bpy.context.scene.render.hair_type = "STRAND"
+        bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(character))
+    assert bpy.context.scene.render.hair_type == "STRIP"
