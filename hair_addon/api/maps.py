@@ -28,10 +28,6 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
     >>> api.shade(hair, color=(0.3, 0.2, 0.1))
     >>> api.set_map(hair, "look.color", coat).source
     'Coat'
-    >>> [each.setting for each in api.maps_of(hair)]
-    ['look.color']
-    >>> api.clear_map(hair, "look.color")
-    True
     """
     target = _editable(hair)
     if isinstance(source, str):
@@ -47,12 +43,20 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
 
 
 def maps_of(hair: Curves) -> tuple[MapSettings, ...]:
-    """Return the maps of hair Curves."""
+    """Return the maps of hair Curves.
+
+    >>> [each.setting for each in api.maps_of(bpy.data.objects["Hair"])]
+    ['look.color']
+    """
     return blender.settings.map_items.maps_of(blender.data.arguments.curves_of(hair, "HAIR").vellus)
 
 
 def clear_map(hair: Curves, setting: str) -> bool:
-    """Remove the map of a setting; returns whether there was one."""
+    """Remove the map of a setting; returns whether there was one.
+
+    >>> api.clear_map(bpy.data.objects["Hair"], "look.color")
+    True
+    """
     varied_settings.require_varied(setting)
     return blender.settings.map_items.remove(_editable(hair).vellus, setting)
 

@@ -10,7 +10,9 @@ def button(layout, state, setting):
     item = map_items.item_of(state, setting)
     has_map = item is not None and map_items.is_set(item)
     icon = "NODE_TEXTURE" if has_map else "DOT"
-    layout.operator("vellus.edit_map", text="", icon=icon, emboss=False).setting = setting
+    side = layout.row()
+    side.emboss = "NONE"
+    side.operator("vellus.edit_map", text="", icon=icon).setting = setting
 
 
 def draw(layout, item, hair):

@@ -92,8 +92,8 @@ def rows(layout, owner, settings_class, names):
     for name, _default, details in declared(settings_class):
         if name in names:
             varied = varied_settings.name_of(settings_class, name) if details.may_vary else ""
-            map_of = varied if isinstance(owner.id_data, bpy.types.Curves) else ""  # not in redo panels
-            row(layout, owner, details.diameter[0] if details.diameter else name, name, map_of)
+            is_stored = varied != "" and isinstance(owner.id_data, bpy.types.Curves)  # not in redo panels
+            row(layout, owner, details.diameter[0] if details.diameter else name, name, varied if is_stored else "")
 
 
 def all_rows(layout, owner, settings_class):
