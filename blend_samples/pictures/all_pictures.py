@@ -26,6 +26,7 @@ SCRIPTS = {
     "styles": "blend_samples/pictures/styles.py",
     "composite": "blend_samples/pictures/composite.py --out OUT",
     "composite_engines": "blend_samples/pictures/composite_engines.py --out OUT",
+    "cryptomatte": "blend_samples/pictures/cryptomatte_picture.py",
     "transfer": "blend_samples/pictures/transfer_picture.py",
     "style_pictures": "blend_samples/pictures/style_pictures.py",
     "guide_tools": "blend_samples/pictures/guide_tool_pictures.py",
@@ -62,6 +63,7 @@ COPIED = {
 OTHERS = {
     "grooms": ("grooms.png", "manual/groom_library.png"),
     "styles": ("styles.png", "wet.png"),
+    "cryptomatte": ("manual/cryptomatte.png",),
     "transfer": ("transfer.png", "manual/transfer_groom.png"),
     "style_pictures": ("manual/style_*.png",),
     "guide_tools": ("manual/guide_tools.png",),
