@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Adds a pass, with several samples per pixel, to the sum of passes: mean light, and the depth of the nearest sample.
+// Adds a pass, with several samples per pixel, to the sum of passes: mean light, and the depth of the nearest sample. `spread`:
+// share of each neighboring pixel along an axis.
 
 // How much nearer than a surface its shadow is drawn, as a fraction of its distance.
 const float SHADOW_BIAS = 1e-3;
@@ -14,22 +15,41 @@ float depth_of(ivec2 sample_place, float alpha)
   return depth - SHADOW_BIAS * (1.0 - depth);
 }
 
-void main()
+// Adds the samples of a pixel, with a weight, to their total; `nearest` becomes their least depth.
+void add_pixel(ivec2 corner, float part, inout vec4 total, inout float nearest)
 {
-  ivec2 corner = ivec2(gl_FragCoord.xy) * samples_per_side - first_place;
-  if (any(lessThan(corner, ivec2(0))) || any(greaterThanEqual(corner, textureSize(picture, 0)))) {
-    discard;
-  }
-  vec4 total = vec4(0.0);
-  float nearest = 1.0;
   for (int y = 0; y < samples_per_side; y++) {
     for (int x = 0; x < samples_per_side; x++) {
       vec4 hair = texelFetch(picture, corner + ivec2(x, y), 0);
-      total += hair;
+      total += part * hair;
       if (hair.a > 0.0) {
         nearest = min(nearest, depth_of(corner + ivec2(x, y), hair.a));
       }
     }
+  }
+}
+
+void main()
+{
+  ivec2 corner = ivec2(gl_FragCoord.xy) * samples_per_side - first_place;
+  ivec2 last = textureSize(picture, 0) - samples_per_side;
+  if (any(lessThan(corner, ivec2(0))) || any(greaterThan(corner, last))) {
+    discard;
+  }
+  vec4 total = vec4(0.0);
+  float nearest = 1.0;
+  float own = 1.0 - 2.0 * spread;
+  add_pixel(corner, own * own, total, nearest);
+  if (spread > 0.0) {
+    float beside = 1.0;
+    for (int turn = 0; turn < 9; turn++) {
+      ivec2 offset = ivec2(turn % 3 - 1, turn / 3 - 1);
+      if (offset != ivec2(0)) {
+        float part = ((offset.x == 0) ? own : spread) * ((offset.y == 0) ? own : spread);
+        add_pixel(clamp(corner + offset * samples_per_side, ivec2(0), last), part, total, beside);
+      }
+    }
+    nearest = (nearest < 1.0) ? nearest : beside;
   }
   if (total.a == 0.0) {
     discard;

@@ -220,6 +220,7 @@ def accumulate_program():
     info.push_constant("INT", "samples_per_side")
     info.push_constant("IVEC2", "first_place")  # origin of the textures in the picture [samples]
     info.push_constant("FLOAT", "weight")
+    info.push_constant("FLOAT", "spread")
     info.sampler(0, "FLOAT_2D", "picture")
     info.sampler(1, "UINT_2D", "depths")
     info.sampler(2, "FLOAT_2D", "surface_depth")

@@ -15,6 +15,9 @@ from .history import History
 
 SAMPLE_COUNT = 32  # per pixel, in all passes of a picture
 
+# With one sample per pixel, the first pass shares each with the pixels around: the least share that leaves no specks.
+_SPREAD = 0.15
+
 
 def samples_per_side():
     """Samples along each side of a pixel in each pass: fewer with software rendering, for responsiveness."""
@@ -118,6 +121,7 @@ class HairPicture:
         program.bind()
         program.uniform_int("samples_per_side", self._detail.per_side)
         program.uniform_int("first_place", self._detail.corner)
+        program.uniform_float("spread", _SPREAD if self._detail.per_side == 1 and self.pass_count == 0 else 0.0)
         program.uniform_sampler("picture", self._pass.color)
         program.uniform_sampler("depths", self._pass.depths)
         program.uniform_sampler("surface_depth", self._pass.surface_depth)

@@ -66,7 +66,7 @@ def test_a_finer_part_of_a_picture_shows_what_the_whole_does(locks, monkeypatch)
     camera = seen_from(5.0)
     finer = hair_picture.HairPicture(SIZE, 1)
     fine(finer, locks, camera)
-    monkeypatch.setattr(picture_detail, "of_hair", lambda *given: picture_detail.whole(*given[2:]))
+    monkeypatch.setattr(picture_detail, "of_hair", lambda *given: picture_detail.whole(*given[2:4]))
     plain = hair_picture.HairPicture(SIZE, 1)
     fine(plain, locks, camera)
     covered = [picture.read()[..., 3] for picture in (finer, plain)]
