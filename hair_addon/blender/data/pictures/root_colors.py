@@ -188,5 +188,5 @@ def _look_up(pixels, uvs, extension, is_closest):
 
 
 def _linear(encoded):
-    """Linear values of sRGB-encoded values [IEC 61966-2-1]."""
+    """Linear values of sRGB-encoded values (IEC 61966-2-1)."""
     return np.where(encoded <= 0.04045, encoded / 12.92, ((np.maximum(encoded, 0.04045) + 0.055) / 1.055) ** 2.4)

@@ -72,7 +72,7 @@ def _separable(values, along, across):
 
 
 def _hunt(linear):
-    """L*a*b* with chroma in proportion to lightness [Hunt effect]."""
+    """L*a*b* with chroma in proportion to lightness, the Hunt effect."""
     relative = linear @ _TO_XYZ.T / _WHITE
     edge = 6.0 / 29.0
     bent = np.where(relative > edge**3, np.cbrt(relative), relative / (3.0 * edge**2) + 4.0 / 29.0)
