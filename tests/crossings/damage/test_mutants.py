@@ -23,6 +23,7 @@ READING = re.compile(
 # Modules that have no reader of `readers.py`, and why.
 OTHERS = {
     # Read by native code, or by Blender: `native.py`, test_hostile_files.py, test_groom_library.py.
+    "blender/data/maps/image_pixels.py": "Blender's images",
     "blender/data/pictures/rendered_files.py": "Blender's images",
     "blender/io/curve_files.py": "a .blend",
     "blender/io/groom_files.py": "what was just written",
