@@ -339,7 +339,8 @@ def test_hair_darkens_the_surface_that_it_grows_on(ball, light):
     """In Solid shading: black, whose alpha is the light that hair blocks; not other surfaces, in X-ray or as wires."""
     hair, camera = bpy.data.objects["Hair"], facing()
     hair.data.vellus.hair.strand_count, hair.data.vellus.hair.radius = 500, 0.01
-    bpy.ops.mesh.primitive_plane_add(size=8.0, location=(0.0, 1.2, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
+    place = {"location": (0.0, 0.9, 0.0), "rotation": (math.pi / 2, 0.0, 0.0)}
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=40, size=4.0, **place)
     bpy.context.view_layer.objects.active = hair
     bpy.context.view_layer.update()
     solid(ball, light=light)
