@@ -51,10 +51,10 @@ _X86 = (
 # others that it loads.
 _COMPARED = {
     "dynamics.rod": ("rod_solver", "rods"),
-    "geometry": (
-        *("bspline", "closest_point", "connected_components", "counting_sort", "fingerprint", "hash_grid"),
-        *("root_frames", "sampling"),
-    ),
+    "geometry": ("closest_point", "fingerprint", "root_frames", "sampling"),
+    "geometry.curves": ("bspline",),
+    "geometry.faces": ("connected_components",),
+    "geometry.search": ("counting_sort", "hash_grid"),
     "grooming": ("guide_growth",),
     "interpolation": ("clump_centers", "guide_weights", "interpolation"),
     "placement": ("exact_cells", "farthest", "preconditioner", "sampled_cells", "voronoi"),
