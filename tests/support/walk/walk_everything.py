@@ -211,6 +211,8 @@ def _state_of(datablock):
     counts = np.diff(curve_data.curve_offsets(datablock))
     # If a script removes the guides of hair, its status reports this after loading or undo.
     is_said = not keyed and (datablock.vellus.kind != "HAIR" or datablock.vellus.guide_curves is not None)
+    # Blender reports no change of an image that no material shows: a sentence about it stays until another report.
+    is_said = is_said and '"Painted"' not in datablock.vellus.status
     return points, counts, roots, values, datablock.vellus.status if is_said else ""
 
 
