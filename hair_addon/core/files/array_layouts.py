@@ -31,9 +31,12 @@ def read(path: Path, archive: zipfile.ZipFile) -> list[CurveSet]:
     headers = {name: untrusted_arrays.header(archive, name) for name in untrusted_arrays.names(archive)}
     whole = [name for name, (shape, kind) in headers.items() if kind.kind == "f" and _is_whole(shape)]
     flat = [name for name, (shape, kind) in headers.items() if kind.kind == "f" and _is_flat(shape)]
-    counts_of = {name: _ragged(archive, headers, headers[name][0][0]) for name in flat}
-    flat = [name for name in flat if counts_of[name] is not None]
-    name = _chosen(path, whole or flat)
+    counts_of = {}
+    for name in flat:
+        ragged = _ragged(archive, headers, headers[name][0][0])
+        if ragged is not None:
+            counts_of[name] = ragged
+    name = _chosen(path, whole or [*counts_of])
     points = untrusted_arrays.array(archive, name)
     counts = np.full(points.shape[0], points.shape[1]) if whole else counts_of[name]
     found = {one.lower(): one for one in headers}

@@ -87,8 +87,9 @@ def added(mattes: tuple[np.ndarray, np.ndarray], others: tuple[np.ndarray, np.nd
     coverages[is_same] += others[1][is_same]
     rest = ~is_same
     if rest.any():
-        both = [np.concatenate([own[rest], other[rest]], axis=1) for own, other in zip(mattes, others, strict=True)]
-        labels[rest], coverages[rest] = combined(*both, labels.shape[-1])
+        all_labels = np.concatenate([labels[rest], others[0][rest]], axis=1)
+        all_coverages = np.concatenate([coverages[rest], others[1][rest]], axis=1)
+        labels[rest], coverages[rest] = combined(all_labels, all_coverages, labels.shape[-1])
 
 
 def passes(

@@ -54,7 +54,7 @@ def remove(guides: Curves, depsgraph: Depsgraph) -> None:
     """Remove the active layer with its combing; guides without layers are their base. Raises `HairError`."""
     state = _require_layers(guides)
     recording.update(guides, depsgraph)
-    identity = layer_items.active_of(state).identity
+    identity = state.layers[state.active_layer].identity
     layer_items.remove(state, state.active_layer)
     layer_attributes.forget(guides, identity)
     recording.show(guides, guide_layers.composed(recording.read(guides, depsgraph)))

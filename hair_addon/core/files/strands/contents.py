@@ -31,7 +31,7 @@ def bytes_of(path: Path) -> Iterator[bytes]:
         raise HairError("{path} cannot be read: {cause}.", path=path, cause=str(error) or "memory is full") from error
 
 
-def array(data: bytes, kind: str, count: int, place: int) -> np.ndarray:
+def array(data: bytes, kind: str | np.dtype, count: int, place: int) -> np.ndarray:
     """Return `count` numbers of a NumPy type at a byte of a file. Raises `Damaged` if the file ends before them."""
     size = np.dtype(kind).itemsize * count
     if count < 0 or place < 0 or place + size > len(data):

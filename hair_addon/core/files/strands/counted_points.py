@@ -10,6 +10,7 @@ Y up, CT2Hair's scans are in millimeters with Z up. A .bin of x, y, z alone, as 
 """
 
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -34,15 +35,21 @@ def read_data(path: Path) -> CurveFile:
 def read_bin(path: Path) -> CurveFile:
     """Read the strands of a .bin file. Raises `HairError`."""
     with contents.bytes_of(path) as data:
-        try:
-            values, counts, end = _parsed(data, _BIN_WIDTH)
-        except Damaged:
-            end = -1
-        if end != len(data):
-            values, counts, end = _parsed(data, _DATA_WIDTH)
-        if end != len(data):
-            raise Damaged("its strands do not end with the file")
+        values, counts = _whole(data, _BIN_WIDTH) or _whole(data, _DATA_WIDTH) or _refuse()
         return CurveFile(curve_sets(path.stem, values[:, :3], counts), usual=BIN_USUAL)
+
+
+def _whole(data, width):
+    """Return points and counts as `_parsed`; None unless the strands end with the file."""
+    try:
+        values, counts, end = _parsed(data, width)
+    except Damaged:
+        return None
+    return (values, counts) if end == len(data) else None
+
+
+def _refuse() -> NoReturn:
+    raise Damaged("its strands do not end with the file")
 
 
 def _parsed(data, width):

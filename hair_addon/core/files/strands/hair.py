@@ -47,16 +47,14 @@ def _read(data, name):
     if not arrays & POINTS:
         raise Damaged("it has no points")
     place = HEADER.size
-    if arrays & SEGMENTS:
-        counts = contents.array(data, "<u2", strand_count, place).astype(np.int64) + 1
-        place += 2 * strand_count
-    elif strand_count * (segments + 1) != point_count:
+    if not arrays & SEGMENTS and strand_count * (segments + 1) != point_count:
         raise Damaged("its strands do not have the number of its points")
+    stored = contents.array(data, "<u2", strand_count if arrays & SEGMENTS else 0, place)
+    place += stored.nbytes
     points = contents.array(data, "<f4", 3 * point_count, place).reshape(-1, 3)
     place += 12 * point_count
-    if not arrays & SEGMENTS:
-        counts = np.full(strand_count, segments + 1, np.int64)
-    elif counts.sum() != point_count:
+    counts = stored.astype(np.int64) + 1 if arrays & SEGMENTS else np.full(strand_count, segments + 1, np.int64)
+    if counts.sum() != point_count:
         raise Damaged("its strands do not have the number of its points")
     radii = None
     if arrays & THICKNESS:

@@ -74,8 +74,8 @@ def _strands(elements, vertex_count):
         element = elements.get(name)
         if element is None:
             continue
-        for lists in element.items.values():
-            return *_listed(*lists, vertex_count), element
+        for items, lengths in element.items.values():
+            return *_listed(items, lengths, vertex_count), element
         for names, extra in ((_SEGMENTS, 1), (_COUNTS, 0)):
             for one in names:
                 if one in element.values:

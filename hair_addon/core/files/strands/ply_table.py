@@ -75,14 +75,18 @@ def _header(text):
 
 def _add_property(element, words):
     is_list = words[:1] == ["list"]
-    kinds = [_TYPES.get(word) for word in (words[1:3] if is_list else words[:1])]
-    if len(words) != (4 if is_list else 2) or None in kinds or words[-1] in element.order:
+    kinds = [_TYPES[word] for word in (words[1:3] if is_list else words[:1]) if word in _TYPES]
+    if (
+        len(words) != (4 if is_list else 2)
+        or len(kinds) != len(words) - (2 if is_list else 1)
+        or words[-1] in element.order
+    ):
         raise Damaged("its header is damaged")
     element.order.append(words[-1])
     if is_list:
         if kinds[0][0] == "f":
             raise Damaged("its header is damaged")
-        element.lists[words[-1]] = tuple(kinds)
+        element.lists[words[-1]] = kinds[0], kinds[1]
     else:
         element.properties[words[-1]] = kinds[0]
 

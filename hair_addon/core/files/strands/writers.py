@@ -127,8 +127,9 @@ def _write_ply(path, written):
     for column, axis in enumerate("xyz"):
         vertices[axis] = points[:, column]
     vertices["thickness"] = widths
-    for column, (name, _kind) in enumerate(_color_types(colors)):
-        vertices[name] = _bytes_of(colors[:, column])
+    if colors is not None:
+        for column, (name, _kind) in enumerate(_color_types(colors)):
+            vertices[name] = _bytes_of(colors[:, column])
     columns = _columns(written)
     strands = np.empty(len(counts), [("nsegs", "<u2"), *((name, values.dtype.str) for name, values in columns.items())])
     strands["nsegs"] = counts - 1
@@ -203,7 +204,7 @@ def _write_npz(path, written):
         counts = np.concatenate([curves.counts for curves, _points in written if not curves.is_guide])
         arrays["roots"] = arrays["strand_points"].reshape(-1, 3)[np.cumsum(counts) - counts]
     with open(path, "wb") as file:
-        np.savez(file, **arrays)
+        np.savez(file, allow_pickle=False, **arrays)
 
 
 def _arrays(some):
