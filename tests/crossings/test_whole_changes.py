@@ -174,8 +174,10 @@ MAKING["hair_cards"].append((on_hair, MAKING["hair_cards"][0][1] | {"folder": "c
 OTHERS = {
     *("apply_dynamics_preset", "apply_preset", "apply_saved_look", "apply_saved_style", "apply_scale"),
     *("apply_style_preset", "attach_to_surface", "attract_guides", "bake_dynamics", "bake_tables"),
+    *("add_layer", "apply_layers", "duplicate_layer", "merge_layer_down", "move_layer", "remove_layer"),
     *("change_guide_count", "check_uvs", "comb_guides", "copy_guide_shape", "delete_hair", "delete_system"),
-    *("deliver_dynamics", "drape_guides", "flip_normals", "free_dynamics", "guide_length", "lift_guides"),
+    *("deliver_dynamics", "drape_guides", "edit_map", "flip_normals", "free_dynamics", "freeze_selected"),
+    *("guide_length", "invert_frozen", "lift_guides", "remove_map", "unfreeze_all"),
     *("load_groom_settings", "mirror_guides", "move_style", "pick_hair", "play_dynamics", "remove_delivery"),
     *("remove_look", "remove_style", "remove_style_preset", "render_picture", "save_look", "save_style_preset"),
     *("select_guides", "select_hair", "smooth_guides", "stiffen_dynamics", "toggle_drawing", "trim_guides"),

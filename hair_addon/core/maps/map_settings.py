@@ -11,8 +11,8 @@ KINDS = (
     ("GROUP", "Vertex Group", "Weights of a vertex group of the surface"),
     ("ATTRIBUTE", "Attribute", "Attribute of the surface: numbers or colors"),
     ("CURVES", "Hair Attribute", "Attribute of the hair's own curves"),
-    ("STRAND", "Random per Strand", "A random number for each strand"),
-    ("CLUMP", "Random per Clump", "A random number for each clump of the hair's styles"),
+    ("STRAND", "Per Strand", "A random number for each strand"),
+    ("CLUMP", "Per Clump", "A random number for each clump of the hair's styles"),
 )
 NAMED = ("GROUP", "ATTRIBUTE", "CURVES")  # kinds with the name of a source; images have their own
 

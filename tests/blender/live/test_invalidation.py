@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import hair_addon
+from hair_addon import api
 from hair_addon.blender.data import scene as scene_door
 from hair_addon.blender.host import running
 from hair_addon.blender.host.caches import Cache
@@ -142,6 +143,11 @@ def regrow():
     bpy.data.objects["Guides"].data.vellus.guides.length = 0.8
 
 
+def dye():
+    """Strands by a map, which another strand's number changes."""
+    api.set_map(bpy.data.objects["Hair"], "look.melanin", "strand", low=0.0, high=0.2)
+
+
 def move_sun():
     bpy.data.objects["Sun"].rotation_euler = (1.5, 0.3, 0.0)
 
@@ -199,6 +205,7 @@ SCENARIOS = {
     "hair_evaluated": lambda _folder: play_modifiers(),
     "curves_reported": lambda _folder: sculpt(),
     "strands_made": lambda _folder: regrow(),
+    "looks_written": lambda _folder: dye(),
     "surface_moved": lambda _folder: bend(),
     "image_changed": lambda _folder: repaint(),
     "data_replaced": lambda _folder: undo(),

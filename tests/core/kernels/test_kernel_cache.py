@@ -20,7 +20,10 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if name != comp
 # Five modules, two of them loaded together as grooming does it, three as they are launched.
 WORK = """
 import numpy as np
-from hair_addon.core.geometry import bspline, fingerprint, connected_components, counting_sort
+from hair_addon.core.geometry import fingerprint
+from hair_addon.core.geometry.curves import bspline
+from hair_addon.core.geometry.faces import connected_components
+from hair_addon.core.geometry.search import counting_sort
 from hair_addon.core.grooming import groom
 from hair_addon.core.interpolation import clump_centers
 from hair_addon.core.geometry.mesh import TriMesh
@@ -200,7 +203,7 @@ def test_without_any_folder_one_sentence(tmp_path):
         f"tempfile.tempdir = {str(blocked)!r}\n"
         "from hair_addon.core.errors import HairError\n"
         "try:\n"
-        "    from hair_addon.core.geometry import connected_components\n"
+        "    from hair_addon.core.geometry.faces import connected_components\n"
         "except HairError as error:\n"
         "    print(error)\n"
     )
