@@ -4,9 +4,12 @@
 from typing import Any
 
 from ..core.errors import HairError
+from ..core.params import Param, plain_value
 from .blender_access import blender
 
 Curves = Any
+
+_WEIGHT, _SWITCH = Param("", low=0.0, high=2.0), Param("")
 
 __all__ = ["add_layer", "apply_layers", "layers", "set_layer"]
 
@@ -34,6 +37,7 @@ def add_layer(guides: Curves, name: str = "") -> str:
     >>> api.add_layer(guides)
     'Combing'
     """
+    name = plain_value("name", name, "", _SWITCH)
     target = _target(guides)
     return blender.groom.guides.layer_changes.add(target, blender.data.scene.present_depsgraph(), name)
 
@@ -41,19 +45,21 @@ def add_layer(guides: Curves, name: str = "") -> str:
 def set_layer(guides: Curves, name: str, *, weight: float | None = None, is_active: bool = False) -> None:
     """Set the weight of a layer, from 0 to 2, or make it the active one; guides follow at the next update.
 
+    A hidden layer that is given a weight is shown.
+
     >>> guides = bpy.data.objects["Guides"]
     >>> api.set_layer(guides, "Combing", weight=0.5)
     >>> api.layers(guides)
     {'Combing': 0.5}
     """
+    name, is_active = plain_value("name", name, "", _SWITCH), plain_value("is_active", is_active, False, _SWITCH)
+    weight = None if weight is None else plain_value("weight", weight, 1.0, _WEIGHT)
     target = _target(guides)
     names = [item.name for item in target.vellus.layers]
     if name not in names:
         raise HairError(f"There is no layer {name!r}: add it first.")
     place = names.index(name)
     if weight is not None:
-        if not 0.0 <= weight <= 2.0:  # also refuses NaN
-            raise HairError(f"The weight of a layer is from 0 to 2, not {weight}.")
         target.vellus.layers[place].is_on = True
         target.vellus.layers[place].weight = weight
     if is_active:

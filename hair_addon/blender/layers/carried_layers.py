@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers that are carried to guides that are grown again: with other settings, at other roots, on other faces."""
+"""Layers that are carried to guides that are grown again, with other settings or roots, and to guides that are added."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +59,28 @@ def write(guides: Curves, surface: Surface, before: LayersBefore, roots: Surface
     guides.vellus.is_base_grown = True
     layer_items.note_shown(guides.vellus)
     recording.show(guides, guide_layers.composed(layers))
+
+
+def between(surface: Surface, before: LayersBefore, roots: SurfacePoints, base: np.ndarray) -> GuideLayers:
+    """Return new guides at `roots` with the layers of the guides around them; base (M, P, 3), in local coordinates."""
+    normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots))
+    counts = np.full(len(base), base.shape[1], np.int32)
+    bare = guide_layers.without_layers(base.reshape(-1, 3), counts, normals)
+    return layer_transfer.transferred(before.layers, bare, *_weights(surface, before, roots))
+
+
+def replace_last(guides: Curves, parts: Sequence[GuideLayers]) -> None:
+    """Give the last guides, which a tool has added, layers of their own; settings no longer grow the base.
+
+    parts: of the last guides, one after another. Guides before them keep their points.
+    """
+    guides.vellus.is_base_grown = False
+    layers = recording.read(guides, scene.present_depsgraph(), is_shown=True)
+    before = np.arange(len(layers.counts) - sum(len(part.counts) for part in parts))
+    joined = layer_transfer.joined([layer_transfer.chosen_guides(layers, before), *parts])
+    joined = joined.weighted(layers.weights)
+    layer_attributes.write(guides, joined, layer_items.identities_of(guides.vellus))
+    recording.show_layers(guides, joined)
 
 
 def _weights(surface, before, roots):

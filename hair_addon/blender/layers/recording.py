@@ -54,13 +54,8 @@ def update(guides: Curves, depsgraph: Depsgraph) -> bool:
     if layer_items.is_reweighed(state):
         layers = read(guides, depsgraph)
         layer_items.note_shown(state)
-        shape = guide_layers.composed(layers)
-    else:
-        shape = guide_layers.composed(layers)
-        # Edited guides keep their exact points, unless layers cannot have them.
-        is_other = np.repeat(guide_layers.is_other(layers, points, shape), layers.counts)
-        shape = np.where(is_other[:, None], shape, points)
-    return show(guides, shape)
+        return show(guides, guide_layers.composed(layers))
+    return show_layers(guides, layers)
 
 
 def _recorded(layers, state, points):
@@ -77,6 +72,13 @@ def _recorded(layers, state, points):
         found, _changed = guide_layers.recorded(layers.weighted(weights), 0, points)
         return replace(found, weights=layers.weights), refusal
     return guide_layers.recorded(layers, place, points)[0], refusal
+
+
+def show_layers(guides: Curves, layers: GuideLayers) -> bool:
+    """Write what layers give to guides that differ from it; others keep their exact points. Returns as `show`."""
+    shape, points = guide_layers.composed(layers), curves.read_points(guides)
+    is_other = np.repeat(guide_layers.is_other(layers, points, shape), layers.counts)
+    return show(guides, np.where(is_other[:, None], shape, points))
 
 
 def show(guides: Curves, shape: np.ndarray) -> bool:

@@ -5,15 +5,17 @@ Turns are averaged as rotation vectors in the frames of the roots: the vector of
 by the least rotation between the normals.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from .. import geometry
-from .guide_layers import GuideLayers, added, without_layers
+from .guide_layers import GuideLayers, added
 from .guide_shapes import rotations
 
 _SAME_PLACE = 1e-6  # of the extent of the roots: guides that are closer are the same
+_OF_GUIDES, _OF_LAYERS = ("base", "counts", "normals", "tangents"), ("turns", "stretches", "weights")
 
 
 def transferred(
@@ -75,17 +77,25 @@ def transferred(
 
 
 def chosen_guides(layers: GuideLayers, kept: np.ndarray) -> GuideLayers:
-    """Return the layers of some guides; kept (M,): their indices."""
-    starts, counts = geometry.strands.curve_offsets(layers.counts), np.asarray(layers.counts)[kept]
+    """Return some guides with their layers; kept (M,): indices of these guides."""
+    starts = geometry.strands.curve_offsets(layers.counts)
     of_points = np.concatenate([np.zeros(0, int), *(np.arange(starts[g], starts[g + 1]) for g in kept)])
-    some = without_layers(layers.base[of_points], counts, layers.normals[kept])
-    return replace(
-        some,
-        tangents=layers.tangents[kept],
-        turns=layers.turns[:, of_points],
-        stretches=layers.stretches[:, of_points],
-        weights=layers.weights[:, kept],
+    return GuideLayers(
+        layers.base[of_points],
+        np.asarray(layers.counts)[kept],
+        layers.normals[kept],
+        layers.tangents[kept],
+        layers.turns[:, of_points],
+        layers.stretches[:, of_points],
+        layers.weights[:, kept],
     )
+
+
+def joined(parts: Sequence[GuideLayers]) -> GuideLayers:
+    """Return the guides of several sets with the same layers, one set after another."""
+    of_guides = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _OF_GUIDES}
+    of_layers = {name: np.concatenate([getattr(part, name) for part in parts], axis=1) for name in _OF_LAYERS}
+    return GuideLayers(**of_guides, **of_layers)
 
 
 def _sampled(starts, counts, sources, count):

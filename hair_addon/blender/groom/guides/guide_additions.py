@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tools that add and remove guides: all others keep their bits, order and attributes."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from bpy.types import Curves, Depsgraph
 
@@ -9,10 +12,13 @@ from ....core.errors import HairError
 from ....core.geometry import mesh as mesh_math
 from ....core.geometry import strands
 from ....core.geometry.mesh import SurfacePoints
+from ....core.grooming import guide_layers, layer_transfer
 from ....core.grooming.groom import POINT_COUNT, HairSettings
+from ....core.grooming.guide_layers import GuideLayers
 from ....core.grooming.guide_tool_settings import CountSettings, MirrorSettings
 from ...data import masks
 from ...data.strands import curves, guide_curves, partings
+from ...layers import carried_layers
 from ...settings import preferences
 from .. import pipeline
 from . import guide_tools
@@ -29,11 +35,17 @@ def change_count(datablock: Curves, settings: CountSettings, depsgraph: Depsgrap
     """
     guides = guide_tools.read(datablock, settings, depsgraph)
     difference = grooming.guide_count.difference(settings, guides.weights)
+    before = carried_layers.read(datablock, guides.surface)
+    layers = None if before is None else []
     if difference > 0:
-        write(guides, [_between(guides, difference, settings.mask, depsgraph)], np.zeros(0, np.int64))
+        roots = _new_roots(guides, difference, settings.mask, depsgraph)
+        if before is not None:
+            bare = replace(guides, points=guides.surface.from_local(before.layers.base))
+            base = guides.surface.to_local(_between(bare, roots, depsgraph)[0])
+            layers = [carried_layers.between(guides.surface, before, roots, base)]
+        write(guides, [(*_between(guides, roots, depsgraph), roots)], np.zeros(0, np.int64), layers)
     elif difference < 0:
-        removed = _crowded(guides, -difference, depsgraph)
-        write(guides, [], removed)
+        write(guides, [], _crowded(guides, -difference, depsgraph), layers)
     return len(datablock.curves)
 
 
@@ -47,19 +59,30 @@ def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) ->
     plane = mirror if settings.direction == "FROM_POSITIVE" else mirror.flipped()
     places = mesh_math.positions(mesh, guides.roots)
     found = grooming.guide_copies.mirroring(mesh, places, plane, guides.weights >= 0.5)
-    additions = []
+    before = carried_layers.read(datablock, guides.surface)
+    additions, layers = [], (None if before is None else [])
     for count in np.unique(guides.counts[found.sources]):
         chosen = np.flatnonzero(guides.counts[found.sources] == count)
         sources, image_roots = found.sources[chosen], found.roots[chosen]
-        points = guides.points[guides.of_count(int(count), sources)]
-        made = grooming.guide_copies.images(mesh, points, guides.roots[sources], image_roots, plane)
-        additions.append((made, sources, image_roots))
-    write(guides, additions, found.removed)
+
+        def images(points, size=int(count), sources=sources, image_roots=image_roots):
+            points = points.reshape(-1, size, 3)
+            return grooming.guide_copies.images(mesh, points, guides.roots[sources], image_roots, plane)
+
+        additions.append((images(guides.points[guides.of_count(int(count), sources)]), sources, image_roots))
+        if layers is not None:
+            layers.append(_mirrored_layers(guides.surface, before.layers, sources, images))
+    write(guides, additions, found.removed, layers)
     return len(found.sources)
 
 
-def write(guides: CombedGuides, additions: list[Additions], removed: np.ndarray) -> None:
-    """Add guides and remove (R,) indices of existing ones. At least one guide must remain."""
+def write(
+    guides: CombedGuides, additions: list[Additions], removed: np.ndarray, layers: Sequence[GuideLayers] | None = None
+) -> None:
+    """Add guides and remove (R,) indices of existing ones. At least one guide must remain.
+
+    layers: of the added guides, in local coordinates; None if guides have no layers.
+    """
     datablock, surface, roots = guides.datablock, guides.surface, guides.roots
     for points, sources, new_roots in additions:
         if len(points):
@@ -75,12 +98,23 @@ def write(guides: CombedGuides, additions: list[Additions], removed: np.ndarray)
     guide_curves.remove(datablock, removed)
     left = np.setdiff1d(np.arange(len(roots)), removed)
     curves.write_roots(datablock, surface, roots[left], firsts=curves.first_points(datablock))
+    if layers is not None:
+        carried_layers.replace_last(datablock, layers)
     datablock.update_tag()
 
 
-def _between(guides, count, mask, depsgraph):
-    """Return `Additions` of new guides, interpolated from the guides around them as strands are."""
-    datablock, surface, device = guides.datablock, guides.surface, preferences.device()
+def _mirrored_layers(surface, layers, sources, images):
+    """Return the `GuideLayers` of mirror images; images: a function of the points [m] of the guides `sources`."""
+
+    def move(points):
+        return surface.to_local(images(surface.from_local(points))).reshape(-1, 3)
+
+    return guide_layers.moved(layer_transfer.chosen_guides(layers, sources), move)
+
+
+def _new_roots(guides, count, mask, depsgraph):
+    """Return at most `count` roots of new guides. Raises `HairError` if there is no room for any."""
+    surface, device = guides.surface, preferences.device()
     density, texture = _density(guides, mask, depsgraph)
     roots = grooming.guide_count.new_roots(
         surface.mesh,
@@ -93,6 +127,12 @@ def _between(guides, count, mask, depsgraph):
     )
     if not len(roots):
         raise HairError("There is no room for more guides here: change the selection or the mask.")
+    return roots
+
+
+def _between(guides, roots, depsgraph):
+    """Return new guides (M, P, 3) [m], interpolated from those around them as strands are, and their nearest (M,)."""
+    datablock, surface, device = guides.datablock, guides.surface, preferences.device()
     settings = _hair_settings(datablock)
     parting = partings.read(datablock.surface, surface, datablock, settings, depsgraph)
     points, nearest = grooming.guide_count.grown_between(
@@ -110,7 +150,7 @@ def _between(guides, count, mask, depsgraph):
     if point_count != POINT_COUNT:
         starts = np.arange(len(points) + 1) * POINT_COUNT
         points = geometry.curves.resampling.resample(points.reshape(-1, 3), starts, point_count)
-    return points, nearest, roots
+    return points, nearest
 
 
 def _density(guides, mask, depsgraph):

@@ -19,6 +19,7 @@ def read(guides: Curves, hair: Curves | None, target: Object, depsgraph: Depsgra
     """Return {name: (V,) weights} of the vertex groups in the settings of a groom that the target mesh object lacks."""
     source = guides.surface
     names = [text_of(guides.vellus.guides, "density_group")]
+    names += [text_of(item, "mask") for item in guides.vellus.layers]
     if hair is not None:
         names += [text_of(hair.vellus.hair, name) for name in ("density_group", "region_group")]
         names += [style_items.masks_of(item)[0] for item in hair.vellus.styles]

@@ -5,7 +5,7 @@ Guides are mapped by core/grooming/groom_transfer.py. The copies keep their attr
 are not regenerated. The hair between them is generated again.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -21,15 +21,17 @@ from ....core.grooming.groom_transfer import Places, TransferSurface
 from ....core.grooming.transfer_settings import TransferSettings
 from ....core.long_work import Work
 from ...data import landmarks, scene, surface_space, usable_surfaces, whole_changes
-from ...data.strands import attributes, curves, curves_objects, guide_curves, kept_shapes
+from ...data.strands import attributes, curves, curves_objects, guide_curves, kept_shapes, layer_attributes
 from ...data.surfaces import Surface
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
+from ...layers import recording
 from ...materials import looks
 from ...settings import setting_properties
 from .. import pipeline
 from ..foreign import hand_made_guides
 from ..guides import guide_tools
+from ..guides.guide_tools import CombedGuides
 from . import carried_masks, transferred_names
 
 _OVERLAPPING = 0.01  # fraction of a surface's area: more ambiguous UVs are reported
@@ -89,6 +91,7 @@ def transferring(
     if hair is not None:
         pipeline.inputs_of(hair)
     curves.require_overridable(guides)
+    recording.update(guides, depsgraph)
     source = guide_tools.open_guides(guides, depsgraph)
     curves_objects.store_rest_positions(target)
     surface = scene.read_surface(target, scene.present_depsgraph())
@@ -110,7 +113,7 @@ def transferring(
     guides, hair, target = (one.find() for one in remembered)
     names = carried_masks.paint(target, surface, painted)
     new_guides = _copy(guides, target, is_rendered=False)
-    _write_guides(new_guides, surface, places, points, source.surface.scale * places.scale)
+    _write_guides(new_guides, source, surface, places, points)
     cleared = transferred_names.clear(new_guides, hair=None, target=target)
     new_hair = None
     if hair is not None:
@@ -177,11 +180,13 @@ def _copy(datablock, target, is_rendered):
     return copy
 
 
-def _write_guides(guides, surface: Surface, places: Places, points, scale):
-    """Write the places and points of copied guides; scale: [m] per unit of their former coordinates."""
+def _write_guides(guides, source: CombedGuides, surface: Surface, places: Places, points):
+    """Write the places, layers and points of copied guides."""
+    scale = source.surface.scale * places.scale  # [m] per unit of former coordinates
     lost = np.setdiff1d(np.arange(len(guides.curves)), places.kept)
     guide_curves.remove(guides, lost)
     starts = curves.curve_offsets(guides)
+    _move_layers(guides, source, surface, places)
     apart = np.linalg.norm(points[starts[:-1]] - positions(surface.mesh, places.roots), axis=1)
     attributes.write_positions(guides, surface.to_local(points[:, None])[:, 0])
     attributes.write(guides, "radius", "FLOAT", "POINT", curves.read_radii(guides) * (scale / surface.scale))
@@ -190,11 +195,27 @@ def _write_guides(guides, surface: Surface, places: Places, points, scale):
     ):
         attributes.write(guides, name, data_type, "CURVE", values)
     guides.vellus.written = curves.BY_HAND
+    if len(guides.vellus.layers):
+        guides.vellus.is_base_grown = False
+        recording.note_shape(guides)
     curves.write_roots(guides, surface, places.roots)
     attributes.write(guides, "root_distance", "FLOAT", "CURVE", apart / surface.scale)
     surface_space.keep_surface(guides, surface)
     transferred_names.scale_lengths(guides.vellus.guides, places.scale)
     transferred_names.scale_lengths(guides.vellus.dynamics, places.scale)
+
+
+def _move_layers(guides, source, surface, places):
+    """Transfer the base and the layers of copied guides; lost guides are removed."""
+    roots, counts = source.roots[places.kept], curves.point_counts(guides)
+    places = replace(places, kept=np.arange(len(roots)))
+
+    def move(points):
+        meshes = source.surface.mesh, surface.mesh
+        there = grooming.groom_transfer.carried(*meshes, roots, source.surface.from_local(points), counts, places)
+        return surface.to_local(there[:, None])[:, 0]
+
+    layer_attributes.move(guides, move)
 
 
 def _growing(guides, hair, surface, places):

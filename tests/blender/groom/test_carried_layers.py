@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Layers of guides are carried along by tools that add, remove, mirror and transfer guides, and by any transform."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from hair_addon import api
+from hair_addon.blender.data.strands import curves
+from tests.support.reading import attribute, points, write_points
+
+
+def update():
+    bpy.context.view_layer.update()
+
+
+def lengths(shape):
+    return np.linalg.norm(np.diff(shape, axis=1), axis=2).sum(axis=1)
+
+
+def comb(guides, by):
+    """Lean guides as a brush does, most above the origin; segments keep their lengths."""
+    shape = points(guides)
+    steps = np.diff(shape.astype(np.float64), axis=1)
+    sizes = np.linalg.norm(steps, axis=2, keepdims=True)
+    share = np.exp(shape[:, :1, 2:] - 1.0) * np.linspace(0.0, 1.0, steps.shape[1])[None, :, None]
+    steps = steps / sizes + share * np.asarray(by)
+    steps *= sizes / np.linalg.norm(steps, axis=2, keepdims=True)
+    combed = np.concatenate([shape[:, :1], shape[:, :1] + np.cumsum(steps, axis=1)], axis=1).astype(np.float32)
+    write_points(guides, combed)
+    guides.data.update_tag()
+    update()
+    return combed
+
+
+def weigh(guides, *weights):
+    """Set the weights of all layers; returns the points of the guides."""
+    for item, weight in zip(guides.data.vellus.layers, weights, strict=True):
+        item.weight = weight
+    update()
+    return points(guides)
+
+
+@pytest.fixture
+def layered(hair):
+    """The guides' object, with two combed layers: Combing, with a keyed weight, and Side."""
+    guides = bpy.data.objects["Guides"]
+    api.add_layer(guides)
+    update()
+    comb(guides, (0.0, 1.0, 0.0))
+    api.add_layer(guides, "Side")
+    update()
+    comb(guides, (0.7, 0.0, -0.3))
+    return guides
+
+
+def test_change_guide_count_carries_layers(layered):
+    """60, then 150, then 60 guides: those that stay are exact, and new guides are combed by each layer as strands are."""
+    state = layered.data.vellus
+    for frame, weight in ((1, 1.0), (11, 0.5)):
+        state.layers[0].weight = weight
+        layered.data.keyframe_insert("vellus.layers[0].weight", frame=frame)
+    state.layers[0].weight = 1.0
+    update()
+    shape = points(layered)
+    bare = weigh(layered, 0.0, 0.0)
+    only = weigh(layered, 1.0, 0.0)
+    weigh(layered, 1.0, 1.0)
+    before = {0: shape, 1: bare, 2: only}
+    assert api.change_guides(layered, "COUNT", count=150) == 150
+    update()
+    many = points(layered)
+    assert np.array_equal(many[:60], shape)
+    for number, weights in ((1, (0.0, 0.0)), (2, (1.0, 0.0)), (0, (1.0, 1.0))):
+        now = weigh(layered, *weights)
+        np.testing.assert_allclose(now[:60], before[number], atol=2e-6)
+        np.testing.assert_allclose(lengths(now), lengths(many), rtol=1e-3)
+        # As hair between the guides that were there.
+        expected = between(layered, before[number])
+        apart = np.linalg.norm(now[60:] - expected, axis=2).max(axis=1) / lengths(expected)
+        print("apart", weights, np.median(apart), np.percentile(apart, 95))
+        assert np.median(apart) < 0.02
+    random = attribute(layered, "id")
+    assert api.change_guides(layered, "COUNT", count=60) == 60
+    update()
+    stay = np.isin(random, attribute(layered, "id")).nonzero()[0]
+    assert np.array_equal(points(layered), now[stay])
+    assert np.array_equal(weigh(layered, 0.0, 0.0)[:, 0], now[stay][:, 0])
+    np.testing.assert_allclose(weigh(layered, 1.0, 1.0), now[stay], atol=2e-6)
+    assert list(api.layers(layered)) == ["Combing", "Side"]
+    bpy.context.scene.frame_set(11)
+    assert api.layers(layered) == {"Combing": 0.5, "Side": 1.0}
+
+
+def between(guides, shape):
+    """Return guides interpolated like hair between the first guides, of the given shape, at the roots of the others."""
+    from hair_addon.blender.data import scene
+    from hair_addon.core.geometry.strands import from_numpy
+    from hair_addon.core.grooming import guide_count
+    from hair_addon.blender.groom import pipeline
+
+    surface = scene.read_surface(guides.data.surface, scene.present_depsgraph())
+    roots = curves.read_roots(guides.data, surface, surface.from_local(points(guides)[:, 0]))
+    settings = pipeline.inputs_of(bpy.data.objects["Hair"].data)[1]
+    count = len(shape)
+    others = roots[np.arange(count, len(roots))]
+    return guide_count.grown_between(surface.mesh, from_numpy(shape, roots[np.arange(count)]), others, settings)[0]
+
+
+def test_mirror_guides_mirrors_each_layer(layered):
+    """At any weights the two sides are mirror images."""
+    api.change_guides(layered, "MIRROR")
+    update()
+    for weights in ((1.0, 1.0), (0.0, 0.0), (1.0, 0.0), (0.4, 1.5)):
+        shape = weigh(layered, *weights)
+        right, left = shape[shape[:, 0, 0] > 0.15], shape[shape[:, 0, 0] < -0.15] * [-1.0, 1.0, 1.0]
+        assert len(right) == len(left) > 10
+        nearest = np.linalg.norm(right[:, None, 0] - left[None, :, 0], axis=2).argmin(axis=1)
+        np.testing.assert_allclose(right, left[nearest], atol=2e-3)
+    assert curves.is_combed(layered.data)
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        Matrix.Translation((3, 0, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 1)) @ Matrix.Scale(1.6, 4),
+        Matrix.Diagonal((-1, 1, 1, 1)),
+    ],
+    ids=["turned", "mirrored"],
+)
+def test_transferred_guides_have_the_same_layers(layered, matrix):
+    """A copy of the mesh gets the same base and layers in its own coordinates, with the mask of a layer."""
+    layered.data.vellus.layers[1].mask = "top"
+    update()
+    sphere = layered.data.surface
+    target = sphere.copy()
+    target.data = sphere.data.copy()
+    bpy.context.scene.collection.objects.link(target)
+    target.vertex_groups.clear()
+    target.matrix_world = matrix
+    update()
+    made = api.transfer_groom(layered, target, method="NEAREST", alignment="LOCAL")
+    made = next(o for o in bpy.data.objects if o.data == getattr(made, "data", made))
+    if made.data.vellus.kind == "HAIR":
+        made = next(o for o in bpy.data.objects if o.data == made.data.vellus.guide_curves)
+    update()
+    assert made.data.surface == target and list(api.layers(made)) == ["Combing", "Side"]
+    size = np.abs(points(layered)).max()
+    for weights in ((1.0, 1.0), (0.0, 0.0), (0.5, 0.0), (0.5, 1.0)):
+        np.testing.assert_allclose(weigh(made, *weights), weigh(layered, *weights), atol=2e-4 * size)
+
+
+PLACES = {
+    "moved, turned, scaled by 0.01": Matrix.Translation((1, 2, 3)) @ Matrix.Rotation(1, 4, (1, 2, 3)) @ Matrix.Scale(0.01, 4),
+    "uneven": Matrix.Rotation(1, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1)),
+    "mirrored": Matrix.Diagonal((1, -1, 1, 1)),
+    "parented": None,
+    "centimeters": Matrix.Identity(4),
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_layers_are_the_same_wherever_the_surface_is(hair, place):
+    """Combing on a moved, parented or mirrored surface, or in centimeters, is recorded and weighed as anywhere."""
+    guides, sphere = bpy.data.objects["Guides"], bpy.data.objects["Sphere"]
+    if place == "parented":
+        parent = bpy.data.objects.new("Parent", None)
+        bpy.context.scene.collection.objects.link(parent)
+        sphere.parent = parent
+        parent.matrix_world = Matrix.Translation((1, 2, 3)) @ Matrix.Rotation(1, 4, (3, 1, 2)) @ Matrix.Scale(3, 4)
+    else:
+        sphere.matrix_world = PLACES[place]
+    if place == "centimeters":
+        bpy.context.scene.unit_settings.scale_length = 0.01
+    update()
+    base = points(guides)
+    api.add_layer(guides)
+    update()
+    shape = comb(guides, (0.0, 1.0, 0.0))
+    half = weigh(guides, 0.5)
+    np.testing.assert_allclose(lengths(half), lengths(base), rtol=1e-4)
+    turned = [np.linalg.norm(one[:, -1] - base[:, -1], axis=1).mean() for one in (half, shape)]
+    assert 0.3 * turned[1] < turned[0] < 0.7 * turned[1]
+    np.testing.assert_allclose(weigh(guides, 0.0), base, atol=1e-6)
+    np.testing.assert_allclose(weigh(guides, 1.0), shape, atol=1e-5)
+    matrix = np.array(guides.matrix_world)
+    np.testing.assert_allclose(matrix, np.array(sphere.matrix_world), atol=1e-6)
+
+
+@pytest.mark.parametrize("change", ["emptied", "faces deleted", "removed"])
+def test_layers_stay_when_the_surface_is_gone(layered, change):
+    """Without faces to grow on, weights still change the guides, and adding guides is refused in one sentence."""
+    shape = points(layered)
+    sphere = bpy.data.objects["Sphere"]
+    if change == "emptied":
+        sphere.data.clear_geometry()
+    elif change == "faces deleted":
+        import bmesh
+
+        mesh = bmesh.new()
+        mesh.from_mesh(sphere.data)
+        bmesh.ops.delete(mesh, geom=mesh.faces[:], context="FACES_ONLY")
+        mesh.to_mesh(sphere.data)
+        mesh.free()
+    else:
+        bpy.data.objects.remove(sphere)
+    update()
+    bare = weigh(layered, 0.0, 0.0)
+    assert np.abs(bare - shape).max() > 0.1
+    np.testing.assert_allclose(weigh(layered, 1.0, 1.0), shape, atol=1e-5)
+    with pytest.raises(api.HairError):
+        api.change_guides(layered, "COUNT", factor=2.0)
+    layered.data.vellus.layers[1].mask = "top"
+    update()
+    comb(layered, (0.0, 0.5, 0.0))
+    assert np.isfinite(points(layered)).all()
