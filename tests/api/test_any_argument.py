@@ -217,6 +217,15 @@ CALLS = {
         (anything(d, np.eye(3)), anything(d, [[0, 1, 2]])), **changes(d, api.GuideSettings, COSTLY)
     ),
     "change_guides": change_guides,
+    "layers": lambda d: api.layers(target(d, "GUIDES")),
+    "add_layer": lambda d: api.add_layer(target(d, "GUIDES"), anything(d, "", "Combing")),
+    "set_layer": lambda d: api.set_layer(
+        target(d, "GUIDES"),
+        anything(d, "Combing", "Other"),
+        weight=anything(d, None, 0.0, 0.5, 2.0, 3.0),
+        is_active=anything(d, False, True),
+    ),
+    "apply_layers": lambda d: api.apply_layers(target(d, "GUIDES")),
     "transfer_groom": lambda d: api.transfer_groom(
         target(d, d.choice(["GUIDES", "HAIR"])), target(d, "MESH"), **changes(d, api.TransferSettings, ())
     ),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers that are carried to guides that are grown again, with other settings or roots, and to guides that are added."""
+"""Layers that are carried to guides that are grown again, with other settings or roots, or that are added."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ def write(guides: Curves, surface: Surface, before: LayersBefore, roots: Surface
     layers = layer_transfer.transferred(before.layers, bare, indices, weights, apart)
     layer_attributes.write(guides, layers, layer_items.identities_of(guides.vellus))
     guides.vellus.is_base_grown = True
-    layer_items.note_shown(guides.vellus)
+    recording.note_shown(guides, scene.present_depsgraph())
     recording.show(guides, guide_layers.composed(layers))
 
 
@@ -75,11 +75,13 @@ def replace_last(guides: Curves, parts: Sequence[GuideLayers]) -> None:
     parts: of the last guides, one after another. Guides before them keep their points.
     """
     guides.vellus.is_base_grown = False
-    layers = recording.read(guides, scene.present_depsgraph(), is_shown=True)
+    depsgraph = scene.present_depsgraph()
+    layers = recording.read(guides, depsgraph)
     before = np.arange(len(layers.counts) - sum(len(part.counts) for part in parts))
     joined = layer_transfer.joined([layer_transfer.chosen_guides(layers, before), *parts])
     joined = joined.weighted(layers.weights)
     layer_attributes.write(guides, joined, layer_items.identities_of(guides.vellus))
+    recording.note_shown(guides, depsgraph)
     recording.show_layers(guides, joined)
 
 

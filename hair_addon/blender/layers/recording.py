@@ -20,6 +20,8 @@ from ..data.strands import attributes, curves, layer_attributes
 from ..host.notices import text_of
 from ..settings import layer_items
 
+_LEAST_PAINT = 1e-5  # smaller changes of masks are rounding
+
 
 def is_outdated(guides: Curves) -> bool:
     """Whether guides were edited, or their weights changed, since they were composed."""
@@ -53,7 +55,7 @@ def update(guides: Curves, depsgraph: Depsgraph) -> bool:
         layer_attributes.write(guides, layers, identities)
     if layer_items.is_reweighed(state):
         layers = read(guides, depsgraph)
-        layer_items.note_shown(state)
+        note_shown(guides, depsgraph)
         return show(guides, guide_layers.composed(layers))
     return show_layers(guides, layers)
 
@@ -104,26 +106,50 @@ def read(guides: Curves, depsgraph: Depsgraph, is_shown: bool = False) -> GuideL
     state = guides.vellus
     weights = np.zeros((len(state.layers), len(guides.curves)), np.float32)
     for row, item in zip(weights, state.layers, strict=True):
-        weight, mask = (item.shown_weight, text_of(item, "shown_mask")) if is_shown else layer_items.wanted(item)
+        weight, name = (item.shown_weight, text_of(item, "shown_mask")) if is_shown else layer_items.wanted(item)
         row[:] = weight
-        if mask and weight:
-            row *= _mask(guides, mask, depsgraph)
+        if not (name and weight):
+            continue
+        mask = layer_attributes.read_mask(guides, item.identity) if is_shown else None
+        if mask is None:
+            mask = _mask(guides, item.identity, name, depsgraph)
+        row *= mask
     return layer_attributes.read(guides, layer_items.identities_of(state), weights)
 
 
-def _mask(guides, name, depsgraph):
-    """Return (G,) weights of a vertex group at the roots; 1 if there is no such group or surface."""
-    if guides.surface is None:
-        return 1.0
+def note_shown(guides: Curves, depsgraph: Depsgraph) -> None:
+    """Note that guides are composed with the present weights and masks, which are stored with their points."""
+    layer_items.note_shown(guides.vellus)
+    for item in guides.vellus.layers:
+        name, mask = text_of(item, "shown_mask"), None
+        if name:
+            mask = _mask(guides, item.identity, name, depsgraph)
+        layer_attributes.write_mask(guides, item.identity, mask)
+
+
+def mark_painted(guides: Curves, depsgraph: Depsgraph) -> None:
+    """Mark layers whose masks were painted since guides were composed."""
+    for item in guides.vellus.layers:
+        name = text_of(item, "shown_mask")
+        shown = layer_attributes.read_mask(guides, item.identity) if name else None
+        if shown is not None and not item.is_painted:
+            mask = _mask(guides, item.identity, name, depsgraph)
+            item.is_painted = bool((np.abs(mask - shown) > _LEAST_PAINT).any())
+
+
+def _mask(guides, identity, name, depsgraph):
+    """Return (G,) weights of a vertex group at the roots.
+
+    Without such a group, or faces, weights are those that guides were composed with, or 1.
+    """
     try:
+        surface = scene.read_surface(guides.surface, depsgraph)
         weights = scene.read_vertex_group(guides.surface, depsgraph, name)
+        roots = curves.read_roots(guides, surface, surface.from_local(curves.first_points(guides)))
     except HairError as error:
         guides.vellus.status = str(error)
-        return 1.0
-    if weights is None:
-        return 1.0
-    surface = scene.read_surface(guides.surface, depsgraph)
-    roots = curves.read_roots(guides, surface, surface.from_local(curves.first_points(guides)))
+        shown = layer_attributes.read_mask(guides, identity)
+        return np.ones(len(guides.curves), np.float32) if shown is None else shown
     return np.clip(mesh_math.interpolate(weights, surface.mesh, roots), 0.0, 1.0)
 
 

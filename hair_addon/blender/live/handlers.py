@@ -94,7 +94,9 @@ def after_depsgraph_update(scene, depsgraph):
         events.image_changed()
     painted = {report.datablock for report in reports if report.is_of(bpy.types.Image)} - {None}
     _mark_painted(painted, depsgraph)
-    stale_marks.follow_mapped_surfaces({surface for surface in deformed if surface.data in changed})
+    edited = {surface for surface in deformed if surface.data in changed}
+    stale_marks.follow_mapped_surfaces(edited)
+    live_layers.follow_masks({surface for surface in edited if surface.mode == "OBJECT"}, depsgraph)
     combed = {}
     for datablock in changed:
         if isinstance(datablock, bpy.types.Mesh):

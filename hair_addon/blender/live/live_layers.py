@@ -36,6 +36,13 @@ def follow(combed, depsgraph):
             combed[guides] = None
 
 
+def follow_masks(surfaces, depsgraph):
+    """Mark layers whose masks on edited surfaces were painted, so that `follow` composes their guides again."""
+    for guides in with_layers():
+        if guides.surface in surfaces and running.job() is None:
+            recording.mark_painted(guides, depsgraph)
+
+
 def follow_frame(depsgraph):
     """Compose guides whose weights are animated; returns {guide Curves that moved: None}."""
     moved = {}

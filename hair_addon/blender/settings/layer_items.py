@@ -60,6 +60,9 @@ class VellusLayer(bpy.types.PropertyGroup):
         "identity": bpy.props.IntProperty(description="Number in names of attributes", options={"HIDDEN"}),
         "shown_weight": bpy.props.FloatProperty(description="Weight in the present guides", options={"HIDDEN"}),
         "shown_mask": bpy.props.StringProperty(description="Mask in the present guides", options={"HIDDEN"}),
+        "is_painted": bpy.props.BoolProperty(
+            description="Whether the mask was painted since guides were composed", options={"HIDDEN"}
+        ),
     }
 
 
@@ -88,13 +91,16 @@ def wanted(item):
 
 def is_reweighed(state):
     """Whether weights or masks have changed since guides were composed."""
-    return any(wanted(item) != (item.shown_weight, text_of(item, "shown_mask")) for item in state.layers)
+    return any(
+        item.is_painted or wanted(item) != (item.shown_weight, text_of(item, "shown_mask")) for item in state.layers
+    )
 
 
 def note_shown(state):
     """Note that guides are composed with the present weights and masks."""
     for item in state.layers:
         item.shown_weight, item.shown_mask = wanted(item)
+        item.is_painted = False
 
 
 def require_combable(state):

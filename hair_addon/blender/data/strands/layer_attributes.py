@@ -2,7 +2,7 @@
 """Layers of guides ↔ attributes of their Curves.
 
 The base and the frames of roots are layer_base, layer_normal and layer_tangent; each layer has layer_<id>_turn and
-layer_<id>_stretch per point. All are in local coordinates.
+layer_<id>_stretch per point, and layer_<id>_mask per guide if a mask limits it. All are in local coordinates.
 """
 
 import numpy as np
@@ -58,9 +58,23 @@ def write_layer(datablock, layers, identity, place):
     attributes.write(datablock, _stretch(identity), "FLOAT", "POINT", layers.stretches[place])
 
 
+def read_mask(datablock, identity):
+    """Return the mask (G,) of a layer that the present points are composed with, in [0, 1]; None if none is stored."""
+    found = attributes.read(datablock, _mask(identity), "FLOAT", "CURVE")
+    return None if found is None else np.clip(np.nan_to_num(found), 0.0, 1.0)
+
+
+def write_mask(datablock, identity, mask):
+    """Store the mask (G,) of a layer, or remove it if it is None."""
+    if mask is not None:
+        attributes.write(datablock, _mask(identity), "FLOAT", "CURVE", mask)
+    elif _mask(identity) in datablock.attributes:
+        datablock.attributes.remove(datablock.attributes[_mask(identity)])
+
+
 def forget(datablock, identity=None):
     """Remove the attributes of a layer, or of all layers and their base."""
-    names = [_turn(identity), _stretch(identity)]
+    names = [_turn(identity), _stretch(identity), _mask(identity)]
     if identity is None:
         names = [one.name for one in datablock.attributes if one.name.startswith("layer_")]
     for name in names:
@@ -83,3 +97,7 @@ def _turn(identity):
 
 def _stretch(identity):
     return f"layer_{identity}_stretch"
+
+
+def _mask(identity):
+    return f"layer_{identity}_mask"

@@ -60,7 +60,7 @@ def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) ->
     places = mesh_math.positions(mesh, guides.roots)
     found = grooming.guide_copies.mirroring(mesh, places, plane, guides.weights >= 0.5)
     before = carried_layers.read(datablock, guides.surface)
-    additions, layers = [], (None if before is None else [])
+    additions, layers = [], []
     for count in np.unique(guides.counts[found.sources]):
         chosen = np.flatnonzero(guides.counts[found.sources] == count)
         sources, image_roots = found.sources[chosen], found.roots[chosen]
@@ -70,9 +70,9 @@ def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) ->
             return grooming.guide_copies.images(mesh, points, guides.roots[sources], image_roots, plane)
 
         additions.append((images(guides.points[guides.of_count(int(count), sources)]), sources, image_roots))
-        if layers is not None:
+        if before is not None:
             layers.append(_mirrored_layers(guides.surface, before.layers, sources, images))
-    write(guides, additions, found.removed, layers)
+    write(guides, additions, found.removed, None if before is None else layers)
     return len(found.sources)
 
 

@@ -120,7 +120,7 @@ def apply(guides: Curves, depsgraph: Depsgraph) -> int:
 
 
 def _compose(guides, depsgraph):
-    layer_items.note_shown(guides.vellus)
+    recording.note_shown(guides, depsgraph)
     recording.show(guides, guide_layers.composed(recording.read(guides, depsgraph)))
 
 
