@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from bpy.types import Curves
+from bpy.types import Curves, Depsgraph
 
 from ...core.geometry import mesh as mesh_math
 from ...core.geometry import strands
@@ -23,12 +23,16 @@ from . import recording
 
 @dataclass(frozen=True)
 class LayersBefore:
-    """Layers of guides before these are grown again: their roots on the surface, and partings between them."""
+    """Layers of guides before these are grown again: their roots on the surface, and partings between them.
+
+    depsgraph: of that time, as an update in between would record half-written guides.
+    """
 
     layers: GuideLayers
     guides: Strands
     settings: HairSettings
     parting: partings.Partings
+    depsgraph: Depsgraph
 
 
 def read(guides: Curves | None, surface: Surface) -> LayersBefore | None:
@@ -45,7 +49,7 @@ def read(guides: Curves | None, surface: Surface) -> LayersBefore | None:
         settings = setting_properties.to_settings(followers[0].vellus.hair, HairSettings)
     parting = partings.read(guides.surface, surface, guides, settings, depsgraph)
     its_guides = curves.read_guides(guides, surface, "cpu")
-    return LayersBefore(recording.read(guides, depsgraph), its_guides, settings, parting)
+    return LayersBefore(recording.read(guides, depsgraph), its_guides, settings, parting, depsgraph)
 
 
 def write(guides: Curves, surface: Surface, before: LayersBefore, roots: SurfacePoints) -> None:
@@ -57,8 +61,8 @@ def write(guides: Curves, surface: Surface, before: LayersBefore, roots: Surface
     layers = layer_transfer.transferred(before.layers, bare, indices, weights, apart)
     layer_attributes.write(guides, layers, layer_items.identities_of(guides.vellus))
     guides.vellus.is_base_grown = True
-    recording.note_shown(guides, scene.present_depsgraph())
-    recording.show(guides, guide_layers.composed(layers))
+    recording.note_shown(guides, before.depsgraph)
+    recording.show(guides, guide_layers.composed(recording.read(guides, before.depsgraph)))
 
 
 def between(surface: Surface, before: LayersBefore, roots: SurfacePoints, base: np.ndarray) -> GuideLayers:
@@ -69,19 +73,18 @@ def between(surface: Surface, before: LayersBefore, roots: SurfacePoints, base: 
     return layer_transfer.transferred(before.layers, bare, *_weights(surface, before, roots))
 
 
-def replace_last(guides: Curves, parts: Sequence[GuideLayers]) -> None:
+def replace_last(guides: Curves, before: LayersBefore, parts: Sequence[GuideLayers]) -> None:
     """Give the last guides, which a tool has added, layers of their own; settings no longer grow the base.
 
     parts: of the last guides, one after another. Guides before them keep their points.
     """
     guides.vellus.is_base_grown = False
-    depsgraph = scene.present_depsgraph()
-    layers = recording.read(guides, depsgraph)
-    before = np.arange(len(layers.counts) - sum(len(part.counts) for part in parts))
-    joined = layer_transfer.joined([layer_transfer.chosen_guides(layers, before), *parts])
+    layers = recording.read(guides, before.depsgraph)
+    others = np.arange(len(layers.counts) - sum(len(part.counts) for part in parts))
+    joined = layer_transfer.joined([layer_transfer.chosen_guides(layers, others), *parts])
     joined = joined.weighted(layers.weights)
     layer_attributes.write(guides, joined, layer_items.identities_of(guides.vellus))
-    recording.note_shown(guides, depsgraph)
+    recording.note_shown(guides, before.depsgraph)
     recording.show_layers(guides, joined)
 
 

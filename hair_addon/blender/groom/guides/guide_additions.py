@@ -19,6 +19,7 @@ from ....core.grooming.guide_tool_settings import CountSettings, MirrorSettings
 from ...data import masks
 from ...data.strands import curves, guide_curves, partings
 from ...layers import carried_layers
+from ...layers.carried_layers import LayersBefore
 from ...settings import preferences
 from .. import pipeline
 from . import guide_tools
@@ -36,16 +37,16 @@ def change_count(datablock: Curves, settings: CountSettings, depsgraph: Depsgrap
     guides = guide_tools.read(datablock, settings, depsgraph)
     difference = grooming.guide_count.difference(settings, guides.weights)
     before = carried_layers.read(datablock, guides.surface)
-    layers = None if before is None else []
+    layers = []
     if difference > 0:
         roots = _new_roots(guides, difference, settings.mask, depsgraph)
         if before is not None:
             bare = replace(guides, points=guides.surface.from_local(before.layers.base))
             base = guides.surface.to_local(_between(bare, roots, depsgraph)[0])
             layers = [carried_layers.between(guides.surface, before, roots, base)]
-        write(guides, [(*_between(guides, roots, depsgraph), roots)], np.zeros(0, np.int64), layers)
+        write(guides, [(*_between(guides, roots, depsgraph), roots)], np.zeros(0, np.int64), before, layers)
     elif difference < 0:
-        write(guides, [], _crowded(guides, -difference, depsgraph), layers)
+        write(guides, [], _crowded(guides, -difference, depsgraph), before)
     return len(datablock.curves)
 
 
@@ -72,16 +73,20 @@ def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) ->
         additions.append((images(guides.points[guides.of_count(int(count), sources)]), sources, image_roots))
         if before is not None:
             layers.append(_mirrored_layers(guides.surface, before.layers, sources, images))
-    write(guides, additions, found.removed, None if before is None else layers)
+    write(guides, additions, found.removed, before, layers)
     return len(found.sources)
 
 
 def write(
-    guides: CombedGuides, additions: list[Additions], removed: np.ndarray, layers: Sequence[GuideLayers] | None = None
+    guides: CombedGuides,
+    additions: list[Additions],
+    removed: np.ndarray,
+    before: LayersBefore | None,
+    layers: Sequence[GuideLayers] = (),
 ) -> None:
     """Add guides and remove (R,) indices of existing ones. At least one guide must remain.
 
-    layers: of the added guides, in local coordinates; None if guides have no layers.
+    before: layers of existing guides, None without layers; layers: of added guides, in local coordinates.
     """
     datablock, surface, roots = guides.datablock, guides.surface, guides.roots
     for points, sources, new_roots in additions:
@@ -98,8 +103,8 @@ def write(
     guide_curves.remove(datablock, removed)
     left = np.setdiff1d(np.arange(len(roots)), removed)
     curves.write_roots(datablock, surface, roots[left], firsts=curves.first_points(datablock))
-    if layers is not None:
-        carried_layers.replace_last(datablock, layers)
+    if before is not None:
+        carried_layers.replace_last(datablock, before, layers)
     datablock.update_tag()
 
 
