@@ -3,18 +3,21 @@
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
+from ...core.geometry.affine import Affine
 from ..data.strands import attributes, curves
 from ..groom.foreign import foreign_curves
 from . import strand_arrays
 
 
 def new_object(name, placed, surface_object, guide_ids=None):
-    """Add an object for a `CurveSet` in metres with Z up to the scene, with the transform of a surface.
+    """Add an object for a `CurveSet` in metres with Z up to the scene, with the transform of a surface but its shear.
 
     guide_ids: (G,) IDs of the guides that the curves follow; their indices are stored with the weights.
     """
-    to_world = np.array(surface_object.matrix_world, np.float64) * strand_arrays.metres_per_unit(bpy.context.scene)
+    matrix = _without_shear(surface_object.matrix_world)
+    to_world = np.array(matrix, np.float64) * strand_arrays.metres_per_unit(bpy.context.scene)
     to_world[3, 3] = 1.0
     back, scale = np.linalg.inv(to_world), abs(np.linalg.det(to_world[:3, :3])) ** (1.0 / 3.0)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -33,9 +36,14 @@ def new_object(name, placed, surface_object, guide_ids=None):
         curves.write_guide_map(datablock, _guide_map(guide_ids, placed.guide_ids, placed.guide_weights))
     made = bpy.data.objects.new(name, datablock)
     bpy.context.scene.collection.objects.link(made)
-    made.matrix_world = surface_object.matrix_world
+    made.matrix_world = matrix
     bpy.context.view_layer.update()
     return made
+
+
+def _without_shear(matrix):
+    """Return a transform that an object without a parent can have."""
+    return Matrix.LocRotScale(*matrix.decompose())
 
 
 def _guide_map(known, ids, weights):
@@ -51,10 +59,19 @@ def make_plain(curves_object):
     """Convert guides, hair or other curves to plain curves with their visible shape and without a surface."""
     datablock = foreign_curves.take(curves_object, True)
     datablock.vellus.kind, datablock.vellus.guide_curves, datablock.surface = "NONE", None, None
-    matrix = curves_object.matrix_world.copy()
+    to_world = Affine.of(curves_object.matrix_world)
     curves_object.parent = None
-    curves_object.matrix_world = matrix
+    curves_object.matrix_world = _without_shear(curves_object.matrix_world)
     bpy.context.view_layer.update()
+    placed = Affine.of(curves_object.matrix_world)
+    shear = placed.inverse @ to_world if placed.is_valid else Affine.identity()
+    if not shear.is_identity:
+        if datablock.users > 1:
+            datablock = curves_object.data = datablock.copy()
+        points = shear.points(curves.read_points(datablock))
+        attributes.write(datablock, "position", "FLOAT_VECTOR", "POINT", points)
+        curves.widen(datablock, shear)
+        bpy.context.view_layer.update()
 
 
 def joined(objects):
