@@ -8,6 +8,7 @@ groups or attributes: they get the strands, or the guides of a file of guides al
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -195,7 +196,10 @@ def _slots(curves, name):
 
 def _write_npz(path, written):
     names = {curves.group_id: curves.group_name for curves, _points in written}
-    arrays = {"up": np.array("Z"), "group_names": np.array([names.get(i, "") for i in range(max(names) + 1)])}
+    arrays: dict[str, Any] = {
+        "up": np.array("Z"),
+        "group_names": np.array([names.get(i, "") for i in range(max(names) + 1)]),
+    }
     for prefix, is_guide in (("guide_", True), ("strand_", False)):
         some = [(curves, points) for curves, points in written if curves.is_guide == is_guide]
         if some:
@@ -204,7 +208,7 @@ def _write_npz(path, written):
         counts = np.concatenate([curves.counts for curves, _points in written if not curves.is_guide])
         arrays["roots"] = arrays["strand_points"].reshape(-1, 3)[np.cumsum(counts) - counts]
     with open(path, "wb") as file:
-        np.savez(file, allow_pickle=False, **arrays)
+        np.savez(file, **arrays)
 
 
 def _arrays(some):
