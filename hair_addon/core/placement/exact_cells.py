@@ -13,11 +13,12 @@ from .voronoi import (
     Sites,
     Sums,
     candidate,
-    candidate_count,
     detour_of,
     detours,
+    find_far,
     fixed,
     nearest_site,
+    next_slot,
     some_sites,
     sum_cells,
 )
@@ -89,6 +90,7 @@ class CutCells:
         if self._cells is None or self._site_count != len(sites.places):
             self._site_count = len(sites.places)
             self._cells = some_sites(self._domain, sites, self._pieces.centres)
+        find_far(self._domain, sites)
         return sum_cells(_cells, len(self._pieces.centres), [self._pieces, sites], [self._cells], sites, self._device)
 
 
@@ -203,12 +205,8 @@ def _cell_of(
     cell = _whole(pieces, piece, sx, sy)
     reach = _reach(cell.farthest, power, own_detour)
     slot = int(0)
-    while slot < candidate_count(sites, site) and cell.count > 0:
-        if slot < sites.counts[site]:
-            if sites.apart[site, slot] > reach:
-                break
+    while slot >= 0 and cell.count > 0:
         other = candidate(sites, site, slot)
-        slot += 1
         if other != site:
             offset = sites.places[other] - centre
             nx = 2.0 * (wp.dot(offset, e1) - sx)
@@ -225,6 +223,7 @@ def _cell_of(
             if worst > 0.0:
                 cell = _clipped(cell, nx, ny, level, other, sx, sy)
                 reach = _reach(cell.farthest, power, own_detour)
+        slot = next_slot(sites, site, slot, reach)
     return cell
 
 
@@ -309,15 +308,12 @@ def _cells(
     is_whole = detour_of(normal, island, detour, sites.normals[nearest], sites.islands[nearest]) == 0.0
     reach = 2.0 * (wp.sqrt(square) + radius)
     slot = int(0)
-    while is_whole and slot < candidate_count(sites, nearest):
-        if slot < sites.counts[nearest]:
-            if sites.apart[nearest, slot] > reach:
-                break
+    while is_whole and slot >= 0:
         other = candidate(sites, nearest, slot)
-        slot += 1
         if other != nearest:
             apart = 2.0 * radius * wp.length(sites.places[other] - sites.places[nearest])
             is_whole = wp.length_sq(sites.places[other] - centre) - square > apart
+        slot = next_slot(sites, nearest, slot, reach)
     if is_whole:
         moment = -pieces.areas[piece] * weight * offset
         wp.atomic_add(out_masses, nearest, fixed(weight * pieces.areas[piece]))

@@ -6,7 +6,7 @@ import warp as wp
 
 from ..geometry.mesh import SurfacePoints, positions
 from .domain import Domain
-from .voronoi import Sites, Sums, detour_of, detours, fixed, nearest_site, some_sites, sum_cells
+from .voronoi import Sites, Sums, detour_of, detours, find_far, fixed, nearest_site, some_sites, sum_cells
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -50,6 +50,7 @@ class SampledCells:
         if not self._site_count <= len(sites.places) <= MOST_GROWTH * self._site_count:
             self._cells = some_sites(self._domain, sites, self._samples.places)
         self._site_count = len(sites.places)
+        find_far(self._domain, sites)
         inputs, outputs = [self._samples, sites, with_seconds], [self._cells, self._seconds]
         return sum_cells(_nearest_two, len(self.places), inputs, outputs, sites, self._device)
 

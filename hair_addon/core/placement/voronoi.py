@@ -27,11 +27,18 @@ SITES_AROUND = 16  # neighbours of a site, itself included, found in one search
 MOST_AROUND = 48  # neighbours before a search of all sites: a thin part has neighbours on its other side too
 ENOUGH_AROUND = 12  # neighbours on the site's own side
 FIRST_RING = 6  # neighbours in a honeycomb
+MOST_FAR = 256  # of the sites in the disk or ball around a site that are searched before all sites are
+FAR = 1.7  # radius of the search for them, in distances of the last neighbour
+FAR_MARGIN = 1.01  # of this radius, against rounding
+FARTHEST = 4.0  # largest radius, in radii of the search for neighbours: a larger one visits too many cells of the grid
 EVERYWHERE = 4.0  # a distance larger than a surface of unit size
 SEARCH_RADIUS = 2.6  # relative to the square root of a cell's area: contains more than SITES_AROUND of a honeycomb
 DETOUR = 2.0  # added distance of a site on the other side of a thin part, in spacings of sites
 
 UNIT = wp.constant(wp.float64(2.0**54))  # sums over a surface with a mass of one stay below 2^63
+
+_FIRST_FAR = MOST_AROUND + 1  # slots of candidates: neighbours, then far sites or all sites
+_FIRST_OF_ALL = _FIRST_FAR + MOST_FAR
 
 near_keys = wp.types.vector(length=SITES_AROUND, dtype=wp.uint64)
 
@@ -40,7 +47,8 @@ near_keys = wp.types.vector(length=SITES_AROUND, dtype=wp.uint64)
 class Sites:
     """Positions of sites, their normals and islands, and `counts` neighbours of each in order of distance.
 
-    gaps: distance of the nearest neighbour on the site's own side; spacings: mean distance of the first ring.
+    gaps: distance of the nearest neighbour on the site's own side; spacings: mean distance of the first ring; far:
+    `far_counts` sites within `far_radii`, neighbours included, in order of index; a radius of -1: none are stored.
     """
 
     places: wp.array[wp.vec3]
@@ -51,6 +59,9 @@ class Sites:
     counts: wp.array[int]
     gaps: wp.array[float]
     spacings: wp.array[float]
+    far: wp.array2d[int]
+    far_counts: wp.array[int]
+    far_radii: wp.array[float]
 
 
 @wp.func
@@ -64,18 +75,38 @@ def detour_of(normal: wp.vec3, island: int, detour: float, site_normal: wp.vec3,
 
 @wp.func
 def candidate(sites: Sites, site: int, slot: int):
-    """Return a candidate site: first the neighbours, in order of distance, then all sites."""
-    if slot < sites.counts[site]:
+    """Return the candidate site in a slot: 0, or one returned by `next_slot`."""
+    if slot < wp.static(_FIRST_FAR):
         return sites.around[site, slot]
-    return slot - sites.counts[site]
+    if slot < wp.static(_FIRST_OF_ALL):
+        return sites.far[site, slot - wp.static(_FIRST_FAR)]
+    return slot - wp.static(_FIRST_OF_ALL)
 
 
 @wp.func
-def candidate_count(sites: Sites, site: int):
-    """Return the number of slots of `candidate`."""
-    if sites.counts[site] < sites.places.shape[0]:
-        return sites.counts[site] + sites.places.shape[0]
-    return sites.counts[site]
+def next_slot(sites: Sites, site: int, slot: int, reach: float):
+    """Return the slot of the next candidate that may be within a distance of a site, -1 for none.
+
+    Candidates are first the neighbours, in order of distance, then in order of index all sites, or only the far sites
+    if these include all sites within the distance: the others would change nothing.
+    """
+    following = slot + 1
+    if following > wp.static(_FIRST_OF_ALL):
+        if following - wp.static(_FIRST_OF_ALL) == sites.places.shape[0]:
+            following = -1
+    elif following < sites.counts[site]:
+        if sites.apart[site, following] > reach:
+            following = -1
+    elif following == sites.counts[site]:
+        if following == sites.places.shape[0]:
+            following = -1
+        elif sites.far_radii[site] >= wp.static(FAR_MARGIN) * reach:
+            following = wp.static(_FIRST_FAR)
+        else:
+            following = wp.static(_FIRST_OF_ALL)
+    elif following - wp.static(_FIRST_FAR) == sites.far_counts[site]:
+        following = -1
+    return following
 
 
 @wp.func
@@ -90,10 +121,7 @@ def nearest_site(point: wp.vec3, normal: wp.vec3, island: int, detour: float, si
         # Triangle inequality: sites beyond this distance are farther from the point than the nearest one [Elkan03].
         reach = wp.length(sites.places[site] - point) + wp.sqrt(square)
         slot = int(0)
-        while slot < candidate_count(sites, site):
-            if slot < sites.counts[site]:
-                if sites.apart[site, slot] > reach:
-                    break
+        while slot >= 0:
             other = candidate(sites, site, slot)
             other_square = wp.length_sq(sites.places[other] - point)
             if other_square < square:
@@ -103,7 +131,7 @@ def nearest_site(point: wp.vec3, normal: wp.vec3, island: int, detour: float, si
                     nearest = other
                     # The reach shrinks with the new nearest distance.
                     reach = wp.length(sites.places[site] - point) + wp.sqrt(square)
-            slot += 1
+            slot = next_slot(sites, site, slot, reach)
         searching = nearest != site
     return nearest
 
@@ -143,7 +171,7 @@ def sites_on(domain: Domain, points: SurfacePoints, device: wp.DeviceLike) -> Si
     sites.counts = wp.empty(len(points), dtype=int, device=device)
     sites.gaps = wp.empty(len(points), dtype=float, device=device)
     sites.spacings = wp.empty(len(points), dtype=float, device=device)
-    radius = SEARCH_RADIUS * float(np.sqrt(domain.parts.areas.sum() / len(points)))
+    radius = _search_radius(domain, len(points))
     domain.grid.build(sites.places, CELLS_PER_RADIUS * radius)
     own = sites.places, sites.normals, sites.islands
     parallel.launch(
@@ -154,7 +182,30 @@ def sites_on(domain: Domain, points: SurfacePoints, device: wp.DeviceLike) -> Si
         device=device,
         least_rows=512,
     )
+    sites.far_radii = wp.full(len(points), -1.0, dtype=float, device=device)
     return sites
+
+
+def _search_radius(domain, site_count):
+    return SEARCH_RADIUS * float(np.sqrt(domain.parts.areas.sum() / site_count))
+
+
+def find_far(domain: Domain, sites: Sites) -> None:
+    """Find the far sites of the `Sites` in the grid of a `Domain`, where these shorten the search of all sites."""
+    count, device = len(sites.places), sites.places.device
+    if count <= 2 * MOST_FAR:
+        return
+    farthest = FARTHEST * _search_radius(domain, count)
+    sites.far = wp.empty((count, MOST_FAR), dtype=int, device=device)
+    sites.far_counts = wp.empty(count, dtype=int, device=device)
+    parallel.launch(
+        _find_far,
+        count,
+        inputs=[*map(Rows, (sites.places, sites.apart, sites.counts)), sites.places, domain.grid.id, farthest],
+        outputs=[sites.far, sites.far_counts, sites.far_radii],
+        device=device,
+        least_rows=512,
+    )
 
 
 def some_sites(domain: Domain, sites: Sites, points: wp.array[wp.vec3]) -> wp.array[int]:
@@ -280,3 +331,61 @@ def _find_around(
         total = gap
     out_gaps[site] = gap
     out_spacings[site] = total / wp.max(ring, 1.0)
+
+
+@wp.func
+def _count_within(place: wp.vec3, radius: float, places: wp.array[wp.vec3], grid: wp.uint64):
+    count = int(0)
+    for other in wp.hash_grid_query(grid, place, radius):
+        if wp.length_sq(places[other] - place) <= radius * radius:
+            count += 1
+            if count > wp.static(MOST_FAR):
+                break
+    return count
+
+
+@wp.kernel
+def _find_far(
+    own_places: wp.array[wp.vec3],
+    own_apart: wp.array2d[float],
+    own_counts: wp.array[int],
+    places: wp.array[wp.vec3],
+    grid: wp.uint64,
+    farthest: float,
+    # outputs
+    out_far: wp.array2d[int],
+    out_counts: wp.array[int],
+    out_radii: wp.array[float],
+):
+    site = wp.tid()
+    place = own_places[site]
+    neighbour_count = own_counts[site]
+    least = own_apart[site, neighbour_count - 1]
+    out_counts[site] = 0
+    out_radii[site] = -1.0
+    # If the first search found enough neighbours on the site's side, these nearly always suffice.
+    if neighbour_count <= wp.static(SITES_AROUND):
+        return
+    radius = wp.min(wp.static(FAR) * least, farthest)
+    while radius > least and _count_within(place, radius, places, grid) > wp.static(MOST_FAR):
+        radius = 0.8 * radius
+    if radius <= least:
+        return
+    count = int(0)
+    for other in wp.hash_grid_query(grid, place, radius):
+        if wp.length_sq(places[other] - place) <= radius * radius:
+            out_far[site, count] = other
+            count += 1
+    # Shell's sort by index.
+    gap = int(wp.static(MOST_FAR))
+    while gap > 1:
+        gap = (gap + 1) * 4 // 9
+        for first in range(gap, count):
+            index = out_far[site, first]
+            slot = int(first)
+            while slot >= gap and out_far[site, wp.max(slot - gap, 0)] > index:
+                out_far[site, slot] = out_far[site, slot - gap]
+                slot -= gap
+            out_far[site, slot] = index
+    out_counts[site] = count
+    out_radii[site] = radius
