@@ -54,6 +54,8 @@ class BoundHair:
     is_map_written: bool = False  # whether the datablock holds this guide map
     straight: "BoundHair | None" = None  # the same without styles while viewports show it: only it follows strokes
     is_behind: bool = False  # whether points are older than `guides`, which only the display has followed
+    thickness: np.ndarray | None = None  # (S,) float32 factors of radii by a map, None without it
+    map_status: str = ""  # sentence about the map of the thickness
 
     @property
     def points(self) -> np.ndarray:
@@ -63,8 +65,9 @@ class BoundHair:
 
     @property
     def radii(self) -> np.ndarray:
-        """(P,) float32 radii along each strand, in the surface's local units."""
-        return self.styles.radius_factor * groom.strand_radii(self.settings) / np.float32(self.surface.scale)
+        """(P,) float32 radii along each strand, or (S, P) if a map varies them, in the surface's local units."""
+        radii = self.styles.radius_factor * groom.strand_radii(self.settings) / np.float32(self.surface.scale)
+        return radii if self.thickness is None else self.thickness[:, None] * radii
 
     @property
     def guide_map(self) -> tuple[np.ndarray, np.ndarray]:
@@ -171,6 +174,15 @@ class BoundHair:
             self.grow()
         self.is_written = self.has_moved_only = False
 
+    def thicken(self, thickness: np.ndarray | None, map_status: str = "") -> None:
+        """Multiply the radii of strands by factors (S,) float32; None for 1. map_status: sentence about their map."""
+        if map_status == self.map_status and is_same_thickness(thickness, self.thickness):
+            return
+        self.thickness, self.map_status = thickness, map_status
+        if self.straight is not None:
+            self.straight.thickness = thickness
+        self.is_written = self.has_moved_only = False
+
     @property
     def shown(self) -> "BoundHair":
         """Hair shown in viewports: the one without styles if it exists."""
@@ -200,6 +212,11 @@ class BoundHair:
             return
         self.is_map_written = self.is_map_written and np.array_equal(shares, self.shares[moved])
         self.shares[moved] = shares
+
+
+def is_same_thickness(one: np.ndarray | None, other: np.ndarray | None) -> bool:
+    """Whether factors of radii, each possibly None, are the same."""
+    return one is other if one is None or other is None else np.array_equal(one, other)
 
 
 def _grown(value: T | None) -> T:

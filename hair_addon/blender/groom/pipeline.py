@@ -27,7 +27,17 @@ from ..data.surfaces import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items
-from . import bindings, grown_guides, hair_memory, read_surfaces, reused_roots, size_fitting, styled_hair, writing
+from . import (
+    bindings,
+    grown_guides,
+    hair_memory,
+    read_surfaces,
+    reused_roots,
+    size_fitting,
+    strand_thickness,
+    styled_hair,
+    writing,
+)
 from .bindings import BoundHair
 from .styled_hair import ReadStyles, StyledHair
 
@@ -97,7 +107,9 @@ def interpolating_hair(
     """`interpolate_hair` as work in steps; styles: of new hair, to be stored by `writing.keep_styles`."""
     place, its_guides, its_target = map(Remembered, (guide_curves.surface, guide_curves, target))
     bound = yield from _binding_hair(guide_curves, settings, depsgraph, target, styles)
-    writing.require_count(its_target.find(), len(bound.binding.positions), len(bound.radii))
+    writing.require_count(its_target.find(), len(bound.binding.positions), settings.point_count)
+    if target is not None:
+        strand_thickness.apply(its_target.find(), bound)
     # Last, so that nothing happens between this and writing.
     bindings.grow_in_place_of(its_target.find(), bound)
     return writing.write_strands(its_target.find(), place.find(), its_guides.find(), bound)
@@ -108,6 +120,8 @@ def bind_hair(
 ) -> BoundHair:
     """Return the `BoundHair` between guides without writing it. Strands of `target` keep their roots if possible."""
     bound = run_now(_binding_hair(guide_curves, settings, depsgraph, target))
+    if target is not None:
+        strand_thickness.apply(target, bound)
     bound.grow()
     return bound
 
@@ -330,7 +344,7 @@ def _known_by(bound, progress):
 def restyle(
     target: Curves, depsgraph: Depsgraph, is_drawn: Callable[[BoundHair, StyledHair], bool] = lambda *_given: False
 ) -> bool:
-    """Apply the present styles to bound hair; returns whether only styles had changed.
+    """Apply the present styles and map of the thickness to bound hair; returns whether nothing else had changed.
 
     is_drawn: whether the GPU generates the shown strands. Nothing is searched, and nothing is computed if styles are
     unchanged. Raises `HairError`.
@@ -352,6 +366,7 @@ def restyle(
         trees = bound.styles.shared_trees()
         styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, trees)
         bound.restyle(styles, is_drawn(bound, styles))
+    strand_thickness.apply(target, bound)
     return True
 
 
@@ -377,7 +392,7 @@ def _is_restyled(target, depsgraph):
     if not restyle(target, depsgraph):
         return False
     writing.write_hair(target)
-    target.vellus.status = ""
+    target.vellus.status = bindings.of(target).map_status
     return True
 
 

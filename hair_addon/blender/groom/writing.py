@@ -97,6 +97,7 @@ def write_hair(target: Curves) -> None:
     bound.update_points()
     if not bound.has_moved_only:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
+        state.status = bound.map_status
         size_fitting.keep(target, bound.fits)
         kept_shapes.forget(target)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key

@@ -11,7 +11,16 @@ import bpy
 
 from ...core.errors import HairError
 from ..data.strands import curves, simulated_guides
-from ..groom import bindings, changed_weights, hair_outside, pipeline, size_fitting, staleness, writing
+from ..groom import (
+    bindings,
+    changed_weights,
+    hair_outside,
+    pipeline,
+    size_fitting,
+    staleness,
+    strand_thickness,
+    writing,
+)
 from ..groom.foreign import kept_following
 from ..groom.styles import painted_masks
 from ..host import running
@@ -137,7 +146,7 @@ def regenerate(hair, depsgraph):
         if hair_cache.may_make(hair.session_uid) and _is_reweighed(hair, depsgraph):
             return
         bound = pipeline.bind_hair(guide_curves, settings, depsgraph, hair)
-        writing.require_count(hair, len(bound.binding.positions), len(bound.radii))
+        writing.require_count(hair, len(bound.binding.positions), settings.point_count)
         bindings.keep(hair, bound)
         size_fitting.show(hair, bound.settings, bound.fits)
         _follow_simulated(hair)
@@ -154,6 +163,7 @@ def _is_reweighed(hair, depsgraph):
     bound = None if hair_outside.is_wanted(hair) else changed_weights.rebound(hair, depsgraph)
     if bound is None:
         return False
+    strand_thickness.apply(hair, bound)
     bindings.keep(hair, bound)
     hair_cache.follow_where_drawn(hair.session_uid, bound)
     write_soon(hair)
@@ -223,7 +233,9 @@ def is_ahead(hair):
         return False  # `regenerate` handles it
     if bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
-    return bound.styles.read.styles == styles
+    thickness, map_status = strand_thickness.read(hair, bound)
+    is_same = map_status == bound.map_status and bindings.is_same_thickness(thickness, bound.thickness)
+    return is_same and bound.styles.read.styles == styles
 
 
 def write_all(*_args):
@@ -305,7 +317,7 @@ def follow_masks(surfaces, depsgraph):
                 if not staleness.has_other_mask(hair, depsgraph):
                     regenerate(hair, depsgraph)
             elif _restyle(hair, depsgraph):
-                state.status = ""
+                state.status = bindings.of(hair).map_status
         except HairError as error:
             state.status = str(error)
 

@@ -110,15 +110,16 @@ class StrandGenerator:
         bound, binding, known = self.due, self.due.binding, self._binding
         before = self.maker if self.maker is not None and known.positions is binding.positions else None
         axes = bound.surface.to_local_axes
-        self.maker = style_maker.maker_of(binding, bound.styles.styling, len(bound.radii), axes, before)
+        radii = bound.radii
+        self.maker = style_maker.maker_of(binding, bound.styles.styling, radii.shape[-1], axes, before)
         if known is not binding and self.maker is before:
             if known.guide_weights is not binding.guide_weights:
                 self.maker = self.maker.weighed(strand_maker.bound_strands(binding))
             self.maker = self.maker.limited(binding.limits.fading, binding.keep_length)
         self._binding = binding
         # If only points have moved, the radii are those of the datablock, which others may have changed.
-        if not bound.has_moved_only and not attributes.repeats(cached.radii.ravel(), bound.radii):
-            cached.radii = np.broadcast_to(bound.radii, cached.radii.shape)
+        if not bound.has_moved_only and not attributes.are_radii(cached.radii.ravel(), radii):
+            cached.radii = np.broadcast_to(radii, cached.radii.shape)
             cached.on_gpu = strand_textures.with_radii(cached.on_gpu, cached.radii)
         wetness = bound.styles.wetness
         if not are_equal(cached.wetness, wetness):
@@ -179,4 +180,4 @@ def _followed(bound):
 def _programs_of(bound, styles):
     """Programs that make the strands of `BoundHair` with the styles of a `StyledHair`."""
     slot_count = bound.binding.guide_weights.indices.shape[1]
-    return style_maker.programs_of(styles.styling, slot_count, len(bound.radii))
+    return style_maker.programs_of(styles.styling, slot_count, bound.settings.point_count)

@@ -18,10 +18,10 @@ from ...core.kernels.checks import require_count, require_indices
 from ...core.shading import appearance, strand_looks
 from ...core.shading.strand_looks import StrandLooks
 from ...core.shading.tables import look_tables, lookup_tables, strand_tables
-from ..data.maps import sources, strand_maps
+from ..data.maps import strand_maps
 from ..data.strands import attributes, curves, posed_strands, simulated_guides, stored_roots
 from ..gpu import hair_shading, strand_textures
-from ..groom import bindings
+from ..groom import bindings, strand_thickness
 from ..host import notices, paths
 from ..host.caches import Cache
 from ..settings import preferences, properties, shared_wetness
@@ -334,28 +334,18 @@ def _read(datablock, bound, shown):
 
 def _unwritten_looks(datablock, bound):
     """The `StrandLooks` of bound hair that is not written yet."""
-    clumps = bound.styles.clumps
-    identities, randoms = bound.binding.identities
-    strands = sources.Strands(
-        datablock,
-        datablock.surface,
-        bound.surface,
-        bound.binding.roots,
-        identities,
-        randoms,
-        None if clumps is None else clumps[0],
-    )
-    return strand_maps.looks_of(datablock, strands)[0]
+    return strand_maps.looks_of(datablock, strand_thickness.strands_of(datablock, bound))[0]
 
 
 def _radii_of(datablock, bound, count):
     """(S, P) radii of bound hair; those of its datablock, which others may have changed, unless it has newer ones."""
-    shape = count, len(bound.radii)
+    radii = bound.radii
+    shape = count, radii.shape[-1]
     if bound.is_written or bound.has_moved_only:
         stored = curves.read_radii(datablock)
-        if not attributes.repeats(stored, bound.radii):
+        if not attributes.are_radii(stored, radii):
             return stored.reshape(shape)
-    return np.broadcast_to(bound.radii, shape)
+    return np.broadcast_to(radii, shape)
 
 
 def _shown_strands(datablock):

@@ -208,6 +208,7 @@ class HairSettings(Settings):
         unit="LENGTH",
         precision=6,
         diameter=("thickness", "Diameter of a strand at its root"),
+        may_vary=True,
     )
     tip_taper: float = param(
         0.2,

@@ -5,11 +5,12 @@ from functools import cache
 from typing import Any
 
 from ..errors import HairError
+from ..grooming.groom import HairSettings
 from ..params import Param, Settings, declared
 from ..shading.appearance import COLOR_FIELDS, Appearance
 from . import map_settings
 
-SECTIONS = {"look": Appearance}  # sections of settings files: their settings
+SECTIONS = {"look": Appearance, "strands": HairSettings}  # first parts of the names of settings: their settings
 
 # Way to set the color that a setting needs.
 _PARAMETRIZATION = {f"look.{name}": way for way, names in COLOR_FIELDS.items() for name in names}
@@ -17,9 +18,12 @@ _PARAMETRIZATION = {f"look.{name}": way for way, names in COLOR_FIELDS.items() f
 
 @cache
 def all_varied() -> dict[str, tuple[Any, Param]]:
-    """Return {"section.setting": (default, its `Param`)} of all settings that may vary."""
+    """Return {"section.setting": (default, its `Param`)} of all settings that may vary.
+
+    A radius has the name of its diameter, as panels show it: "strands.thickness".
+    """
     return {
-        f"{section}.{name}": (default, details)
+        f"{section}.{details.diameter[0] if details.diameter else name}": (default, details)
         for section, settings_class in SECTIONS.items()
         for name, default, details in declared(settings_class)
         if details.may_vary
@@ -28,8 +32,10 @@ def all_varied() -> dict[str, tuple[Any, Param]]:
 
 def name_of(settings_class: type[Settings], name: str) -> str:
     """Return "section.setting" of a class's setting; "" if no map can vary it."""
-    found = next((section for section, known in SECTIONS.items() if known is settings_class), "")
-    return f"{found}.{name}" if f"{found}.{name}" in all_varied() else ""
+    section = next((section for section, known in SECTIONS.items() if known is settings_class), "")
+    details = next(details for its_name, _default, details in declared(settings_class) if its_name == name)
+    found = f"{section}.{details.diameter[0] if details.diameter else name}"
+    return found if found in all_varied() else ""
 
 
 def require_varied(setting: str) -> None:

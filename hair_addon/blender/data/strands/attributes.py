@@ -115,6 +115,11 @@ def repeats(values, row):
     return all(np.array_equal(part, some[: len(part)]) for part in parts)
 
 
+def are_radii(values, radii):
+    """Whether values (N,) are radii (P,) that all strands have, or (S, P) of each."""
+    return repeats(values, radii) if radii.ndim == 1 else np.array_equal(values, radii.ravel())
+
+
 def valid_radii(radii):
     """Radii with negative and excessive values replaced by Blender's default."""
     return np.where((radii >= 0.0) & (radii <= notices.LARGEST), radii, np.float32(RADIUS))

@@ -32,24 +32,26 @@ def _write_positions(curves, points):
 
 
 def _write_radii(curves, radii):
-    """Write the same radii (P,) along every strand, unless they are unchanged."""
+    """Write radii (P,) of every strand or (S, P) of each, unless they are unchanged."""
     radii, present = np.asarray(radii, np.float32), attributes.read(curves, "radius", "FLOAT", "POINT")
-    if present is not None and attributes.repeats(present, radii):
+    if present is not None and attributes.are_radii(present, radii):
         return
-    attributes.write(curves, "radius", "FLOAT", "POINT", np.tile(radii, len(curves.curves)))
+    values = np.tile(radii, len(curves.curves)) if radii.ndim == 1 else radii.ravel()
+    attributes.write(curves, "radius", "FLOAT", "POINT", values)
 
 
 def make_strands(curves, surface, roots, radii, identities, *, leaders=None, normals=None):
     """Resize the curves for strands, and write everything except their points.
 
-    roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; identities: from `Surface.identities`;
+    roots: `SurfacePoints` (S,); radii: (P,) of all strands or (S, P), in local coordinates; identities: from
+    `Surface.identities`;
     leaders: (S,) int32, the strand that represents the guide of each strand; None for guides;
     normals: (S, 3) float32 of the surface at the roots, if known.
     Returns the `Surface` that the roots are stored on, like `write_roots`.
     """
     if len(roots) == 0:
         raise ValueError("no strands: an empty list of curves would crash Blender")
-    _resize(curves, len(roots), len(radii))
+    _resize(curves, len(roots), np.shape(radii)[-1])
     _write_radii(curves, radii)
     if leaders is not None:
         # Blender's hair nodes clump, curl and braid strands around this curve.

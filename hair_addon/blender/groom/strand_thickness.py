@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Factors of the radii of bound hair by the map of *Thickness*."""
+
+import numpy as np
+from bpy.types import Curves
+
+from ...core.errors import HairError
+from ...core.maps import combination
+from ...core.params import Param
+from ..data.maps import sources
+from ..settings import map_items
+from .bindings import BoundHair
+
+SETTING = "strands.thickness"
+
+_FACTOR = Param("", low=0.0, high=1e3)
+
+
+def strands_of(hair: Curves, bound: BoundHair) -> sources.Strands:
+    """The `Strands` of bound hair, which may be unwritten, for its maps."""
+    clumps = bound.styles.clumps
+    identities, randoms = bound.binding.identities
+    return sources.Strands(
+        hair,
+        hair.surface,
+        bound.surface,
+        bound.binding.roots,
+        identities,
+        randoms,
+        None if clumps is None else clumps[0],
+    )
+
+
+def read(hair: Curves, bound: BoundHair) -> tuple[np.ndarray | None, str]:
+    """(factors (S,) float32 of radii, a sentence about a missing source); None without a map."""
+    item = map_items.item_of(hair.vellus, SETTING)
+    if item is None or not map_items.is_set(item):
+        return None, ""
+    try:
+        settings = map_items.settings_of(item)
+        mask = sources.masks(strands_of(hair, bound), settings, item.image)
+    except HairError as error:
+        return None, str(error)
+    return combination.varied_number(1.0, mask, settings.combination, _FACTOR).astype(np.float32), ""
+
+
+def apply(hair: Curves, bound: BoundHair) -> None:
+    """Give bound hair the thickness that the map of its Curves has now."""
+    bound.thicken(*read(hair, bound))
