@@ -392,7 +392,8 @@ def _is_restyled(target, depsgraph):
     if not restyle(target, depsgraph):
         return False
     writing.write_hair(target)
-    target.vellus.status = bindings.of(target).map_status
+    bound = bindings.of(target)
+    target.vellus.status = "" if bound is None else bound.map_status
     return True
 
 
