@@ -92,7 +92,7 @@ def rows(layout, owner, settings_class, names):
     for name, _default, details in declared(settings_class):
         if name in names:
             varied = varied_settings.name_of(settings_class, name) if details.may_vary else ""
-            is_stored = varied != "" and isinstance(owner.id_data, bpy.types.Curves)  # not in redo panels
+            is_stored = varied != "" and isinstance(getattr(owner, "id_data", None), bpy.types.Curves)  # not redo
             row(layout, owner, details.diameter[0] if details.diameter else name, name, varied if is_stored else "")
 
 
