@@ -7,7 +7,6 @@ import os
 
 import numpy as np
 import pytest
-from hypothesis.internal.conjecture import providers
 
 from hair_addon.core.kernels import compiled_kernels
 from tests.support.devices import DEVICE
@@ -49,12 +48,7 @@ def pytest_collection():
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Begin with the files that take longest.
-
-    Hypothesis does not look for numbers in the sources of all loaded modules, which takes seconds: the examples of a
-    test would depend on what other tests load.
-    """
-    providers._get_local_constants = lambda: providers._local_constants
+    """Begin with the files that take longest."""
     items.sort(key=lambda item: item.path.name not in LONG_FILES)
 
 
