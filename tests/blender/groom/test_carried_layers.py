@@ -94,6 +94,19 @@ def test_change_guide_count_carries_layers(layered):
     assert api.layers(layered) == {"Combing": 0.5, "Side": 1.0}
 
 
+def test_first_layer_keeps_guides_that_were_added(hair):
+    """Settings that grow another number of guides grow no base: the guides count as combed, with all their points."""
+    guides = bpy.data.objects["Guides"]
+    api.change_guides(guides, "COUNT", method="COUNT", guide_count=2 * len(guides.data.curves))
+    update()
+    before = points(guides)
+    api.add_layer(guides)
+    update()
+    np.testing.assert_array_equal(points(guides), before)
+    assert curves.is_combed(guides.data)
+    np.testing.assert_array_equal(weigh(guides, 0.0), before)
+
+
 def test_another_guide_count_carries_each_layer(layered):
     """The setting from 60 to 150 and back to 60: each layer is off by 2 % of the length in the median."""
     weights = (1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)

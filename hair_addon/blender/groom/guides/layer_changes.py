@@ -22,13 +22,14 @@ from .. import grown_guides, read_surfaces, size_fitting
 def add(guides: Curves, depsgraph: Depsgraph, name: str = "") -> str:
     """Add an empty layer above the active one; returns its name. Raises `HairError` before anything changes.
 
-    The first layer takes the combing of guides that settings have grown.
+    The first layer takes the combing of guides that settings have grown. Guides that were added or removed since then
+    are the base as they are: settings no longer grow them.
     """
     _require_guides(guides)
     state = guides.vellus
     if not len(state.layers):
         points = curves.read_points(guides)
-        is_grown = not curves.is_hand_made(guides)
+        is_grown = not curves.is_hand_made(guides) and len(guides.curves) == state.guides.guide_count
         base = _grown_base(guides, depsgraph) if is_grown and curves.is_combed(guides) else points
         recording.begin(guides, base, is_grown)
         _added(guides, name or layer_items.FIRST_NAME, 0)
