@@ -24,6 +24,7 @@ TOOLS = {
     "LIFT": guide_tool_settings.LiftSettings,
     "ATTRACT": guide_tool_settings.AttractSettings,
     "DRAPE": guide_tool_settings.DrapeSettings,
+    "OUTSIDE": guide_tool_settings.OutsideSettings,
 }
 
 
@@ -34,9 +35,9 @@ def change_guides(
 
     For "MIRROR" the number of mirrored guides is returned, for "COUNT" the new number of guides.
 
-    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT", "ATTRACT" or "DRAPE"; settings: of the tool,
-    from core/grooming/guide_tool_settings.py; changes: its fields by name. Hair follows at the next update of the view
-    layer.
+    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT", "ATTRACT", "DRAPE" or "OUTSIDE"; settings: of
+    the tool, from core/grooming/guide_tool_settings.py; changes: its fields by name. Hair follows at the next update of
+    the view layer.
 
     >>> guides = bpy.data.objects["Guides"]
     >>> api.change_guides(guides, "LENGTH", method="MAXIMUM", length=0.2)
@@ -60,5 +61,6 @@ def change_guides(
         "LIFT": tools.lift,
         "ATTRACT": tools.attract,
         "DRAPE": blender.groom.dynamics.guide_draping.drape,
+        "OUTSIDE": blender.groom.guides.outside_guides.push,
     }
     return functions[tool](target, wanted, depsgraph)

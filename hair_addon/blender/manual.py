@@ -29,7 +29,7 @@ _CLASSES = {
 _PROPERTIES = {"model": "shading", "is_drawn": "shading", "viewport_percentage": "shading"}
 _PROPERTIES |= {"table_folder": "lookup_tables", "simulates": "dynamics", "cache_folder": "dynamics"}
 _PROPERTIES |= {"show_guides": "systems", "guide_colors": "systems", "guide_opacity": "systems"}
-_PROPERTIES |= {"shows_styles_while_combing": "surface", "style": "styles"}
+_PROPERTIES |= {"shows_styles_while_combing": "surface", "keeps_outside": "surface", "style": "styles"}
 
 # Page → the operators that it explains, a heading each.
 _OPERATORS = {
@@ -46,7 +46,7 @@ _OPERATORS = {
     ),
     "guide_tools": (
         *("guide_length", "trim_guides", "change_guide_count", "mirror_guides", "copy_guide_shape"),
-        *("smooth_guides", "lift_guides", "attract_guides", "drape_guides"),
+        *("smooth_guides", "lift_guides", "attract_guides", "drape_guides", "push_outside"),
     ),
     "strands": ("interpolate_hair", "draw_parting", "update_hair"),
     "dynamics": (

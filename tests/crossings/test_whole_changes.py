@@ -177,7 +177,7 @@ OTHERS = {
     *("add_layer", "apply_layers", "duplicate_layer", "merge_layer_down", "move_layer", "remove_layer"),
     *("change_guide_count", "check_uvs", "comb_guides", "copy_guide_shape", "delete_hair", "delete_system"),
     *("deliver_dynamics", "drape_guides", "edit_map", "flip_normals", "free_dynamics", "freeze_selected"),
-    *("guide_length", "invert_frozen", "lift_guides", "remove_map", "unfreeze_all"),
+    *("guide_length", "invert_frozen", "lift_guides", "push_outside", "remove_map", "unfreeze_all"),
     *("load_groom_settings", "mirror_guides", "move_style", "pick_hair", "play_dynamics", "remove_delivery"),
     *("remove_look", "remove_style", "remove_style_preset", "render_picture", "save_look", "save_style_preset"),
     *("select_guides", "select_hair", "smooth_guides", "stiffen_dynamics", "toggle_drawing", "trim_guides"),

@@ -7,7 +7,7 @@ After an event nothing is drawn or computed from values that were cached before 
 from ..data.maps import image_pixels
 from ..data.pictures import root_colors
 from ..gpu import world_texture
-from ..groom.guides import guide_states
+from ..groom.guides import guide_states, outside_guides
 from ..render import hair_cache, modified_hair
 from ..render.viewport import viewport
 
@@ -41,7 +41,8 @@ def strands_made(datablock):
 
 
 def surface_moved(surface_object):
-    """A surface may be deformed: invalidate its pose, which places strands."""
+    """A surface may be deformed: invalidate its pose, which places strands and keeps guides outside."""
+    outside_guides.barrier_cache.clear()
     hair_cache.invalidate_pose(surface_object)
 
 

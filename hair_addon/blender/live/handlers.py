@@ -104,7 +104,8 @@ def after_depsgraph_update(scene, depsgraph):
         if isinstance(datablock, bpy.types.Curves):
             events.curves_reported(datablock)
             if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):
-                combed[datablock] = stroke_limits.limited(datablock, reported.points_of(datablock))
+                combed[datablock] = stroke_limits.limited(datablock, reported.points_of(datablock), depsgraph)
+    stroke_limits.begin({u.datablock for u in reports if u.is_of(bpy.types.Object)} - {None})
     for hair in _of_kind("HAIR"):
         if hair.vellus.is_stale and hair.vellus.is_live:
             hidden_previews.hair_changed(hair, is_seen)

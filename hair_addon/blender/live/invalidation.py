@@ -13,7 +13,7 @@ from ..gpu import light_grid, lights, solid_shading, studio_lights, surface_shad
 from ..gpu.programs import shaders
 from ..groom import bindings, followed_names, frame_faces, hidden_hair
 from ..groom.dynamics import frame_folders, guide_simulation
-from ..groom.guides import guide_states
+from ..groom.guides import guide_states, outside_guides
 from ..groom.surfaces import edited_faces
 from ..groom.systems import copied_hair
 from ..host import notices
@@ -32,6 +32,7 @@ COPIES = (
     bindings.binding_cache,
     bindings.kept_cache,
     guide_states.state_cache,
+    outside_guides.barrier_cache,
     root_colors.sample_cache,
     world_texture.light_cache,
     lights.frame_cache,

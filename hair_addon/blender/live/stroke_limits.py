@@ -1,32 +1,48 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limits of strokes: after each event, frozen points of combed guides return to where they were."""
+"""Limits of strokes: after each event frozen points return to where they were, and guides stay outside the surface."""
 
 import bpy
 
 from ..data.strands import attributes, curves, frozen_points
+from ..groom.guides import outside_guides
 from ..layers import recording
 from . import reported
 
 _MODES = {"SCULPT_CURVES", "EDIT"}
 
 
-def limited(guides, points):
-    """Restore frozen points of combed guides; returns all points (N, 3), which are `points` if none has moved."""
-    if not _is_edited(guides):
+def begin(objects):
+    """Note the points of guides among objects that entered a mode in which they are combed, before the first stroke."""
+    for guides in {o.data for o in objects if o.type == "CURVES" and o.mode in _MODES}:
+        if guides.vellus.kind == "GUIDES" and reported.points_of(guides) is None:
+            reported.note_points(guides, curves.read_points(guides))
+
+
+def limited(guides, points, depsgraph):
+    """Return the points (N, 3) of combed guides within the limits, which are written; `points` if none is moved."""
+    former = reported.former_points_of(guides)
+    if former is None or not _is_edited(guides):
         return points
-    restored = frozen_points.restored(guides, reported.former_points_of(guides), points)
-    if restored is points:
+    allowed = frozen_points.restored(guides, former, points)
+    if guides.vellus.keeps_outside:
+        pushed = outside_guides.pushed_out(guides, former, allowed, depsgraph)
+        allowed = frozen_points.restored(guides, former, pushed)
+    if allowed is points:
         return points
-    attributes.write(guides, "position", "FLOAT_VECTOR", "POINT", restored)
+    attributes.write(guides, "position", "FLOAT_VECTOR", "POINT", allowed)
     guides.update_tag()
-    reported.note_points(guides, restored)
-    return restored
+    reported.note_points(guides, allowed)
+    return allowed
 
 
 def _is_edited(guides):
-    """Whether an artist edits guides, and neither settings nor layers have just moved them."""
-    if attributes.is_from_library(guides) or frozen_points.FROZEN not in guides.attributes:
+    """Whether an artist edits guides that are limited, and neither settings nor layers have just moved them."""
+    if not guides.vellus.keeps_outside and frozen_points.FROZEN not in guides.attributes:
+        return False
+    if attributes.is_from_library(guides):
         return False
     if not any(user.data == guides and user.mode in _MODES for user in bpy.data.objects):
         return False
-    return recording.is_edited(guides) if len(guides.vellus.layers) else curves.is_combed(guides)
+    if len(guides.vellus.layers):
+        return recording.is_edited(guides)
+    return curves.is_hand_made(guides) or curves.is_combed(guides)

@@ -4,6 +4,7 @@
 import bpy
 
 from ...core.errors import HairError
+from ...core.grooming.guide_layers import LEAST_WEIGHT
 from ..host.notices import text_of
 from . import style_items, style_keys
 from .marks import mark_shown
@@ -11,7 +12,6 @@ from .translations import CONTEXT
 
 FIRST_NAME = "Combing"
 MOST_LAYERS = 32
-LEAST_WEIGHT = 0.01  # of layers that can be combed
 
 
 def _renamed(item, name, present, _is_set):

@@ -252,6 +252,13 @@ class VellusCurves(bpy.types.PropertyGroup):
         default=True,
         update=mark_shown,
     )
+    keeps_outside: bpy.props.BoolProperty(
+        name="Keep Outside",
+        description="Keep combed guides outside of the surface as it is posed: strokes and edits push their points out",
+        translation_context=CONTEXT,
+        default=True,
+        options=_NOT_KEYED,
+    )
     is_live: bpy.props.BoolProperty(
         name="Auto Update",
         description="Update automatically when settings or inputs change",

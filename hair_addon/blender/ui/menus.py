@@ -18,6 +18,7 @@ _GUIDE_TOOLS = (
         ("lift_guides", "SORT_DESC"),
         ("attract_guides", "SNAP_ON"),
         ("drape_guides", "FORCE_FORCE"),
+        ("push_outside", "MOD_SHRINKWRAP"),
     ),
     (
         ("change_guide_count", "PARTICLES"),

@@ -8,7 +8,6 @@ import numpy as np
 import warp as wp
 
 from ..errors import HairError
-from ..geometry import closest_point
 from ..geometry.mesh import TriMesh
 from .collision import closed_parts
 from .rod import rotations
@@ -41,7 +40,10 @@ def draped(
     cancel; wetness: as in `Simulation`. Raises `HairError`, also if the surface is unusable as a collider.
     """
     pose = RootPose(np.asarray(points[:, 0], np.float64), np.tile(rotations.IDENTITY, (len(points), 1)))
-    vertices, triangles = mesh.vertices.astype(np.float64), _facing(mesh, points)
+    vertices, triangles = (
+        mesh.vertices.astype(np.float64),
+        closed_parts.facing_strands(mesh, points[:, 0], points[:, 1]),
+    )
     surface = Obstacle("surface", vertices, triangles, settings.friction, settings.collision_distance)
     world = World(gravity, (surface,))
     falling = replace(
@@ -68,12 +70,3 @@ def draped(
             break
         before = after
     return simulation.points()
-
-
-def _facing(mesh, points):
-    """Return the triangles (F, 3) of a mesh; open parts are wound so that the hair (G, P, 3) is in front of them."""
-    parts = closed_parts.open_parts(mesh)
-    if (parts < 0).all():
-        return mesh.triangles
-    nearest = closest_point.SurfaceQuery(mesh).nearest(points[:, 0])
-    return closed_parts.facing_hair(mesh, parts, mesh.triangles[nearest.triangle], points[:, 1] - points[:, 0])

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands between simulated guides, kept outside the guides' colliders.
+"""Strands kept outside of meshes: hair between simulated guides, and guides that are combed.
 
-Guides are outside, but their weighted sums may pass through a collider between them. From root to tip, each point that
-is inside is moved to the closest place outside; the following points move along and return gradually, so that strands
-keep their shape and almost their length. Strands that are outside stay bit-identical.
+Simulated guides are outside, but their weighted sums may pass through a collider between them; strokes may push guides
+into the surface. From root to tip, each point that is inside is moved to the closest place outside; the following
+points move along and return gradually, so that strands keep their shape and almost their length. Strands that are
+outside stay bit-identical.
 """
 
 from collections.abc import Sequence
@@ -24,10 +25,15 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _RETURN = wp.constant(0.15)  # fraction of the way back to the original path, per segment
 _ROUNDS = wp.constant(3)  # of moving a point out, and back to its distance from the previous point
+_TURNS = wp.constant(8)  # further turns of a segment outwards, where a mesh is concave
+_TURN = wp.constant(0.3)  # of a segment's length, by which each of them moves its end
 _PUSHES = wp.constant(4)  # further moves out, for notches of a mesh
 _AHEAD = wp.constant(1.0)  # additional search radius in segments, which saves later queries
+_FAR = wp.constant(1e6)  # [m]
 _PER_CELL = 16  # points for each cell of the grid of distances
 _NEAR = wp.constant(1e-6)  # tolerance of distances [m]
+
+_NON_FINITE = "Strands to keep outside need points with finite coordinates."
 
 
 def moved_outside(
@@ -39,29 +45,55 @@ def moved_outside(
     Raises `HairError` for non-finite points.
     """
     points = np.asarray(points, np.float64)
-    if not np.isfinite(points).all():
-        raise HairError("Strands to keep outside need points with finite coordinates.")
-    colliders = Colliders(wp.get_device(device))
     origin = points[:, :1].reshape(-1, 3).mean(axis=0) if points.size else np.zeros(3)
-    colliders.read([obstacle.seen_from(origin) for obstacle in obstacles])
-    is_moved = np.zeros(len(points), bool)
-    if colliders.mesh is None or not points.size:
-        return points, is_moved
-    # Rows of whole strands: broadcasting over three numbers takes three times as long.
-    offsets = points.reshape(len(points), -1) - np.tile(origin, points.shape[1])
-    original = wp.array(offsets.astype(np.float32).reshape(points.shape), dtype=wp.vec3, device=colliders.device)
-    out = wp.empty_like(original)
-    moved = wp.zeros(len(points), dtype=int, device=colliders.device)
-    inputs = [Rows(original), _surface_of(colliders), _grid_of(colliders, points.size // 3)]
-    parallel.launch(_keep_outside, len(points), inputs, [out, moved], colliders.device, least_rows=256)
-    is_moved = moved.numpy() != 0
-    if not is_moved.any():
-        return points, is_moved
-    before, after = original.numpy()[is_moved], out.numpy()[is_moved]
-    is_same = (after == before).all(axis=2)[..., None]
-    corrected = points.copy()
-    corrected[is_moved] = np.where(is_same, points[is_moved], after + origin)
-    return corrected, is_moved
+    if not np.isfinite(origin).all():
+        raise HairError(_NON_FINITE)
+    return Barrier(obstacles, origin, points.size // 3, device).moved(points)
+
+
+class Barrier:
+    """Obstacles at rest that strands are moved out of, prepared once for any number of calls."""
+
+    def __init__(
+        self, obstacles: Sequence[Obstacle], origin: np.ndarray, point_count: int, device: wp.DeviceLike = None
+    ) -> None:
+        """obstacles: as for `moved_outside`; origin: (3,) [m] near the strands; point_count: of a typical call."""
+        self._origin = np.asarray(origin, np.float64)
+        self._colliders = Colliders(wp.get_device(device))
+        self._colliders.read([obstacle.seen_from(self._origin) for obstacle in obstacles])
+        if self._colliders.mesh is not None:
+            self._surface, self._grid = _surface_of(self._colliders), _grid_of(self._colliders, point_count)
+
+    def moved(self, points: np.ndarray, held: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Move strands (S, P, 3) [m] out of the obstacles; returns as `moved_outside`.
+
+        held: (S,) number of points from the root that do not move, at least 1; None for the root alone. Raises
+        `HairError` for non-finite points.
+        """
+        points = np.asarray(points, np.float64)
+        if not np.isfinite(points).all():
+            raise HairError(_NON_FINITE)
+        is_moved = np.zeros(len(points), bool)
+        if self._colliders.mesh is None or not points.size:
+            return points, is_moved
+        device = self._colliders.device
+        # Rows of whole strands: broadcasting over three numbers takes three times as long.
+        offsets = points.reshape(len(points), -1) - np.tile(self._origin, points.shape[1])
+        original = wp.array(offsets.astype(np.float32).reshape(points.shape), dtype=wp.vec3, device=device)
+        held = np.ones(len(points), np.int32) if held is None else np.asarray(held, np.int32)
+        first_moved = wp.array(np.clip(held, 1, points.shape[1]), dtype=int, device=device)
+        out = wp.empty_like(original)
+        moved = wp.zeros(len(points), dtype=int, device=device)
+        inputs = [Rows(original), Rows(first_moved), self._surface, self._grid]
+        parallel.launch(_keep_outside, len(points), inputs, [out, moved], device, least_rows=256)
+        is_moved = moved.numpy() != 0
+        if not is_moved.any():
+            return points, is_moved
+        before, after = original.numpy()[is_moved], out.numpy()[is_moved]
+        is_same = (after == before).all(axis=2)[..., None]
+        corrected = points.copy()
+        corrected[is_moved] = np.where(is_same, points[is_moved], after + self._origin)
+        return corrected, is_moved
 
 
 def _grid_of(colliders, point_count):
@@ -94,6 +126,7 @@ def _lack(surface: Surface, place: wp.vec3, radius: float):
 @wp.kernel
 def _keep_outside(
     points: wp.array2d[wp.vec3],
+    first_moved: wp.array[int],
     surface: Surface,
     grid: DistanceGrid,
     # outputs
@@ -105,8 +138,12 @@ def _keep_outside(
     out_points[strand, 0] = last
     is_moved = int(0)
     clear = float(0.0)  # distance that can be travelled before a surface may be near
-    for i in range(1, points.shape[1]):
+    for i in range(1, first_moved[strand]):
+        last = points[strand, i]
+        out_points[strand, i] = last
+    for i in range(first_moved[strand], points.shape[1]):
         before = points[strand, i - 1]
+        last_but_one = out_points[strand, wp.max(i - 2, 0)]
         way = points[strand, i] - before
         size = wp.length(way)
         place = points[strand, i]
@@ -124,13 +161,20 @@ def _keep_outside(
             gap = float(0.0)
             # The previous point is outside: a surface between the two is no farther than their distance.
             radius = _AHEAD * size + step_size + surface.largest_distance
-            for step in range(_ROUNDS + _PUSHES):
+            if i == first_moved[strand]:  # points that do not move may be inside
+                radius = _FAR
+            for step in range(_ROUNDS + _TURNS + 1 + _PUSHES):
                 if lack > _NEAR:
                     out, lack, gap = _lack(surface, place, radius)
                     if lack > _NEAR:
                         is_moved = 1
-                        place += lack * out
-                        if step < _ROUNDS:
+                        if step < _ROUNDS or step > _ROUNDS + _TURNS:
+                            place += lack * out
+                        elif step < _ROUNDS + _TURNS:
+                            place += _TURN * size * out
+                        else:  # the notch is narrower than the segment, which turns back
+                            place = last_but_one
+                        if step <= _ROUNDS + _TURNS:
                             place = last + size * wp.normalize(place - last)
             clear = gap - surface.largest_distance
         out_points[strand, i] = place

@@ -138,6 +138,21 @@ class AttractSettings(ToolSettings):
 
 
 @dataclass(frozen=True)
+class OutsideSettings(ToolSettings):
+    """Settings for pushing guides out of the surface."""
+
+    clearance: float = param(
+        0.0,
+        "Distance from the surface that guides keep at least",
+        low=0.0,
+        high=1e3,
+        soft_high=0.1,
+        unit="LENGTH",
+        subtype="DISTANCE",
+    )
+
+
+@dataclass(frozen=True)
 class CountSettings(ToolSettings):
     """Settings for changing the number of guides."""
 

@@ -16,6 +16,7 @@ SELECTED = ".selection"
 def guides(hair):
     """Guides in Sculpt Mode; of the even ones all points are frozen, of the third the first half."""
     found = bpy.data.objects["Guides"]
+    found.data.vellus.keeps_outside = False
     bpy.context.view_layer.objects.active = found
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     selection = np.zeros(points(found).shape[:2], bool)

@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.dynamics.outside import moved_outside
+from hair_addon.core.dynamics.outside import Barrier, moved_outside
 from hair_addon.core.dynamics.simulation import Obstacle
 from hair_addon.core.errors import HairError
-from tests.support.meshes import subdivided_sphere
+from tests.support.meshes import HEAD, read_obj, subdivided_sphere
 
 RADIUS, DISTANCE = 0.02, 1e-3
 
@@ -74,3 +74,25 @@ def test_points_that_are_not_finite_are_refused(ball, strands, device):
     strands[3, 4, 1] = np.nan
     with pytest.raises(HairError, match="finite"):
         moved_outside(strands, [ball], device)
+
+
+def test_segments_keep_their_lengths_in_notches(rng, device):
+    """Strands that start anywhere on a head and turn into it, among eye sockets and ears."""
+    head = read_obj(HEAD)
+    corners = head.corners[rng.choice(np.flatnonzero(head.corners[:, :, 2].min(axis=1) > 0.66), 300)]
+    roots = corners.mean(axis=1)
+    inward = -np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    steps = np.linspace(-1.0, 2.0, 24)[None, :, None] * inward[:, None] + 0.5 * rng.normal(size=(300, 24, 3))
+    steps *= 0.005 / np.linalg.norm(steps, axis=2, keepdims=True)
+    strands = np.concatenate([roots[:, None], roots[:, None] + np.cumsum(steps, axis=1)], axis=1)
+    obstacle = Obstacle("Head", head.vertices.astype(np.float64), head.triangles, distance=1e-4)
+    barrier = Barrier([obstacle], roots.mean(axis=0), strands.shape[0] * strands.shape[1], device)
+    kept, is_moved = barrier.moved(strands)
+    assert is_moved.sum() > 50
+    errors = np.abs(lengths(kept) / lengths(strands) - 1.0)
+    assert np.quantile(errors, 0.999) < 1e-4 and errors.max() < 0.02  # beside a root in a notch
+    again, is_inside = barrier.moved(kept)
+    assert is_inside.sum() <= 3 and np.abs(again - kept).max() < 1e-4  # rounding at the distance that points keep
+    held = np.full(300, 5)
+    np.testing.assert_array_equal(barrier.moved(strands, held)[0][:, :5], strands[:, :5])

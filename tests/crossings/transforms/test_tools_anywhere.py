@@ -19,7 +19,8 @@ TOOLS = {(tool,): values for tool, values in SHAPING.items()} | {
     ("change_guide_count", "fewer"): {"factor": 0.5},
     ("change_guide_count", "more"): {"factor": 2.0},
 }
-SIZED = {"attract_guides": ["clearance"]}  # values in metres, fitted to the surface's size
+# Values in metres, fitted to the size of the surface.
+SIZED = {"attract_guides": ["clearance"], "push_outside": ["clearance"]}
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,7 @@ from tests.support.walk.walk_styles import StyleSteps
 
 GUIDE_COUNT, STRAND_COUNT = 12, 40
 GUIDE_TOOLS = ["guide_length", "trim_guides", "change_guide_count", "mirror_guides", "copy_guide_shape"]
-GUIDE_TOOLS += ["smooth_guides", "lift_guides", "attract_guides"]
+GUIDE_TOOLS += ["smooth_guides", "lift_guides", "attract_guides", "push_outside"]
 
 
 class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         guide_tools,
         layer_changes,
         line_drawing,
+        outside_guides,
     )
 else:
     __getattr__ = submodules(__name__)

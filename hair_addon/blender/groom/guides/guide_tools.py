@@ -89,6 +89,15 @@ class CombedGuides:
         some = tuple(part[chosen] for part in places)
         return self.surface.from_local(posed_strands.carried(self.surface.to_local(posed), motion, some, is_back=True))
 
+    def posed_of(self, chosen: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Return points (M, P, 3) float32 [m] of chosen guides on the deformed surface; places: from `of_count`."""
+        pose = posed_strands.pose_of(self.surface)
+        if not pose.is_deformed:
+            return self.points[places]
+        roots = self.surface.places(self.roots)
+        some = tuple(part[chosen] for part in roots)
+        return self.surface.from_local(posed_strands.carried(self.local[places], pose.motion_at(roots[0]), some))
+
     def posed(self) -> np.ndarray:
         """(N, 3) float32 [m] points on the surface deformed by shape keys and modifiers."""
         pose = posed_strands.pose_of(self.surface)
@@ -103,6 +112,11 @@ def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
     """Return the `CombedGuides` of guide Curves, all with weight one. Raises `HairError` if they cannot be read."""
     surface = scene.read_surface(datablock.surface, depsgraph)
     mesh_math.check_mesh(surface.mesh)
+    return on_surface(datablock, surface)
+
+
+def on_surface(datablock: Curves, surface: Surface) -> CombedGuides:
+    """Return the `CombedGuides` of guide Curves on a checked `Surface`; otherwise as `open_guides`."""
     starts = curves.curve_offsets(datablock).astype(np.int64)
     if len(starts) < 2:
         raise HairError('"{name}" has no guides: generate guides first.', name=name_of(datablock))

@@ -11,6 +11,7 @@ from ....core.grooming.guide_tool_settings import (
     LengthSettings,
     LiftSettings,
     MirrorSettings,
+    OutsideSettings,
     SmoothSettings,
     ToolSettings,
     TrimSettings,
@@ -18,7 +19,7 @@ from ....core.grooming.guide_tool_settings import (
 from ....core.params import declared
 from ...data import scene
 from ...groom.dynamics import guide_draping
-from ...groom.guides import guide_additions, guide_tools
+from ...groom.guides import guide_additions, guide_tools, outside_guides
 from ...groom.selection import guides_of, surface_of
 from ...settings import setting_properties
 from .. import setting_rows
@@ -212,6 +213,18 @@ class VELLUS_OT_lift_guides(GuideTool, bpy.types.Operator):
         return guide_tools.lift(guides, settings, depsgraph)
 
 
+class VELLUS_OT_push_outside(GuideTool, bpy.types.Operator):
+    """Push points of guides that are inside the surface out of it; roots and lengths are kept"""
+
+    bl_idname = "vellus.push_outside"
+    bl_label = "Push Outside"
+    Settings = OutsideSettings
+    __annotations__ = setting_properties.annotations(OutsideSettings)
+
+    def apply(self, guides, settings, depsgraph):
+        return outside_guides.push(guides, settings, depsgraph)
+
+
 _PART = 0.02  # default clearance as a fraction of the guides' length, which fits a surface of any size
 
 
@@ -270,4 +283,5 @@ CLASSES = (
     VELLUS_OT_lift_guides,
     VELLUS_OT_attract_guides,
     VELLUS_OT_drape_guides,
+    VELLUS_OT_push_outside,
 )

@@ -51,7 +51,7 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
             layout.operator("vellus.convert_particles", icon="PARTICLES")
         if parts:
             _draw_tools(layout, context)
-            _draw_comb_styled(layout, context)
+            _draw_combing_settings(layout, context)
 
 
 def _draw_foreign(layout, context):
@@ -81,10 +81,13 @@ def _draw_tools(layout, context):
     column.operator("vellus.delete_hair", icon="TRASH")
 
 
-def _draw_comb_styled(layout, context):
-    """Draw the setting that shows styles while guides are combed."""
+def _draw_combing_settings(layout, context):
+    """Draw what applies while guides are combed: they stay outside, and hair is shown with its styles."""
     hair, guides = hair_of(context.object), guides_of(context.object)
-    if hair is not None and guides is not None and len(hair.vellus.styles):
+    if guides is None:
+        return
+    row(layout, guides.vellus, "keeps_outside")
+    if hair is not None and len(hair.vellus.styles):
         row(layout, guides.vellus, "shows_styles_while_combing")
 
 

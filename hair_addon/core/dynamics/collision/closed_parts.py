@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from ...geometry.closest_point import SurfaceQuery
 from ...geometry.faces.connected_components import connected_components
 from ...geometry.mesh import TriMesh
 
@@ -54,6 +55,18 @@ def facing_hair(mesh: TriMesh, parts: np.ndarray, corners: np.ndarray, ways: np.
     is_behind = np.bincount(part_of_strand[is_on], sines, minlength=parts.max() + 1) < 0.0
     is_turned = (parts >= 0) & is_behind[parts]
     return np.where(is_turned[:, None], triangles[:, [0, 2, 1]], triangles)
+
+
+def facing_strands(mesh: TriMesh, roots: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+    """Return the triangles (F, 3) int32; open parts are wound so that strands are in front of them on average.
+
+    roots, seconds: (S, 3) [m] the first two points of each strand.
+    """
+    parts = open_parts(mesh)
+    if (parts < 0).all():
+        return mesh.triangles
+    nearest = SurfaceQuery(mesh).nearest(roots)
+    return facing_hair(mesh, parts, mesh.triangles[nearest.triangle], seconds - roots)
 
 
 def _unit(vectors):

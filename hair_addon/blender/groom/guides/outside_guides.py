@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides kept outside of their surface as it is posed: after each event of a stroke, and by Push Outside.
+
+Points are pushed out from root to tip; roots and the lengths of segments stay. All surfaces are scaled to the size of a
+head, so that tolerances do not depend on the units of a scene.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from bpy.types import Curves, Depsgraph
+
+from ....core import dynamics, grooming
+from ....core.errors import HairError
+from ....core.geometry import mesh as mesh_math
+from ....core.grooming.guide_tool_settings import OutsideSettings
+from ...data.strands import frozen_points
+from ...data.surfaces import Surface
+from ...host.caches import Cache
+from . import guide_tools
+
+_HEAD = 0.25  # [m] extent that surfaces are scaled to
+_SKIN = 5e-5  # [m] distance of guides from a surface of this extent
+_CELL_POINTS = 65_536  # points of guides that the grid of distances is made for
+
+# session_uid of guide Curves → `_Barrier` of their surface in its present pose.
+barrier_cache = Cache(capacity=8)
+
+
+@dataclass(frozen=True)
+class _Barrier:
+    """The posed surface of guides, prepared for pushing; key: of the surface and its transform."""
+
+    key: tuple
+    surface: Surface
+    barrier: "dynamics.outside.Barrier"
+    factor: float  # from metres to a surface of the extent of a head
+
+
+def push(datablock: Curves, settings: OutsideSettings, depsgraph: Depsgraph) -> int:
+    """Push guides out of their posed surface; returns the number changed. Raises `HairError`."""
+    guides = guide_tools.read(datablock, settings, depsgraph)
+    prepared = _prepared(guides, settings.clearance, ())
+    after = guides.points.copy()
+    for chosen, places in guide_tools.to_shape(guides):
+        pushed, is_moved = _pushed(guides, prepared, chosen, places)
+        weights = guides.weights[chosen]
+        partly = grooming.guide_shapes.blended(guides.points[places], pushed, weights)
+        pushed = np.where((weights < 1.0)[:, None, None], partly, pushed)
+        after[places[is_moved]] = pushed[is_moved]
+    return guide_tools.write_shapes(guides, after)
+
+
+def pushed_out(datablock: Curves, former: np.ndarray, points: np.ndarray, depsgraph: Depsgraph) -> np.ndarray:
+    """Return local points (N, 3) of guides, with guides outside that have changed since they had `former` points.
+
+    `points` itself if no guide is pushed. Guides without a surface, and broken ones, stay.
+    """
+    try:
+        prepared = _known(datablock, former, depsgraph)
+        guides = replace(guide_tools.on_surface(datablock, prepared.surface), local=points)
+    except HairError:
+        return points  # panels report what is wrong with the guides or their surface
+    guides = replace(
+        guides, points=prepared.surface.from_local(points), weights=_changed(guides.starts, former, points)
+    )
+    local = points.copy()
+    is_pushed = False
+    for chosen, places in guide_tools.to_shape(guides):
+        pushed, is_moved = _pushed(guides, prepared, chosen, places)
+        rows = places[is_moved]
+        moved = (pushed[is_moved] != guides.points[rows]).any(axis=2)
+        local[rows[moved]] = prepared.surface.to_local(pushed[is_moved][moved][:, None])[:, 0]
+        is_pushed |= bool(moved.any())
+    return local if is_pushed else points
+
+
+def _changed(starts, former, points):
+    """Return (G,) float64: 1 for guides that have other points than before, or are new."""
+    changed = np.zeros(len(starts) - 1)
+    if len(former) > len(points):
+        return changed  # guides were removed
+    is_other = np.ones(len(points), bool)
+    is_other[: len(former)] = (points[: len(former)] != former).any(axis=1)
+    has_points = np.diff(starts) > 0
+    changed[has_points] = np.logical_or.reduceat(is_other, starts[:-1][has_points])
+    return changed
+
+
+def _known(datablock, former, depsgraph):
+    """Return the `_Barrier` of guides, from the cache if their surface has the same pose. Raises `HairError`."""
+    surface_object = datablock.surface
+    if surface_object is None:
+        raise HairError("The surface is missing: pick a mesh.")
+    key = (surface_object.session_uid, *(value for row in surface_object.matrix_world for value in row))
+    known = barrier_cache.get(datablock.session_uid)
+    if known is None or known.key != key:
+        guides = guide_tools.open_guides(datablock, depsgraph)
+        if len(former) == len(guides.local):  # before the stroke
+            guides = replace(guides, local=former, points=guides.surface.from_local(former))
+        known = barrier_cache.keep(datablock.session_uid, _prepared(guides, 0.0, key))
+    return known
+
+
+def _prepared(guides, clearance, key):
+    """Return the `_Barrier` of guides with a clearance [m]. Raises `HairError` if it cannot be collided with."""
+    surface = guides.surface
+    mesh_math.require_finite(surface.posed)
+    factor = _HEAD / max(surface.extent * surface.scale, 1e-20)
+    mesh = surface.posed_mesh
+    triangles = mesh.triangles
+    for chosen, places in guide_tools.to_shape(replace(guides, weights=np.ones(len(guides.counts)))):
+        posed = guides.posed_of(chosen, places[:, :2])
+        triangles = dynamics.collision.closed_parts.facing_strands(mesh, posed[:, 0], posed[:, 1])
+        break  # guides of one point count are enough to tell the sides of an open surface
+    vertices = factor * mesh.vertices.astype(np.float64)
+    distance = max(_SKIN, factor * clearance)
+    obstacle = dynamics.simulation.Obstacle("surface", vertices, triangles, 0.0, distance)
+    origin = vertices.mean(axis=0)
+    return _Barrier(key, surface, dynamics.outside.Barrier([obstacle], origin, _CELL_POINTS, "cpu"), factor)
+
+
+def _pushed(guides, prepared, chosen, places):
+    """Return (points (M, P, 3) float32 [m] at rest outside of the posed surface, (M,) bool: which guides moved)."""
+    posed = guides.posed_of(chosen, places)
+    held = _held(guides.datablock, places)
+    after, is_moved = prepared.barrier.moved(prepared.factor * posed.astype(np.float64), held)
+    pushed = guides.points[places]
+    if is_moved.any():
+        after = (after[is_moved] / prepared.factor).astype(np.float32)
+        is_same = (after == posed[is_moved]).all(axis=2)
+        # Points that stay keep their bits, the root among them.
+        at_rest = guides.carried_back(after, chosen[is_moved])
+        pushed[is_moved] = np.where(is_same[..., None], pushed[is_moved], at_rest)
+    return pushed, is_moved
+
+
+def _held(datablock, places):
+    """Return (M,) number of points at the beginning of each guide that are frozen; at least 1."""
+    are_frozen = frozen_points.read(datablock)
+    if are_frozen is None:
+        return None
+    frozen = are_frozen[places]
+    frozen[:, 0] = True
+    return np.where(frozen.all(axis=1), frozen.shape[1], np.argmin(frozen, axis=1))
