@@ -18,7 +18,7 @@ SHAPING = {
     "attract_guides": {"amount": 0.8, "clearance": 0.02},
     "drape_guides": {"stiffness": 0.1, "seconds": 0.5},
     "copy_guide_shape": {"source": "top"},
-    "push_outside": {"clearance": 0.02},
+    "push_outside": {"clearance": 0.2},
 }
 TOOLS = SHAPING | {"change_guide_count": {"factor": 1.5}, "mirror_guides": {}}
 CHOSEN = sorted(TOOLS.keys() - {"copy_guide_shape"})  # tools whose guides are chosen by selection and mask
