@@ -21,6 +21,8 @@ if TYPE_CHECKING:
         selection,
         size_fitting,
         staleness,
+        strand_lengths,
+        strand_thickness,
         styled_hair,
         writing,
     )

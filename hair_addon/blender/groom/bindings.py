@@ -22,7 +22,7 @@ from ...core.interpolation.hair_binding import HairBinding
 from ..data import scene
 from ..data.surfaces import Surface, cage_of
 from ..host.caches import Cache
-from ..settings import style_items
+from ..settings import map_items, style_items
 from . import styled_hair
 from .size_fitting import Fits
 from .styled_hair import StyledHair
@@ -255,10 +255,10 @@ def of(datablock: Curves) -> BoundHair | None:
 
 
 def can_read_masks(bound: BoundHair, target: Curves, depsgraph: Depsgraph) -> bool:
-    """Whether the surface has the level of subdivision that hair is bound at, or no masks of styles depend on it."""
+    """Whether the surface has the level of subdivision that hair is bound at, or no masks or maps depend on it."""
     if target.surface is None or target.surface.type != "MESH":
         return False
-    if not any(any(style_items.masks_of(item)) for item in target.vellus.styles):
+    if not style_items.have_masks(target.vellus) and not map_items.read_faces(target.vellus):
         return True
     present, known = scene.read_surface(target.surface, depsgraph).cage.topology, bound.surface.topology
     return present == known or cage_of(present) != cage_of(known)

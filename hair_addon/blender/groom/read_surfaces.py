@@ -7,7 +7,7 @@ from ...core.errors import HairError
 from ..data import scene
 from ..data.strands import curves, curves_objects, partings
 from ..data.surfaces import Surface
-from ..settings import style_items
+from ..settings import map_items, style_items
 from . import bindings
 from .bindings import BoundHair
 
@@ -28,12 +28,12 @@ def read(surface_object: Object | None, depsgraph: Depsgraph, target: Curves | N
 
 
 def _is_as_bound(bound: BoundHair, surface: Surface, target: Curves) -> bool:
-    """Whether only the level of subdivision has changed since hair was bound, and hair reads no masks of faces.
+    """Whether only the level of subdivision has changed since hair was bound, and hair reads no masks or maps of faces.
 
     Strands then keep that level, as viewports have other levels than renders.
     """
     state = target.vellus
-    reads_faces = partings.is_wanted(state.hair) or any(any(style_items.masks_of(item)) for item in state.styles)
+    reads_faces = partings.is_wanted(state.hair) or style_items.have_masks(state) or map_items.read_faces(state)
     return not reads_faces and bound.surface.is_same_cage(surface)
 
 

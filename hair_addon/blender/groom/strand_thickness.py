@@ -32,16 +32,16 @@ def strands_of(hair: Curves, bound: BoundHair) -> sources.Strands:
 
 
 def read(hair: Curves, bound: BoundHair) -> tuple[np.ndarray | None, str]:
-    """(factors (S,) float32 of radii, a sentence about a missing source); None without a map."""
-    item = map_items.item_of(hair.vellus, SETTING)
+    """(factors (S,) float32 of radii, a sentence about a missing source of the hair's maps); None without a map."""
+    item, status = map_items.item_of(hair.vellus, SETTING), bound.styles.read.map_status
     if item is None or not map_items.is_set(item):
-        return None, ""
+        return None, status
     try:
         settings = map_items.settings_of(item)
         mask = sources.masks(strands_of(hair, bound), settings, item.image)
     except HairError as error:
         return None, str(error)
-    return combination.varied_number(1.0, mask, settings.combination, _FACTOR).astype(np.float32), ""
+    return combination.varied_number(1.0, mask, settings.combination, _FACTOR).astype(np.float32), status
 
 
 def apply(hair: Curves, bound: BoundHair) -> None:

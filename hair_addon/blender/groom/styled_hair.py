@@ -20,9 +20,11 @@ from ...core.styling.base import StyleSettings, has_effect
 from ...core.styling.clump_trees import ClumpTrees
 from ...core.styling.style_inputs import Inputs
 from ..data import surface_space
+from ..data.maps.sources import Source
 from ..data.strands import style_inputs
 from ..data.surfaces import Surface
 from ..settings import setting_properties
+from . import strand_lengths
 
 if TYPE_CHECKING:
     from ...core.styling.stack import Styling
@@ -33,18 +35,27 @@ class ReadStyles:
     """Styles of a hair, and the inputs that they refer to.
 
     applied: from the local coordinates in which the hair was generated, which define the axes and the origin of random
-    shapes, to the present ones.
+    shapes, to the present ones; length: of the map of the strands' length; map_status: sentence about its source.
     """
 
     styles: tuple[StyleSettings, ...] = ()
     inputs: Inputs = field(default_factory=Inputs)
     applied: Affine = field(default_factory=Affine.identity)
+    length: Source | None = None
+    map_status: str = ""
 
     def is_same(self, other: "ReadStyles") -> bool:
         """Whether both style hair identically."""
-        if not np.array_equal(self.applied.matrix, other.applied.matrix):
+        if not np.array_equal(self.applied.matrix, other.applied.matrix) or not self.has_length(
+            other.length, other.map_status
+        ):
             return False
         return self._active == other._active and _are_same(self.inputs, other.inputs)
+
+    def has_length(self, length: Source | None, map_status: str) -> bool:
+        """Whether a map, with a sentence about its source, varies the length of strands; None for no map."""
+        is_same = length is None if self.length is None else self.length.is_same(length)
+        return is_same and self.map_status == map_status
 
     @property
     def _active(self):
@@ -104,12 +115,13 @@ def read_styles(
     hair: Curves | None = None,
 ) -> ReadStyles:
     """Return the `ReadStyles` of hair on a surface; guide_curves, hair: None if they are new. Raises `HairError`."""
+    length = strand_lengths.read(hair, surface_object, surface, styles)
     if not styles:
-        return ReadStyles()
+        return ReadStyles((), Inputs(), Affine.identity(), *length)
     styles = [setting_properties.as_stored(settings) for settings in styles]  # rounded as Curves store them
     applied = Affine.identity() if hair is None else surface_space.applied(hair)
     inputs = style_inputs.read(surface_object, surface, guide_curves, styles, depsgraph)
-    return ReadStyles(tuple(styles), inputs, applied)
+    return ReadStyles(tuple(styles), inputs, applied, *length)
 
 
 def bind(
@@ -121,8 +133,9 @@ def bind(
     make_trees: Callable[[], ClumpTrees],
     progress: Progress = no_progress,
 ) -> StyledHair:
-    """Bind styles to strands; make_trees: called if a style needs clump trees or a surface."""
-    if not any(map(has_effect, read.styles)) and settings.point_count == guides.point_count:
+    """Bind styles and lengths to strands; make_trees: called if one needs clump trees or a surface."""
+    cut = strand_lengths.cut_mask(read.length, settings)
+    if cut is None and grooming.hair_styles.is_plain(guides, settings, read.styles):
         return StyledHair(read, None, make_trees)
     styling = grooming.hair_styles.bind_styles(
         binding,
@@ -133,6 +146,7 @@ def bind(
         read.inputs,
         grooming.hair_styles.own_axes((Affine.linear(surface.to_world_axes) @ read.applied).matrix),
         progress,
+        cut,
     )
     return StyledHair(read, styling, make_trees)
 
@@ -156,7 +170,7 @@ def unstyled(
     styles: StyledHair, binding: HairBinding, guides: Strands, settings: HairSettings, surface: Surface
 ) -> StyledHair:
     """Return the `StyledHair` of the same strands without styles, with the same number of points."""
-    return bind(ReadStyles(), binding, guides, settings, surface, styles.shared_trees())
+    return bind(ReadStyles(length=styles.read.length), binding, guides, settings, surface, styles.shared_trees())
 
 
 def _are_same(inputs, others):

@@ -18,6 +18,7 @@ from ..groom import (
     pipeline,
     size_fitting,
     staleness,
+    strand_lengths,
     strand_thickness,
     writing,
 )
@@ -27,7 +28,7 @@ from ..host import running
 from ..host.notices import text_of
 from ..render import hair_cache, modified_hair
 from ..settings import style_items
-from . import events, stale_marks
+from . import events
 
 
 def follow(hair, depsgraph, local=None):
@@ -235,7 +236,11 @@ def is_ahead(hair):
         return False
     thickness, map_status = strand_thickness.read(hair, bound)
     is_same = map_status == bound.map_status and bindings.is_same_thickness(thickness, bound.thickness)
-    return is_same and bound.styles.read.styles == styles
+    return (
+        is_same
+        and bound.styles.read.styles == styles
+        and bound.styles.read.has_length(*strand_lengths.read(hair, hair.surface, bound.surface, styles))
+    )
 
 
 def write_all(*_args):
@@ -323,7 +328,7 @@ def follow_masks(surfaces, depsgraph):
 
 
 def _is_painted(hair, surfaces):
-    return hair.surface in surfaces and stale_marks.has_masks(hair.vellus)
+    return hair.surface in surfaces and style_items.have_masks(hair.vellus)
 
 
 def _is_set_while_painting(hair):

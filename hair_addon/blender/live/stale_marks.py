@@ -61,7 +61,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         with _refusal_as_status(hair):
             if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):
                 _mark(hair)
-            elif has_masks(state) and hair not in in_place:
+            elif style_items.have_masks(state) and hair not in in_place:
                 state.is_stale = True
 
 
@@ -189,11 +189,6 @@ def follow_mapped_surfaces(surfaces):
             for item in datablock.vellus.maps:
                 if item.kind in {"GROUP", "ATTRIBUTE", "IMAGE"}:
                     marks.mark_changed_map(item)
-
-
-def has_masks(state):
-    """Whether any style of a hair's settings has a mask."""
-    return any(any(style_items.masks_of(item)) for item in state.styles)
 
 
 def follow_styles(changed):

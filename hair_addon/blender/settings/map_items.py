@@ -72,6 +72,14 @@ def is_set(item: VellusMap) -> bool:
     return item.kind in {"STRAND", "CLUMP"} or item.source != "" or (item.kind == "IMAGE" and item.image is not None)
 
 
+def read_faces(state) -> bool:
+    """Return whether maps vary the strands of a hair by values on faces of the surface."""
+    return any(
+        item.setting.startswith("strands.") and item.kind in {"IMAGE", "GROUP", "ATTRIBUTE"} and is_set(item)
+        for item in state.maps
+    )
+
+
 def add(state, setting: str) -> VellusMap:
     """Add a map without a source for a setting without a map; returns the item."""
     item = state.maps.add()

@@ -104,6 +104,11 @@ def masks_of(item):
     return text_of(group, "mask"), text_of(group, "mask_image")
 
 
+def have_masks(state):
+    """Whether any style of a hair's settings has a mask."""
+    return any(any(masks_of(item)) for item in state.styles)
+
+
 def objects_named(state):
     """Names of the objects that a hair's styles read."""
     leaning = [item.lean for item in state.styles if item.kind == "LEAN" and item.lean.direction == "OBJECT"]

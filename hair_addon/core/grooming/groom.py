@@ -199,6 +199,14 @@ class HairSettings(Settings):
     guide_map: bool = param(
         False, "Store the guides of each strand and their weights as curve attributes", label="Store guide weights"
     )
+    strand_length: float = param(
+        1.0,
+        "Length of a strand as a fraction of the length between its guides",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
+    )
     radius: float | None = param_from_surface(
         0.00004,
         "Radius of a strand at its root",

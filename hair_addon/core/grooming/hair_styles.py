@@ -2,6 +2,7 @@
 """Binding of styles to the strands of a hair, with the placement of clump sites."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..interpolation.root_binder import RootBinder
 from ..long_work import Progress, no_progress
 from ..styling.base import StyleSettings
 from ..styling.clump_trees import ClumpTrees
+from ..styling.masks import CutMask
 from ..styling.style_inputs import Inputs
 from . import groom, groom_defaults
 from .groom import HairSettings
@@ -74,18 +76,30 @@ def bind_styles(
     inputs: Inputs | None = None,
     axes: np.ndarray | None = None,
     progress: Progress = no_progress,
+    cut: CutMask | None = None,
 ) -> "Styling | None":
-    """Return the `Styling` of strands; None if no style has an effect and guides have the strands' point count.
+    """Return the `Styling` of strands; None if they follow their guides unchanged, as `is_plain` tells.
 
     axes: (4, 4) to the surface's own coordinates, from `own_axes`, None for the identity; progress(step, part):
-    callback for the placement of clump sites, may raise to cancel.
+    callback for the placement of clump sites, may raise to cancel; cut: the `CutMask` of strands whose lengths differ,
+    None for the length of the settings.
     """
-    if not any(map(styling.base.has_effect, styles)) and settings.point_count == guides.point_count:
+    if cut is None and is_plain(guides, settings, styles):
         return None
     trees.search([tree for tree, _level in styling.program.tree_levels(styles)], progress)
     inputs = Inputs() if inputs is None else inputs
+    if cut is not None or settings.strand_length != 1.0:
+        mask = CutMask(settings.strand_length) if cut is None else cut
+        styles = (styling.program.CUT, *styles)
+        inputs = replace(inputs, masks={**inputs.masks, styling.program.CUT_KEY: mask})
     axes = np.eye(4) if axes is None else axes
     return styling.stack.bind(binding, guides, styles, inputs, trees, axes, settings.point_count)
+
+
+def is_plain(guides: Strands, settings: HairSettings, styles: Sequence[StyleSettings]) -> bool:
+    """Return whether strands without maps follow their guides unchanged, with the guides' number of points."""
+    has_styles = any(map(styling.base.has_effect, styles)) or settings.strand_length != 1.0
+    return not has_styles and settings.point_count == guides.point_count
 
 
 def own_axes(from_own: np.ndarray) -> np.ndarray:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Masks: weights at roots that multiply the amount of a style."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +25,8 @@ class Mask:
     guides: np.ndarray | None = None
     is_inverted: bool = False
 
-    def of_strands(self, binding: HairBinding) -> np.ndarray:
-        """Return (S,) float32 in [0, 1] of bound strands."""
+    def of_strands(self, binding: HairBinding, _clumps: np.ndarray | None = None) -> np.ndarray:
+        """Return (S,) float32 in [0, 1] of bound strands; their clumps are not used."""
         weights = self._on_surface(binding.roots)
         if self.guides is not None:
             indices, shares = binding.guide_weights.indices.numpy(), binding.guide_weights.weights.numpy()
@@ -54,3 +55,25 @@ class Mask:
     def _finished(self, weights):
         weights = np.clip(np.where(np.isfinite(weights), weights, 0.0), 0.0, 1.0)
         return (1.0 - weights if self.is_inverted else weights).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class CutMask:
+    """The part of its length that each strand loses.
+
+    length: the fraction of its length that a strand keeps; read: a function of a `HairBinding` and the clumps (S,)
+    int32 of its strands, None if unknown, that returns the fraction (S,) of each strand; None for `length`.
+    """
+
+    length: float
+    read: Callable[[HairBinding, np.ndarray | None], np.ndarray] | None = None
+
+    def of_strands(self, binding: HairBinding, clumps: np.ndarray | None = None) -> np.ndarray:
+        """Return (S,) float32 in [0, 1] of bound strands; clumps: (S,) int32, None if unknown."""
+        if self.read is None:
+            return np.full(len(binding.roots), 1.0 - self.length, np.float32)
+        return (1.0 - np.clip(self.read(binding, clumps), 0.0, 1.0)).astype(np.float32)
+
+    def of_guides(self, roots: SurfacePoints) -> np.ndarray:
+        """Return (G,) float32 zeros: guides keep their length."""
+        return np.zeros(len(roots), np.float32)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from . import clump, kinds, style_text, wet
+from . import clump, kinds, style_text, trim, wet
 from .base import Cutter, Step, StyleSettings, TreeSettings, has_effect
 
 # The whole numbers of a step: its kind, of `kinds.STEP_KINDS`; its seed; its row of masks or -1; its row of members or
@@ -17,6 +17,10 @@ CHOICES = ("kind", "seed", "mask", "level", "first_centre")
 # The numbers that all steps have, before their own, and the total count.
 SHARED = ("amount", "vary", "at_root", "at_tip", "exponent", "is_flipped", "from", "keep_length")
 NUMBERS = 24
+
+# The style that cuts strands to their length before all others, by a `masks.CutMask` with a key that no style has.
+CUT = trim.Settings(factor=0.0)
+CUT_KEY = ("", "", True)
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,8 @@ def tree_levels(styles: Sequence[StyleSettings]) -> list[tuple[TreeSettings, int
 
 def mask_key(settings: StyleSettings) -> tuple[str, str, bool] | None:
     """Return the key of a style's mask, (name, image, whether it is inverted); None for a style without a mask."""
+    if settings is CUT:
+        return CUT_KEY
     if not settings.mask and not settings.mask_image:
         return None
     return settings.mask, settings.mask_image, settings.invert_mask

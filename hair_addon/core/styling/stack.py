@@ -243,7 +243,8 @@ def bind(
             else:
                 rows[row] = trees.members(owner, bound, tree)[level]
         rows[-1] = bound.guide_weights.indices.numpy()[:, 0]
-        weights = np.array([inputs.masks[key].of_strands(bound) for key in keys], np.float32)
+        clumps = _finest_clumps(levels, owner, rows, known)
+        weights = np.array([inputs.masks[key].of_strands(bound, clumps) for key in keys], np.float32)
         return StrandData(
             bound.normals if side == 1 else _joined([side * bound.normals.numpy()], wp.vec3, device),
             wp.array(bound.identities[0], dtype=int, device=device),
@@ -274,6 +275,19 @@ def bind(
         levels,
         centres,
     )
+
+
+def _finest_clumps(levels, owner, rows, known):
+    """Return (S,) int32: the clumps of strands as in `Styling.clumps`; None for strands with no or several of them.
+
+    owner: as of `ClumpTrees.members`; rows: members of the first `known` levels.
+    """
+    if not levels:
+        return None
+    finest = len(levels[0][0].sizes) - 1
+    if known > finest:
+        return rows[finest]
+    return np.arange(rows.shape[1], dtype=np.int32) if owner == levels[finest] else None
 
 
 def _side(guides, normals):

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .base import Cutter
-from .masks import Mask
+from .masks import CutMask, Mask
 
 
 @dataclass(frozen=True)
 class Inputs:
     """Masks by `program.mask_key`, planes of cutters and directions by objects."""
 
-    masks: Mapping[tuple[str, str, bool], Mask] = field(default_factory=dict)
+    masks: Mapping[tuple[str, str, bool], Mask | CutMask] = field(default_factory=dict)
     cutters: Mapping[str, Cutter] = field(default_factory=dict)
     targets: Mapping[str, np.ndarray] = field(default_factory=dict)

@@ -61,40 +61,122 @@ def stored_strands(hair):
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Source:
+    """What a map reads of Blender's data, from which its values at any roots follow.
+
+    hair_uid: session UID of the hair; corners: (F, 3, C) float32 of a vertex group or attribute, or the UVs of an image;
+    pixels: {UDIM tile: (H, W, C)} of an image; of_curves: (S, C) of an attribute of the hair; None for other kinds.
+    """
+
+    settings: MapSettings
+    is_color: bool
+    hair_uid: int
+    surface: Surface | None = None
+    corners: np.ndarray | None = None
+    pixels: dict | None = None
+    of_curves: np.ndarray | None = None
+
+    def values(self, roots, identities: np.ndarray, clumps: np.ndarray | None) -> np.ndarray:
+        """(S, 1) masks or (S, 4) colors with alpha of strands; NaN where the map has none.
+
+        roots, identities, clumps: as of `Strands`.
+        """
+        if self.pixels is not None:
+            return self._of_image(roots)
+        if self.corners is not None:
+            return self._at_roots(roots)
+        if self.of_curves is not None:
+            count = len(identities)
+            found = self.of_curves if len(self.of_curves) == count else np.full((count, 1), np.nan, np.float32)
+        elif self.settings.kind == "CLUMP":
+            found = np.full((len(identities), 1), np.nan, np.float32)
+            if clumps is not None:
+                found = combination.random_masks(clumps, self.settings.seed)[:, None]
+        else:
+            found = combination.random_masks(identities, self.settings.seed)[:, None]
+        return _as(found, self.is_color)
+
+    def is_same(self, other: "Source | None") -> bool:
+        """Whether both give the same values at the same roots."""
+        if other is None or (self.settings, self.is_color) != (other.settings, other.is_color):
+            return False
+        pairs = [(self.corners, other.corners), (self.of_curves, other.of_curves)]
+        if (self.pixels is None) != (other.pixels is None):
+            return False
+        if self.pixels is not None and self.pixels is not other.pixels:
+            if self.pixels.keys() != other.pixels.keys():
+                return False
+            pairs += [(self.pixels[tile], other.pixels[tile]) for tile in self.pixels]
+        return all(one is two if one is None or two is None else np.array_equal(one, two) for one, two in pairs)
+
+    def _at_roots(self, roots):
+        owned = self.corners[roots.triangle]
+        at_roots = np.einsum("nck,nc->nk", owned, roots.barycentric)
+        # Barycentric coordinates sum to one up to rounding.
+        return _as(np.clip(at_roots, owned.min(axis=1), owned.max(axis=1)).astype(np.float32), self.is_color)
+
+    def _of_image(self, roots):
+        sizes = {tile: values.shape[1::-1] for tile, values in self.pixels.items()}
+        key = self.hair_uid, self.settings.uv, tuple(sizes.items()), len(roots)
+        known = texel_cache.get(key)
+        if known is None or not (known.roots.is_same(roots) and np.array_equal(known.corner_uvs, self.corners)):
+            texels = maps.box_filter.root_texels(self.surface.mesh, self.corners, roots, sizes)
+            known = texel_cache.keep(key, _Known(roots, self.corners, sizes, texels))
+        return known.texels.sample(self.pixels)
+
+
 def masks(strands: Strands, settings: MapSettings, image) -> np.ndarray:
     """(S,) float32 masks of a map; NaN where it has no value. Raises `HairError` if its source is missing.
 
     image: of a map of the kind IMAGE.
     """
-    return _read(strands, settings, image, is_color=False)[:, 0]
+    return _of_strands(strands, settings, image, is_color=False)[:, 0]
 
 
 def colors(strands: Strands, settings: MapSettings, image) -> tuple[np.ndarray, np.ndarray]:
     """Colors (S, 3) and alpha (S,) of a map; NaN where it has no value. Raises `HairError`."""
-    return pixels.unpremultiplied(_read(strands, settings, image, is_color=True))
+    return pixels.unpremultiplied(_of_strands(strands, settings, image, is_color=True))
 
 
-def _read(strands, settings, image, is_color):
-    """(S, 1) masks, or (S, 4) colors with alpha."""
-    if settings.kind == "IMAGE":
-        return _of_image(strands, settings, image, is_color)
-    if settings.kind == "STRAND":
-        return _as(combination.random_masks(strands.identities, settings.seed)[:, None], is_color)
-    if settings.kind == "CLUMP":
-        if strands.clumps is None:
-            raise HairError("There are no clumps for a random map: add the style Clump.")
-        return _as(combination.random_masks(strands.clumps, settings.seed)[:, None], is_color)
+def _of_strands(strands, settings, image, is_color):
+    if settings.kind == "CLUMP" and strands.clumps is None:
+        raise HairError("There are no clumps for a random map: add the style Clump.")
+    if settings.kind in _ON_SURFACE and strands.roots is None:
+        raise _without_roots(strands.curves)
+    found = read(strands.curves, strands.surface_object, strands.surface, settings, image, is_color)
+    if found.of_curves is not None and len(found.of_curves) != len(strands.identities):
+        sentence = 'The attribute "{attribute}" of "{name}" has values for other strands: pick another attribute.'
+        raise HairError(sentence, attribute=settings.source, name=name_of(strands.curves))
+    return found.values(strands.roots, strands.identities, strands.clumps)
+
+
+_ON_SURFACE = ("IMAGE", "GROUP", "ATTRIBUTE")
+
+
+def read(hair, surface_object, surface, settings: MapSettings, image, is_color=False) -> Source:
+    """The `Source` of a map of hair Curves on the `Surface` of an object. Raises `HairError` if it is missing."""
+    known = settings, is_color, hair.session_uid
+    if settings.kind in ("STRAND", "CLUMP"):
+        return Source(*known)
     if settings.kind == "CURVES":
-        return _as(_finite(_of_curves(strands.curves, settings.source)), is_color)
-    _require_roots(strands)
+        return Source(*known, of_curves=_finite(_of_curves(hair, settings.source)))
+    if settings.kind == "IMAGE" and image is None:
+        sentence = 'There is no image "{name}": pick another image, or clear the field.'
+        raise HairError(sentence, name=settings.source)
+    if surface is None:
+        raise _without_roots(hair)
+    if settings.kind == "IMAGE":
+        found = image_pixels.read(image, is_color)
+        return Source(*known, surface, _corner_uvs(surface_object, surface, settings.uv), found)
     if settings.kind == "GROUP":
-        corners = _of_group(strands, settings.source)
-    else:
-        corners = _of_attribute(strands, settings.source)
-    at_roots = np.einsum("nck,nc->nk", corners[strands.roots.triangle], strands.roots.barycentric)
-    # Barycentric coordinates sum to one up to rounding.
-    owned = corners[strands.roots.triangle]
-    return _as(np.clip(at_roots, owned.min(axis=1), owned.max(axis=1)).astype(np.float32), is_color)
+        return Source(*known, surface, _of_group(surface_object, surface, settings.source))
+    return Source(*known, surface, _of_attribute(surface_object, surface, settings.source))
+
+
+def _without_roots(hair):
+    sentence = 'The strands of "{name}" have no roots on a surface: attach the hair to a mesh.'
+    return HairError(sentence, name=name_of(hair))
 
 
 def _finite(values):
@@ -114,12 +196,6 @@ def _as(values, is_color):
     return np.where(is_gray, values[:, :1], values[:, :3].mean(axis=1, keepdims=True)).astype(np.float32)
 
 
-def _require_roots(strands):
-    if strands.roots is None:
-        sentence = 'The strands of "{name}" have no roots on a surface: attach the hair to a mesh.'
-        raise HairError(sentence, name=name_of(strands.curves))
-
-
 @dataclass(frozen=True, eq=False)
 class _Known:
     """`RootTexels` and the inputs that they depend on."""
@@ -130,54 +206,37 @@ class _Known:
     texels: "maps.box_filter.RootTexels"
 
 
-# (session_uid of hair, UV map, sizes) → `_Known`, which is checked.
+# (session_uid of hair, UV map, sizes, number of roots) → `_Known`, which is checked.
 texel_cache = Cache(capacity=16)
 
 
-def _of_image(strands, settings, image, is_color):
-    if image is None:
-        sentence = 'There is no image "{name}": pick another image, or clear the field.'
-        raise HairError(sentence, name=settings.source)
-    _require_roots(strands)
-    found = image_pixels.read(image, is_color)
-    uvs = _corner_uvs(strands, settings.uv)
-    sizes = {tile: values.shape[1::-1] for tile, values in found.items()}
-    key = strands.curves.session_uid, settings.uv, tuple(sizes.items())
-    known = texel_cache.get(key)
-    if known is None or not (known.roots.is_same(strands.roots) and np.array_equal(known.corner_uvs, uvs)):
-        texels = maps.box_filter.root_texels(strands.surface.mesh, uvs, strands.roots, sizes)
-        known = texel_cache.keep(key, _Known(strands.roots, uvs, sizes, texels))
-    return known.texels.sample(found)
-
-
-def _corner_uvs(strands, name):
+def _corner_uvs(surface_object, surface, name):
     """(F, 3, 2) float32 of a UV map by name; empty: the active UV map."""
-    surface = strands.surface
     if not name or name == surface.uv_map:
         if surface.corner_uvs is None:
             raise HairError('"{name}" has no UV map for the images of its hair: create one.', name=surface.name)
         return surface.corner_uvs
-    values = _corner_values(strands, name)
+    values = _corner_values(surface_object, surface, name)
     if values is None or values.shape[2] != 2:
         raise HairError('"{name}" has no UV map "{uv}": pick another UV map.', name=surface.name, uv=name)
     return values
 
 
-def _of_group(strands, name):
-    surface_object = strands.surface_object
+def _of_group(surface_object, surface, name):
+    """(F, 3, 1) float32 weights of a vertex group."""
     if surface_object.vertex_groups.get(name) is None:
         sentence = '"{name}" has no vertex group "{group}": pick another group.'
-        raise HairError(sentence, name=strands.surface.name, group=name)
-    weights = scene.read_weights(surface_object, strands.surface, present_depsgraph(), name)
-    _require_same(strands, len(weights) == len(strands.surface.rest))
-    return weights[strands.surface.mesh.triangles][..., None]
+        raise HairError(sentence, name=surface.name, group=name)
+    weights = scene.read_weights(surface_object, surface, present_depsgraph(), name)
+    _require_same(surface, len(weights) == len(surface.rest))
+    return weights[surface.mesh.triangles][..., None]
 
 
-def _of_attribute(strands, name):
-    values = _corner_values(strands, name)
+def _of_attribute(surface_object, surface, name):
+    values = _corner_values(surface_object, surface, name)
     if values is None:
         sentence = '"{name}" has no attribute "{attribute}" of numbers or colors: pick another attribute.'
-        raise HairError(sentence, name=strands.surface.name, attribute=name)
+        raise HairError(sentence, name=surface.name, attribute=name)
     return _finite(values)
 
 
@@ -198,11 +257,10 @@ def _values(attribute):
     return values.reshape(-1, width).astype(np.float32)
 
 
-def _corner_values(strands, name):
+def _corner_values(surface_object, surface, name):
     """(F, 3, C) float32 at the corners of triangles of an attribute on any domain; None without it."""
-    surface = strands.surface
     depsgraph = present_depsgraph()
-    evaluated = strands.surface_object.evaluated_get(depsgraph)
+    evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
         attribute = mesh.attributes.get(name)
@@ -213,10 +271,10 @@ def _corner_values(strands, name):
             domain, values = "POINT", _of_edges(mesh, values)
     finally:
         evaluated.to_mesh_clear()
-    values = scene.on_surface(strands.surface_object, surface, depsgraph, values, domain)
+    values = scene.on_surface(surface_object, surface, depsgraph, values, domain)
     faces, triangles = surface.faces, surface.mesh.triangles
     sizes = {"POINT": len(surface.rest), "CORNER": len(faces.corner_vertices), "FACE": len(faces.starts) - 1}
-    _require_same(strands, domain in sizes and len(values) == sizes[domain])
+    _require_same(surface, domain in sizes and len(values) == sizes[domain])
     if domain == "POINT":
         return values[triangles]
     owners = geometry.faces.face_places.owners(faces)
@@ -236,7 +294,7 @@ def _of_edges(mesh, values):
     return (found / np.maximum(counts, 1)[:, None]).astype(np.float32)
 
 
-def _require_same(strands, is_same):
+def _require_same(surface, is_same):
     if not is_same:
         sentence = 'The mesh of "{name}" has changed: the hair updates when you leave its paint mode.'
-        raise HairError(sentence, name=strands.surface.name)
+        raise HairError(sentence, name=surface.name)
