@@ -65,6 +65,7 @@ _OPERATORS = {
         "remove_look",
         "toggle_drawing",
         "edit_map",
+        "paint_map",
         "remove_map",
     ),
     "lookup_tables": ("bake_tables",),

@@ -12,6 +12,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.data import whole_changes
 from hair_addon.blender.io import groom_library
+from hair_addon.blender.settings import map_items
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
 from tests.support import file_digest, folder_digest
@@ -103,6 +104,16 @@ def on_selected_guides(rng):
     selected.data.foreach_set("value", [float(index < 5) for index in range(len(guides.curves))])
 
 
+def on_map(kind):
+    def on_map_without_source(rng):
+        on_hair(rng)
+        item = map_items.add(bpy.data.hair_curves["Hair"].vellus, "look.color")
+        item.kind = kind
+        bpy.context.view_layer.update()
+
+    return on_map_without_source
+
+
 def on_shared_guides(_rng):
     copy = things("Hair").copy()
     copy.data = copy.data.copy()
@@ -158,6 +169,7 @@ MAKING = {
     "add_style": [(on_styled, {"style": "FRIZZ"})],
     "duplicate_style": [(on_styled, {})],
     "paint_style_mask": [(on_styled, {})],
+    "paint_map": [(on_map("GROUP"), {"setting": "look.color"}), (on_map("IMAGE"), {"setting": "look.color"})],
     "mask_from_selection": [(on_selected_guides, {})],
     "make_uv_map": [(on_sphere, {})],
     "toggle_composite": [(on_cycles, {})],

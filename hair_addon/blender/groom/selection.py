@@ -8,8 +8,8 @@ from bpy.types import Context, Curves, Object, SpaceView3D, ViewLayer
 
 from ..data.strands.curves import followers
 from ..data.usable_surfaces import is_deleted
-from ..host.notices import text_of
-from ..settings import style_items
+from ..host.notices import name_of, text_of
+from ..settings import map_items, style_items
 
 
 def is_shown(hair: Curves) -> bool:
@@ -80,12 +80,13 @@ def hair_of(active: Object | None) -> Curves | None:
 def painted_hair(active: Object) -> Curves | None:
     """Return the hair whose mask is painted on a mesh object in a paint mode; None if there is none.
 
-    Hair whose active style has the mask comes first, then hair with another such style, then hair that it limits.
+    Hair whose active style has the mask comes first, then hair with another such style, then hair whose map it is, then
+    hair that it limits.
     """
     painted = _painted(active)
     if not any(painted):
         return None
-    for masks_of in (_active_masks, _style_masks, _density_masks):
+    for masks_of in (_active_masks, _style_masks, _map_sources, _density_masks):
         masked = [hair for hair in curves_on(active, "HAIR") if any(map(_are_alike, masks_of(hair), repeat(painted)))]
         if masked:
             return _newest(masked)
@@ -120,6 +121,11 @@ def _active_masks(hair):
 
 def _style_masks(hair):
     return [style_items.masks_of(item) for item in hair.vellus.styles]
+
+
+def _map_sources(hair):
+    named = [text_of(item, "source") for item in hair.vellus.maps if item.kind in {"GROUP", "ATTRIBUTE"}]
+    return [*((name, "") for name in named), *(("", name_of(image)) for image in map_items.images_of(hair.vellus))]
 
 
 def _density_masks(hair):

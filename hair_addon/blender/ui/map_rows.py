@@ -2,6 +2,7 @@
 """Rows of a map: its kind, the picker of this kind, and how it changes its setting."""
 
 from ...core.maps import varied_settings
+from ..groom.styles import painted_maps
 from ..settings import map_items
 
 
@@ -33,6 +34,8 @@ def draw(layout, item, hair):
         layout.prop_search(item, "source", hair, "attributes")
     elif item.kind in {"STRAND", "CLUMP"}:
         layout.prop(item, "seed")
+    if item.kind in painted_maps.MODES and surface is not None:
+        layout.operator("vellus.paint_map", text="Paint", icon="BRUSH_DATA").setting = item.setting
     if varied_settings.is_color(item.setting):
         layout.prop(item, "amount")
     else:

@@ -65,8 +65,9 @@ def stored_strands(hair):
 class Source:
     """What a map reads of Blender's data, from which its values at any roots follow.
 
-    hair_uid: session UID of the hair; corners: (F, 3, C) float32 of a vertex group or attribute, or the UVs of an image;
-    pixels: {UDIM tile: (H, W, C)} of an image; of_curves: (S, C) of an attribute of the hair; None for other kinds.
+    hair_uid: session UID of the hair; corners: (F, 3, C) float32 of a vertex group or attribute, or the UVs for an
+    image; pixels: {UDIM tile: (H, W, C)} of an image; of_curves: (S, C) of an attribute of the hair; None for other
+    kinds.
     """
 
     settings: MapSettings

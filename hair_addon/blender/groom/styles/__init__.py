@@ -8,6 +8,7 @@ from ....core.lazy import submodules
 if TYPE_CHECKING:
     from . import (
         hair_styles,
+        painted_maps,
         painted_masks,
         style_notes,
     )

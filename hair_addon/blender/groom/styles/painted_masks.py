@@ -3,7 +3,7 @@
 
 import bpy
 import numpy as np
-from bpy.types import Context, Curves, Object, PropertyGroup
+from bpy.types import Context, Curves, Image, Object, PropertyGroup
 
 from ....core.errors import HairError, cause_of
 from ...data.strands import curves, guide_curves
@@ -30,13 +30,11 @@ def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
     """
     curves.require_editable(hair)
     surface, group = hair.surface, style_items.group_of(item)
-    _require_paintable(surface, context)
+    require_paintable(surface, context)
     mask, attribute = group.mask, surface.data.color_attributes.get(group.mask)
     if not mask and group.mask_image:
         mode = "TEXTURE_PAINT"
-        canvas = _canvas(surface, group.mask_image)
-        paint_settings = context.tool_settings.image_paint
-        paint_settings.mode, paint_settings.canvas = "IMAGE", canvas
+        set_canvas(_canvas(surface, group.mask_image), context)
     elif mask and attribute is not None and mask not in surface.vertex_groups:
         mode = "VERTEX_PAINT"
         surface.data.color_attributes.active_color = attribute
@@ -47,14 +45,25 @@ def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
         painted = surface.vertex_groups.get(name) or surface.vertex_groups.new(name=name)
         surface.vertex_groups.active = painted
         mask = painted.name
+    enter(surface, mode, context)
+    if group.mask != mask:
+        group.mask = mask  # last: nothing can fail after it
+
+
+def set_canvas(image: Image, context: Context) -> None:
+    """Let Texture Paint mode paint an image."""
+    paint_settings = context.tool_settings.image_paint
+    paint_settings.mode, paint_settings.canvas = "IMAGE", image
+
+
+def enter(surface: Object, mode: str, context: Context) -> None:
+    """Enter a paint mode on the surface of hair, which becomes visible and active. Raises `HairError`."""
     selection.reveal(surface, context.view_layer, _viewport(context))
     selection.make_active(surface, context.view_layer)
     try:
         bpy.ops.object.mode_set(mode=mode)
     except RuntimeError as error:  # hidden by a library or a driver
         raise HairError('"{name}" cannot be painted: {cause}.', name=name_of(surface), cause=cause_of(error)) from error
-    if group.mask != mask:
-        group.mask = mask  # last: nothing can fail after it
 
 
 def stop(surface: Object, context: Context) -> None:
@@ -95,7 +104,8 @@ def from_selection(hair: Curves, item: PropertyGroup) -> int:
     return count
 
 
-def _require_paintable(surface, context):
+def require_paintable(surface: Object | None, context: Context) -> None:
+    """Raise `HairError` unless a surface can be painted in the view layer of a context."""
     if surface is None or surface.type != "MESH":
         raise HairError("The surface is missing: pick a mesh.")
     curves.require_overridable(surface)

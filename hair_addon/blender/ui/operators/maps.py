@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators of maps: a popover with the map of a setting, and its removal."""
+"""Operators of maps: a popover with the map of a setting, its painting and its removal."""
 
 import bpy
 
+from ....core.errors import HairError
 from ....core.maps import varied_settings
 from ...data.strands.curves import require_editable
 from ...groom.selection import hair_of
+from ...groom.styles import painted_maps
 from ...settings import map_items, properties
 from .. import map_rows
 from .base.hair_operator import HairOperator, needs_hair
@@ -47,6 +49,24 @@ class VELLUS_OT_edit_map(HairOperator, bpy.types.Operator):
             map_rows.draw(self.layout, item, hair)
 
 
+class VELLUS_OT_paint_map(HairOperator, bpy.types.Operator):
+    """Paint the map on the surface with Blender's brushes, while the hair follows. A map without a source gets one"""
+
+    bl_idname = "vellus.paint_map"
+    bl_label = "Paint Map"
+    applies = needs_hair
+    __annotations__ = {"setting": setting_property()}
+
+    def change(self, context):
+        """Enter the paint mode of the map of the setting."""
+        hair = hair_of(context.object)
+        varied_settings.require_varied(self.setting)
+        item = map_items.item_of(hair.vellus, self.setting)
+        if item is None:
+            raise HairError('The setting "{setting}" has no map to paint: add one first.', setting=self.setting)
+        painted_maps.paint(hair, item, context)
+
+
 class VELLUS_OT_remove_map(HairOperator, bpy.types.Operator):
     """Remove the map: all strands have the value of the setting"""
 
@@ -63,4 +83,4 @@ class VELLUS_OT_remove_map(HairOperator, bpy.types.Operator):
         map_items.remove(hair.vellus, self.setting)
 
 
-CLASSES = (VELLUS_OT_edit_map, VELLUS_OT_remove_map)
+CLASSES = (VELLUS_OT_edit_map, VELLUS_OT_paint_map, VELLUS_OT_remove_map)
