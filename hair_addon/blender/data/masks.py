@@ -19,7 +19,7 @@ class Mask:
 
     def read(self, surface_object, surface, depsgraph):
         """(V,) weights and the `Texture` on the `Surface` of a mesh object, each None without a name."""
-        weights = scene.read_weights(surface_object, surface, depsgraph, self.group)
+        weights = scene.read_density(surface_object, surface, depsgraph, self.group)
         return weights, scene.read_texture(surface, self.image)
 
 

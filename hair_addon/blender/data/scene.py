@@ -231,9 +231,66 @@ def read_vertex_group(surface_object, depsgraph, name):
         evaluated.to_mesh_clear()
 
 
+_NUMBERS = {
+    "FLOAT": ("value", 1, np.float32),
+    "INT": ("value", 1, np.int32),
+    "BOOLEAN": ("value", 1, bool),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+}
+
+
+def _read_vertex_weights(surface_object, depsgraph, name):
+    """`read_vertex_group`, or (V,) float32 of an attribute of numbers or colors, at least 0; None for an empty name."""
+    if not name or surface_object.vertex_groups.get(name) is not None:
+        return read_vertex_group(surface_object, depsgraph, name)
+    evaluated = surface_object.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        attribute = mesh.attributes.get(name)
+        if attribute is None or attribute.data_type not in _NUMBERS:
+            sentence = '"{name}" has no vertex group or attribute "{group}": pick another, or clear the field.'
+            raise HairError(sentence, name=name_of(surface_object), group=name)
+        field, width, scalar = _NUMBERS[attribute.data_type]
+        values = np.empty(len(attribute.data) * width, scalar)
+        attribute.data.foreach_get(field, values)
+        means = values.reshape(-1, width)[:, :3].astype(np.float64).mean(axis=1)
+        means = np.where(np.isfinite(means), np.maximum(means, 0.0), 0.0)
+        return _at_vertices(mesh, attribute.domain, means).astype(np.float32)
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def _at_vertices(mesh, domain, values):
+    """(V,) means of the values (N,) of a domain around each vertex, 0 at vertices without any."""
+    if domain == "POINT":
+        return values
+    if domain == "EDGE":
+        vertices, values = np.empty(2 * len(mesh.edges), np.int32), np.repeat(values, 2)
+        mesh.edges.foreach_get("vertices", vertices)
+    else:
+        vertices = np.empty(len(mesh.loops), np.int32)
+        mesh.loops.foreach_get("vertex_index", vertices)
+        if domain == "FACE":
+            sizes = np.empty(len(mesh.polygons), np.int32)
+            mesh.polygons.foreach_get("loop_total", sizes)
+            values = np.repeat(values, sizes)
+    counts = np.bincount(vertices, minlength=len(mesh.vertices))
+    return np.bincount(vertices, values, len(mesh.vertices)) / np.maximum(counts, 1)
+
+
 def read_weights(surface_object, surface, depsgraph, name):
     """`read_vertex_group` for a `Surface` of an object, which may be the cage or at another level of subdivision."""
-    weights = read_vertex_group(surface_object, depsgraph, name)
+    return _at_level(surface_object, surface, depsgraph, read_vertex_group(surface_object, depsgraph, name))
+
+
+def read_density(surface_object, surface, depsgraph, name):
+    """`read_weights` of a vertex group, or else of an attribute."""
+    return _at_level(surface_object, surface, depsgraph, _read_vertex_weights(surface_object, depsgraph, name))
+
+
+def _at_level(surface_object, surface, depsgraph, weights):
+    """Weights (V,) of an evaluated mesh, or None, at the vertices of its `Surface` at another level of subdivision."""
     if weights is None or len(weights) == len(surface.rest):
         return weights
     present = read_surface(surface_object, depsgraph)
@@ -246,8 +303,8 @@ def read_weights(surface_object, surface, depsgraph, name):
 
 
 def read_cage_weights(surface_object, depsgraph, name):
-    """`read_vertex_group` at the vertices of a `Surface.of_cage`, the same at every level of subdivision."""
-    weights = read_vertex_group(surface_object, depsgraph, name)
+    """`read_density` at the vertices of a `Surface.of_cage`, the same at every level of subdivision."""
+    weights = _read_vertex_weights(surface_object, depsgraph, name)
     return None if weights is None else read_surface(surface_object, depsgraph).of_cage(weights)
 
 

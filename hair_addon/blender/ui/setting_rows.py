@@ -168,7 +168,9 @@ def _mask_row(layout, owner, name, surface):
 
 
 def _density_rows(layout, owner, surface):
-    _mask_row(layout, owner, "density_group", surface)
+    if surface is not None:
+        # Suggestions: attributes are not listed.
+        search_row(layout, owner, "density_group", surface, "vertex_groups", results_are_suggestions=True)
     search_row(layout, owner, "density_image", bpy.data, "images")
 
 

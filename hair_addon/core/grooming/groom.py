@@ -47,7 +47,7 @@ class GuideSettings(Settings):
     seed: int = param(1, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
     density_group: str = param(
         "",
-        "Vertex group that controls guide density; higher weights place more guides, zero places none",
+        "Vertex group or attribute that controls guide density; higher values place more guides, zero places none",
         label="Guide mask",
     )
     density_image: str = param(
@@ -127,7 +127,7 @@ class HairSettings(Settings):
     seed: int = param(1, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
     density_group: str = param(
         "",
-        "Vertex group that controls strand density. Leave empty to use the guide mask",
+        "Vertex group or attribute that controls strand density. Leave empty to use the guide mask",
         label="Strand mask",
     )
     density_image: str = param(
