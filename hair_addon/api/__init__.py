@@ -27,6 +27,8 @@ from ..core.errors import HairError
 from ..core.files.settings_file import GroomSettings
 from ..core.grooming.groom import GuideSettings, HairSettings
 from ..core.shading.appearance import Appearance
+from ..core.styling import kinds
+from ..core.styling.kinds import *  # the classes of settings of styles
 from .cards import CardSettings, TubeSettings, make_hair_cards, make_hair_tubes
 from .dynamics import (
     DynamicsSettings,
@@ -55,46 +57,23 @@ from .imports import DerivationSettings, TransferSettings, import_curves, transf
 from .library import apply_groom, groom_names, save_groom
 from .maps import MapSettings, clear_map, maps_of, set_map
 from .pictures import draw, render
-from .styles import (
-    Bend,
-    Braid,
-    Clump,
-    Curl,
-    Frizz,
-    Lean,
-    Smooth,
-    Trim,
-    Wet,
-    add_style,
-    apply_style_preset,
-    set_styles,
-    styles_of,
-)
+from .styles import add_style, apply_style_preset, set_styles, styles_of
 from .systems import delete_hair, hair_systems, look_names, style_preset_names
 from .tables import bake_tables, table_settings
 
 __all__ = [
     "Appearance",
-    "Bend",
-    "Braid",
     "CardSettings",
-    "Clump",
-    "Curl",
     "DerivationSettings",
     "DynamicsSettings",
     "ExportSettings",
-    "Frizz",
     "GroomSettings",
     "GuideSettings",
     "HairError",
     "HairSettings",
-    "Lean",
     "MapSettings",
-    "Smooth",
     "TransferSettings",
-    "Trim",
     "TubeSettings",
-    "Wet",
     "add_hair",
     "add_layer",
     "add_style",
@@ -141,3 +120,4 @@ __all__ = [
     "use_as_guides",
     "use_as_hair",
 ]
+__all__ += kinds.__all__

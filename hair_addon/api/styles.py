@@ -16,41 +16,19 @@ from ..core.grooming import following, groom, hair_styles
 from ..core.grooming.groom import HairSettings
 from ..core.long_work import Progress, no_progress, part_of, run_now
 from ..core.params import Param, array_of, declared, described, plain_value
+from ..core.styling import lean, trim
 from ..core.styling.base import StyleSettings
-from ..core.styling.bend import Settings as Bend
-from ..core.styling.braid import Settings as Braid
-from ..core.styling.clump import Settings as Clump
-from ..core.styling.curl import Settings as Curl
-from ..core.styling.frizz import Settings as Frizz
 from ..core.styling.kinds import OFFERS, kind_of
-from ..core.styling.lean import Settings as Lean
 from ..core.styling.masks import Mask
 from ..core.styling.program import mask_keys
-from ..core.styling.smooth import Settings as Smooth
 from ..core.styling.style_inputs import Inputs
-from ..core.styling.trim import Settings as Trim
-from ..core.styling.wet import Settings as Wet
 from . import systems
 from .arguments import changed, checked_progress, choice
 from .blender_access import blender
 
 Curves = Any
 
-__all__ = [
-    "Bend",
-    "Braid",
-    "Clump",
-    "Curl",
-    "Frizz",
-    "Lean",
-    "Smooth",
-    "Trim",
-    "Wet",
-    "add_style",
-    "apply_style_preset",
-    "set_styles",
-    "styles_of",
-]
+__all__ = ["add_style", "apply_style_preset", "set_styles", "styles_of"]
 
 _SWITCH = Param("")
 
@@ -169,5 +147,7 @@ def _mask(mesh, masks, key):
 
 
 def _require_arrays(style):
-    if (isinstance(style, Trim) and style.cutter) or (isinstance(style, Lean) and style.direction == "OBJECT"):
+    if (isinstance(style, trim.Settings) and style.cutter) or (
+        isinstance(style, lean.Settings) and style.direction == "OBJECT"
+    ):
         raise HairError("Plain arrays have no objects: styles can name objects in Blender only.")

@@ -35,6 +35,7 @@ from hair_addon.core.kernels import compiled_kernels
 from hair_addon.core.long_work import Stopped
 from hair_addon.core.placement import cvt
 from hair_addon.core.shading import appearance
+from hair_addon.core.styling import kinds
 from tests.support.commands import PYTHONPATH
 from tests.support.dynamics.following import update
 from tests.support.reading import evaluated_points, points, snapshot
@@ -278,6 +279,13 @@ def test_styles_are_what_a_script_says(hair):
     api.set_styles(hair, [])
     api.apply_settings(hair, settings)
     assert api.settings_of(hair) == settings and settings.styles == (third, again, added)
+
+
+def test_each_kind_of_style_has_its_class_under_its_label():
+    """A kind is registered in kinds.py alone."""
+    classes = {name: getattr(api, name) for name in kinds.__all__}
+    assert classes == {kinds.LABELS[kind]: settings_class for kind, settings_class in kinds.KINDS.items()}
+    assert set(classes) <= set(api.__all__)
 
 
 def _giving_locks(hair):

@@ -122,16 +122,8 @@ def marschner_shading(tables):
 
 def marschner_strand_shading(tables):
     """The `Shading` of the Marschner model for varied strands, from `strand_tables.StrandTables`."""
-    slices = tables.slices
-    blocks = {"settings": tables.settings, "variation": tables.variation, "slices": slices.range}
-    arrays = {"return_slices": tables.returned, "n_slices": slices.n}
-    if tables.settings.mode == "energy":
-        arrays |= {"n_g_slices": slices.n_g, "dual_table": tables.dual}
-    file = _VARIED[tables.settings.mode]
-    if slices.n_trt is not None:
-        file, arrays["n_trt_slices"] = "fibre/marschner_elliptic.comp", slices.n_trt
     deep = _deep(tables.settings, tables.forward, tables.backward)
-    shading = _shading(file, blocks, arrays, *deep, is_varied=True)
+    shading = _shading(*_sliced(tables), *deep, is_varied=True)
     return replace(shading, fibre=_fibre(tables.settings, tables.variation))
 
 
@@ -147,6 +139,18 @@ def marschner_look_shading(tables):
 
     tables: `look_tables.LookTables`; the given strands define the light that strands pass on to others.
     """
+    shading = _shading(*_sliced(tables), np.zeros(3), is_varied=True, is_mapped=True)
+    shading = replace(shading, fibre=_fibre(tables.settings, tables.variation))
+
+    def fitted(sigma_a):
+        forward, reflectance = _deep(tables.settings, *tables.mean_parts(sigma_a))
+        return replace(shading, forward=forward, reflectance=np.array(reflectance))
+
+    return fitted
+
+
+def _sliced(tables):
+    """(file, blocks, tables) of `_shading` for strands whose absorptions differ; tables: with slices of absorptions."""
     slices = tables.slices
     blocks = {"settings": tables.settings, "variation": tables.variation, "slices": slices.range}
     arrays = {"return_slices": tables.returned, "n_slices": slices.n}
@@ -155,14 +159,7 @@ def marschner_look_shading(tables):
     file = _VARIED[tables.settings.mode]
     if slices.n_trt is not None:
         file, arrays["n_trt_slices"] = "fibre/marschner_elliptic.comp", slices.n_trt
-    shading = _shading(file, blocks, arrays, np.zeros(3), is_varied=True, is_mapped=True)
-    shading = replace(shading, fibre=_fibre(tables.settings, tables.variation))
-
-    def fitted(sigma_a):
-        forward, reflectance = _deep(tables.settings, *tables.mean_parts(sigma_a))
-        return replace(shading, forward=forward, reflectance=np.array(reflectance))
-
-    return fitted
+    return file, blocks, arrays
 
 
 def _fibre(settings, variation):

@@ -8,28 +8,19 @@ from ..lazy import submodules
 if TYPE_CHECKING:
     from . import (
         base,
-        bend,
-        braid,
-        clump,
         clump_trees,
-        curl,
         fitting,
-        frizz,
         guide_lean,
         guide_styles,
         kinds,
-        lean,
         masks,
         program,
         random_numbers,
-        smooth,
         stack,
         steps,
         strand_wetness,
         style_inputs,
         style_text,
-        trim,
-        wet,
     )
 else:
     __getattr__ = submodules(__name__)

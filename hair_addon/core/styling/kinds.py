@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The kinds of styles by their names in files and in Blender, and the entries of the menu."""
+"""The kinds of styles by their names in files and in Blender, the entries of the menu, and the classes of settings.
+
+`from kinds import *` gives the classes of settings, as `api` does: `Curl(radius=0.004)`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,6 +12,12 @@ from ..errors import HairError
 from ..params import described
 from . import bend, braid, clump, curl, frizz, lean, smooth, trim, wet
 from .base import Cutter, Step, StyleSettings
+
+__all__ = ["Bend", "Braid", "Clump", "Curl", "Frizz", "Lean", "Smooth", "Trim", "Wet"]
+
+# The classes of settings by their names in `api`, each written out so that type checkers know it.
+Trim, Clump, Curl, Frizz, Bend = trim.Settings, clump.Settings, curl.Settings, frizz.Settings, bend.Settings
+Smooth, Lean, Braid, Wet = smooth.Settings, lean.Settings, braid.Settings, wet.Settings
 
 _MODULES: dict[str, Any] = {
     "TRIM": trim,

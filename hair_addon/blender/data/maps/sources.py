@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ....core import geometry, maps
+from ....core import maps
 from ....core.errors import HairError
 from ....core.geometry.mesh import SurfacePoints
 from ....core.maps import combination, pixels
@@ -14,7 +14,7 @@ from ....core.maps.map_settings import MapSettings
 from ...host.caches import Cache
 from ...host.notices import name_of
 from .. import scene
-from ..strands import attributes, curves, stored_roots
+from ..strands import attributes, curves, stored_roots, style_inputs
 from ..surfaces import Surface
 from . import image_pixels
 
@@ -229,7 +229,7 @@ def _of_group(surface_object, surface, name):
         sentence = '"{name}" has no vertex group "{group}": pick another group.'
         raise HairError(sentence, name=surface.name, group=name)
     weights = scene.read_weights(surface_object, surface, present_depsgraph(), name)
-    _require_same(surface, len(weights) == len(surface.rest))
+    style_inputs.require_same(surface_object, len(weights) == len(surface.rest))
     return weights[surface.mesh.triangles][..., None]
 
 
@@ -272,16 +272,7 @@ def _corner_values(surface_object, surface, name):
             domain, values = "POINT", _of_edges(mesh, values)
     finally:
         evaluated.to_mesh_clear()
-    values = scene.on_surface(surface_object, surface, depsgraph, values, domain)
-    faces, triangles = surface.faces, surface.mesh.triangles
-    sizes = {"POINT": len(surface.rest), "CORNER": len(faces.corner_vertices), "FACE": len(faces.starts) - 1}
-    _require_same(surface, domain in sizes and len(values) == sizes[domain])
-    if domain == "POINT":
-        return values[triangles]
-    owners = geometry.faces.face_places.owners(faces)
-    if domain == "FACE":
-        return np.repeat(values[owners][:, None], 3, axis=1)
-    return values[faces.starts[owners][:, None] + geometry.faces.face_places.corners_of(faces, owners, triangles)]
+    return style_inputs.at_corners(surface_object, surface, depsgraph, values, domain)
 
 
 def _of_edges(mesh, values):
@@ -293,9 +284,3 @@ def _of_edges(mesh, values):
         found[:, channel] = np.bincount(ends, np.repeat(values[:, channel], 2), len(found))
     counts = np.bincount(ends, minlength=len(found))
     return (found / np.maximum(counts, 1)[:, None]).astype(np.float32)
-
-
-def _require_same(surface, is_same):
-    if not is_same:
-        sentence = 'The mesh of "{name}" has changed: the hair updates when you leave its paint mode.'
-        raise HairError(sentence, name=surface.name)

@@ -66,7 +66,7 @@ def read_mask(surface_object, surface, guide_curves, key, depsgraph):
         return Mask(None, texture, None, is_inverted)
     if surface_object.vertex_groups.get(name) is not None:
         weights = scene.read_weights(surface_object, surface, depsgraph, name)
-        _require_same(len(weights) == len(surface.rest), surface_object)
+        require_same(surface_object, len(weights) == len(surface.rest))
         return Mask(weights[surface.mesh.triangles], texture, None, is_inverted)
     corners = _read_surface_attribute(surface_object, surface, name, depsgraph)
     guides = None if corners is not None or guide_curves is None else _read_guide_attribute(guide_curves, name)
@@ -87,10 +87,18 @@ def _read_surface_attribute(surface_object, surface, name, depsgraph):
         domain, values = attribute.domain, _numbers(attribute, name_of(surface_object))
     finally:
         evaluated.to_mesh_clear()
+    return at_corners(surface_object, surface, depsgraph, values, domain)
+
+
+def at_corners(surface_object, surface, depsgraph, values, domain):
+    """(F, 3, …) at the corners of a `Surface`'s triangles, from an evaluated mesh's values (N, …) on a domain.
+
+    domain: POINT, FACE or CORNER. Raises `HairError` if the mesh has changed since the `Surface` was read.
+    """
     values = scene.on_surface(surface_object, surface, depsgraph, values, domain)
     faces, triangles = surface.faces, surface.mesh.triangles
     sizes = {"POINT": len(surface.rest), "CORNER": len(faces.corner_vertices), "FACE": len(faces.starts) - 1}
-    _require_same(len(values) == sizes[domain], surface_object)
+    require_same(surface_object, domain in sizes and len(values) == sizes[domain])
     if domain == "POINT":
         return values[triangles]
     owners = geometry.faces.face_places.owners(faces)
@@ -99,7 +107,7 @@ def _read_surface_attribute(surface_object, surface, name, depsgraph):
     return values[faces.starts[owners][:, None] + geometry.faces.face_places.corners_of(faces, owners, triangles)]
 
 
-def _require_same(is_same, surface_object):
+def require_same(surface_object, is_same):
     """Raise `HairError` if a mesh has changed since its `Surface` was read."""
     if not is_same:
         sentence = 'The mesh of "{name}" has changed: the hair updates when you leave its paint mode.'
