@@ -293,13 +293,13 @@ BENCHMARKS = [path for path in TESTS if path.parent.name == "benchmarks"]
 
 @each_file(path for path in TESTS if path not in {*BENCHMARKS, Path(__file__)})
 def test_no_test_but_benchmarks_holds_a_clock_to_a_limit(path):
-    """On a busy machine it would fail: a law of how much is done counts what is done."""
+    """A test with a time limit would fail on a busy machine; tests count operations instead."""
     assert not CLOCKS.search(path.read_text(encoding="utf-8"))
 
 
 @each_file(BENCHMARKS)
 def test_every_benchmark_is_long(path):
-    """Thus `make test` runs only cases marked one by one: of memory, which other work does not change."""
+    """`make test` runs only benchmarks of memory, which other work does not change."""
     tests = [node for node in syntax(path).body if getattr(node, "name", "").startswith("test_")]
     unmarked = [test.name for test in tests if not any("mark.long" in ast.unparse(d) for d in test.decorator_list)]
     assert tests and not unmarked, unmarked

@@ -100,7 +100,7 @@ def test_zip_holds_what_blender_runs_and_nothing_else(extension):
 
 
 def test_bare_python_has_neither_warp_nor_openexr(bare_python):
-    """Otherwise the next tests would pass without the zip's wheels."""
+    """Bare Python lacks both; otherwise the next tests would pass without the zip's wheels."""
     for name in ("warp", "OpenEXR"):
         found = subprocess.run([bare_python, "-I", "-c", f"import {name}"], capture_output=True, text=True)
         assert "ModuleNotFoundError" in found.stderr

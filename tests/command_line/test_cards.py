@@ -43,7 +43,7 @@ def test_textures_lie_beside_files_that_have_none(shot):
 
 
 def test_relative_paths_lead_to_all_levels_and_their_textures(shot, monkeypatch):
-    """In a folder beside the .blend: USD names textures from the file's folder, a .blend wherever it is opened."""
+    """Paths relative to the .blend work: USD names textures relative to its own folder."""
     bpy.utils.expose_bundled_modules()
     from pxr import Usd, UsdGeom, UsdShade
 

@@ -150,7 +150,7 @@ def test_scripts_run_where_they_are_enabled():
 
 
 def test_the_add_on_of_blender_evaluates_the_pattern(tmp_path):
-    """As it does for a setting that is not editable: Python's eval with these names."""
+    """Blender evaluates the pattern with Python's eval and these names, as for a setting that is not editable."""
     settings = {setting["key"]: setting for setting in submitted()["type"]["settings"]}
     assert all(
         setting["type"] in {"string", "int32", "bool"} and setting["description"] for setting in settings.values()

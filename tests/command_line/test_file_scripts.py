@@ -35,7 +35,7 @@ def written(folder):
 
 @pytest.mark.parametrize(("verb", "run"), [*((verb, run_here) for verb in VERBS), ("info", run)])
 def test_nothing_of_its_own_runs(stranger, tmp_path, verb, run):
-    """Nor do scripts run in a separate process, for which no test has set what is allowed."""
+    """No scripts run in a separate process, in which no test has set a permission."""
     ended = run(*VERBS[verb](stranger, tmp_path))
     assert ended.status == 0, ended.errors
     assert written(tmp_path) == set()
@@ -44,7 +44,7 @@ def test_nothing_of_its_own_runs(stranger, tmp_path, verb, run):
 
 
 def test_all_of_it_runs_when_the_user_asks(stranger, tmp_path):
-    """In a process of its own: Blender keeps in mind that scripts were allowed or refused."""
+    """All scripts run in a new process; Blender remembers in a process whether scripts were allowed."""
     ended = run(*VERBS["groom"](stranger, tmp_path), "--enable-scripts")
     assert (ended.status, ended.errors) == (0, "")
     assert written(tmp_path) == {"from_script", "from_driver"}

@@ -73,7 +73,7 @@ ENDINGS = [".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".usdc", ".usda", 
 
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_a_whole_file_is_read(mesh, ending):
-    """Otherwise the refusals below would prove nothing."""
+    """Undamaged files are read; otherwise the refusals below would prove nothing."""
     path = mesh(f"whole{ending}")
     assert run_here("groom", path, *SMALL, "--out", path.parent / "out.npz").status == 0
 

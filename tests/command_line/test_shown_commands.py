@@ -14,7 +14,7 @@ PAGE = ROOT / "docs" / "command_line.md"
 
 
 def test_the_page_shows_commands_that_work(lit, tmp_path, monkeypatch):
-    """With less to do, one after the other in a folder that holds what they name."""
+    """Commands with smaller numbers run one after another in a folder with the files that they name."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "head.obj").write_bytes(HEAD.read_bytes())
     bpy.context.scene.render.resolution_percentage, bpy.context.scene.vellus.sample_count = 3, 1

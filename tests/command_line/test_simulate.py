@@ -84,7 +84,7 @@ def test_frames_are_given_as_for_render(shot):
 
 
 def test_the_time_of_all_guides_is_reported(shot, monkeypatch):
-    """Of a clock that advances by a second with each look: reading, simulating, and half of the change of frame."""
+    """The clock advances a second per reading; reading, simulation and half of each frame change are counted."""
     other = bpy.data.objects["Guides"].copy()
     other.data = other.data.copy()
     bpy.context.scene.collection.objects.link(other)
@@ -129,7 +129,7 @@ def test_frames_that_are_not_baked_are_not_rendered(shot, tmp_path):
 
 
 def test_a_frame_that_cannot_be_read_is_refused_as_a_missing_one(shot, tmp_path):
-    """By sequences, in one process or in two, single frames, exports and pictures; baking again mends it alone."""
+    """Sequences, single frames, exports and pictures refuse an unreadable frame; only baking again repairs it."""
     run_here("simulate", shot)
     whole = {path.name: path.read_bytes() for path in frame_folders.folder_of(guides_of()).glob("*.npz")}
     damaged = frame_folders.folder_of(guides_of()) / "+00000005.npz"
@@ -197,7 +197,7 @@ def test_files_without_simulated_guides_are_refused(shot):
 
 
 def test_only_what_is_rendered_is_simulated_if_needed(shot):
-    """As render says itself: guides that start after the last frame need no frames, nor those of delivered hair."""
+    """Guides that start after the last rendered frame, and guides of delivered hair, need no frames."""
     assert run_here("simulate", shot, "--if-needed", "--last-frame", "1", "--json").results == []
     frame_folders.require_baked([1], bpy.context.scene)
     assert [line["frame"] for line in run_here("simulate", shot, "--if-needed", "--json").results] == [*range(2, 8)]

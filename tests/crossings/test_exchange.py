@@ -65,7 +65,7 @@ def imported(path, read):
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("is_drawn", [True, False])
 def test_strands_come_back_as_they_went(sphere, tmp_path, capfd, format, is_drawn):
-    """From a surface that is turned and twisted; hair shaded by us, which Blender does not draw, or by Blender."""
+    """Strands of a turned and twisted surface come back, whether Vellus or Blender draws the hair."""
     write, read = FORMATS[format]
     sphere.location, sphere.rotation_euler, sphere.scale = (1.0, 2.0, 3.0), (0.3, 0.2, 0.5), (2.0, 2.0, 2.0)
     update()

@@ -157,7 +157,7 @@ def shipped():
 
 
 def test_blender_ships_brushes_as_we_take_them_to_be(scene):
-    """Otherwise all brushes would count as set by an artist."""
+    """Blender's brushes have the settings that we expect; otherwise all would count as changed by the artist."""
     folder = Path(bpy.utils.system_resource("DATAFILES", path="assets/brushes"))
     with bpy.data.libraries.load(str(folder / "essentials_brushes-curve_sculpt.blend")) as (_there, wanted):
         wanted.brushes = ["Add", "Density"]

@@ -49,7 +49,7 @@ def assert_same(found, expected):
 
 @pytest.mark.parametrize(("name", "unit"), pairs(FILES, [1.0, 0.01], 2))
 def test_a_groom_comes_back_as_it_was(sphere, scene, tmp_path, name, unit):
-    """On a surface that is moved, turned and scaled, in a scene of meters and of centimeters."""
+    """A groom of a moved, turned and scaled surface comes back, in scenes of meters and centimeters."""
     scene.unit_settings.scale_length = unit
     sphere.location, sphere.rotation_euler = np.array([1.0, 2.0, 3.0]) / unit, (0.3, 0.2, 0.5)
     sphere.scale = np.full(3, 0.1 / unit)

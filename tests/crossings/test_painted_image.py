@@ -99,7 +99,7 @@ def test_guides_without_auto_update_stay(masked, image):
 
 
 def test_an_image_painted_black_is_reported_until_it_is_painted_again(masked, image):
-    """Also for hair whose settings are unchanged, which is bound, and loses no strands."""
+    """The image is reported also for bound hair with unchanged settings, which loses no strands."""
     bpy.ops.vellus.interpolate_hair(strand_count=40)
     hair = next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR")
     hair.data.vellus.hair.density_image = "Density"

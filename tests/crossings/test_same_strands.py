@@ -90,7 +90,7 @@ def _open(blend):
 
 
 def test_arrays_make_what_an_object_of_them_does(sphere):
-    """For an object whose local coordinates are the world's."""
+    """Arrays give the strands of an object whose local coordinates are the world's."""
     mesh = sphere.data
     mesh.calc_loop_triangles()
     triangles = np.array([triangle.vertices[:] for triangle in mesh.loop_triangles], np.int32)

@@ -98,7 +98,7 @@ bpy.ops.wm.save_mainfile()
 
 
 def test_another_engine_ends_before_a_frame_that_is_not_baked(vellus, desktop):
-    """With Blender's own engine and `-a`: frames before are written, the status is 1, one sentence says why."""
+    """Blender's own engine with `-a` writes the frames before, then ends with status 1 and one sentence."""
     folder = vellus.folder / "unbaked"
     folder.mkdir()
     shot = folder / "shot.blend"

@@ -133,7 +133,7 @@ def shown(light, transform):
 
 
 def test_the_window_shows_what_is_drawn_offscreen(walk):
-    """Of what hair covers, in the scene's view transform; of different samples, so that pixels differ by noise."""
+    """Pixels covered by hair agree in the scene's view transform up to noise, as samples differ."""
     view = walk.facts["steps"]["grown"]["view"]
     window, bare = (part(seen(walk, name), view) for name in ("grown", "grown_bare"))
     light = np.load(walk.folder / "offscreen.npy")
@@ -183,7 +183,7 @@ def test_pictures_and_tables_are_written_while_the_window_lives_on(walk):
 
 
 def test_selected_hair_is_outlined_by_its_silhouette(walk):
-    """In the theme's orange, all around it and nowhere else; without Outline Selected there is no orange at all."""
+    """The theme's orange is all around the hair and nowhere else; without Outline Selected there is none."""
     view = walk.facts["steps"]["grown"]["view"]
     names = ("selected", "not_outlined", "not_outlined_bare")
     outlined, plain, bare = (part(seen(walk, name), view) for name in names)
@@ -199,7 +199,7 @@ def test_selected_hair_is_outlined_by_its_silhouette(walk):
 
 
 def test_our_engine_draws_surfaces_and_hair_in_the_window(walk):
-    """With hair and without; the head, which the same light falls on, is neither black nor the background."""
+    """With and without hair, the lit head is neither black nor the background."""
     facts = walk.facts["steps"]["grown"]
     drawn, bare = (part(seen(walk, name), facts["view"]) for name in ("engine", "engine_bare"))
     assert (np.abs(drawn - bare).max(axis=-1) > 10.0 / 255.0).mean() > 0.02

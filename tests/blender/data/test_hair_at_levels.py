@@ -132,7 +132,7 @@ def test_hair_is_the_same_whatever_viewports_show(render, tmp_path):
 
 
 def test_cages_are_the_same_at_every_level(scene):
-    """To the bit: also where Mirror makes them, and where their faces are turned."""
+    """Cages have the same bits, also if Mirror makes them or their faces are turned."""
     surface = make_surface()
     surface.add_rest_position_attribute = True
     for mirrors in (False, True):
@@ -156,7 +156,7 @@ def test_cages_are_the_same_at_every_level(scene):
 
 
 def test_guides_begin_on_the_surface_wherever_they_are_simulated_or_attached(scene):
-    """On the subdivided surface, not on the cage where they were placed, whose faces are bent."""
+    """Roots are on the subdivided surface, not on the bent faces of the cage on which they were placed."""
     make_hair(2)
     guides, surface = bpy.data.objects["Guides"], bpy.data.objects["Cube"]
     pose = guide_poses.read(guides.data, bpy.context.evaluated_depsgraph_get(), 1.0)

@@ -41,7 +41,7 @@ def turns(before, after):
 
 @pytest.mark.parametrize("levels", [1, 2, 3])
 def test_subdivision_does_not_turn_strands(cube, levels):
-    """On a cube, by a fifth of the angle between its cage and the smooth surface; 45° at its edges."""
+    """Strands of a cube turn by at most a fifth of the angle between cage and smooth surface, which is 45° at edges."""
     cube.modifiers[0].levels = levels
     update()
     for curves_object in grow_straight(cube):
@@ -188,7 +188,7 @@ def evaluated_mesh(surface):
 
 
 def test_strands_follow_what_is_moved_at_another_level(cube):
-    """After editing the cage with the modifier disabled and enabling it, hair keeps its place on the faces."""
+    """Hair keeps its place on the faces if the cage is edited while the modifier is disabled."""
     guides, hair = grow(cube, guide_count=40, strand_count=200)
     before = points(hair)[:, 0]
     set_eye(cube, 0)

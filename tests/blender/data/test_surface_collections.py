@@ -27,7 +27,7 @@ def test_what_is_new_is_seen_beside_its_surface(sphere, way):
 
 
 def test_hair_stays_in_the_only_collection_of_its_surface(sphere):
-    """Though it is hidden."""
+    """A hidden collection is found too."""
     listed = bpy.data.collections.new("Heads")
     bpy.context.scene.collection.children.link(listed)
     listed.objects.link(sphere)

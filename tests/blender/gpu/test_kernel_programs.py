@@ -221,7 +221,7 @@ def test_paths_of_light_are_those_of_the_processor(rng):
 
 
 def test_light_of_one_event_is_the_same_to_rounding(rng):
-    """On black hair, without surfaces, next to nothing is left for further events."""
+    """Black hair without surfaces leaves almost no light for further events."""
     grid, light = lit_scene(rng, (1e4, 1e4, 1e4))
     light = surroundings(lamps=light.lamps)
     given, count, _mesh = paths_of(grid, light, 1000)

@@ -113,7 +113,7 @@ def test_a_picture_is_lit_by_the_image_of_now(dark, tmp_path, make, change):
 
 @pytest.mark.parametrize(("make", "change"), [WAYS[0], WAYS[3], WAYS[5]], ids=["float", "generated", "reloaded"])
 def test_viewports_are_lit_by_the_image_of_now(dark, tmp_path, make, change):
-    """Which ask for the light when Blender has reported a change."""
+    """Viewports read the light again when Blender has reported a change."""
     image = make(tmp_path)
     environment_node(dark, image)
     bpy.context.view_layer.update()

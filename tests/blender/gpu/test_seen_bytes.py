@@ -87,7 +87,7 @@ def test_bytes_keep_what_strands_see(fine_world, rng):
 
 
 def test_bytes_of_visibility_are_no_visible_step_in_pictures(thin, monkeypatch):
-    """Beside textures of single precision, in light of the world alone: in steps of what displays show."""
+    """Under world light, pictures differ from those of single-precision textures by less than a step of a display."""
     bpy.data.objects["Sun"].hide_render = True
     world = bpy.context.scene.world = bpy.data.worlds.new("World")
     background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")

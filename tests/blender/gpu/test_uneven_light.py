@@ -37,7 +37,7 @@ def test_even_light_has_no_part_but_one(rng):
 
 
 def test_a_mirror_sees_light_that_varies_exponentially_as_it_is(rng):
-    """Of light as exp(b sin(theta_i)) a smooth fibre shows that at -theta_o, however little there is of it."""
+    """A smooth fiber under light exp(b sin(theta_i)) shows the light at -theta_o, however weak it is."""
     b = rng.uniform(-10.0, 10.0, COUNT)
     seen = rng.uniform(-1.0, 1.0, COUNT)
     sine = np.linspace(-1.0, 1.0, 20001)[:, None]

@@ -167,7 +167,7 @@ def test_thin_strands_in_one_line_cover_what_one_of_them_does(shading, in_comput
 
 
 def test_wide_strands_end_with_disks(shading):
-    """In a parallel view: the distance of a center from the segment between the strand's ends decides."""
+    """In a parallel view, a pixel is covered if its center is near enough to the segment between the strand's ends."""
     height, width = np.indices(SIZE[::-1])
     centres = np.stack([(width + 0.5) / SIZE[0] * 2 - 1, (height + 0.5) / SIZE[1] * 2 - 1], axis=-1)
     centres *= [HALF_WIDTH, 0.2]

@@ -174,7 +174,7 @@ def test_transmittance_of_a_cloud_equals_ray_tracing(scene, rng):
 
 @pytest.mark.parametrize("has_hair", [False, True])
 def test_an_even_world_gives_a_surface_its_colour(sphere, scene, has_hair):
-    """With and without hair in the scene, which has surfaces look through it."""
+    """The law holds with and without hair in the scene."""
     color = np.array([0.2, 0.4, 0.6])
     scene.world = bpy.data.worlds.new("World")
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)

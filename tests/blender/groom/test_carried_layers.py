@@ -132,7 +132,7 @@ def between(guides, shape):
 
 
 def test_mirror_guides_mirrors_each_layer(layered):
-    """At any weights the two sides are mirror images."""
+    """The two sides are mirror images at any weights."""
     api.change_guides(layered, "MIRROR")
     update()
     for weights in ((1.0, 1.0), (0.0, 0.0), (1.0, 0.0), (0.4, 1.5)):

@@ -280,7 +280,7 @@ def test_an_edit_in_such_a_frame_is_followed(changing, scene):
 
 
 def test_a_setting_that_is_changed_back_is_an_edit_too(hair, scene):
-    """Though as many faces as before were those of the frame."""
+    """Within a frame the topology follows a ratio that is changed, and one that is changed back."""
     decimate = bpy.data.objects["Skin"].modifiers.new("Decimate", "DECIMATE")
     topologies = []
     for frame, ratio in ((1, 0.5), (2, 0.5), (2, 1.0), (2, 0.5)):

@@ -157,7 +157,7 @@ def test_a_window_shows_sizes_before_strands_are_written(mask_first, monkeypatch
 
 
 def test_a_group_that_is_named_like_hair_is_picked(sphere):
-    """Before hair is made, and in the panel; not a bone's, not an empty one, and none that has its hair."""
+    """The group is picked before hair is made and in the panel, unless it is a bone's, empty or used by hair."""
     sphere.vertex_groups["top"].name = "Kopfhaar"
     for name, vertices in (("scalp", []), ("hair", range(40)), ("beard", range(40))):
         sphere.vertex_groups.new(name=name).add(list(vertices), 1.0, "REPLACE")

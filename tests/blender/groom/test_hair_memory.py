@@ -89,7 +89,7 @@ def test_the_command_line_refuses_and_says(free, tmp_path, capsys):
 
 
 def test_what_hair_has_already_is_not_asked_for_again(hair, free, monkeypatch):
-    """In a window: a slider that takes much more waits for the button; one that takes no more does not."""
+    """In a window, a slider that needs much more memory waits for the button; others do not."""
     monkeypatch.setattr(running, "has_window", lambda: True)
     state = hair.data.vellus
     free(0.4)

@@ -108,7 +108,7 @@ def test_the_eye_hides_hair_from_viewports_and_the_camera_from_renders(systems):
 
 
 def test_deleting_a_row_leaves_the_others_alone(systems):
-    """Also if the mesh is active: there Delete Hair would delete all hair."""
+    """Only the row's hair is deleted, also if the mesh is active, where Delete Hair would delete all hair."""
     activate("Sphere")
     bpy.ops.ed.undo_push(message="systems")
     bpy.ops.vellus.delete_system("EXEC_DEFAULT", True)

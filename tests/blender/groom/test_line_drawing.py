@@ -36,7 +36,7 @@ def arc(normal, steps=24):
 
 
 def test_a_parting_is_drawn_on_the_surface(hair):
-    """In two clicks; the curve is picked, lies in the surface's coordinates and can be gone on with."""
+    """Two clicks draw a curve that is picked, lies in the surface's coordinates and can be extended."""
     sphere = hair.parent
     sphere.location = (1.0, 2.0, 3.0)
     assert "Draw Parting" in buttons()

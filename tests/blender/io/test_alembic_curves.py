@@ -23,7 +23,7 @@ def lines(sphere, rng):
 
 @pytest.mark.parametrize("kind", ["POLY", "CATMULL_ROM"])
 def test_blenders_curves_are_read_as_they_are_seen_in_every_frame(scene, lines, tmp_path, kind):
-    """From an object that is turned, scaled and parented to one that moves."""
+    """Curves of an object that is turned, scaled and parented to a moving object are read."""
     made = curves_object(lines, kind=kind)
     made.data.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", np.full(60, 0.001, np.float32))
     made.rotation_euler, made.scale = (0.5, 0.2, 0.1), (2.0, 2.0, 2.0)
@@ -87,7 +87,7 @@ def test_scripts_read_them_too(scene, sphere, lines, tmp_path):
 
 @pytest.mark.parametrize(("ending", "kind"), [(".abc", "POLY"), (".usdc", "POLY"), (".abc", "CATMULL_ROM")])
 def test_hair_of_a_file_that_moves_plays_all_of_its_frames(scene, sphere, lines, tmp_path, ending, kind):
-    """In a .blend; other files have the present frame, and a warning. Splines play as lines through their points."""
+    """A .blend file plays all frames; other files get the present frame and a warning. Splines play as polylines."""
     lines[::3] = lines[::3, ::-1]  # from tip to root
     made = curves_object(lines, kind=kind)
     for frame, place in ((1, 0.0), (4, 0.3)):

@@ -56,7 +56,7 @@ def test_levels_have_the_polygons_and_textures_that_were_promised(hair):
 
 
 def test_cards_are_where_the_strands_are(head, rng):
-    """On a surface that is turned, moved and scaled: the hair's box and the cards' differ by less than a card."""
+    """On a turned, moved and scaled surface, the boxes of hair and cards differ by less than a card."""
     bpy.context.view_layer.objects.active = head
     bpy.ops.vellus.add_hair(guide_count=30, strand_count=200, length=0.4)
     update()
@@ -110,7 +110,7 @@ def drawn_area(points, radii, step=1.5e-4):
 
 
 def test_samples_show_the_nearest_strand_there(rng):
-    """By brute force, of strands that cross each other at several heights."""
+    """Samples agree with brute force for strands that cross each other at several heights."""
     places = rng.uniform(0.1, 0.9, (9, 4, 3)).astype(np.float32)
     places[..., 2] *= 0.2
     radii = np.full((9, 4), 0.02, np.float32)

@@ -60,7 +60,7 @@ def put(
 
 @pytest.mark.parametrize("place", PLACES)
 def test_strands_lie_where_the_file_has_them(scene, sphere, rng, tmp_path, place):
-    """For each format, in centimeters with Y up: positions within 1e-5 of the surface's size, widths of the file."""
+    """Each format in centimeters with Y up gives positions within 1e-5 of the surface's size, and the file's widths."""
     put(sphere, **PLACES[place])
     metres = PLACES[place].get("scene", 1.0)
     lines = [np.float32(line) for line in lines_on(sphere, rng, 8, 5, 5)]
@@ -100,7 +100,7 @@ def test_unit_and_axis_are_found_by_the_surface(scene, sphere, rng, tmp_path):
 
 @pytest.mark.parametrize("ending", OF_STRANDS)
 def test_written_strands_come_back(hair, tmp_path, ending):
-    """To the bit of what was written, with widths; guides, IDs and weights from formats that have them."""
+    """Points and widths come back with the same bits; guides, IDs and weights come back from formats that have them."""
     bpy.data.objects["Sphere"].location = (1.0, 2.0, 3.0)
     update()
     path = tmp_path / f"groom{ending}"

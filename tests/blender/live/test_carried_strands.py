@@ -107,7 +107,7 @@ def test_styled_hair_is_carried_too(watched, monkeypatch):
 
 
 def test_another_topology_while_the_surface_bends_is_carried_anew(watched, monkeypatch):
-    """By an upload, and from the next pose on where strands are drawn."""
+    """Strands are carried by an upload at first, and on the GPU from the next pose on."""
     surface = watched.data.surface
     bend(surface, 0.5)
     drawn(watched)
@@ -237,7 +237,7 @@ def test_hair_that_warp_computes_is_lit_as_at_rest_while_it_plays(hair, coarse_s
 
 
 def test_guides_are_drawn_at_the_roots_that_are_stored_with_their_hair(hair):
-    """In the update that stores them, before Blender reports the guides."""
+    """Guides have the stored roots in the update that stores them, before Blender reports the guides."""
     guides = bpy.data.objects["Guides"]
     bend(hair.data.surface, 0.5)
     hair.data.vellus.is_live = False

@@ -81,7 +81,7 @@ def grown(hair):
 
 
 def test_a_redraw_waits_for_strands_that_grow(hair, window, monkeypatch):
-    """In other threads, as all strands do that moved at once."""
+    """A redraw waits while strands grow in other threads."""
     go_on, strands_now = threading.Event(), following.strands_now
     drawn(hair)
     for _ in stroke(bpy.data.objects["Guides"], slice(None), steps=1):

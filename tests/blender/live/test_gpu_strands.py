@@ -239,7 +239,7 @@ def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, coarse_shad
 
 
 def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watched, coarse_shadows, monkeypatch):
-    """From the comb to shadows and light: one texture of twelve bytes a point of guides; six numbers come back."""
+    """A stroke uploads one texture of twelve bytes per point of the guides and reads six numbers back."""
     bpy.ops.object.light_add(type="SUN")
 
     def scene_now():

@@ -83,7 +83,7 @@ def test_strands_edited_before_blender_reports_our_write_are_drawn(hair):
 
 @pytest.mark.usefixtures("made_anew")
 def test_radii_edited_by_hand_are_drawn(hair):
-    """Also those of bound hair, and while its guides are combed."""
+    """Edited radii are drawn for bound hair too, and while its guides are combed."""
     guides = bpy.data.objects["Guides"]
     hair.data.vellus.hair.seed = 9
     update()

@@ -179,7 +179,7 @@ def test_a_style_that_is_switched_off_and_on(watched):
 
 
 def test_wetness_and_the_radii_that_swell_with_it(watched, monkeypatch):
-    """By one upload of a number a strand where strands differ in it."""
+    """A change uploads one number per strand if strands differ in wetness."""
     add_styles(watched, wet.Settings(lock=0.3, amount=0.2))
     calls = counts_of(monkeypatch)
     for amount, vary in ((0.9, 0.0), (0.9, 0.5), (0.5, 0.3), (0.5, 0.0)):

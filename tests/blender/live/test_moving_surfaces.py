@@ -297,7 +297,7 @@ def test_renders_carry_hair_that_viewports_hide(playing, monkeypatch):
 
 
 def test_all_objects_of_hair_are_hidden_and_carried_again(bent, monkeypatch):
-    """Also an object that is copied while it is hidden."""
+    """An object that is copied while it is hidden is carried too."""
     other = bent.copy()
     bpy.context.scene.view_layers.new("Other")
     bpy.context.scene.collection.objects.link(other)

@@ -96,7 +96,7 @@ def test_an_unevenly_scaled_surface_keeps_hair_at_its_roots(swung):
 
 
 def test_hair_follows_simulated_guides_as_combed_ones(swung):
-    """With styles too: guides that are combed to where they were simulated have the same hair."""
+    """Guides that are combed to their simulated positions have the same hair, with styles too."""
     guides, hair = swung
     bpy.context.view_layer.objects.active = hair
     bpy.ops.vellus.add_style(style="CURL")

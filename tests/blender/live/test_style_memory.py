@@ -147,7 +147,7 @@ def grown(change):
 @pytest.mark.long
 @pytest.mark.parametrize("offer", OFFER_OF_KINDS)
 def test_memory_stays_as_it_is_in_a_thousand_changes_and_frames(hair, offer):
-    """Of all numbers of a style, dragged, keyed and driven, with 300 strands."""
+    """Memory stays constant while each number of a style of 300 strands is dragged, keyed and driven."""
     changing = Changing(hair, offer, 300)
     for begin in (changing.dragged, changing.keyed, changing.driven):
         (few_things, few), (things, memory) = grown(begin())

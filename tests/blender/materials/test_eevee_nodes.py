@@ -77,6 +77,6 @@ def test_random_colors_are_shown_too(hair):
 
 
 def test_strands_are_as_thick_for_light_as_they_are(hair):
-    """Otherwise EEVEE would take hair to be as thick as its bounds, and no strand would shade another."""
+    """EEVEE gets the strands' thickness; with the thickness of the bounds no strand would shade another."""
     thickness = hair.data.materials[0].node_tree.nodes["EEVEE Output"].inputs["Thickness"]
     assert [link.from_socket.name for link in thickness.links] == ["Thickness"]

@@ -48,7 +48,7 @@ def test_a_holdout_leaves_a_hole_in_the_shape_of_the_surface(lit, tmp_path):
 
 
 def test_shadow_is_the_part_of_light_that_arrives(lit, tmp_path):
-    """Of a matt surface under one sun and no world, sample by sample: what is left of it is the pass."""
+    """On a matte surface under one sun, the shadow pass is the remaining fraction of the light in each sample."""
     sun = next(o for o in bpy.data.objects if o.type == "LIGHT")
     bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, 2.0, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
     bpy.context.view_layer.use_pass_shadow = bpy.context.view_layer.vellus.has_hair_mask = True
@@ -67,7 +67,7 @@ def test_shadow_is_the_part_of_light_that_arrives(lit, tmp_path):
 
 
 def test_depth_is_the_distance_along_the_view(scene, tmp_path):
-    """Of Cycles' convention: a plane across the view has one depth, a slanted one that of its points; nothing, 1e10."""
+    """Depth is as in Cycles: constant on a plane across the view, and 1e10 for the background."""
     bpy.ops.object.camera_add(location=(0.0, 0.0, 5.0))
     scene.camera = bpy.context.object
     bpy.ops.mesh.primitive_plane_add(size=2.0, rotation=(0.0, math.pi / 4, 0.0))
@@ -113,7 +113,7 @@ def seen_points(curves_object, frame, size):
 
 
 def test_vectors_of_hair_lead_to_the_frame_before_and_from_the_frame_after(lit, tmp_path):
-    """In each sample, by the point of a strand that it shows: hair that a surface carries, camera moving too."""
+    """In each sample the vectors are those of its point on the strand, with a moving surface and camera."""
     moving(bpy.data.objects["Sphere"])
     view_layer = bpy.context.view_layer
     view_layer.use_pass_vector = view_layer.use_pass_z = view_layer.vellus.has_hair_mask = True

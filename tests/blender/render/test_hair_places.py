@@ -193,7 +193,7 @@ def camera_in_front(distance):
 
 
 def test_an_instance_is_the_same_picture_as_the_hair_itself(hair):
-    """To rounding, in which samples a strand is nearest."""
+    """The pictures are equal except for rounding in the choice of the nearest strand."""
     camera_in_front(8.0)
     picture = {"itself": api.draw(width=96, height=96, is_transparent=True)}
     collection = bpy.data.collections.new("Creature")

@@ -65,7 +65,7 @@ def mean_color(drawn):
 
 
 def test_scenes_without_a_setting_take_the_light_grid(scene, rng):
-    """Also scenes of files; stored values of the setting keep their meaning."""
+    """Scenes in files get the same default, and stored values keep their meaning."""
     hair_of(scene, rng.uniform(-0.5, 0.5, (50, 3)), BROWN)
     light(scene, world=0.3, sun=2.0)
     dual, wanted = (picture(scene, scattering) for scattering in ("DUAL", "GRID"))
@@ -119,7 +119,7 @@ def test_hair_that_is_too_large_for_its_width_takes_dual_scattering(scene, monke
 
 
 def test_a_thick_ring_covers_its_area(scene):
-    """Also where it turns from rows to columns of the picture; half disks are its ends."""
+    """The covered area is right also where the ring turns from rows to columns; its ends are half disks."""
     turn = np.linspace(0.3, 2.0 * np.pi - 0.3, 65)
     points = np.stack([0.5 * np.cos(turn), 0.0 * turn, 0.5 * np.sin(turn)], axis=-1)
     curves = bpy.data.hair_curves.new("Ring")

@@ -100,7 +100,7 @@ def test_a_wide_light_sets_slowly(elevation, scene):
 
 
 def test_a_plane_that_light_grazes_does_not_shade_itself(scene, rng):
-    """With hair the sun has a map of shadows: where strands are too thin to cast any, the plane stays as light."""
+    """A plane stays as bright beside strands too thin to cast shadows, although the sun then has a shadow map."""
     plane = plane_and_sun(scene, 0.25, 0.4)
     alone = light_along_x(1)
     radii = add_sheet(scene, plane, rng, strand_count=1000).data.attributes["radius"].data

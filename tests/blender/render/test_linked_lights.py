@@ -67,7 +67,7 @@ def test_each_is_lit_by_its_own_lights(suns, tmp_path, state):
 
 
 def test_hair_that_is_no_blocker_casts_no_shadow(suns, fine_shadows):
-    """On the surface: as if the hair were not there."""
+    """The surface is lit as if the hair were not there."""
     shadowed = picture()
     for sun in suns.values():
         link(sun, "Hair", "EXCLUDE", "blocker")
@@ -80,7 +80,7 @@ def test_hair_that_is_no_blocker_casts_no_shadow(suns, fine_shadows):
 
 
 def test_ambient_light_of_lights_without_room_is_linked_too(suns, monkeypatch):
-    """With room for one light the other is ambient light, for the hair alone."""
+    """With room for one light, the other light is ambient light of its linked hair alone."""
     monkeypatch.setattr(uniforms, "LIGHT_CAPACITY", 1)
     suns["Sphere"].data.energy = 0.5
     link(suns["Sphere"], "Hair")

@@ -43,7 +43,7 @@ def light_of(lamps, chosen):
 
 
 def test_many_lights_are_the_sum_of_all(lamps):
-    """Of pictures in which each is drawn by itself: light is additive."""
+    """A picture with many lights is the sum of pictures with one light each."""
     together = light()
     size = uniforms.LIGHT_CAPACITY
     each = sum(light_of(lamps, lamps[first : first + size]) for first in range(0, COUNT, size))

@@ -161,7 +161,7 @@ def seen_from_behind(drawn):
 
 
 def test_each_look_is_drawn_from_tables_of_its_own_baked_where_the_user_wants(lit, monkeypatch):
-    """Even hair from tables of one absorption, strands that differ from slices; both on the chosen device."""
+    """Uniform hair uses tables of one absorption, varied hair slices of tables; both are baked on the chosen device."""
     baked = []
     for module in (lookup_tables, strand_tables):
         real = module.bake

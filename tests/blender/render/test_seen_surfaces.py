@@ -104,7 +104,7 @@ def test_a_viewport_without_materials_shows_what_is_transparent_as_solid(stage):
 
 
 def test_glass_reflects_and_shows_what_is_behind_it(stage):
-    """Of light that comes from the side, which it reflects to the other side."""
+    """Glass reflects light from one side to the other."""
     bpy.data.objects["Sun"].rotation_euler.x -= math.radians(60.0)
     bare = seen_color(picture())
     plane(material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.1), depth=0.5)
@@ -146,7 +146,7 @@ def test_an_image_ends_where_it_is_clipped(is_clipped, stage):
 
 @pytest.mark.parametrize(("alpha_mode", "seen"), [("STRAIGHT", 0.4), ("CHANNEL_PACKED", 1.0)])
 def test_straight_alpha_lays_an_image_over_black_unless_it_is_read(alpha_mode, seen, stage):
-    """As in Cycles and EEVEE."""
+    """The result is that of Cycles and EEVEE."""
     made = matt(0.0, 0.0, 0.0)
     tree = made.node_tree
     image = tree.nodes.new("ShaderNodeTexImage")
@@ -276,7 +276,7 @@ def test_a_view_layer_overrides_material_and_world(stage):
 
 @pytest.mark.parametrize("kind", ["ORTHO", "PERSP"])
 def test_a_mirrored_camera_has_a_mirrored_picture(kind, stage):
-    """Of a box and hair in light from the side: each is lit and shaded as in the other picture."""
+    """A box and hair in light from the side are lit and shaded alike in both pictures."""
     stage.camera.data.type = kind
     bpy.data.objects["Sun"].rotation_euler = (math.radians(60.0), 0.0, math.radians(40.0))
     bpy.ops.mesh.primitive_cube_add(size=0.5, location=(-0.5, -0.5, 0.2), rotation=(0.3, 0.2, 0.5))

@@ -319,7 +319,7 @@ def test_samples_share_light_of_their_own_surface_alone(stage):
 
 
 def test_slots_of_like_materials_change_nothing(stage):
-    """On a surface that is bent, where each sample has a shade of its own; those that share light differ by little."""
+    """The law holds on a curved surface, where samples that share light differ by little."""
     bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8, radius=0.8)
     ball = bpy.context.object
     ball.data.shade_smooth()

@@ -67,7 +67,7 @@ def small(lit):
 
 
 def test_a_mask_of_one_is_wet_and_of_zero_is_dry(small):
-    """Also of a style that wets less. Interpolated weights are one up to rounding, which moves strands as little."""
+    """The law holds for partial wetness. Interpolated weights are one up to rounding, which moves strands as little."""
     count = len(bpy.data.objects["Sphere"].data.vertices)
     group("all", np.ones(count))
     group("none", np.zeros(count))

@@ -169,7 +169,7 @@ def rendered():
 
 
 def test_what_a_script_keys_and_drives_is_in_its_first_render(hair, rendered):
-    """With no update in between: Blender changes to the frame of a render first."""
+    """No update is needed: Blender changes to the frame before it renders."""
     drive(hair, "vellus.hair.radius")
     for frame, length in ((1, 0.2), (11, 0.4)):
         bpy.data.objects["Guides"].data.vellus.guides.length = length

@@ -200,7 +200,7 @@ def test_settings_are_kept_in_a_file_and_in_copies(state, tmp_path):
 
 
 def test_properties_come_and_go_with_the_add_on():
-    """Twice, in a Blender of its own: objects and Curves have no group of ours afterwards."""
+    """Registering twice in a separate Blender leaves no property group on objects and Curves."""
     program = (
         "import bpy, hair_addon\n"
         "for _ in range(2):\n"

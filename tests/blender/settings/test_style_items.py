@@ -216,7 +216,7 @@ def test_paths_by_name_are_renamed(keyed_styles):
 
 
 def test_keys_of_other_hair_and_other_settings_stay(keyed_styles):
-    """Also if that hair shares the action."""
+    """Keys of other hair stay, also if it shares the action."""
     state, curves = keyed_styles, keyed_styles.id_data
     curves.keyframe_insert("vellus.appearance.melanin", frame=1)
     other = curves.copy()
@@ -230,7 +230,7 @@ def test_keys_of_other_hair_and_other_settings_stay(keyed_styles):
 
 
 def test_an_action_that_waits_follows(keyed_styles):
-    """As artists keep several: it has the slot of this hair, and no user."""
+    """An unused action with the slot of this hair follows too."""
     state, animation = keyed_styles, keyed_styles.id_data.animation_data
     waiting = animation.action
     animation.action = None

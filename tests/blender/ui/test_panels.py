@@ -247,7 +247,7 @@ def test_memory_grows_with_the_count():
 
 
 def test_long_work_is_announced_and_short_work_is_not(hair):
-    """By what the surface has once its modifiers are evaluated, and by what was asked for."""
+    """The evaluated surface and the requested amount decide."""
     sphere, guides = bpy.data.objects["Sphere"], bpy.data.objects["Guides"]
 
     def announced():
@@ -350,7 +350,7 @@ def test_looks_have_pictures_of_their_own(hair):
 
 
 def test_a_click_on_a_picture_gives_its_look(hair, tmp_path, monkeypatch):
-    """As an operator, which undo takes back; the picture that is shown is that of the look that is there."""
+    """The click runs an operator that can be undone; the shown picture is that of the present look."""
     monkeypatch.setattr(saved_looks.FILES, "folder", lambda create: tmp_path)
     mine = Appearance(parametrization="COLOR", color=(0.5, 0.01, 0.01))
     saved_looks.write("Mine", mine)

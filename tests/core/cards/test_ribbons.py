@@ -61,7 +61,7 @@ def test_ribbons_face_away_from_the_surface(carded):
 
 
 def test_a_clump_that_is_flat_gives_a_ribbon_in_its_plane(rng):
-    """Where the surface says nothing, as strands rise straight from it, the spread does."""
+    """Strands that rise straight from the surface get the plane of their spread."""
     x = rng.uniform(-0.02, 0.02, (50, 1))
     s = np.linspace(0.0, 0.1, 9)
     direction = np.array([np.cos(0.7), np.sin(0.7), 0.0])

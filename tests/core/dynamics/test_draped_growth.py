@@ -72,7 +72,7 @@ def test_without_draping_guides_grow_as_they_did():
 
 
 def test_hair_of_a_giant_hangs_alike(draped):
-    """At two powers of two, where the arithmetic is the same: how guides fall follows from their surface's size."""
+    """Hair falls alike at scales of powers of two, where the arithmetic is the same."""
     factor = 64.0
     giant = grown(replace(SETTINGS, length=factor * LENGTH), TriMesh(factor * BALL.vertices, BALL.triangles))
     np.testing.assert_allclose(giant.numpy() / factor, draped.numpy(), atol=1e-5 * LENGTH)

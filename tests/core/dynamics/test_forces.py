@@ -36,7 +36,7 @@ def drag_of_cylinder(speed, radius, length):
 @pytest.mark.parametrize("substeps", [2, 8])
 @pytest.mark.parametrize("speed", [0.05, 0.5, 3.0])
 def test_a_limp_strand_hangs_straight_in_the_wind(speed, substeps):
-    """At the angle θ where wind and weight are equal across it, c_n u cos θ = ρA g sin θ, whatever the substeps are."""
+    """For any substeps the strand hangs at the angle θ at which c_n u cos θ = ρA g sin θ."""
     length, radius = 0.1, FIBRE.fibre_radius
     line_mass = FIBRE.density * np.pi * radius**2
 
@@ -107,7 +107,7 @@ def test_pinned_points_follow_the_surface(part):
 
 
 def test_a_groom_turns_with_its_surface():
-    """Without weight a strand comes to rest as it was combed, turned."""
+    """A weightless strand comes to rest in its combed shape, turned with the surface."""
     groom = np.concatenate([line(0.1, 25), curl(0.1, 25)])
     turn = Rotation.from_rotvec([0.9, -0.4, 0.5])
     simulation = Simulation(groom, DynamicsSettings(damping=0.02, air_drag=3.0), gravity=WEIGHTLESS)

@@ -119,7 +119,7 @@ def test_cohesion_pulls_wet_strands_alone(rng, hair):
 
 
 def test_sums_have_no_order(rng, hair, monkeypatch):
-    """Of strands, and of the threads that share them."""
+    """Sums do not depend on the order of strands and threads."""
     shuffled = Hair(rng, hair.device)
     order = rng.permutation(len(hair.points))
     for name in ("points", "velocities", "masses"):

@@ -70,7 +70,7 @@ def test_coordinates_that_are_no_numbers_are_refused(name):
 
 @pytest.mark.parametrize("has_start", [False, True])
 def test_kernels_turn_roots_as_numpy_does(rng, has_start):
-    """To the last bit, since the groom or since another rotation; and the frame begins where the last one ended."""
+    """Rotations from the groom or another rotation have NumPy's bits; a frame begins where the last one ended."""
     simulation = Simulation(line(0.1, 4) + rng.normal(size=(35, 1, 3)))
     rods, (start, turns) = simulation.rods, rotations.unit(rng.normal(size=(2, 35, 4)))
     if has_start:

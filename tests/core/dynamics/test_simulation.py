@@ -76,7 +76,7 @@ def test_without_inertia_hair_moves_with_its_surface(rng):
 
 
 def test_hair_that_is_pinned_to_the_tip_moves_with_its_surface(rng):
-    """Also with a collider, though no strand has a free point."""
+    """The law holds with a collider, although no strand has a free point."""
     groom, pose = fur(rng)
     simulation = Simulation(groom, DynamicsSettings(pinned=1.0), pose, World(obstacles=(ball(),)), DEVICE)
     np.testing.assert_allclose(play(simulation, pose, range(1, 5)), shake(4).moved(groom), atol=1e-6)
@@ -190,7 +190,7 @@ def test_guides_without_length_follow_rigidly(rng):
 
 
 def test_a_strand_that_breaks_in_ten_frames_running_stays_in_its_groom(rng):
-    """To the end, where the surface carries it; the others move as without it."""
+    """The surface carries the broken strand to the end, and the others move as without it."""
     groom, pose = fur(rng)
     simulation, sound = (Simulation(groom, DynamicsSettings(), pose, World(), DEVICE) for _ in range(2))
     for frame in range(1, 12):

@@ -62,7 +62,7 @@ def test_roots_beyond_the_size_of_the_surface_are_refused_with_what_fits(head):
 
 
 def test_curves_that_shrink_into_the_surface_do_not_count_as_on_it(sphere):
-    """In centimetres, hair of a head around the origin would be a speck inside of it: its roots are near, and wrong."""
+    """Curves read as centimeters would be a speck inside the head, whose roots are near the surface and wrong."""
     head = TriMesh((0.5 * SIZE * sphere.vertices + [0.0, 0.0, 0.5 * SIZE]).astype(np.float32), sphere.triangles)
     roots = head.vertices[::30].astype(np.float64)
     lines = np.stack([roots, 1.3 * roots], axis=1).reshape(-1, 3) @ TO_Z_UP["Y"]

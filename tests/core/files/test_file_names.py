@@ -17,7 +17,7 @@ def test_signs_that_some_systems_forbid_are_replaced():
 
 
 def test_different_things_have_different_files():
-    """Also on systems that ignore case."""
+    """Names differ also on systems that ignore case."""
     owners = {}
     for name in ("A/B", "A:B", "a|b", "A_B", "A_B.001"):
         owners[free_stem(name, lambda stem: stem.casefold() in owners).casefold()] = name

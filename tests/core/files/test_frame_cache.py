@@ -310,7 +310,7 @@ PREPARED = [linked, with_files, with_claim_link, with_marker_link, with_other_ma
 
 @pytest.mark.parametrize("prepare", PREPARED, ids=lambda prepare: prepare.__name__)
 def test_nothing_is_written_to_a_folder_that_others_have_prepared(tmp_path, prepare):
-    """Neither there nor elsewhere: the folder is a web application's, with its own manifest.json and numbered files."""
+    """The folder of a web application, with its own manifest.json and numbered files, stays unchanged."""
     victim, folder = tmp_path / "application", tmp_path / "cache"
     victim.mkdir()
     (victim / "manifest.json").write_text('{"name": "application"}')
@@ -326,7 +326,7 @@ def test_nothing_is_written_to_a_folder_that_others_have_prepared(tmp_path, prep
 
 
 def test_a_folder_is_identified_by_its_marker(folder):
-    """Also if its manifest is damaged, or all frames are removed and a foreign file remains."""
+    """The marker identifies the folder with a damaged manifest, and with a foreign file in place of the frames."""
     (folder / "manifest.json").write_bytes(b"damaged")
     bake(folder, [1])
     assert check_whole(folder)[0][:1] == [-2]

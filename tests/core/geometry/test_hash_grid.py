@@ -39,7 +39,7 @@ def assert_equal_to_brute_force(points, queries, distance, limit):
     scale=st.integers(-6, 6),
 )
 def test_neighbours_equal_brute_force(seed, point_count, limit, reach, scale):
-    """For distances from a thousandth to a hundred times the extent, and surfaces from micrometres to megametres."""
+    """The law holds for distances from 0.001 to 100 times the extent, and extents from micrometers to megameters."""
     generator = np.random.default_rng(seed)
     points = 10.0**scale * generator.random((point_count, 3))
     queries = 10.0**scale * (1.4 * generator.random((30, 3)) - 0.2)

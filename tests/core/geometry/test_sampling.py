@@ -27,7 +27,7 @@ def test_points_are_on_the_surface(head):
 
 
 def test_uniform_roots_follow_area(head):
-    """In a hundred parts of the head that are nearly as large as each other."""
+    """A hundred parts of the head of nearly equal area have nearly equal numbers of roots."""
     points = sample_surface(head, 100_000, seed=2)
     part = (np.cumsum(head.areas) / head.areas.sum() * 99.999).astype(int)
     assert_follows(np.bincount(part[points.triangle]), np.bincount(part, weights=head.areas))

@@ -36,7 +36,7 @@ def surface(degree, controls, divisions):
 
 @pytest.mark.parametrize("levels, part", [(1, 0.15), (2, 0.08), (3, 0.08)])
 def test_a_cage_of_quads_becomes_its_bicubic_spline(rng, levels, part):
-    """To a small part of how far the spline is from the cage's faces."""
+    """The error is a small part of the distance between the spline and the cage's faces."""
     controls, faces = rng.normal(size=(CELLS, CELLS, 3)), torus_grid(CELLS * 2**levels)
     flat, smooth = (surface(degree, controls, 2**levels) for degree in (1, 3))
     found = smooth_surface.smoothed(flat.astype(np.float32), faces, 4 * CELLS**2)

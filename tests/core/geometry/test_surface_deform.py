@@ -70,7 +70,7 @@ def test_a_surface_that_grows_leaves_strands_as_long_and_unturned(sphere, rng, s
 
 
 def test_some_vertices_turn_as_they_do_among_all(sphere, rng):
-    """On a mesh of triangles and one of quads: a few strands, whose corners alone are asked for."""
+    """On triangles and quads, the corners of a few strands turn as among all."""
     after = (sphere.vertices * (1.0 + 0.3 * np.sin(3.0 * sphere.vertices[:, ::-1]))).astype(np.float32)
     triangles = faces_of(sphere)
     quads = Faces(triangles.corner_vertices[:3720], np.append(np.arange(0, 3720, 4), 3720).astype(np.int32))

@@ -64,7 +64,7 @@ def test_guides_of_hair_that_is_one_strand_everywhere_reproduce_it(mesh):
 
 
 def test_the_fit_is_the_least_squares_of_interpolation(mesh, hair):
-    """By brute force: interpolation is linear in each coordinate of each guide, one at a time."""
+    """The fit agrees with least squares by brute force, as interpolation is linear in each coordinate of each guide."""
     points, roots = (part[:60] for part in hair)
     guides, own = hair[0][60:66, :3], hair[1][60:66]
     settings = complete(mesh, 6, keep_length=0.0, angle_limit=np.pi, length_limit=1e6)

@@ -139,7 +139,7 @@ def test_one_guide_is_enough(square):
 
 
 def test_influence_distance_is_obeyed(square):
-    """In reach of one guide only, or of all."""
+    """With a tiny distance strands follow the nearest guide, with a huge distance the mean of all guides."""
     guides = distribute_guides(square, GuideSettings(guide_count=30))
     settings = {"strand_count": 300, "automatic_influence": False}
     narrow = generate_hair(square, guides, HairSettings(influence_distance=1e-6, **settings)).numpy()

@@ -37,7 +37,7 @@ def test_new_guides_stand_on_their_roots_between_their_neighbors(sphere, guides)
 
 
 def test_new_guides_do_not_blend_across_regions(sphere, guides):
-    """On one side guides lean to +Z, on the other to -Z: no new one stands between."""
+    """Between regions that lean to +Z and to -Z, no new guide has a direction in between."""
     points = guides.numpy().copy()
     side = np.where(points[:, 0, 0] > 0.0, 1.0, -1.0)
     steps = np.linspace(0.0, 0.4, points.shape[1], dtype=np.float32)

@@ -97,7 +97,7 @@ def test_more_gravity_takes_tips_lower(sphere, roots):
 
 
 def test_full_gravity_lets_the_sides_hang(sphere, roots):
-    """Where nothing is in the way, tips point to the domain."""
+    """Tips point down where nothing is in the way."""
     sides = np.abs(mesh_math.normals(sphere, roots)[:, 2]) < 0.5
     points = grown(sphere, roots, gravity=1.0, length=0.3)[sides]
     tips = points[:, -1] - points[:, -2]

@@ -170,7 +170,7 @@ def test_slivers_alone_are_shared_out_soon():
 
 @pytest.mark.parametrize("width", [1e-6, 1e-3, 4e-3, 0.1])
 def test_slivers_are_sliced_and_nothing_of_them_is_lost(width):
-    """In a number that grows with their length alone, not with its power of log 3 / log 2."""
+    """The number of pieces grows linearly with a sliver's length, not with its power of log 3 / log 2."""
     corners = np.array([[(0, 0, 0), (1, 0, 0), (1, width, 0)], [(0, width, 0), (0, 0, 0), (1, 0.5 * width, 0)]])
     corners = np.concatenate([corners, np.roll(corners, 1, axis=1), np.roll(corners, 2, axis=1)])
     areas = np.full(len(corners), 0.5 * width)

@@ -22,7 +22,7 @@ def test_names_have_the_numbers_of_the_specification(name, number):
 
 
 def test_numbers_are_normal_and_those_of_another_implementation():
-    """Also of names beyond ASCII, and hashes whose bits would be infinite or next to zero."""
+    """The law holds for names beyond ASCII, and for hashes whose bits would be infinite or denormal."""
     names = ["", "a", "ab", "abc", "Haar.001", "Größe", "毛", *(f"Hair.{n:03}" for n in range(3000))]
     ours = cryptomatte.hash_numbers([cryptomatte.name_hash(name) for name in names])
     np.testing.assert_array_equal(ours.view("u4"), np.float32([name_number(name) for name in names]).view("u4"))

@@ -70,7 +70,7 @@ def test_ambient_light_of_places_is_their_mean(rng):
 
 
 def test_a_lamp_that_shines_all_around_turns_its_disk_to_all():
-    """At any distance it is an area lamp that faces the place, with a quarter of the power."""
+    """At any distance the lamp is an area lamp that faces the place, with a quarter of the power."""
     around = np.zeros(1, LAMP)
     around["kind"], around["radius"], around["axis"][0, 2], around["power"] = lamps.POINT, 0.3, -1.0, 4.0
     forward = around.copy()

@@ -21,7 +21,7 @@ def test_the_first_pass_looks_through_the_middle():
 
 
 def test_points_fill_a_disk_evenly():
-    """Of any first passes: their middle, and a variance of a quarter of the radius' square along each axis."""
+    """The first passes have the disk's center as mean, and a quarter of the squared radius as variance per axis."""
     lens = Lens(0.02, 2.0)
     for count in (16, 64, 1024):
         spread = np.cov(points(lens, count).T, bias=True) / (0.25 * lens.radius**2)
@@ -50,7 +50,7 @@ def test_a_ratio_makes_the_aperture_narrower():
 
 
 def test_what_is_in_focus_stays_and_all_else_moves_by_the_thin_lens_formula():
-    """By (1 - d / F) of the lens' point, at the depth d of a focus F."""
+    """A point at depth d moves by (1 - d / F) of the lens point, with F the focus distance."""
     lens = Lens(0.05, 2.0, 5, 0.2, 1.3)
     view = np.array([(0.3, -0.1, -depth, 1.0) for depth in (0.5, 2.0, 7.0)])
     world = view @ np.linalg.inv(LOOK).T

@@ -133,7 +133,7 @@ def test_few_guides_or_many_in_one_place(guide_roots, distance):
 
 @pytest.mark.parametrize("distance", [1e-6, 0.02])
 def test_a_root_without_a_guide_in_reach_follows_the_nearest(rng, distance):
-    """And those that are at most a quarter farther away, or there would be a step between two of them."""
+    """The strand follows the nearest guide, and guides at most a quarter farther away, so weights are continuous."""
     guide_roots, roots = rng.random((40, 2)), rng.random((300, 2))
     weights = weights_at(roots, guide_roots, distance)
     apart = np.linalg.norm(roots[:, None] - guide_roots[None], axis=-1)

@@ -136,7 +136,7 @@ def test_mirrored_input_gives_mirrored_strands(scene):
 
 
 def test_strands_stay_within_the_hull_of_their_guides(scene, rng):
-    """As Eq. 10 has it, on flat ground, where nothing turns: no direction in which no guide reaches as far."""
+    """On flat ground, in every direction some guide reaches as far as each strand (Eq. 10)."""
     up = np.array([0.0, 0.0, 1.0])
     flat = scene | {"normals": np.tile(up, (200, 1)), "guide_normals": np.tile(up, (60, 1))}
     shapes = strands_between(**flat, keep_length=0.0) - scene["roots"][:, None]

@@ -118,7 +118,7 @@ CORNERS = {
 
 @pytest.mark.parametrize("corners", CORNERS.values(), ids=CORNERS)
 def test_ways_are_never_longer_than_the_shortest_there_is(ground, rng, corners):
-    """Nor shorter than straight, and mostly the shortest itself."""
+    """Ways are between the straight and the shortest way in length, and mostly the shortest itself."""
     roots, guides = 0.1 + 0.8 * rng.random((25, 2)), 0.1 + 0.8 * rng.random((25, 2))
     straight = np.linalg.norm(roots[:, None] - guides[None], axis=-1)
     shortest = shortest_ways(corners, roots, guides)
@@ -141,7 +141,7 @@ def test_a_closed_line_leaves_no_way_in_or_out(ground, rng):
 
 @pytest.mark.parametrize("corners", [[(0.0, 0.5), (1.0, 0.5)], [(0.005, 0.5), (0.99, 0.5)], [(-0.2, 0.5), (1.3, 0.5)]])
 def test_there_is_no_way_round_beyond_the_border(ground, rng, corners):
-    """For a line that ends at it, a bit before, or beyond."""
+    """The law holds for lines that end at the border, before it or beyond it."""
     roots, guide_roots = rng.random((800, 2)), rng.random((100, 2))
     weights = parted_weights(ground, segments(*corners), roots, guide_roots)
     assert np.all(weights[(roots[:, None, 1] > 0.5) != (guide_roots[:, 1] > 0.5)] == 0.0)

@@ -10,7 +10,7 @@ from hair_addon.core.interpolation.regions import Regions, kept_apart, regions_a
 
 
 def test_two_regions_of_vertices_meet_halfway(square, rng):
-    """Where the indicator of either, interpolated, passes a half."""
+    """Two regions meet where their interpolated indicators pass one half."""
     labels = rng.choice([-4, 9], len(square.vertices)).astype(np.int32)
     points = sample_surface(square, 2000, 1)
     share = mesh_math.interpolate(labels == 9, square, points)

@@ -121,7 +121,7 @@ def folders(made, tmp_path_factory):
 
 
 def test_the_same_hair_and_nothing_is_compiled(folders, tmp_path):
-    """Of every kind of processor that this one is."""
+    """Each processor level that this machine supports gives the same hair and compiles nothing."""
     cache = tmp_path / "cache"
     command = [sys.executable, "-c", PROGRAM, cache, tmp_path / "none", *folders]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
@@ -132,7 +132,7 @@ def test_the_same_hair_and_nothing_is_compiled(folders, tmp_path):
 
 
 def test_strands_are_the_same_bits_on_every_processor(folders):
-    """With the kernels of each kind, and where NumPy, OpenBLAS and the C library take this processor for an old one."""
+    """Kernels of each level give the same bits, also if NumPy, OpenBLAS and the C library run on old processors."""
     best, *others = made_by(*folders)
     assert [made["compiled here"] for made in (best, *others)] == [[]] * len(folders), "see compile_kernels.COMPARED"
     assert all(sizes == [] for made in (best, *others) for sizes in made["laws"].values())

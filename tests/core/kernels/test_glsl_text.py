@@ -10,7 +10,7 @@ from tools import translate_kernels
 
 @pytest.mark.parametrize("name", translate_kernels.SHADERS)
 def test_translated_shaders_are_those_of_their_source(name):
-    """Otherwise run tools/translate_kernels.py."""
+    """Generated shaders match their sources; if not, run tools/translate_kernels.py."""
     path = translate_kernels.ROOT / "shaders" / name
     assert path.read_text(encoding="utf-8") == translate_kernels.text_of(name)
 

@@ -130,7 +130,7 @@ print("without digest:", kernel_entries.is_whole(device, module))
 
 
 def test_a_flipped_bit_is_noticed(cache, tmp_path):
-    """In code it ends the process, or computes something else; none of the damaged files is loaded."""
+    """No file with a flipped bit is loaded: its code could end the process or compute something else."""
     environment = os.environ | {"PYTHONPATH": str(ROOT), "WARP_CACHE_PATH": str(cache), "TMPDIR": str(tmp_path)}
     line = [sys.executable, "-c", WORK + FLIPS]
     done = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=120, check=False)

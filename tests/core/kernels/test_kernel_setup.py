@@ -62,7 +62,7 @@ def names_of(modules):
 
 
 def test_each_module_is_compiled_once(modules, compiled):
-    """By whoever comes first: two callers that want the same wait for each other's."""
+    """The first caller compiles a module, and the others wait for it."""
     seen = []
 
     def background():

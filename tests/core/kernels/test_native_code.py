@@ -35,7 +35,7 @@ def test_a_constant_in_scientific_notation_is_a_float(module_file):
 
 
 def test_a_change_of_a_header_changes_the_body(module_file, tmp_path):
-    """Which Warp's hash of the module is made of."""
+    """A changed header changes the text from which Warp computes the module's hash."""
     before = native_code.body(module_file, "fill.cpp")
     (tmp_path / "shared.h").write_text(HEADER.replace("2.0f", "3.0f"), encoding="utf-8")
     assert native_code.body(module_file, "fill.cpp") != before

@@ -161,7 +161,7 @@ def test_size_does_not_matter(sphere, scale):
 
 
 def test_a_site_with_an_empty_cell_keeps_its_place(sphere):
-    """Of sites in one place the first one gets the cell."""
+    """Among sites at one place, the first one gets the cell."""
     site = sample_surface(sphere, 1, seed=1)
     twins = SurfacePoints(np.repeat(site.triangle, 40), np.repeat(site.barycentric, 40, axis=0))
     others = sample_surface(sphere, 5, seed=2)
@@ -174,7 +174,7 @@ def test_a_site_with_an_empty_cell_keeps_its_place(sphere):
 
 
 def test_cells_do_not_depend_on_how_far_neighbours_are_known(head, scalp, monkeypatch):
-    """With two known neighbours a site the rest must be found by looking at all."""
+    """With two known neighbors per site, the other neighbors are found by a search of all sites."""
     sites = sample_surface(head, 150, 5, scalp)
     expected = relax(head, sites, 0, scalp).energies
     monkeypatch.setattr(voronoi, "SITES_AROUND", 2)

@@ -22,7 +22,7 @@ def sampled(values, count=4000, seed=1, density=None, cells=2):
 
 @pytest.mark.parametrize("cells", [2, 40])
 def test_no_root_is_where_the_image_is_black(cells):
-    """Even where two large triangles know nothing of a small mark."""
+    """No root is on a small black mark in two large triangles."""
     values = np.zeros((100, 100))
     values[60:80, 10:30] = 1.0
     places = sampled(values, cells=cells)

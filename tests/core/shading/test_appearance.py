@@ -205,7 +205,7 @@ def test_hair_darkens_with_each_step_of_wetness(name):
 
 @pytest.mark.parametrize("name", (*NATURAL, "WHITE"))
 def test_the_flat_colour_of_wet_hair_is_darker_as_its_fibres_say(name):
-    """By a deep layer of fibres that absorb and send back what the tables of the Marschner model say."""
+    """The color is that of a deep layer of fibers with the absorption and reflection of the Marschner tables."""
     looks = [replace(presets.PRESETS[name][1], wetness=wetness) for wetness in STEPS]
     colors = np.array([appearance.mean_color(look) for look in looks])
     assert (np.diff(colors, axis=0) < 0.0).all()

@@ -41,7 +41,7 @@ def distances_between(points, line):
 
 @pytest.mark.parametrize("pattern, count", [("BRAID", 3), ("ROPE", 2)])
 def test_strands_gather_in_tresses(pattern, count):
-    """As many as the pattern has, of about as many strands each, and thin far from the roots."""
+    """The pattern's number of tresses has about equal numbers of strands, and tresses are thin far from the roots."""
     strands, centre = lock()
     made = stepped(strands, braid.Settings(pattern=pattern, **EVEN), centres=centre)
     label = tresses_of(made, count)
@@ -54,7 +54,7 @@ def test_strands_gather_in_tresses(pattern, count):
 
 
 def test_centre_lines_of_tresses_stay_apart():
-    """By 0.9 R in a round braid whose pitch is 6 R."""
+    """Center lines in a round braid with a pitch of 6 R stay 0.9 R apart."""
     strands, centre = lock()
     made = stepped(strands, braid.Settings(pattern="BRAID", **EVEN), centres=centre).astype(np.float64)
     label = tresses_of(made, 3)
@@ -130,7 +130,7 @@ SWINGING = {
 @pytest.mark.parametrize("is_bent", [False, True])
 @pytest.mark.parametrize("name", SWINGING)
 def test_strands_turn_as_their_guides_do(name, is_bent):
-    """In a lock as wide as a braid of default size: nearly all by a tenth more at most, none twice as far."""
+    """In a lock of default width nearly all strands turn at most a tenth more than their guides, none twice as far."""
     strands, centre = lock(size=0.025, count=60)
     for angle in FRAMES:
         before, after = (

@@ -85,7 +85,7 @@ def test_strands_leave_their_roots_by_degrees():
 
 
 def test_a_shorter_strand_ends_higher_up():
-    """At its own length along the centre, not at the centre's tip."""
+    """A shorter strand ends at its own length along the center, not at the center's tip."""
     strands = straight_strands(5, 0.2, 41, 0.001)
     strands[0, :, 2] *= 0.5
     made = stepped(strands, FULL, centres=strands[2:3])

@@ -56,7 +56,7 @@ def test_a_part_of_the_locks_winds_to_the_left():
 
 
 def test_a_coil_reaches_as_far_as_its_pitch_says():
-    """Of a strand with ten points a turn; less the first half turn, over which the radius grows."""
+    """The law holds for ten points per turn, except in the first half turn, over which the radius grows."""
     settings = helix(radius=0.005, pitch=0.03)
     turn = curl.turn_length(settings)
     points = stepped(straight_strands(1, 10 * turn, 101), settings)[0]
@@ -178,7 +178,7 @@ def test_a_clumped_lock_is_one_ringlet(normal, rng):
 
 
 def test_strands_that_slide_along_a_crooked_centre_change_by_degrees():
-    """Beside one segment of the centre as beside the next, though these differ by ten degrees."""
+    """Strands change gradually from one segment of the center to the next, although these differ by ten degrees."""
     bend = np.linspace(0.0, 1.0, 40)
     crooked = bend + 0.1 * (-1.0) ** np.arange(40)
     centre, smooth = (

@@ -20,7 +20,7 @@ def offsets(count=600, strands=None, **settings):
 
 @pytest.mark.parametrize("octaves", [1, 2, 3])
 def test_the_amplitude_is_the_root_mean_square(octaves):
-    """Of each coordinate; between points so far apart that their noise is independent, it is twice the square."""
+    """The law holds for each coordinate; differences of independent points have twice the amplitude's square."""
     rho = offsets(2000, octaves=octaves, amplitude=1e-4)
     square = ((rho[:, 60:] - rho[:, :1]) ** 2).mean()
     assert np.sqrt(0.5 * square) == pytest.approx(1e-4, rel=0.03)

@@ -18,7 +18,7 @@ def wave(wavelength, size=2e-4, length=1.0, point_count=241):
 
 @pytest.mark.parametrize("part", [0.25, 0.5, 0.75, 1.0])
 def test_what_is_left_of_a_wave_is_sinc_squared(part):
-    """Of its directions, away from the ends, where there is less strand to average."""
+    """The law holds for directions away from the ends, where less strand can be averaged."""
     strand = wave(0.1)
     made = stepped(strand, smooth.Settings(length=0.1 * part))
     inner = slice(60, 180)

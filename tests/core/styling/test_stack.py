@@ -69,7 +69,7 @@ def test_strands_that_are_reached_are_as_in_a_full_update(hair, name):
 
 
 def test_guides_that_lean_as_before_are_not_computed_again(hair, monkeypatch):
-    """Where another style of the stack changes; others are, and the bits are the same."""
+    """Leaned guides are reused if another style changes; otherwise they are computed, with the same bits."""
     styles = lean.Settings(amount=0.7), curl.Settings()
     first = hair.bound(*styles)
     wanted = first.guides(hair.guides).numpy()
@@ -86,7 +86,7 @@ def test_guides_that_lean_as_before_are_not_computed_again(hair, monkeypatch):
 
 @pytest.mark.parametrize("point_count", [41, 81])
 def test_guides_that_were_combed_are_followed_as_all_are(hair, point_count):
-    """After each other or at once: the same bits."""
+    """Guides that are followed one after another or at once give the same bits."""
     styles = lean.Settings(amount=0.7), wet.Settings(amount=0.5)
     bound = hair.bound(*styles, point_count=point_count)
     bound.guides(hair.guides)
@@ -251,7 +251,7 @@ def test_strands_and_centres_that_are_not_there_are_refused(hair, stack, member)
 
 
 def test_a_mask_of_guides_is_mixed_as_strands_are(hair, rng):
-    """By the weights of the guides that a strand follows."""
+    """A mask of guides is mixed by the weights of the guides that a strand follows."""
     weights = rng.random(60).astype(np.float32)
     found = Mask(guides=weights).of_strands(hair.binding)
     indices, shares = hair.binding.guide_weights.indices.numpy(), hair.binding.guide_weights.weights.numpy()

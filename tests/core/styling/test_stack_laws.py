@@ -181,7 +181,7 @@ def test_the_processor_and_a_gpu_agree(rng, point_count):
 @pytest.mark.parametrize("is_mirrored", [False, True])
 @pytest.mark.parametrize("name", ON_STRANDS)
 def test_turned_moved_scaled_and_mirrored_before_or_after(rng, name, is_mirrored):
-    """With lengths scaled as well, and the surface's own axes and origin taken along."""
+    """Styles commute with transforms if lengths are scaled, and the surface's axes and origin are transformed too."""
     strands = curved_strands(rng, 48)
     normals = rng.normal(UP, 0.2, (48, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -265,7 +265,7 @@ def test_strands_that_are_near_are_alike(rng):
 
 
 def test_other_points_a_strand_make_the_same_hair(hair):
-    """Of twice as many points every second is near the old one, for styles that points can carry."""
+    """With twice as many points every second point is near the old one, for styles that points can carry."""
     for settings in (bend.Settings(), curl.Settings(pitch=0.12), clump.Settings(), lean.Settings(), wet.Settings()):
         fine, coarse = hair.styled(settings, point_count=81), hair.styled(settings)
         assert np.median(np.linalg.norm(fine[:, ::2] - coarse, axis=2)) < 2e-3, settings
@@ -273,7 +273,7 @@ def test_other_points_a_strand_make_the_same_hair(hair):
 
 
 def test_strands_follow_moving_guides_steadily(hair):
-    """In an animation of guides no strand moves more than half as far again a frame as the farthest unstyled one."""
+    """Per frame no strand moves more than 1.5 times as far as the farthest unstyled strand."""
     combed = hair.guides.numpy()
     along = np.linspace(0.0, 1.0, combed.shape[1])[None, :, None] ** 2
     styles = clump.Settings(), curl.Settings(), frizz.Settings()

@@ -90,7 +90,7 @@ def phases(normals, centre_normals=None, axes=None):
 
 
 def test_frames_are_smooth_over_the_surface():
-    """But straight below; all strands in one phase are displaced alike, up to the turn between their normals."""
+    """Strands in one phase are displaced alike up to the turn between their normals, except straight below."""
     angles = np.linspace(0.0, 2.0 * np.pi, 200)
     for polar in (0.3, 1.2, 2.0, 2.8):
         normals = np.stack(
@@ -103,7 +103,7 @@ def test_frames_are_smooth_over_the_surface():
 
 
 def test_strands_of_a_clump_share_its_frame(rng):
-    """Also astride a place where normals differ much: displaced as the least rotation from the centre's says."""
+    """Strands are displaced by the least rotation from the center's frame, also where normals differ much."""
     normals = unit(rng.normal((0.0, 0.3, 1.0), 0.4, (50, 3)))
     centre = unit(np.array([[0.1, 0.2, 1.0]]))
     found = unit(phases(normals, centre))
@@ -142,7 +142,7 @@ def spread(vectors):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_hair_against_the_normals_is_as_coherent_as_hair_along_them(sign, rng):
-    """On a surface that is inside out, too, strands of one guide are displaced alike."""
+    """On an inside-out surface strands of one guide are displaced alike."""
     hair = straight(600)
     tilts = rng.normal(0.0, 0.15, (len(hair.guides), 1, 2))
     along = np.linspace(0.0, 1.0, hair.guides.point_count)[None, :, None] * 0.2

@@ -66,7 +66,7 @@ def test_variation_takes_from_each_strand_a_part_of_its_own(hair):
 
 
 def test_the_wettest_style_counts(hair):
-    """In each strand, whatever their order."""
+    """The wettest style counts in each strand, in any order."""
     low = replace(WET, amount=0.4, seed=4)
     inputs = inputs_of(hair, PLACES, corners=half(hair))
     found = hair.bound(low, PLACES, inputs=inputs).wetness()

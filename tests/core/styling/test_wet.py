@@ -18,7 +18,7 @@ def hair():
 
 
 def test_wetness_zero_is_dry(hair):
-    """To the last bit, whatever styles come before."""
+    """At zero the bits are those of dry hair, whatever styles come before."""
     np.testing.assert_array_equal(hair.styled(replace(LOCK, amount=0.0)), hair.plain)
     others = curl.Settings(), frizz.Settings()
     np.testing.assert_array_equal(hair.styled(*others, replace(LOCK, amount=0.0)), hair.styled(*others))
@@ -42,7 +42,7 @@ def test_the_wetter_the_thinner_the_locks(hair):
 
 
 def test_small_locks_form_first(hair):
-    """At a tenth of the wetness the small ones have gathered by a third or more, the large ones hardly."""
+    """At a tenth of the wetness small locks have gathered by a third or more, and large locks hardly."""
     made = program.strand_steps([replace(LOCK, amount=0.1)], {})
     large, small = (step.amount for step in made if step.level is not None and step.kind == clump.STEP)
     assert large < 0.05 and small > 0.25

@@ -156,7 +156,7 @@ def test_characters_of_files_with_one_name_have_frames_of_their_own(character, t
 
 
 def test_shots_in_one_folder_have_frames_of_their_own(character, tmp_path):
-    """Also a shot that was saved from another: it plays the frames of the other until it is baked itself."""
+    """A shot that was saved from another plays the other's frames until it is baked."""
     path, there = character
     shutil.rmtree(path.parent / "haircache")
     first = shot_of(path, tmp_path, "linked")

@@ -40,7 +40,7 @@ def baked(guides):
 
 
 def test_a_renamed_collection_of_colliders_is_followed(guides, collider):
-    """By a script too, which updates nothing before it bakes. In no scene, it is what guides collide with as well."""
+    """A collection renamed by a script is followed without an update; a collection in no scene collides too."""
     as_set = baked(guides)
     bpy.data.collections["Body"].name = "COL body"
     np.testing.assert_array_equal(baked(guides), as_set)

@@ -58,7 +58,7 @@ def reading_modules():
 
 
 def test_every_reader_has_mutants():
-    """Of what the add-on reads, `readers.py` has a file to damage, or there is a reason why not."""
+    """For each reader of the add-on, `readers.py` has a file to damage or a reason why not."""
     known, reading = {reader.module for reader in readers().values()}, reading_modules()
     assert reading - known - OTHERS.keys() == set()
     assert OTHERS.keys() - reading == set()
@@ -80,7 +80,7 @@ def test_shares_of_a_campaign_are_all_of_it():
 
 @pytest.mark.long
 def test_a_million_mutants():
-    """In a process whose memory is limited."""
+    """A million mutants are read in a process with limited memory."""
     words = [sys.executable, "-m", "tests.support.mutants.run", "1000000", "2"]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=7200, check=False)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]

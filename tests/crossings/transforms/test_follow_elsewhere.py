@@ -30,7 +30,7 @@ class _Reader(bpy.types.RenderEngine):
 
 
 def test_every_frame_of_a_render_has_its_hair(arm, scene, tmp_path):
-    """On a surface that renders are given with a finer subdivision than the viewport."""
+    """Every frame has its hair on a surface with a finer subdivision in renders than in the viewport."""
     finer = arm.modifiers.new("Finer", "SUBSURF")
     finer.subdivision_type, finer.levels, finer.render_levels = "SIMPLE", 0, 1
     update()

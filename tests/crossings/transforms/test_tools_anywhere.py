@@ -121,7 +121,7 @@ def mirrored_in(path, place):
 
 @pytest.mark.parametrize("place", ["turned", "large", "uneven", "mirrored and uneven", "on a sheared rig"])
 def test_guides_are_mirrored_across_the_objects_own_axis(symmetric_file, place):
-    """As its mesh is, whatever its transform: an object that is sheared in the world is no mirror image there."""
+    """Guides are mirrored in the object's coordinates, since a sheared object is no mirror image in the world."""
     wanted, found = mirrored_in(symmetric_file, "origin"), mirrored_in(symmetric_file, place)
     # Normals of a sheared surface, by which copies are turned, are no images of each other.
     for step in range(1 if place == "on a sheared rig" else 2):

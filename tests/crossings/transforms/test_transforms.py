@@ -283,7 +283,7 @@ def test_hair_without_guides_stays_on_its_surface(place):
     indirect=True,
 )
 def test_locks_stay_the_same(place):
-    """Where clumps stand, and how each is shaped, follows from all bits of the surface at rest."""
+    """Places and shapes of clumps depend on the rest surface alone, with all its bits."""
     select(bpy.data.objects["Hair"])
     bpy.ops.vellus.add_style(style="CLUMP")
     before = seen()

@@ -134,7 +134,7 @@ def test_coordinates_that_are_drawn_and_the_surfaces_own_axes(hair, rng, one_pro
 
 @pytest.mark.parametrize("point_count", [7, 65])
 def test_other_numbers_of_points(hair, rng, point_count):
-    """And a program of one kind."""
+    """Strands of any number of points agree, with a program for one kind of step."""
     assert_same(hair, rng, (bend.Settings(),), point_count=point_count)
 
 
@@ -173,7 +173,7 @@ def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
 
 
 def test_masks_that_are_painted_further(hair, rng, one_program):
-    """And one that is removed: what is known of strands is uploaded again, and no more."""
+    """A mask that is painted or removed causes an upload of the data per strand and of nothing else."""
     maker, strands = None, uploaded(hair.plain)
     for weights in (rng.random(hair.mesh.triangles.shape), rng.random(hair.mesh.triangles.shape), None):
         inputs = Inputs(masks={("Mask", "", False): Mask(None if weights is None else weights.astype(np.float32))})

@@ -61,7 +61,7 @@ def test_flat_matrices_have_rotations_that_are_as_near_as_any(blender, rng):
 
 @pytest.mark.parametrize("kind", ["bend", "shear", "twist", "bulge"])
 def test_turns_are_those_of_double_precision(blender, ball, rng, kind):
-    """Of some of a mesh's vertices too, far from its origin, and from a smooth surface."""
+    """The law holds for a part of the vertices, far from the origin and on smooth surfaces."""
     faces, rest = faces_of(ball), ball.vertices
     after = deformations(rest)[kind] @ rotation(rng).T
     smooth = (rest * (1.0 + 0.01 * np.sin(9.0 * rest))).astype(np.float32)

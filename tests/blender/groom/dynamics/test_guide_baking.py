@@ -109,7 +109,7 @@ def test_a_folder_that_goes_away_ends_baking(swung):
 
 
 def test_a_surface_that_only_turns_keeps_its_size(swung):
-    """In whatever direction; guides would be given their shape at rest anew in each frame, half the time of a bake."""
+    """A rotation in any direction keeps the size, so guides do not compute their rest shape again in each frame."""
     guides, _hair = swung
     scene, sphere = bpy.context.scene, bpy.data.objects["Sphere"]
     sphere.rotation_euler, sphere.scale = (0.3, 0.2, 0.1), (1.7, 1.7, 1.7)
@@ -214,7 +214,7 @@ def test_a_moved_part_line_outdates_what_was_baked(swung):
 
 
 def test_a_part_line_that_the_deformed_surface_leaves_behind_outdates_nothing(swung):
-    """In a file that is opened in another frame, too; a line that is moved then does."""
+    """The law holds after the file is opened in another frame; moving the line outdates the bake."""
     guides, hair = swung
     sphere = bpy.data.objects["Sphere"]
     sphere.shape_key_add(name="Basis")

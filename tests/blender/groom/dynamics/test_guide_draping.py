@@ -21,7 +21,7 @@ def draping(guides):
 
 @pytest.mark.parametrize("last", [0.0, 0.3])
 def test_esc_leaves_guides_as_they_were(guides, last):
-    """At the beginning, and between frames."""
+    """Esc restores the guides at the beginning and between frames."""
     before, told = points(guides), []
 
     def stop(_step, part):

@@ -62,7 +62,7 @@ def test_guides_are_wet_where_the_mask_is(hair, swung):
 
 
 def test_guides_are_as_wet_as_their_strands_on_the_mean(hair, swung):
-    """With a variation, everywhere and where the mask is; keys of it are the animation's."""
+    """The law holds for varied wetness, with and without a mask, and with keyframes."""
     wet_side, dry_side = sides(swung)
     swung.data.vellus.dynamics.wetness = 0.5
     half = baked(swung)
@@ -108,7 +108,7 @@ def test_draped_guides_are_as_wet_as_the_mask_says(hair, swung):
 
 
 def test_baked_frames_follow_from_the_mask(hair, swung):
-    """Also if keys animate the amount, and if only a weaker style changes."""
+    """A changed mask outdates baked frames, also with an animated amount or if it belongs to a weaker style."""
     scene = bpy.context.scene
     paint(1.0)
     api.add_style(hair, api.Wet(lock=0.4, mask="rain"))

@@ -128,7 +128,7 @@ SOURCES = {
 
 @pytest.mark.parametrize("source", SOURCES)
 def test_hair_stays_where_the_artist_sees_it(head, tmp_path, source):
-    """On a head that is posed: guides are stored where it rests."""
+    """Hair of a posed head stays in place; its guides are stored at the rest pose."""
     made = SOURCES[source](head, tmp_path)
     twist = head.modifiers.new("Twist", "SIMPLE_DEFORM")
     twist.deform_method, twist.angle = "TWIST", 0.4

@@ -75,7 +75,7 @@ def links_of(tree):
 
 
 def test_it_is_vellus_hair_over_shaded_surfaces(cycles, tmp_path):
-    """By the compositor, from the pictures of both engines apart: surfaces × shadow × (1 - alpha) + hair."""
+    """The compositor combines the pictures of both engines as surfaces × shadow × (1 - alpha) + hair."""
     scene = bpy.context.scene
     view_layer = bpy.context.view_layer
     scene.vellus.is_hair_only = view_layer.vellus.has_hair_shadow = True
@@ -96,7 +96,7 @@ def test_it_is_vellus_hair_over_shaded_surfaces(cycles, tmp_path):
 
 
 def test_on_a_floor_the_shadow_is_as_dark_as_by_cycles(cycles, tmp_path):
-    """Of hair alone, seen beside it: the mean light of the floor that it shades."""
+    """The darkest part of a hair's shadow on a floor is as dark as by Cycles, within a tenth."""
     scene = bpy.context.scene
     bpy.ops.mesh.primitive_plane_add(size=12.0, location=(0.0, 0.0, -1.6))
     scene.camera.location, scene.camera.rotation_euler = (0.0, -7.0, 4.0), (1.1, 0.0, 0.0)

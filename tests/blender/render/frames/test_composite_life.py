@@ -122,7 +122,7 @@ def test_the_first_view_layer_that_is_rendered_has_the_surfaces(composited):
 
 
 def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composited, tmp_path, capfd):
-    """After the render a window shows the message, as Blender shows none."""
+    """A window shows the message after the render, since Blender shows none."""
     scene = bpy.context.scene
     bpy.data.objects["Guides"].data.vellus.simulates = True
     configure(engine="CYCLES", resolution_x=8, resolution_y=6, film_transparent=True, use_compositing=True)

@@ -56,7 +56,7 @@ def motion(scene):
 
 @pytest.mark.parametrize("how", ["filter", "motion blur", "depth of field", "tiles"])
 def test_coverages_are_those_of_the_samples(three, tmp_path, monkeypatch, how):
-    """With what is empty they sum to 1 within 0.001, and hair's are the hair mask."""
+    """Coverages and the empty part sum to 1 within 0.001, and the coverage of hair is the hair mask."""
     scene, settings = bpy.context.scene, {"filter_size": 1.5}
     if how == "motion blur":
         motion(scene)
@@ -109,7 +109,7 @@ def test_ranks_and_indices_follow_the_view_layer(three, tmp_path):
 
 
 def test_hair_that_is_composited_has_mattes_of_its_own(three, tmp_path):
-    """As the hair scene of Composite Hair renders it: surfaces hide hair, and have no matte."""
+    """In the hair scene of Composite Hair, surfaces hide hair and have no matte."""
     _passes, whole = read(tmp_path)
     passes, found = read(tmp_path, is_hair_only=True)
     assert set(found) == {"Hair", "Fringe", "Crown"}

@@ -34,7 +34,7 @@ def test_it_renders_the_offscreen_picture(lit, tmp_path, kind):
 
 
 def test_more_samples_come_closer_to_many(lit, tmp_path):
-    """By any number of them, alpha too: the error falls at least as fast as chance would have it."""
+    """For any number of samples, the errors of color and alpha fall at least as fast as those of random samples."""
     many = rendered(tmp_path, film_transparent=True, sample_count=200)["Combined"]
     errors = [
         np.sqrt(np.mean((rendered(tmp_path, sample_count=count)["Combined"] - many) ** 2, axis=(0, 1)))
@@ -148,7 +148,7 @@ def pixels_of(path):
 
 
 def test_motion_blur_is_the_mean_of_still_pictures(lit, tmp_path, monkeypatch):
-    """Of hair, surface and camera that move, at each moment of the exposure; all by the same places of the samples."""
+    """The law holds for moving hair, surface and camera; all pictures use the same sample positions."""
     real = drawing.pass_record
     monkeypatch.setattr(drawing, "pass_record", lambda *args: real(*args[:3], 0, *args[4:]))
     scene = bpy.context.scene
@@ -288,7 +288,7 @@ def test_a_scene_without_anything_is_its_background(scene, tmp_path):
 
 
 def test_objects_disabled_in_renders_are_skipped(lit, tmp_path):
-    """By the object's own switch; and guides always, which renders by Cycles and EEVEE leave out too."""
+    """An object's own switch disables it; guides are always skipped, as in Cycles and EEVEE."""
     bpy.context.view_layer.vellus.has_hair_mask = True
     bpy.data.objects["Sphere"].hide_render = True
     seen = rendered(tmp_path, film_transparent=True)

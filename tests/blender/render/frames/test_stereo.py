@@ -84,7 +84,7 @@ def test_views_of_two_cameras_are_the_pictures_of_each(pair, tmp_path):
 
 
 def test_passes_are_those_of_each_view(pair, tmp_path):
-    """Of eyes at one place both are the picture without stereo, motion vectors too."""
+    """If both eyes are at one place, both views equal the picture without stereo, including motion vectors."""
     pair.camera.data.stereo.interocular_distance, pair.camera.data.stereo.convergence_mode = 0.0, "PARALLEL"
     layer = bpy.context.view_layer
     layer.use_pass_z = layer.use_pass_vector = True

@@ -112,7 +112,7 @@ def space(lit):
 
 @pytest.mark.parametrize("shading", ["WIREFRAME", "SOLID", "MATERIAL", "RENDERED"])
 def test_it_cuts_off_where_blender_does(space, shading):
-    """Which is in two modes of shading."""
+    """Strands are cut off where Blender cuts off, in two shading modes."""
     space.shading.type = shading
     context = SimpleNamespace(space_data=space, region_data=space.region_3d)
     is_clipped = shading in {"WIREFRAME", "SOLID"}

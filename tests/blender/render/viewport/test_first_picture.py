@@ -103,7 +103,7 @@ LONG = pytest.mark.long  # each takes ten seconds of a core
     [("cube", "lights"), pytest.param("monkey", "solid", marks=LONG), pytest.param("head", "preview", marks=LONG)],
 )
 def test_the_first_picture_looks_like_the_picture_at_rest(name, mode, blender):
-    """With four samples per pixel FLIP on hair is 0.08 at most, with one 0.12; neither has a speck."""
+    """The FLIP error on hair is at most 0.08 with four samples per pixel and 0.12 with one, without specks."""
     model(name)
     scene = drawn_in(mode)
     last, found = picture_of(*scene, 2, 8), {}

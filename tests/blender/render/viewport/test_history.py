@@ -82,7 +82,7 @@ MOVEMENTS = [("HAIR", turn_object), ("HAIR", turn_camera), ("FILM", turn_camera)
 
 @pytest.mark.parametrize("movement", share_of(MOVEMENTS, 2))
 def test_what_moves_changes_no_more_than_pictures_at_rest(lit, movement):
-    """From rest, a degree a frame, one sample a pixel: at most 1.2 times as much, and as bright."""
+    """At a degree per frame with one sample per pixel, pictures change at most 1.2 times as much and are as bright."""
     kind, turn = movement
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
     moving, shown, still = new_picture(kind), [], []
@@ -143,7 +143,7 @@ def test_light_that_goes_out_is_gone_in_a_few_frames(lit):
 
 
 def test_light_that_changes_is_shown_at_once(lit):
-    """With the first pass, and in each part of the picture: more light, little, and again as much as before."""
+    """The first pass shows more, less and restored light in each part of the picture."""
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
     picture, side = new_picture("HAIR"), SIZE // 8
     rest(picture, read_drawn(), camera())
@@ -175,7 +175,7 @@ def seen(drawn, view):
 
 @pytest.mark.usefixtures("made_anew")
 def test_combed_strands_know_where_they_were(lit, monkeypatch):
-    """Where some strands are brought to their places, motion vectors are those of strands that are all uploaded."""
+    """Motion vectors are the same whether some or all strands are uploaded."""
     monkeypatch.setattr(strand_textures, "MOST_GROUPS", 7)
     guides, view = bpy.data.objects["Guides"], camera()
     vectors = {}
@@ -201,7 +201,7 @@ def test_combed_strands_know_where_they_were(lit, monkeypatch):
 
 
 def test_surfaces_that_are_read_again_have_not_moved(lit):
-    """By where their corners are: a light that moves has all of the scene read again."""
+    """A moving light makes the scene read again, but surfaces with the same corners have not moved."""
     view = camera()
     before = motion_vectors.places(read_drawn(), *view)
     bpy.data.objects["Sun"].rotation_euler.x += 0.1
@@ -240,7 +240,7 @@ def test_hair_is_carried_where_it_moves(lit, push):
 
 @even_guides
 def test_the_first_pass_is_as_bright_as_the_last(thin):
-    """With one sample a pixel of strands that are thinner: the mean, and as far as noise allows each part's."""
+    """Thin strands with one sample per pixel have the same mean brightness, and that of each part up to noise."""
     picture, drawn, view = new_picture("HAIR", 3 * SIZE), read_drawn(), camera()
     picture.add_pass(drawn, *view)
     first, last = picture.read(), rest(picture, drawn, view)
@@ -254,7 +254,7 @@ def test_the_first_pass_is_as_bright_as_the_last(thin):
 
 @even_guides
 def test_strands_that_are_left_out_leave_no_trace(thin):
-    """From 4000 to 1000 of them: the picture of the change is as bright as the one at rest in a few frames."""
+    """After a change from 4,000 to 1,000 strands, the picture is as bright as at rest within a few frames."""
     picture = new_picture("HAIR")
     before = rest(picture, read_drawn(), camera())
     thin.data.vellus.hair.strand_count = 1000

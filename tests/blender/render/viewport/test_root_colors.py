@@ -108,7 +108,7 @@ def test_images_extend_as_their_nodes_say():
 
 @pytest.mark.parametrize("kind", ["VERTEX", "TEXTURE"])
 def test_hair_shows_the_colors_of_its_surface(ball, kind):  # noqa: F811
-    """In even colors as in Single; without an attribute or UV map as its look; a redraw makes no new texture."""
+    """Uniform colors look as in Single; without attribute or UV map the look is shown; redraws add no texture."""
     camera = facing()
     solid(ball, light="FLAT", color_type="MATERIAL")
     by_look = picture_of(read(ball, camera)[0], camera)

@@ -152,7 +152,7 @@ def test_lights_that_are_edited_replace_the_studio_light():
 
 @pytest.mark.parametrize("wrap", [0.0, 0.3, 0.5, 0.8, 1.0])
 def test_a_lamp_has_the_light_and_the_mean_direction_that_wrapping_gives(wrap):
-    """Of a surface that faces it: pi times the color in all, and the first moment of the wrapped cosine."""
+    """A surface facing the lamp receives pi times its color, and the first moment of the wrapped cosine."""
     light = viewport_shading.StudioLight((0.0, 0.0, 1.0), (0.5, 0.5, 0.5), (0.25, 0.25, 0.25), wrap)
     (lamp,), ambient = studio_lights.lamps_of([light], has_highlights=True)
     cosine = np.linspace(-1.0, 1.0, 20_001)
@@ -316,7 +316,7 @@ def test_wires_are_thin_and_in_the_color_of_the_theme(ball):
 
 
 def test_other_surfaces_cast_no_shadow_in_solid_shading(ball):
-    """As Workbench's meshes; in the light of the scene they do."""
+    """Other surfaces cast no shadow, as in Workbench; in scene light they do."""
     camera = facing()
     pictures = {}
     for has_roof in (False, True):
@@ -336,7 +336,7 @@ def test_other_surfaces_cast_no_shadow_in_solid_shading(ball):
 
 @pytest.mark.parametrize("light", ["STUDIO", "FLAT"])
 def test_hair_darkens_the_surface_that_it_grows_on(ball, light):
-    """In Solid shading: black, whose alpha is the light that hair blocks; not other surfaces, in X-ray or as wires."""
+    """In Solid shading the hair's own surface is black with the blocked light as alpha; X-ray and wires are not."""
     hair, camera = bpy.data.objects["Hair"], facing()
     hair.data.vellus.hair.strand_count, hair.data.vellus.hair.radius = 500, 0.01
     place = {"location": (0.0, 0.9, 0.0), "rotation": (math.pi / 2, 0.0, 0.0)}
@@ -455,7 +455,7 @@ def test_white_hair_is_lit_by_lights_without_a_size(ball):
 
 @pytest.mark.parametrize("kind", ["MATERIAL", "RENDERED"])
 def test_the_scene_lights_hair_as_far_as_the_viewport_asks(ball, kind):
-    """By its lamps, its world, both or neither: the studio light's image replaces the world, turned and in strength."""
+    """Lamps, world, both or neither light hair; the studio light's image, rotation and strength replace the world's."""
     bpy.ops.object.light_add(type="SUN", rotation=(0.5, 0.3, 0.0))
     bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
     light_up((0.2, 0.3, 0.4))

@@ -52,7 +52,7 @@ def fine(picture, drawn, camera):
 
 @even_guides
 def test_small_hair_is_as_bright_and_covers_as_much(locks):
-    """With one sample a pixel, near by and far away, in the first pass and in the last."""
+    """The law holds near and far, in the first and the last pass, with one sample per pixel."""
     picture, near = hair_picture.HairPicture(SIZE, 1), None
     for distances in (1.0, 7.5):
         last, first = fine(picture, locks, seen_from(distances))
@@ -62,7 +62,7 @@ def test_small_hair_is_as_bright_and_covers_as_much(locks):
 
 
 def test_a_finer_part_of_a_picture_shows_what_the_whole_does(locks, monkeypatch):
-    """Which hair is at a pixel, too; beside the part there is none."""
+    """The part also shows the same hair system at each pixel, and nothing beside it."""
     camera = seen_from(5.0)
     finer = hair_picture.HairPicture(SIZE, 1)
     fine(finer, locks, camera)

@@ -215,7 +215,7 @@ def test_the_redo_panel_of_copies_picks_groups(waved):
 
 
 def test_no_attraction_says_why_nothing_changes(waved, capfd):
-    """At an amount of 0, with which the redo panel may begin."""
+    """At an amount of 0, with which the redo panel may begin, a message says why."""
     before = points(bpy.data.objects["Guides"])
     use_tool("attract_guides", amount=0.0)
     assert np.array_equal(points(bpy.data.objects["Guides"]), before)

@@ -51,7 +51,7 @@ def test_it_asks_unless_it_is_given_a_setting(hair, window, monkeypatch, is_aski
 
 @pytest.mark.parametrize("is_asking", [True, False])
 def test_what_was_asked_for_is_made_once(hair, monkeypatch, is_asking):
-    """After the dialog by an operator of its own, which Blender can undo; again, as by the redo panel, by this one."""
+    """The dialog runs an operator that Blender can undo; a repetition, as by the redo panel, runs this one."""
     at_once = []
     monkeypatch.setattr(LongOperator, "execute", lambda self, context: at_once.append(self) or {"FINISHED"})
     operator = Asked()

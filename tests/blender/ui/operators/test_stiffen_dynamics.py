@@ -66,7 +66,7 @@ def test_guides_that_hang_need_none(state):
 
 
 def test_the_panel_says_how_many_guides_are_too_soft(state):
-    """From when they were simulated on; it follows the settings, and offers the button."""
+    """After a simulation the panel shows the number, follows the settings and offers the button."""
     panel = [panels.dynamics.VELLUS_PT_dynamics_material]
     assert dynamics_notes.stiffness_note(state.id_data) == "" and not draw_all(panel)["vellus.stiffen_dynamics"]
     count, most = (needed(state) > 8.0).sum(), needed(state).max()

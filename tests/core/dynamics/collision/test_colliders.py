@@ -152,7 +152,7 @@ def test_a_collider_that_was_away_comes_back_without_a_motion(device):
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @given(data=st.data())
 def test_any_arrays_collide_or_are_named(data):
-    """With another collider beside them, which is found in any case."""
+    """Another collider beside the arrays is found in any case."""
     coordinates = st.sampled_from([0.0, 0.1, 1.0, -1.0, 1e-30, 1e5, 1e7, 1e30, np.nan, np.inf])
     vertices = data.draw(st.lists(st.tuples(coordinates, coordinates, coordinates), max_size=5))
     triangles = data.draw(st.lists(st.tuples(*[st.integers(-1, 5)] * 3), max_size=6))

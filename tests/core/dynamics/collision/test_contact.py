@@ -45,7 +45,7 @@ SLOPES = [(0.3, 10.0), (0.3, 16.0), (0.3, 17.5), (0.3, 30.0), (0.0, 30.0)]  # μ
 @pytest.mark.gate(id="V11")
 @pytest.mark.parametrize("friction,degrees", SLOPES)
 def test_a_free_strand_slides_or_sticks_on_an_incline(friction, degrees):
-    """As Coulomb says, a = g (sin θ - μ cos θ); what sticks creeps by at most 0.1 mm/s."""
+    """A sliding strand accelerates by a = g (sin θ - μ cos θ); a sticking strand creeps by at most 0.1 mm/s."""
     angle = np.radians(degrees)
     normal = np.array([np.sin(angle), 0.0, np.cos(angle)])
     down = np.array([np.cos(angle), 0.0, -np.sin(angle)])
@@ -172,7 +172,7 @@ def hair_on_a_ball(count, vertex_count=25):
 @pytest.mark.gate(id="V12")
 @pytest.mark.parametrize("substeps", [4, 8])
 def test_a_shaken_and_turned_head_keeps_its_hair_outside(substeps):
-    """By 5 cm at 3 Hz and 70° at 1.5 Hz, with friction; 1 mm is kept, to a millionth of a metre."""
+    """A head shaken by 5 cm at 3 Hz and turned by 70° at 1.5 Hz keeps hair 1 mm away, to a micrometer."""
     groom = hair_on_a_ball(48)
     simulation = Simulation(groom, FIBRE, substeps)
     rods, step = simulation.rods, replace(simulation.step, count=1)

@@ -95,7 +95,7 @@ def test_a_point_that_is_not_asked_has_no_plane_to_miss(device, rng):
 @pytest.mark.parametrize("kind", ["sheet", "slab"])
 @pytest.mark.parametrize("who_moves", ["points", "collider", "both", "bending collider"])
 def test_fast_points_do_not_pass_through(device, rng, kind, who_moves):
-    """Nor do points at rest while the collider moves by: they stay in front, at the distance."""
+    """Fast points, and points at rest before a moving collider, stay in front of it at the distance."""
     mesh = sheet(rng) if kind == "sheet" else slab(rng)
     collider = {"is_double_sided": kind == "sheet"}
     colliders = Colliders(device)

@@ -105,7 +105,7 @@ def free_rod(substeps, seconds):
 @pytest.mark.gate(id="V7")
 @pytest.mark.parametrize(("substeps", "gate"), [(1, 1e-6), (2, 1e-6), (8, 5e-6)])
 def test_a_free_rod_keeps_its_momentum(substeps, gate):
-    """For two seconds; what single precision rounds a position by, up to 4e-9 m here, is divided by h each time."""
+    """Momentum is constant for two seconds, up to the rounding of positions, 4e-9 m, divided by the time step."""
     (before, turning), (after, _) = free_rod(substeps, 2.0)
     assert np.linalg.norm(after - before) < gate * np.linalg.norm(before)
     assert np.linalg.norm(turning) > 0.0
@@ -122,7 +122,7 @@ def test_the_error_of_angular_momentum_is_of_first_order_in_time():
 
 @pytest.mark.gate(id="V8")
 def test_a_strand_keeps_its_length():
-    """At rest; shaken by ten times gravity at 5 Hz; after its root has jumped by a third of a metre."""
+    """Length is constant at rest, shaken by ten times gravity at 5 Hz, and after a jump of the root by 1/3 m."""
     groom = np.concatenate([curl(0.15, 25), line(0.15, 25), line(0.15, 25, (0.0, 0.3, -1.0))])
     simulation = Simulation(groom).advance(48)
     assert abs(simulation.rods.stretch()).max() < 1e-4
@@ -145,7 +145,7 @@ def test_a_strand_keeps_its_length():
     ("length", "vertex_count", "modulus"), [(0.01, 65, 4.0), (0.02, 65, 4000.0), (0.0512, 33, 4.0), (2.0, 65, 400.0)]
 )
 def test_short_and_stiff_segments_keep_their_length(length, vertex_count, modulus):
-    """Without LEAST_INERTIA rounding would make their matrix indefinite."""
+    """LEAST_INERTIA keeps rounding from making their matrix indefinite."""
     settings = replace(FIBRE, youngs_modulus=min(modulus, 1e3), bend_stiffness=max(modulus / 1e3, 1.0))
     groom = np.concatenate([line(length, vertex_count), curl(length, vertex_count, 2, 0.05 * length)])
     simulation = Simulation(groom, settings)

@@ -39,7 +39,7 @@ def drift(simulation):
     ("length", "vertex_count", "substeps"), [(0.05, 25, 4), (0.1, 25, 4), (0.18, 25, 1), (0.18, 41, 4)]
 )
 def test_the_groom_stays_as_it_was_combed(length, vertex_count, substeps):
-    """For five seconds, where Γ ≤ 7: to a hundredth of a millimetre from the first frame on."""
+    """For Γ ≤ 7 the groom stays in place for five seconds, to a hundredth of a millimeter."""
     groom = shapes(length, vertex_count)
     simulation = held(groom, substeps=substeps)
     most = 0.0

@@ -42,7 +42,7 @@ def test_a_stiff_cantilever_sinks_by_an_eighth_of_its_weight_ratio(ratio):
 
 @pytest.mark.parametrize("tip", [0.0, 0.25, 4.0])
 def test_a_stiff_cantilever_with_another_tip_sinks_as_a_beam_does(tip):
-    """By unit load: ½ Γ ∫ (1 − s)³ / p ds."""
+    """The tip sinks by ½ Γ ∫ (1 − s)³ / p ds, from the unit load method."""
     wanted, _error = quad(lambda s: 0.5 * (1.0 - s) ** 3 / (1.0 + (tip - 1.0) * s), 0.0, 1.0)
     assert tip_sink(1e-5, tip) / 1e-5 == pytest.approx(wanted, rel=5e-3)
 

@@ -44,7 +44,7 @@ def assert_close(found, expected, where):
 
 @pytest.mark.parametrize("degrees", share_of(THETA_D, 2))
 def test_texels_are_the_light_that_leaves_through_them(hair, degrees):
-    """At the middle of a row even the caustic's own texel agrees: both sides are means over it."""
+    """In the middle of a row the caustic's texel agrees too: both values are means over it."""
     sigma_a, tables = hair
     row, theta_d = row_of(THETA_D[degrees])
     traced = cylinder_tracer.trace(theta_d, ETA, sigma_a, ray_count=200_000)

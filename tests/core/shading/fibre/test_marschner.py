@@ -75,7 +75,7 @@ def test_trt_has_one_root_beyond_the_caustic_and_three_inside():
 
 
 def test_trt_does_not_count_the_root_at_zero_twice():
-    """For eta' >= 2 one ray, the axial one, leaves straight back."""
+    """For eta' >= 2 only the axial ray leaves straight back."""
     cos_theta_d = 0.5
     eta_prime = np.sqrt(ETA**2 - 1.0 + cos_theta_d**2) / cos_theta_d
     axial = paths.path_attenuation(paths.TRT, np.array(0.0), np.array(cos_theta_d), ETA, (0.2,))[0]
@@ -141,7 +141,7 @@ def test_caustic_treatment_has_the_published_energy(degrees, gain, width, publis
 
 
 def test_caustic_treatment_is_continuous_where_the_caustics_merge():
-    """At eta' = 2; the printed smoothstep would jump there from full strength to none."""
+    """The treatment is continuous at eta' = 2, where the published smoothstep would jump from full strength to none."""
     merge = np.sqrt((ETA**2 - 1.0) / 3.0)
     phi = np.linspace(0.0, 1.5, 200)
     before, after = (marschner.n_trt_caustic(phi, merge * factor, marschner.Settings()) for factor in (1.0001, 0.9999))
@@ -169,7 +169,7 @@ PUBLISHED = {0: 0.969, 30: 0.963, 45: 0.949, 60: 0.907, 70: 0.848, 75: 0.815, 80
 
 @pytest.mark.parametrize("degrees", share_of(PUBLISHED, 2))
 def test_white_fibre_returns_the_published_part_of_light(degrees):
-    """With the factor ½ in M almost all of it; without, nearly twice as much as it receives."""
+    """With the factor ½ in M a white fiber returns almost all light; without it, nearly twice as much."""
     settings = lookup_tables.Settings(
         eta=ETA, sigma_a=NO_ABSORPTION, tilt=0.0, beta_r=7.5 * DEGREE, caustic="exact", size=256
     )

@@ -20,7 +20,7 @@ def test_roughness_survives_the_way_there_and_back(roughness):
 
 
 def test_roughness_is_the_published_variance_and_scale():
-    """Of [Chiang16] at 0.3 and 1; in theta_i + theta_o twice the deviation in theta_h."""
+    """Variance and scale are those of [Chiang16] at 0.3 and 1; theta_i + theta_o has twice the deviation of theta_h."""
     assert principled.variance_from_roughness(0.3) == pytest.approx(0.0846, abs=1e-4)
     assert principled.variance_from_roughness(0.3) == pytest.approx((2.0 * principled.beta_r_from_roughness(0.3)) ** 2)
     assert principled.scale_from_radial_roughness(0.3) == pytest.approx(0.1172, abs=1e-4)

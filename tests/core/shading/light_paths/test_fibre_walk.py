@@ -127,7 +127,7 @@ def test_turns_are_distributed_as_the_values(row, turns):
 
 
 def test_densities_are_those_of_turns(row):
-    """Of a path without red, whose lobes have other shares: moments of the directions that it takes."""
+    """The moments of the directions agree for a path without red, whose lobes have other shares."""
     weight = 0.0, 0.2, 1.0
     directions = turned(row, weight)[0]
     z, turn = np.meshgrid((np.arange(48) + 0.5) / 24 - 1.0, 2.0 * np.pi * (np.arange(96) + 0.5) / 96)

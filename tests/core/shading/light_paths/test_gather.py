@@ -117,7 +117,7 @@ def test_faint_light_counts_as_much_in_the_mean(rng):
 
 
 def test_light_of_voxels_and_what_they_keep_of_the_drawn_is_that_of_paths(rng):
-    """In every voxel and in each channel; of what is drawn as much is kept as is like the paths' light."""
+    """In every voxel and channel the light is that of paths; drawn light is kept as far as it resembles it."""
     grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), voxel_count=625)
     light = surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 20_000)
@@ -193,7 +193,7 @@ def test_a_strand_within_another_is_shaded_on_the_far_side(rng, axis, least, mos
 
 
 def test_paths_start_as_often_as_rays_meet_strands(rng):
-    """On thin short strands beside thick long ones, of which few samples tell what is seen."""
+    """Thin short strands beside thick long strands get their share of paths with few samples."""
     thin, thick = strands_in_a_box(rng, 4_000), strands_in_a_box(rng, 60)
     thin = thin.mean(axis=1, keepdims=True) + 0.05 * (thin - thin.mean(axis=1, keepdims=True))
     points = np.concatenate([thin, thick])
@@ -244,7 +244,7 @@ def test_thinned_strands_stop_as_much_light(rng):
 
 
 def test_samples_show_the_segments_and_places_that_are_drawn(rng):
-    """Of two systems, of which the second is thinned out, and what is not hair, in a picture of numbers."""
+    """The picture of numbers shows segments of two systems, the second thinned out, and pixels without hair."""
     points = strands_in_a_box(rng, 30)
     grid = grid_of(points, BLACK, 0.002)
     height, width, of_strand = 20, 30, 3
@@ -271,7 +271,7 @@ def test_samples_show_the_segments_and_places_that_are_drawn(rng):
 
 
 def test_samples_show_segments_that_are_kept(rng):
-    """Of strands of 16 segments, each second of which is kept with 8."""
+    """Half of the strands with 16 segments is kept, with 8 segments each."""
     points = np.concatenate([strands_in_a_box(rng, 40)] * 5, axis=1)[:, :17]
     thin = grid_of(points, BLACK, 0.001, segment_count=160)
     (kept,) = thin.kept
@@ -415,7 +415,7 @@ def test_voxels_without_paths_take_the_ratio_around_them(rng):
 
 
 def test_drawn_light_keeps_edges_that_noisy_paths_do_not_find(rng):
-    """Where what is drawn has an edge of the paths' light, few paths say how bright both sides are."""
+    """Where drawn light has the edge of the paths' light, few paths give the brightness of both sides."""
     even = np.ones((8, 8, 8, 3))
     drawn = np.where(np.arange(8) < 3, 0.2, 1.0)[:, None] * even
     expected = 0.6 * drawn + 0.3 * even

@@ -90,7 +90,7 @@ def test_a_spot_is_a_point_within_its_cone():
 
 
 def test_an_area_lamp_of_less_spread_gives_as_much_light():
-    """In a narrower cone: the sum over all directions is that of a lamp without a cone."""
+    """The light over all directions in a narrower cone is that of a lamp without a cone."""
     edges = np.linspace(0.0, 0.75, 13)
     sums = []
     for cos_cone in (0.0, np.cos(0.7)):

@@ -107,7 +107,7 @@ def test_light_is_that_of_principled_bsdf(material, angles, expected):
 @pytest.mark.parametrize("angle", [5, 50, 80])
 @pytest.mark.parametrize("material", [USUAL, SMOOTH, METAL, MATT])
 def test_directions_are_as_dense_as_the_value_says(material, angle):
-    """In parts of the half of all directions above the surface: their chance, and the light that they carry."""
+    """In each part of the upper hemisphere, the probability and the light of directions agree with the value."""
     viewer, weight = direction(angle, 180.0), (1.0, 0.5, 0.2)
     sides = 400
     cosine, azimuth = np.meshgrid((np.arange(sides) + 0.5) / sides, 360.0 * (np.arange(sides) + 0.5) / sides)

@@ -91,7 +91,7 @@ def test_voxels_in_sight_are_those_of_places_and_what_touches_them(rng):
 
 
 def test_shares_of_whole_sums_are_those_of_one_voxel_without_a_grid(rng):
-    """Where there are very many paths, each voxel's shares are its own ratios; with few, all are those of the sum."""
+    """With very many paths each voxel's shares are its own ratios; with few, they are those of the sum."""
     sums = rng.uniform(0.5, 1.5, (3, 4, 5, 12))
     own, shared = (
         voxel_means.smooth_ratios(wp.array(sums, dtype=wp.float64, device="cpu"), count) for count in (10**15, 1e-9)
@@ -104,7 +104,7 @@ def test_shares_of_whole_sums_are_those_of_one_voxel_without_a_grid(rng):
 
 
 def test_kept_points_are_in_the_world_with_the_absorption_of_their_places(rng):
-    """Of a system that is turned and thinned out: each second strand, twice as wide."""
+    """The law holds for a turned system that keeps every second strand at twice the width."""
     count, variation = 40, strand_variation.Settings(pigment=(0.2, 0.4, 0.9), random_color=0.3, tip_absorption=2.0)
     randoms, points = rng.random(count), rng.normal(size=(count, 17, 3)).astype(np.float32)
     radii = rng.uniform(0.01, 0.02, (count, 17)).astype(np.float32)

@@ -12,7 +12,7 @@ BROWN = (0.1, 0.25, 0.6)
 
 @pytest.mark.parametrize("mode", ["energy", "classic"])
 def test_moments_are_those_of_the_radiance_over_all_directions(mode):
-    """Of even light, weighed with the cosine of phi, and of light that varies as P1 and P2 of sin(theta_i)."""
+    """The moments agree for uniform light weighted by cos(phi), and for light as P1 and P2 of sin(theta_i)."""
     tables = lookup_tables.bake(lookup_tables.Settings(mode=mode, sigma_a=BROWN, caustic="exact"))
     moments = albedo.azimuthal_moments(tables)
     nodes, weights = np.polynomial.legendre.leggauss(300)

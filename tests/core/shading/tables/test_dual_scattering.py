@@ -196,7 +196,7 @@ def test_deeper_strands_are_darker_and_of_purer_colour(rng):
 
 
 def test_a_white_strand_deep_in_white_hair_passes_on_what_it_receives():
-    """From all views the single lobes of spread light have the energy of the row: spreading loses nothing."""
+    """Summed over all views, the lobes of spread light have the energy of the row."""
     tables, dual = baked(sigma_a=(0.0, 0.0, 0.0), tilt=0.0)
     unit = replace(dual, theta=dual.theta.copy())
     unit.theta[dual_scattering.QUANTITIES.index("a_f")] = 1.0
