@@ -15,7 +15,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import hair_addon
-from blend_samples.heads import head
+from blend_samples.heads import head, portrait
 from blend_samples.sheets import picture_files
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "manual" / "cryptomatte.png"
@@ -32,21 +32,22 @@ SYSTEMS = {
 def main():
     """Groom, render, pick, and write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--strands", type=int, default=5_000, help="of each system")
-    parser.add_argument("--samples", type=int, default=16)
+    parser.add_argument("--strands", type=int, default=9_000, help="of each system")
+    parser.add_argument("--samples", type=int, default=48)
     parser.add_argument("--out", type=Path, default=OUT)
     given = parser.parse_args()
     hair_addon.register()
     head_object = head.build()
+    portrait.dress(head_object)
     for name, (low, high, _color) in SYSTEMS.items():
         grow(head_object, name, low, high, given.strands)
     head.light()
     scene = bpy.context.scene
     scene.render.engine, scene.vellus.sample_count = "VELLUS", given.samples
     scene.render.resolution_x, scene.render.resolution_y = SIZE
-    scene.camera.data.lens = 125.0
+    scene.camera.data.lens = 110.0
     lens = scene.camera.data.dof
-    lens.use_dof, lens.focus_distance, lens.aperture_fstop = True, 1.3, 0.7
+    lens.use_dof, lens.focus_distance, lens.aperture_fstop = True, 1.3, 1.2
     bpy.context.view_layer.use_pass_cryptomatte_object = True
     before = picture_files.rendered()
     pick(scene)
