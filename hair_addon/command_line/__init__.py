@@ -18,6 +18,7 @@ from . import (
     import_mesh,
     info,
     interruption,
+    panorama,
     paths,
     render,
     settings,
@@ -28,7 +29,7 @@ from . import (
 )
 from .options import Parser
 
-_VERBS = (groom, tables, transfer, simulate, render, export, cards, tubes, info, settings, import_mesh)
+_VERBS = (groom, tables, transfer, simulate, render, export, cards, tubes, info, settings, import_mesh, panorama)
 
 
 def main(arguments, program):

@@ -7,13 +7,14 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
+from ...core.errors import HairError
 from ...core.imaging import lamps
-from ..data.pictures import light_linking
+from ..data.pictures import light_linking, world_panoramas
 from ..data.pictures.rendered_instances import is_rendered
 from ..data.pictures.shader_sockets import ShaderInput, shown_shader
 from ..host import scene_time
 from ..host.caches import Cache
-from ..host.notices import can_be_drawn
+from ..host.notices import can_be_drawn, say
 from .programs import uniforms
 from .studio_lights import StudioImage, image_of
 
@@ -138,38 +139,67 @@ def world_of_hdri(hdri):
     return World(np.full(3, hdri.strength), image_of(hdri.path), to_image)
 
 
-def read_world(scene, view_layer=None):
+def read_world(scene, view_layer=None, waits=True):
     """The `World` of a scene, or of a view layer that overrides it.
 
-    Unsupported nodes are replaced by the world's viewport color. A world with non-finite values is black, with a
-    message.
+    Cycles renders nodes that Vellus does not read as a panorama; waits: for that panorama. Else the world has its
+    viewport color meanwhile, and with a message if Cycles cannot render it. A world with non-finite values is black,
+    with a message. Raises `HairError`.
     """
     world = (view_layer and view_layer.world_override) or scene.world
     if world is None:
         return World(np.zeros(3))
     with np.errstate(all="ignore"):
         found = _read_world(world, scene_time.frame_of(scene))
+    if found is None:
+        found = _panorama_of(world, scene_time.time_of(scene), waits)
     is_finite = can_be_drawn(world, found.color, () if found.to_image is None else found.to_image)
     return found if is_finite else World(np.zeros(3))
 
 
 def _read_world(world, scene_frame):
+    """The `World` of nodes that are a background of one color or one environment texture; None for other nodes."""
     background = shown_shader(world.node_tree, ["BACKGROUND"])
     if background is None:
         return World(np.array(world.color))
-    strength, color = background["Strength"].value(), background["Color"]
+    strength, color = background["Strength"].constant(), background["Color"]
+    if strength is None or not _is_shown(background, world.node_tree):
+        return None
     constant = color.constant()
     if constant is not None:
         return World(strength * np.array(constant[:3]))
     source = color.source()[0]
     to_image = _mapping(source["Vector"]) if source.type == "TEX_ENVIRONMENT" else None
+    if to_image is None:
+        return None
     texture = source.node
-    if to_image is None or texture.image is None:
+    if texture.image is None:
         return World(strength * np.array(world.color))
     frame = _load_frame(texture.image, texture.image_user, scene_frame)
     if not all(texture.image.size):  # the access loads the file if necessary
         return World(strength * np.array(world.color))
     return World(np.full(3, strength), texture.image, to_image, texture.projection == "MIRROR_BALL", frame)
+
+
+def _is_shown(shader, tree):
+    """Whether a tree's output reads a `ShaderNode`, or nothing."""
+    output = tree.get_output_node("ALL")
+    found = ShaderInput(output.inputs["Surface"]).source()[0] if output else None
+    return found is None or found.node == shader.node
+
+
+def _panorama_of(world, time, waits):
+    """The `World` of a panorama that Cycles renders of a world at a time [frames]."""
+    try:
+        path = world_panoramas.file_of(world, time, waits)
+    except HairError as error:
+        if waits:
+            raise
+        say(str(error))
+        path = None
+    if path is None:
+        return World(np.array(world.color))
+    return World(np.ones(3), image_of(str(path)), np.eye(4))
 
 
 def _load_frame(image, user, scene_frame):

@@ -18,6 +18,8 @@ _MOST_WRAP = 0.5  # the greatest softness of a lamp: of softer lights a part is 
 _DIMMED_BEHIND = 0.85  # hair lets light from behind through, which the opaque surfaces that lights are made for do not
 _LEAST_DIFFUSE = 1e-3  # least diffuse color relative to the specular color, as highlights are relative to other light
 
+_LARGEST_HALF = 65504.0
+
 image_cache = Cache(capacity=8)  # StudioImage → {layer: (H, W, 3)}
 texture_cache = Cache(capacity=8)  # (StudioImage, whether as a matcap) → texture
 
@@ -109,7 +111,11 @@ def _texture(pixels, extension):
     texels = np.ones((height, width, 4), np.float32)
     texels[..., :3] = pixels
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
-    texture = gpu.types.GPUTexture((width, height), format="RGBA16F", data=data)
+    texture = gpu.types.GPUTexture((width, height), format=_format_of(pixels), data=data)
     texture.filter_mode(True)
     texture.extend_mode(extension)
     return texture
+
+
+def _format_of(pixels):
+    return "RGBA16F" if float(pixels.max()) < _LARGEST_HALF else "RGBA32F"  # a sun's disk is brighter

@@ -6,7 +6,7 @@
 
 from ..data import guide_map_readers, scene, subdivided_surfaces, usable_surfaces
 from ..data.maps import image_pixels, sources
-from ..data.pictures import drawn_meshes, root_colors
+from ..data.pictures import drawn_meshes, root_colors, world_panoramas
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, solid_shading, studio_lights, surface_shading, surface_textures, world_texture
@@ -86,6 +86,7 @@ OTHERS = (
     surface_shading.texture_cache,
     surface_textures.surface_cache,
     notices.printed_cache,
+    world_panoramas.process_cache,
 )
 
 # If a bound program is freed and a new one gets its address, the GPU module takes the new one for bound, so programs

@@ -104,7 +104,7 @@ def read(
         if shown.light.kind != viewport_shading.SCENE:
             below = tuple(blocker for blocker in surroundings["blockers"] if blocker.owner[1] in grown_on)
             surroundings["blockers"] = below  # in Solid shading other surfaces cast no shadows
-        world, lamps, maps = _world_of(shown.light, blender_scene, view_layer), None, None
+        world, lamps, maps = _world_of(shown.light, blender_scene, view_layer, viewport is None), None, None
     else:
         surroundings = {name: getattr(before, name) for name in _SURROUNDINGS}
         world, lamps, maps = before.world, before.lamps, before.shadow_maps
@@ -169,12 +169,12 @@ def relit(drawn, blender_scene, view_layer, depsgraph, light, maps=None, is_wide
     return _lit(drawn, lamps, maps, hair_receivers, _are_made(drawn.hair))
 
 
-def _world_of(light, blender_scene, view_layer):
-    """The `World` of a viewport's light."""
+def _world_of(light, blender_scene, view_layer, waits=False):
+    """The `World` of a viewport's light; waits: as of `lights.read_world`."""
     if light.hdri is not None:
         return blender_lights.world_of_hdri(light.hdri)
     if light.has_world and light.kind == viewport_shading.SCENE:
-        return blender_lights.read_world(blender_scene, view_layer)
+        return blender_lights.read_world(blender_scene, view_layer, waits)
     return blender_lights.World(np.array(light.ambient))
 
 

@@ -2,13 +2,18 @@
 """World light: the image as in Cycles, and the light that arrives among strands and on surfaces."""
 
 import math
+import sys
+import time
 
 import bpy
 import numpy as np
 import pytest
 
+from hair_addon.blender.data.pictures import world_digest, world_panoramas
 from hair_addon.blender.gpu import ambient_visibility, lights, strand_textures, surface_textures, world_texture
+from hair_addon.blender.host import cli_command
 from hair_addon.blender.render import offscreen
+from hair_addon.core.errors import HairError
 from hair_addon.core.imaging import environment
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
@@ -110,14 +115,63 @@ def test_decomposition_of_an_environment_conserves_light(scene, rng):
     np.testing.assert_allclose(found, solid_angles @ unrolled.reshape(-1, 3), rtol=0.01)
 
 
-def test_a_world_of_other_nodes_shines_in_its_viewport_colour(scene):
+def mixed_world(scene):
+    """Light the scene with nodes that Vellus does not read: a sky without its sun, and a turned gradient below it."""
     scene.world = bpy.data.worlds.new("World")
     scene.world.color = (0.1, 0.2, 0.3)
     tree = scene.world.node_tree
-    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
-    noise = tree.nodes.new("ShaderNodeTexNoise")
-    tree.links.new(noise.outputs[1], background.inputs["Color"])
-    np.testing.assert_allclose(lights.read_world(scene).color, (0.1, 0.2, 0.3), rtol=1e-6)
+    (output,) = (node for node in tree.nodes if node.type == "OUTPUT_WORLD")
+    sky, gradient = tree.nodes.new("ShaderNodeTexSky"), tree.nodes.new("ShaderNodeTexGradient")
+    sky.sky_type, sky.sun_direction = "PREETHAM", (0.3, -0.5, 0.8)
+    coordinates, mapping = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeMapping")
+    mapping.inputs["Rotation"].default_value = (0.4, 0.2, 1.0)
+    add, mix = tree.nodes.new("ShaderNodeAddShader"), tree.nodes.new("ShaderNodeMixShader")
+    camera_only, path = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeLightPath")
+    first, second = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeBackground")
+    camera_only.inputs["Color"].default_value = (9.0, 0.0, 9.0, 1.0)
+    for source, sink in (
+        (sky.outputs["Color"], first.inputs["Color"]),
+        (coordinates.outputs["Generated"], mapping.inputs["Vector"]),
+        (mapping.outputs["Vector"], gradient.inputs["Vector"]),
+        (gradient.outputs["Color"], second.inputs["Color"]),
+        (first.outputs[0], add.inputs[0]),
+        (second.outputs[0], add.inputs[1]),
+        (path.outputs["Is Camera Ray"], mix.inputs[0]),
+        (add.outputs[0], mix.inputs[1]),
+        (camera_only.outputs[0], mix.inputs[2]),
+        (mix.outputs[0], output.inputs["Surface"]),
+    ):
+        tree.links.new(source, sink)
+    return mapping.inputs["Rotation"], mix.inputs[0]
+
+
+def test_cycles_renders_a_world_of_other_nodes(scene, tmp_path):
+    """The panorama has the radiance that light rays see in Cycles, in all directions, and is rendered once."""
+    rotation, camera_part = mixed_world(scene)
+    unrolled = world_texture.picture_of(lights.read_world(scene))
+    made = world_panoramas.file_of(scene.world, 1.0, waits=False)
+    assert made is not None and not len(world_panoramas.process_cache)
+    rotation.default_value = (0.4, 0.2, 1.5)
+    assert world_digest.digest_of(scene.world) != made.stem
+    rotation.default_value = (0.4, 0.2, 1.0)
+    assert world_digest.digest_of(scene.world) == made.stem
+    camera_part.links[0].is_muted = True
+    camera_part.default_value = 0.0
+    rendered = panorama(scene, tmp_path)
+    np.testing.assert_allclose(unrolled, rendered, rtol=0.02, atol=0.01)
+
+
+def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, monkeypatch):
+    """Until then, the world has its viewport color, which it keeps with a message if Cycles cannot render it."""
+    mixed_world(scene)[0].default_value = (0.1, 0.0, 0.0)
+    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "raise SystemExit('no Cycles')"])
+    for _look in range(200):
+        np.testing.assert_allclose(lights.read_world(scene, waits=False).color, (0.1, 0.2, 0.3), rtol=1e-6)
+        if world_panoramas.look() is None:
+            break
+        time.sleep(0.05)
+    with pytest.raises(HairError, match=r"World.*no Cycles"):
+        lights.read_world(scene)
 
 
 def test_the_picture_is_seen_behind_the_scene(scene, rng, tmp_path):

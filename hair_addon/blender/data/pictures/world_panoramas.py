@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panoramas of worlds whose nodes Vellus does not read: Cycles renders them once, in another process.
+
+Panoramas are kept by the digest of the nodes: in the user's folder of the extension, or as long as Blender runs.
+"""
+
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from ....core.errors import HairError, cause_of
+from ...host.caches import Cache
+from ...host.notices import name_of
+from ...host.other_process import OtherProcess
+from ...settings import preferences
+from . import world_digest
+
+_PATIENCE = 300.0  # [s] for a panorama
+_LOOK = 0.25  # [s] between looks at processes
+_MOST_KEPT = 64  # files
+
+process_cache = Cache()  # digest → _Rendering, of what is rendered now or could not be rendered
+
+
+class _Rendering:
+    """A panorama that another process renders; reason: why there is none, empty until then."""
+
+    def __init__(self, world, path, frame):
+        self.reason, self._path, self.world = "", path, name_of(world)
+        self._folder = tempfile.TemporaryDirectory(prefix="vellus_", ignore_cleanup_errors=True)
+        folder = Path(self._folder.name)
+        blend, self._made = folder / "world.blend", folder / "world.exr"
+        words = ["panorama", str(blend), "--out", str(self._made), "--frame", repr(float(frame))]
+        try:
+            bpy.data.libraries.write(str(blend), {world.original}, path_remap="ABSOLUTE", fake_user=True)
+            self._process = OtherProcess(words, folder / "errors")
+        except (OSError, RuntimeError) as error:
+            self._process, self.reason = None, cause_of(error)
+
+    def is_ended(self, waits):
+        """Whether it has ended, after waiting if `waits`; the file is then in its place, or there is a reason."""
+        if self._process is not None and waits:
+            self._process.wait(_PATIENCE)
+        if self._process is None or self._process.is_running:
+            return self._process is None
+        complaint, self._process = self._process.complaint(), None
+        if self._made.is_file():
+            self._made.replace(self._path)
+        else:
+            self.reason = complaint or "the process ended without a picture"
+        self._folder.cleanup()
+        return True
+
+
+def file_of(world, frame, waits):
+    """The OpenEXR file with the panorama of a world at a frame; None while it is rendered.
+
+    waits: return only once it is there. Raises `HairError` if it cannot be rendered.
+    """
+    digest = world_digest.digest_of(world)
+    path = _folder() / f"{digest}.exr"
+    if path.is_file():
+        process_cache.invalidate(digest)
+        return path
+    rendering = process_cache.get(digest, lambda: _Rendering(world, path, frame))
+    if not rendering.is_ended(waits):
+        if not bpy.app.timers.is_registered(look):
+            bpy.app.timers.register(look, first_interval=_LOOK, persistent=True)
+        return None
+    if rendering.reason:
+        sentence = 'Cycles cannot render the nodes of the world "{world}": {reason}'
+        raise HairError(sentence, world=rendering.world, reason=rendering.reason)
+    _remove_oldest(path)
+    process_cache.invalidate(digest)
+    return path
+
+
+def look():
+    """Timer: show panoramas that are done. Returns the time to the next look, None after the last."""
+    renderings = [one for one in process_cache.values() if isinstance(one, _Rendering)]
+    ended = [one.is_ended(waits=False) for one in renderings]
+    if any(ended):
+        for world in bpy.data.worlds:
+            world.update_tag()
+    return None if all(ended) else _LOOK
+
+
+def _folder():
+    """The folder of panoramas."""
+    if preferences.is_extension():
+        folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="worlds", create=True)
+        if folder:  # empty if Blender could not create it, which it reports on the console
+            return Path(folder)
+    folder = Path(bpy.app.tempdir or tempfile.gettempdir()) / "vellus_worlds"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def _remove_oldest(path):
+    """Remove the oldest files beside a panorama if there are too many."""
+    files = sorted(path.parent.glob("*.exr"), key=lambda file: file.stat().st_mtime)
+    for file in files[:-_MOST_KEPT]:
+        file.unlink(missing_ok=True)

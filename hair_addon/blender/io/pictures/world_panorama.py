@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rendering of a world by Cycles, as a panorama of all directions."""
+
+import math
+import os
+from pathlib import Path
+
+import bpy
+
+from ....core.errors import HairError, cause_of
+from ...host import scene_time
+
+SIZE = 1024, 512  # pixels of a third of a degree: the sun's disk is half a degree wide
+SAMPLES = 16  # of a pixel
+
+# What the Light Path node says of light that hair scatters.
+_LIGHT_PATH = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0}
+
+
+def render(path, frame, out):
+    """Render the only world of a .blend at a frame into an .exr. Raises `HairError`.
+
+    The picture is what light from all directions is, in the projection of the Environment Texture node.
+    """
+    try:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        with bpy.data.libraries.load(str(path)) as (found, wanted):
+            wanted.worlds = list(found.worlds)
+        scene = bpy.context.scene
+        (scene.world,) = wanted.worlds
+        scene.render.engine = "CYCLES"
+    except (OSError, RuntimeError, TypeError, ValueError) as error:
+        raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
+    _replace_light_paths(scene.world.node_tree, set())
+    camera = bpy.data.cameras.new("Panorama")
+    camera.type, camera.panorama_type = "PANO", "EQUIRECTANGULAR"
+    scene.camera = bpy.data.objects.new("Panorama", camera)
+    scene.camera.rotation_euler = 0.5 * math.pi, 0.0, -0.5 * math.pi  # looks along +x, z up
+    scene.collection.objects.link(scene.camera)
+    _set_up(scene)
+    scene_time.go_to_time(scene, frame)
+    out = Path(out)
+    scene.render.filepath = str(out.with_suffix(".part.exr"))
+    bpy.ops.render.render(write_still=True)
+    os.replace(scene.render.filepath, out)
+
+
+def _set_up(scene):
+    cycles, render = scene.cycles, scene.render
+    cycles.device, cycles.samples = "CPU", SAMPLES
+    cycles.use_adaptive_sampling = cycles.use_denoising = False
+    cycles.pixel_filter_type = "BOX"  # so that pixels keep the whole light of the sun
+    (render.resolution_x, render.resolution_y), render.resolution_percentage = SIZE, 100
+    render.film_transparent = render.use_motion_blur = render.use_compositing = render.use_sequencer = False
+    picture = render.image_settings
+    picture.file_format, picture.color_depth, picture.exr_codec = "OPEN_EXR", "32", "ZIP"
+
+
+def _replace_light_paths(tree, known):
+    """Let nodes read constants in place of Light Path nodes; known: trees that are done."""
+    if tree is None or tree.name in known:
+        return
+    known.add(tree.name)
+    for node in list(tree.nodes):
+        if node.type == "GROUP":
+            _replace_light_paths(node.node_tree, known)
+        if node.type != "LIGHT_PATH":
+            continue
+        for output in node.outputs:
+            value = tree.nodes.new("ShaderNodeValue")
+            value.outputs[0].default_value = _LIGHT_PATH.get(output.name, 0.0)
+            for link in list(output.links):
+                tree.links.new(value.outputs[0], link.to_socket)
