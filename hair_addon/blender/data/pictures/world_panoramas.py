@@ -28,7 +28,8 @@ class _Rendering:
 
     def __init__(self, world, path, frame):
         self.reason, self._path, self.world = "", path, name_of(world)
-        self._folder = tempfile.TemporaryDirectory(prefix="vellus_", ignore_cleanup_errors=True)
+        # Beside the path, as a file cannot be renamed to another file system.
+        self._folder = tempfile.TemporaryDirectory(prefix=".", dir=path.parent, ignore_cleanup_errors=True)
         folder = Path(self._folder.name)
         blend, self._made = folder / "world.blend", folder / "world.exr"
         words = ["panorama", str(blend), "--out", str(self._made), "--frame", repr(float(frame))]
