@@ -20,6 +20,7 @@ STATE = {
     "blender/live/handlers.py: _is_undone": "the first update after an undo",
     "blender/live/hidden_previews.py: _handles": "unregister",
     "blender/render/frames/engine.py: _listener": "listening, a context",
+    "blender/render/viewport/live_light.py: _jobs": "the end of each share, at the latest unregister",
     "blender/render/viewport/viewport.py: _handles": "unregister",
     "blender/ui/look_previews.py: _previews": "unregister",
     # Kernels stay loaded as long as Python runs.

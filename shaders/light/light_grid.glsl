@@ -10,5 +10,6 @@ bool has_light_grid()
 // light by dual scattering to add.
 vec4 light_among_strands(vec3 position)
 {
-  return textureLod(light_grid, (position - lights.grid_corner.xyz) * lights.grid_scale.xyz, 0.0);
+  vec4 measured = textureLod(light_grid, (position - lights.grid_corner.xyz) * lights.grid_scale.xyz, 0.0);
+  return mix(vec4(0.0, 0.0, 0.0, 1.0), measured, lights.grid_corner.w);
 }

@@ -19,7 +19,7 @@ from ..groom.systems import copied_hair
 from ..host import notices
 from ..render import hair_cache, modified_hair, solid_hair
 from ..render.frames import composite
-from ..render.viewport import region_pictures, viewport
+from ..render.viewport import live_light, region_pictures, viewport
 from ..settings import animated
 from . import dynamics_state, hidden_previews, moving_surfaces, refused_hair, reported, simulated_hair, unlocked_renders
 
@@ -64,6 +64,7 @@ OTHERS = (
     frame_faces.count_cache,
     subdivided_surfaces.smooth_cache,
     region_pictures.picture_cache,
+    live_light.light_cache,
     viewport.display_table_cache,
     solid_hair.tint_cache,
     root_colors.corner_cache,
@@ -104,11 +105,13 @@ def data_replaced():
 
 def clear():
     """Clear all caches except programs, when another file is opened or the add-on is disabled."""
+    live_light.end()
     for cache in COPIES + OTHERS:
         cache.clear()
 
 
 def end():
     """Clear all caches and programs when Python ends, while the GPU context still exists."""
+    live_light.end()
     for cache in CACHES:
         cache.clear()

@@ -2,6 +2,7 @@
 """The scene on the GPU: hair, surfaces, lights and their shadow maps."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -52,14 +53,22 @@ class DrawnScene:
 
 @dataclass(frozen=True, eq=False)
 class Blocker:
-    """A surface that blocks light. owner: as of a `scene_lights.Receiver`; mesh: (corner positions, their normals,
-    `triangle_materials`) in a render; is_seen: visible to cameras.
+    """A surface that blocks light. owner: as of a `scene_lights.Receiver`; source: its `DrawnMesh`, where light paths
+    may be traced; is_seen: visible to cameras.
     """
 
     surface: surface_textures.SurfaceOnGPU
     owner: tuple
-    mesh: tuple | None = None
+    source: drawn_meshes.DrawnMesh | None = None
     is_seen: bool = True
+
+    @cached_property
+    def mesh(self):
+        """(corner positions, their normals, `triangle_materials`); normals are zero if they were not read."""
+        source = self.source
+        positions = source.positions
+        normals = np.zeros_like(positions) if source.normals is None else source.corner_normals
+        return positions, normals, source.triangle_materials
 
 
 _EMPTY = DrawnScene([], [], uniforms.LIGHTS.record(), blender_lights.World(np.zeros(3)), None, [], [])
@@ -100,7 +109,8 @@ def read(
         meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
         if is_shaded:
             meshes = drawn_meshes.split_clear(meshes)
-        surroundings = _upload(meshes, is_shaded, has_paths=viewport is None)
+        has_paths = viewport is None or shown.light.kind == viewport_shading.SCENE
+        surroundings = _upload(meshes, is_shaded, has_paths)
         if shown.light.kind != viewport_shading.SCENE:
             below = tuple(blocker for blocker in surroundings["blockers"] if blocker.owner[1] in grown_on)
             surroundings["blockers"] = below  # in Solid shading other surfaces cast no shadows
@@ -279,7 +289,7 @@ _SURROUNDINGS = ("surfaces", "clear", "receivers", "surface_owners", "blockers")
 def _upload(meshes, is_shaded, has_paths):
     """{name of `_SURROUNDINGS`: value} of `DrawnMesh`es.
 
-    is_shaded: whether Vellus shades surfaces; has_paths: whether light paths will be traced against them.
+    is_shaded: whether Vellus shades surfaces; has_paths: whether light paths may be traced against them.
     """
     uploaded, blockers = {False: [], True: []}, []
     for mesh in meshes:
@@ -289,8 +299,7 @@ def _upload(meshes, is_shaded, has_paths):
             receiver = scene_lights.Receiver(mesh.owner[1::-1], places)
             uploaded[is_clear].append(((surface, mesh.parts), receiver, mesh.owner))
         if mesh.casts_shadow and not is_clear:
-            traced = (mesh.positions, mesh.corner_normals, mesh.triangle_materials) if has_paths else None
-            blockers.append(Blocker(surface, mesh.owner[1::-1], traced, mesh.is_seen))
+            blockers.append(Blocker(surface, mesh.owner[1::-1], mesh if has_paths else None, mesh.is_seen))
     solid, clear = uploaded.values()
     return {
         "surfaces": [surface for surface, _receiver, _owner in solid],

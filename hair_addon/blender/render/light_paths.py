@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among strands for a render: `core.shading.light_paths` of a `DrawnScene` from a camera."""
+"""Light among strands: `core.shading.light_paths` of a `DrawnScene` from a camera."""
 
 from dataclasses import replace
 
@@ -16,8 +16,11 @@ from . import seen_strands
 
 _PATHS_A_PIXEL = 2
 _LEAST_PATHS, _MOST_PATHS = 20_000, 300_000  # over the part of the picture that contains the hair
-_SAMPLES_A_PATH = 2  # samples of the picture per path
-_MOST_TIMES = 4  # maximum factor of paths, if the part is mostly empty or few of its paths reach light
+SAMPLES_A_PATH = 2  # samples of the picture per path
+MOST_TIMES = 4  # maximum factor of paths, if the part is mostly empty or few of its paths reach light
+
+_OTHER_MODEL = "Hair is lit by Dual Scattering: Light Grid needs Marschner with Energy Conserving for all hair."
+_LINKED = "Hair is lit by Dual Scattering: Light Grid does not support light linking."
 
 
 def path_count(blender_scene, size):
@@ -36,14 +39,10 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     """
     if not count or not drawn.hair:
         return drawn
-    looks = [layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers]
-    is_usual = all(layer.fibre is not None for layer in looks) and drawn.lamps.are_linked_to_all
-    window = window_of(drawn.hair, world_to_view, view_to_clip) if is_usual else None
+    window = None if obstacle(drawn) else window_of(drawn.hair, world_to_view, view_to_clip)
     if window is None:
         return drawn
-    fibres = [layer.fibre[0] for layer in looks]
-    firsts = np.cumsum([0, *(len(shading.layers) for _strands, shading, *_ in drawn.hair)])
-    systems = [_strands_of(*hair[:3], first) for hair, first in zip(drawn.hair, firsts[:-1], strict=True)]
+    systems, fibres = strands_of(drawn)
     if not light_paths.strand_grid.has_area(systems):
         return drawn
     device = preferences.device()
@@ -52,23 +51,46 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     if not grid.is_resolved:
         return drawn
     progress(light_paths.gather.FOLLOWING, 0.15)
-    seen = seen_strands.find(drawn, grid, (world_to_view, view_to_clip), window, _SAMPLES_A_PATH * count, seed)
+    shown = seen_strands.draw(drawn, (world_to_view, view_to_clip), window, SAMPLES_A_PATH * count, seed)
+    seen = shown.seen(grid)
     if not len(seen.segments):
         return drawn
     progress(light_paths.gather.FOLLOWING, 0.3)
-    most = _MOST_TIMES * count
-    starting = -(-len(seen.segments) // _SAMPLES_A_PATH)
+    most = MOST_TIMES * count
+    starting = -(-len(seen.segments) // SAMPLES_A_PATH)
     tracing = part_of(progress, 0.3, 1.0)
-    sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, starting, seed, most, tracing)
+    sums, taken = light_paths.gather.gather(grid, surroundings_of(drawn), seen, starting, seed, most, tracing)
     if not taken:
         return drawn
     means = [light_paths.voxel_means.shares(of_hair, taken, grid.origin) for of_hair in sums]
+    return lit_by(drawn, grid, [light_grid.upload(of_hair) for of_hair in means])
+
+
+def obstacle(drawn):
+    """Why hair of a `DrawnScene` cannot be lit by paths, as a sentence; empty if it can."""
+    if any(layer.fibre is None for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers):
+        return _OTHER_MODEL
+    return "" if drawn.lamps.are_linked_to_all else _LINKED
+
+
+def strands_of(drawn):
+    """([`strand_grid.Strands`] of the hair of a `DrawnScene`, settings of all looks)."""
+    fibres = [layer.fibre[0] for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers]
+    firsts = np.cumsum([0, *(len(shading.layers) for _strands, shading, *_ in drawn.hair)])
+    return [_strands_of(*hair[:3], first) for hair, first in zip(drawn.hair, firsts[:-1], strict=True)], fibres
+
+
+def lit_by(drawn, grid, textures, part=1.0, shift=0.0):
+    """A `DrawnScene` whose hair is lit by `light_grid.upload` of each hair, over a `StrandGrid`.
+
+    part: how much of this light replaces dual scattering, from 0 to 1; shift: (3,) of hair since [m].
+    """
     visibility = [
-        {**textures, "light_grid": light_grid.upload(of_hair)}
-        for textures, of_hair in zip(drawn.hair_visibility, means, strict=True)
+        {**seen, "light_grid": texture} for seen, texture in zip(drawn.hair_visibility, textures, strict=True)
     ]
     lights = drawn.lights.copy()
-    lights["grid_corner"][:3] = grid.corner
+    lights["grid_corner"][:3] = grid.corner + shift
+    lights["grid_corner"][3] = part
     lights["grid_scale"][:3] = 1.0 / (grid.voxel * texture_sides.avoid_powers_of_two(grid.shape))
     return replace(drawn, lights=lights, hair_lights=None, hair_visibility=visibility)
 
@@ -129,7 +151,7 @@ def _strands_of(strands, shading, to_world, first):
     )
 
 
-def _surroundings(drawn):
+def surroundings_of(drawn):
     """`media.Surroundings` of a `DrawnScene`."""
     found = drawn.lamps.lamps
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in drawn.hair])

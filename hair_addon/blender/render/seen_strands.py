@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The strands visible from a camera, with their light by dual scattering: the starts of light paths."""
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
 from ...core.shading import light_paths
@@ -11,11 +14,28 @@ from . import scene_drawing
 _MOST_SAMPLES = 4096  # along each side
 
 
-def find(drawn, grid, camera, window, count, turn):
-    """`seen_rays.Seen` of a `DrawnScene` in a window of a camera's picture, for about `count` samples.
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A picture of hair by dual scattering, read from the GPU; the fields are arguments of `seen_rays.shown_in`.
 
-    grid: `StrandGrid` of the scene's hair; camera: (4, 4) world to view and view to clip; window: (low, high) corners
-    (2,) in clip space; turn: index among passes of the same picture.
+    view: a `light_paths.view.View`.
+    """
+
+    view: Any
+    picture: np.ndarray
+    color: np.ndarray
+    ranges: list
+
+    def seen(self, grid):
+        """`seen_rays.Seen` of a `StrandGrid` of the scene's hair."""
+        return light_paths.seen_rays.shown_in(grid, self.view, self.picture, self.color, self.ranges)
+
+
+def draw(drawn, camera, window, count, turn):
+    """`Drawn` of a `DrawnScene` in a window of a camera's picture, with about `count` samples.
+
+    camera: (4, 4) world to view and view to clip; window: (low, high) corners (2,) in clip space; turn: index among
+    passes of the same picture.
     """
     whole, tile = _samples(camera[1], window, count)
     view = drawing.pass_record(*camera, whole, turn, tile)
@@ -29,8 +49,7 @@ def find(drawn, grid, camera, window, count, turn):
         color = np.array(buffer.color.read(), np.float32).reshape(tile[3], tile[2], 4)
     a_strand = [hair[0].point_count - 1 for hair in drawn.hair]
     ranges = [(*range_of, segments) for range_of, segments in zip(buffer.segment_ranges, a_strand, strict=True)]
-    seen_in = light_paths.view.View(view["world_to_clip"].T.astype(np.float64))
-    return light_paths.seen_rays.shown_in(grid, seen_in, picture, color, ranges)
+    return Drawn(light_paths.view.View(view["world_to_clip"].T.astype(np.float64)), picture, color, ranges)
 
 
 def _samples(view_to_clip, window, count):

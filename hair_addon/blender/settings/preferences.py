@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Preferences: the compute device, and the device that makes strands in viewports."""
+"""Preferences: the compute device, the device that makes strands in viewports, and light paths there."""
 
 import bpy
 
@@ -34,10 +34,20 @@ class VellusPreferences(bpy.types.AddonPreferences):
         default="AUTOMATIC",
     )
 
+    has_live_light: bpy.props.BoolProperty(
+        name="Light Grid in Viewports",
+        description=(
+            "Follow light paths in Material Preview and Rendered shading while nothing moves, on the compute device or "
+            "one core of the processor, if the scene's Multiple Scattering is Light Grid"
+        ),
+        translation_context=CONTEXT,
+        default=True,
+    )
+
     def draw(self, _context):
         """Draw rows of all preferences: Blender draws none by itself."""
         self.layout.use_property_split = True
-        for name in ("device", "stroke_device"):
+        for name in ("device", "stroke_device", "has_live_light"):
             self.layout.prop(self, name)
 
 
@@ -59,6 +69,12 @@ def stroke_device():
     """Return the choice for strands while combing: "AUTOMATIC", "GPU" or "COMPUTE"."""
     chosen = _chosen()
     return "AUTOMATIC" if chosen is None else chosen.stroke_device
+
+
+def has_live_light():
+    """Return whether light paths may be followed in viewports."""
+    chosen = _chosen()
+    return True if chosen is None else chosen.has_live_light
 
 
 def _chosen():

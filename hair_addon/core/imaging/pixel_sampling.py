@@ -35,20 +35,20 @@ class RenderSettings(Settings):
     )
     multiple_scattering: str = param(
         "GRID",
-        "How renders compute light that reaches hair from other hair and from surfaces",
+        "How renders and viewports compute light that reaches hair from other hair and from surfaces",
         label="Multiple Scattering",
         choices=(  # .blend files store the index of a choice
             (
                 "DUAL",
                 "Dual Scattering",
-                "As in the viewport, from the amount of hair in front of and behind each strand. Fast and without "
-                "noise; for previews, and for animations on slow computers",
+                "From the amount of hair in front of and behind each strand, as while something moves in a viewport. "
+                "Fast and without noise; for previews, and for animations on slow computers",
             ),
             (
                 "GRID",
                 "Light Grid",
-                "Light paths through the hair, closest to Cycles. Takes seconds longer for each frame; not available "
-                "in viewports",
+                "Light paths through the hair, closest to Cycles. Takes seconds longer for each frame; viewports in "
+                "Material Preview and Rendered shading follow them while nothing moves",
             ),
         ),
     )

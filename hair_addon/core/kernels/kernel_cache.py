@@ -63,6 +63,15 @@ def load(device: wp.DeviceLike, *modules: wp.Module) -> None:
                 load_locked(device, module)
 
 
+def default_device(name: str) -> wp.Device:
+    """Make a device the default of all threads and return it.
+
+    Threads that change the default for a while, and then restore it, otherwise restore each other's.
+    """
+    wp.set_device(name)
+    return wp.get_device(name)
+
+
 def is_loaded(device: wp.Device, module: wp.Module) -> bool:
     """Return whether `load` has loaded a module."""
     return (module.name, device.alias) in _loaded

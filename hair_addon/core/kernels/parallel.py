@@ -5,8 +5,10 @@ A Warp launch on the CPU is a loop on one core, which releases the GIL. Rows are
 with its own launch. `launch` is for independent rows, `launch_shares` for sums over rows. On a GPU both are one launch.
 """
 
+import contextlib
 import itertools
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -21,6 +23,8 @@ PARTS_PER_CORE = 2  # for load balancing, because a core may have other work
 UNEVEN_PARTS_PER_CORE = 4  # if parts may take unequal times
 LEAST_ROWS = 4096  # fewer are not worth a thread
 MOST_SHARES = 8  # of sums, each in its own memory
+
+_limits = threading.local()  # of the threads that `on_one_core` limits
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,18 @@ def launch_shares(
 
 def _core_count(device):
     """Return the number of simultaneous launches on a device."""
-    return kernel_setup.processor_count() if device.is_cpu else 1
+    return 1 if not device.is_cpu or getattr(_limits, "is_single", False) else kernel_setup.processor_count()
+
+
+@contextlib.contextmanager
+def on_one_core() -> Iterator[None]:
+    """Launch kernels from the calling thread on no other thread."""
+    before = getattr(_limits, "is_single", False)
+    _limits.is_single = True
+    try:
+        yield
+    finally:
+        _limits.is_single = before
 
 
 def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=None, threads_per_row=1):

@@ -3,7 +3,7 @@
 
 from ...data.pictures import cameras
 from ...gpu import drawing
-from . import hair_picture, region_pictures, viewport
+from . import hair_picture, live_light, region_pictures, viewport
 from .view_film import ViewFilm
 
 
@@ -11,6 +11,7 @@ def draw(context):
     """Draw the context's viewport; returns whether more passes are needed."""
     with drawing.ALONE:
         drawn, camera = viewport.drawn_scene_of(context), viewport.matrices_of(context.region_data)
+        drawn = live_light.lit(context, drawn, camera)
         lens = _lens(context)
         per_side = 1 if lens is not None else hair_picture.samples_per_side()
         options = per_side, _is_transparent(context, drawn)

@@ -22,7 +22,7 @@ from ...host.caches import Cache
 from ...host.engines import ENGINE
 from ...host.notices import say
 from .. import drawn_scene, hair_cache
-from . import guide_lines, hair_picture, region_pictures, selected_hair
+from . import guide_lines, hair_picture, live_light, region_pictures, selected_hair
 from .outline import HairOutline
 
 _PICK_REACH = 5  # maximum distance [pixels] of a click from hair, as strands are thinner than a pixel
@@ -54,6 +54,7 @@ def register():
 
 def unregister():
     """Stop drawing, and leave hair and guides to Blender's own drawing."""
+    live_light.unregister()
     for datablock in bpy.data.hair_curves:
         if datablock.vellus.kind != "NONE":
             curves_objects.draw_natively(datablock, True)
@@ -101,9 +102,11 @@ def _draw_hair(context):
     viewport, region = context.space_data, context.region
     drawn = drawn_scene_of(context)
     if not drawn.hair:
+        live_light.drop(context.region.as_pointer())
         return
     xray = _xray(context)
     outlined = selected_hair.outlined(context, drawn, is_see_through=xray is not None)
+    drawn = live_light.lit(context, drawn, matrices_of(context.region_data))
     clip_planes = _clip_planes(context)
     is_shadowed = _is_shadowed(context, drawn) and clip_planes is None
     region_picture = _picture(drawn, context.region_data, region, xray is not None, outlined, is_shadowed, clip_planes)
@@ -158,7 +161,8 @@ def hair_at(context, x, y):
     if is_drawn_by_engine(context) or not (0 <= x < width and 0 <= y < height):
         return None
     view = view_cache.get(context.space_data.as_pointer())
-    if view is None or region_picture.drawn is not view.lit.get(context.region.as_pointer()):
+    known = None if view is None else view.lit.get(context.region.as_pointer())
+    if known is None or region_picture.drawn.hair is not known.hair:
         return None  # the picture is outdated and about to be redrawn
     index = region_picture.picture.hair_near(x, y, round(_PICK_REACH * context.preferences.system.ui_scale))
     uid = None if index is None else region_picture.drawn.owners[index]

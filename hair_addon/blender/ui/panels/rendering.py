@@ -5,10 +5,11 @@ import bpy
 
 from ....core.imaging.pixel_sampling import PassSettings, RenderSettings
 from ...render.frames.engine import NAME
+from ...render.viewport import live_light
 from ...settings.setting_properties import names_of
-from ...settings.translations import CONTEXT
+from ...settings.translations import CONTEXT, interface_text
 from .. import setting_rows
-from .tab import split
+from .tab import split, write
 
 
 class _OfEngine:
@@ -32,6 +33,8 @@ class VELLUS_PT_sampling(_OfEngine, bpy.types.Panel):
     def draw(self, context):
         names = ("sample_count", "multiple_scattering")
         setting_rows.rows(self.layout, context.scene.vellus, RenderSettings, names)
+        for sentence in live_light.obstacles(context.scene):
+            write(self.layout, context, interface_text(sentence), "INFO")
 
 
 class VELLUS_PT_film(_OfEngine, bpy.types.Panel):

@@ -12,7 +12,7 @@ import warp as wp
 
 from ...kernels.checks import require_count, require_indices
 from ...long_work import Progress, no_progress, part_of
-from . import grid_walk, start_places, view, voxel_sums
+from . import grid_walk, start_places, view, voxel_means, voxel_sums
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
 from .lamp_light import Event, light_at_once, light_by_share, light_met
@@ -131,35 +131,97 @@ def gather(
     seems to need to fall to 1.5 % of it, at most as many again, until it has fallen so far or there would be more than
     `most_paths`: few paths of dark hair find a lamp.
     """
-    count = len(seen.segments)
-    require_indices("segments", seen.segments.numpy(), len(grid.points) - 1)
-    for name in ("places", "drawn"):
-        require_count(name, len(getattr(seen, name)), count)
-    device, sums = grid.device, voxel_sums.VoxelSums(grid)
-    if not count:
-        return sums.of_systems(), 0
-    with wp.ScopedDevice(device):
-        mesh = mesh_of(surroundings.corners)
-        medium = medium_of(grid, mesh, surroundings.normals, surroundings.albedo, surroundings.gloss)
-        in_sight, _hiding = _sight_of(grid, surroundings) or (medium, mesh)
-        segments, places, drawn = seen.segments, seen.places, seen.drawn
-        sources = sources_of(surroundings, _FAINT * voxel_sums.brightness(drawn)[0] / count)
-        sums.add(places, segments, drawn, _even_there(medium, seen.view, segments, places), 6)
-        voxels = start_places.voxels_of(medium, places)
-        total, squares, taken, tried, turn, more = 0.0, 0.0, 0, 0, 0, path_count
-        while True:
-            starts = start_places.of_seen(in_sight, seen, voxels, more, seed * _MOST_TURNS + turn)
-            told = part_of(progress, tried / (tried + more), 1.0)
-            positions, light, even = _traced(medium, sources, seen.view, starts, told)
-            sums.add(positions, starts.segments, light, even, 0)
-            of_turn = voxel_sums.brightness(light)
-            total, squares = total + of_turn[0], squares + of_turn[1]
-            taken += len(light)
-            tried, turn = tried + more, turn + 1
-            wanted = (_standard_error(total, squares, taken) / _KNOWN) ** 2  # times as many
-            more = int(tried * min(max(_SPARE * wanted - 1.0, _LEAST_TURN), 1.0))
-            if wanted < 1.0 or tried + more > most_paths:
-                return sums.of_systems(), taken
+    light = PathSums(grid, surroundings)
+    light.see(seen)
+    if not len(seen.segments):
+        return light.of_systems(), 0
+    tried, turn, more = 0, 0, path_count
+    while True:
+        light.follow(more, seed * _MOST_TURNS + turn, part_of(progress, tried / (tried + more), 1.0))
+        tried, turn = tried + more, turn + 1
+        wanted = light.wanted  # times as many
+        more = int(tried * min(max(_SPARE * wanted - 1.0, _LEAST_TURN), 1.0))
+        if wanted < 1.0 or tried + more > most_paths:
+            return light.of_systems(), int(light.taken)
+
+
+class PathSums:
+    """Sums of `gather` over the paths of any number of views, one turn of paths after the other.
+
+    taken: number of paths, less where sums have faded.
+    """
+
+    def __init__(self, grid: StrandGrid, surroundings: Surroundings) -> None:
+        self.grid, self.taken = grid, 0.0
+        self._sums = voxel_sums.VoxelSums(grid)
+        self._total = self._squares = 0.0
+        self._seen: Seen | None = None
+        self._surroundings = surroundings
+        with wp.ScopedDevice(grid.device):
+            self._mesh = mesh_of(surroundings.corners)
+            of_surfaces = surroundings.normals, surroundings.albedo, surroundings.gloss
+            self._medium = medium_of(grid, self._mesh, *of_surfaces)
+            self._in_sight, self._hiding = _sight_of(grid, surroundings) or (self._medium, self._mesh)
+
+    def see(self, seen: Seen) -> None:
+        """Start paths in another view from now on, and add what is drawn there to the sums."""
+        count = len(seen.segments)
+        require_indices("segments", seen.segments.numpy(), len(self.grid.points) - 1)
+        for name in ("places", "drawn"):
+            require_count(name, len(getattr(seen, name)), count)
+        self._seen = seen
+        if not count:
+            return
+        with wp.ScopedDevice(self.grid.device):
+            segments, places, drawn = seen.segments, seen.places, seen.drawn
+            self._sources = sources_of(self._surroundings, _FAINT * voxel_sums.brightness(drawn)[0] / count)
+            even = _even_there(self._medium, seen.view, segments, places)
+            self._sums.add(places, segments, drawn, even, 6)
+            self._voxels = start_places.voxels_of(self._medium, places)
+
+    def follow(self, count: int, seed: int, progress: Progress = no_progress, share: int = 0) -> None:
+        """Add about `count` paths that start on hair in sight; share: paths after which progress is told, 0: many.
+
+        Sums change at the end only: an exception of `progress` leaves them as they are.
+        """
+        if self._seen is None or not len(self._seen.segments):
+            return
+        with wp.ScopedDevice(self.grid.device):
+            starts = start_places.of_seen(self._in_sight, self._seen, self._voxels, count, seed)
+            traced = _traced(self._medium, self._sources, self._seen.view, starts, progress, share)
+            positions, light, even = traced
+            self._sums.add(positions, starts.segments, light, even, 0)
+            total, squares = voxel_sums.brightness(light)
+        self._total, self._squares, self.taken = self._total + total, self._squares + squares, self.taken + len(light)
+
+    @property
+    def wanted(self) -> float:
+        """How many times as many paths the standard error of the mean light seems to need to fall to 1.5 % of it."""
+        return (_standard_error(self._total, self._squares, self.taken) / _KNOWN) ** 2
+
+    def fade(self, weight: float) -> None:
+        """Multiply all sums with a weight."""
+        self._sums.scale(weight)
+        self._total, self._squares, self.taken = weight * self._total, weight * self._squares, weight * self.taken
+
+    def of_systems(self) -> list[wp.array4d[wp.float64]]:
+        """(Z, Y, X, 12) of each system of hair, as of `gather`."""
+        return self._sums.of_systems()
+
+    def shares(
+        self, former: "PathSums | None" = None, weight: float = 0.0, shift: np.ndarray | float = 0.0
+    ) -> list[np.ndarray]:
+        """`voxel_means.shares` of each system of hair.
+
+        former: other sums on this device of as many systems, which count with a weight; shift: (3,) since then [m].
+        """
+        sums, taken = self._sums, self.taken
+        if former is not None and weight > 0.0:
+            sums, taken = voxel_sums.VoxelSums(self.grid), taken + weight * former.taken
+            sums.carry(self._sums, 1.0, 0.0)
+            sums.carry(former._sums, weight, shift)
+        count = max(int(taken), 1)
+        return [voxel_means.shares(of_hair, count, self.grid.origin) for of_hair in sums.of_systems()]
 
 
 def _sight_of(grid, surroundings):
@@ -178,12 +240,12 @@ def _even_there(medium, seen_in, segments, places):
     return found
 
 
-def _traced(medium, sources, seen_in, starts, progress):
+def _traced(medium, sources, seen_in, starts, progress, share=0):
     """Of paths: where they start, light from there, and what even light would give, (N,) each."""
     count, seen_here, device = len(starts.segments), view.on_device(seen_in), medium.points.device
     found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
     # A GPU takes about as long for a share as for all.
-    share = max(count // _SHARES, _LEAST_SHARE) if device.is_cpu else max(count, 1)
+    share = share or (max(count // _SHARES, _LEAST_SHARE) if device.is_cpu else max(count, 1))
     for first in range(0, count, share):  # none if no place is in sight: Warp has no empty slices
         some = slice(first, min(first + share, count))
         rows = [array[some] for array in (starts.segments, starts.keys, *found)]

@@ -104,6 +104,40 @@ def _add_sums(
         out_sums[row, first_channel + channel] += wp.float64(whole[row, channel]) / _scale(largest, count)
 
 
+@wp.kernel
+def _carry(
+    before: wp.array2d[wp.float64],
+    before_shape: wp.vec3i,
+    before_corner: wp.vec3,
+    before_voxel: float,
+    corner: wp.vec3,
+    voxel: float,
+    shape: wp.vec3i,
+    weight: wp.float64,
+    out_sums: wp.array2d[wp.float64],
+):
+    """Add the sums of the voxel of another grid that contains a voxel's center."""
+    row, channel = wp.tid()
+    count = shape[0] * shape[1] * shape[2]
+    at = row % count
+    cell = wp.vec3(float(at % shape[0]), float(at / shape[0] % shape[1]), float(at / (shape[0] * shape[1])))
+    place = (corner + voxel * (cell + wp.vec3(0.5, 0.5, 0.5)) - before_corner) / before_voxel
+    x = int(wp.floor(place[0]))
+    y = int(wp.floor(place[1]))
+    z = int(wp.floor(place[2]))
+    is_low = x >= 0 and y >= 0 and z >= 0
+    if is_low and x < before_shape[0] and y < before_shape[1] and z < before_shape[2]:
+        first = row / count * (before_shape[0] * before_shape[1] * before_shape[2])
+        known = before[first + (z * before_shape[1] + y) * before_shape[0] + x, channel]
+        out_sums[row, channel] += weight * known
+
+
+@wp.kernel
+def _scale_sums(weight: wp.float64, out_sums: wp.array2d[wp.float64]):
+    row, channel = wp.tid()
+    out_sums[row, channel] *= weight
+
+
 class VoxelSums:
     """(systems, Z, Y, X, 12) sums over a `StrandGrid`, zero at first: `voxel_means.CHANNELS` of each voxel."""
 
@@ -118,6 +152,23 @@ class VoxelSums:
         count = int(np.prod(self._voxels))
         firsts = range(0, len(self._sums), count)
         return [self._sums[first : first + count].reshape((*self._voxels, CHANNELS)) for first in firsts]
+
+    def scale(self, weight: float) -> None:
+        """Multiply all sums with a weight."""
+        kernel_cache.launch(_scale_sums, self._sums.shape, [wp.float64(weight)], [self._sums], self._sums.device)
+
+    def carry(self, before: "VoxelSums", weight: float, shift: np.ndarray | float) -> None:
+        """Add the sums of another grid on this device with as many systems, with a weight.
+
+        shift: (3,) of the other grid's voxels [m]. Voxels beside the other grid get nothing.
+        """
+        own, other = self.grid, before.grid
+        require_count("systems of hair", len(other.kept), len(own.kept))
+        size = (own.voxel / other.voxel) ** 3
+        corner, shifted = own.corner.tolist(), (other.corner + shift).tolist()
+        given = [before._sums, wp.vec3i(*other.shape), wp.vec3(*shifted), other.voxel]
+        given += [wp.vec3(*corner), own.voxel, wp.vec3i(*own.shape), wp.float64(weight * size)]
+        kernel_cache.launch(_carry, self._sums.shape, given, [self._sums], self._sums.device)
 
     def add(
         self,

@@ -1,0 +1,424 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light Grid in viewports: paths are followed in the background while nothing moves, one share after the other.
+
+A share runs in a thread and starts with a redraw, so nothing is followed for a region that is not shown. The picture
+goes over from dual scattering to paths in steps. While something moves, the light that is known stays in its voxels:
+its part of the picture falls with changes of hair, lights and looks, its weight beside new paths also with the angle
+that the view has turned.
+"""
+
+import os
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ....core import kernels
+from ....core.errors import HairError
+from ....core.imaging import lamps
+from ....core.long_work import Job, Stopped
+from ....core.shading import light_paths as paths
+from ...data.pictures import viewport_shading
+from ...gpu import drawing, light_grid
+from ...host import running, scene_time
+from ...host.caches import Cache
+from ...host.notices import say
+from ...settings import preferences
+from .. import light_paths, seen_strands
+
+_REST = 0.3  # [s] without a change after which paths are followed
+_INTERVAL = 0.1  # [s] between checks whether a share is done
+_MOST_ASKED = 20  # redraws that a region is asked for before it counts as hidden
+_SHARES = 16  # of the paths of a picture, each followed between two redraws
+_RAMP = 6  # shares after which paths have replaced dual scattering, at the earliest
+_LEAST_SHARE, _MOST_SHARE = 1024, 16_384  # paths
+_PATHS_AT_ONCE = 1024  # of a share on the processor, after which it can be stopped
+_HALF_TURN = np.radians(20.0)  # angle of the view at which former paths have half their weight
+_NICE = 10  # priority of the thread, if the system has priorities of threads
+_STILL = 0.01  # part of the hair's radius by which strands may move and count as still
+_SAMPLED = 500  # strands that are compared
+_LEAST_PART = 0.02  # of what was known: less is forgotten
+_OTHER = 0.5  # weight of what is known of other strands, surfaces or looks
+
+_OFF = "Viewports show Dual Scattering: Light Grid in Viewports is off in the preferences."
+
+light_cache = Cache(capacity=4)  # pointer of a region → LiveLight
+
+_jobs = []  # of all regions: at most one that is not done
+
+
+def unregister():
+    """Stop following paths, wait for the share that is under way, and remove the timer."""
+    if bpy.app.timers.is_registered(_wake):
+        bpy.app.timers.unregister(_wake)
+    end()
+
+
+def end():
+    """Stop all shares, wait for them, and drop all light."""
+    for job in _jobs:
+        job.stop()
+        job.wait()
+    _jobs.clear()
+    light_cache.clear()
+
+
+def lit(context, drawn, camera):
+    """A `DrawnScene` of the context's region, lit by the paths followed so far; camera: (world to view, view to clip).
+
+    Starts the next share at rest. Returns the scene unchanged with dual scattering.
+    """
+    key, count = context.region.as_pointer(), 0
+    if drawn.hair and drawn.light.kind == viewport_shading.SCENE and preferences.has_live_light():
+        count = light_paths.path_count(context.scene, (context.region.width, context.region.height))
+    if not count or not running.has_window():
+        drop(key)
+        return drawn
+    live = light_cache.get(key, LiveLight)
+    may_follow = not (scene_time.is_playing() or running.is_rendering())
+    found = live.lit(drawn, camera, count, time.monotonic(), may_follow)
+    if live.is_waiting and not bpy.app.timers.is_registered(_wake):
+        bpy.app.timers.register(_wake, first_interval=_INTERVAL, persistent=True)
+    return found
+
+
+def drop(key):
+    """Forget the light of a region, by its pointer."""
+    live = light_cache.get(key)
+    if live is not None:
+        live.stop()
+        light_cache.invalidate(key)
+
+
+def obstacles(blender_scene):
+    """Why viewports show dual scattering although a scene's setting is Light Grid: sentences."""
+    if not light_paths.path_count(blender_scene, (1, 1)):
+        return []
+    if not preferences.has_live_light():
+        return [_OFF]
+    return sorted({live.obstacle for live in light_cache.values()} - {""})
+
+
+def _wake():
+    """For `bpy.app.timers`: redraw regions whose share is done, or due."""
+    waiting = [live for live in light_cache.values() if live.is_waiting]
+    due = {id(live) for live in waiting if live.is_due(time.monotonic())}
+    for window in bpy.context.window_manager.windows if due else ():
+        for area in window.screen.areas:
+            for region in area.regions if area.type == "VIEW_3D" else ():
+                live = light_cache.get(region.as_pointer())
+                if live is not None and id(live) in due:
+                    region.tag_redraw()
+    for live in waiting:
+        live.asked += id(live) in due
+    return _INTERVAL if waiting else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Content:
+    """What the light of paths depends on, beside the view."""
+
+    hair: tuple  # (StrandsOnGPU, Shading, (4, 4) to world)
+    lights: np.ndarray  # vector irradiance around the hair by lamp and channel, then the world's sides
+    blockers: tuple  # (texture of places, corners, (4, 4) to world) of surfaces
+    centre: np.ndarray  # (3,) of the hair [m]
+    radius: float
+
+    def part_since(self, before):
+        """How much of what was known of another `_Content` holds, from 0 to 1."""
+        if len(self.hair) != len(before.hair):
+            return 0.0
+        known = _unchanged(self.lights, before.lights)
+        if not self._has_blockers_of(before):
+            known *= _OTHER
+        counts = np.array([strands.strand_count for strands, *_ in self.hair], float)
+        parts = [self._part_of(now, then, before) for now, then in zip(self.hair, before.hair, strict=True)]
+        part = known * float(np.dot(counts, parts) / max(counts.sum(), 1.0))
+        return part if part >= _LEAST_PART else 0.0
+
+    def _part_of(self, now, then, before):
+        """`part_since` of a single hair."""
+        (strands, shading, to_world), (other, other_shading, other_to_world) = now, then
+        part = _unchanged(to_world[:3, :3], other_to_world[:3, :3])
+        if shading is not other_shading:
+            part *= min(_unchanged(shading.reflectance, other_shading.reflectance), np.sqrt(_OTHER))
+        if strands is other or not (strands.has_points and other.has_points):
+            return part
+        if strands.points.shape != other.points.shape:
+            return _OTHER * part
+        some = slice(None, None, max(strands.strand_count // _SAMPLED, 1))
+        places, others = (
+            one.points[some] @ placed[:3, :3].T + placed[:3, 3] - content.centre
+            for one, placed, content in ((strands, to_world, self), (other, other_to_world, before))
+        )
+        moved = np.linalg.norm(places - others, axis=-1).max(axis=-1)
+        return part * float((moved <= _STILL * self.radius).mean())
+
+    def is_same(self, before):
+        """Whether the light is that of another `_Content`."""
+        pairs = zip(self.hair, before.hair, strict=False)
+        is_hair = len(self.hair) == len(before.hair) and all(
+            now[0] is then[0] and now[1] is then[1] and np.array_equal(now[2], then[2]) for now, then in pairs
+        )
+        return is_hair and self._has_blockers_of(before) and np.array_equal(self.lights, before.lights)
+
+    def _has_blockers_of(self, before):
+        return len(self.blockers) == len(before.blockers) and all(
+            now[0] is then[0] and now[1] is then[1] and np.array_equal(now[2], then[2])
+            for now, then in zip(self.blockers, before.blockers, strict=True)
+        )
+
+    def has_hair_of(self, before):
+        """Whether strands, looks and places are those of another `_Content`."""
+        return _replaced(self, before).is_same(before)
+
+
+def _replaced(content, other):
+    return _Content(content.hair, other.lights, other.blockers, content.centre, content.radius)
+
+
+def _content_of(drawn):
+    """The `_Content` of a `DrawnScene`."""
+    centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _, to_world, *_ in drawn.hair])
+    places = centre + 0.5 * radius * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    found = drawn.lamps.lamps
+    of_world = np.pi * drawn.lights["world"][:, :3].astype(float).ravel() / 3.0
+    arriving = np.zeros(0)
+    if len(found):
+        to_lamps, amount = lamps.directions_to(found, places), lamps.irradiance(found, places)
+        arriving = (to_lamps[..., None] * amount[..., None, :]).ravel() / len(places)
+    return _Content(
+        tuple(hair[:3] for hair in drawn.hair),
+        np.concatenate([of_world, arriving]),
+        tuple((one.places, one.corners, one.to_world) for one in (blocker.surface for blocker in drawn.blockers)),
+        centre,
+        radius,
+    )
+
+
+def _unchanged(values, before):
+    """The part of light that is the same, from 0 to 1, if numbers of any count were others before."""
+    size = max(np.size(values), np.size(before))
+    now, then = (np.pad(np.ravel(one).astype(float), (0, size - np.size(one))) for one in (values, before))
+    change = np.abs(now - then).sum() / max(np.abs(now).sum(), np.abs(then).sum(), 1e-12)
+    return max(1.0 - float(change), 0.0) ** 4
+
+
+def _direction(camera, centre):
+    """Unit vector from a center (3,) towards the viewer."""
+    world_to_view, view_to_clip = camera
+    towards = world_to_view[2, :3]
+    if abs(view_to_clip[3, 3]) < 0.5:  # a perspective
+        towards = np.linalg.inv(world_to_view)[:3, 3] - centre
+    return towards / max(float(np.linalg.norm(towards)), 1e-12)
+
+
+def _view_weight(camera, before, centre):
+    """Weight of the paths of a former view."""
+    cosine = np.clip(np.dot(_direction(camera, centre), _direction(before, centre)), -1.0, 1.0)
+    return float(0.5 ** (np.arccos(cosine) / _HALF_TURN))
+
+
+@dataclass(frozen=True, eq=False)
+class _Request:
+    """A share of paths. systems: arguments of `strand_grid.build` for other hair; surroundings: `Surroundings` of other
+    hair or light; shown: `seen_strands.Drawn` of these, or in another view; weight, shift [m]: of the sums so far.
+    """
+
+    content: _Content
+    camera: tuple
+    count: int
+    seed: int
+    systems: tuple | None = None
+    surroundings: Any = None
+    shown: Any = None
+    weight: float = 1.0
+    shift: Any = 0.0
+
+
+class LiveLight:
+    """The light of paths in one region. obstacle: why there is none, as a sentence; asked: redraws since the last."""
+
+    def __init__(self):
+        self.obstacle, self.asked = "", 0
+        self._job = self._drawn = self._content = self._camera = None
+        self._paths = None  # `PathSums`; the thread's while a job runs
+        self._former = None  # (`PathSums` of other hair or light, weight, shift), which count until paths replace them
+        self._followed = None  # (`_Content`, camera) of the sums, likewise the thread's
+        self._known = None  # (`_Content`, part) of the textures
+        self._grid, self._textures, self._scene = None, (), (None, None)
+        self._acted, self._tried, self._goal, self._seed = -np.inf, 0, 0, 0
+        self._is_done = False
+
+    @property
+    def is_busy(self):
+        """Whether a share is under way."""
+        return self._job is not None and not self._job.is_done
+
+    @property
+    def is_waiting(self):
+        """Whether a redraw would be of use, now or later."""
+        return (self._job is not None or not self._is_done) and self.asked < _MOST_ASKED
+
+    @property
+    def is_done(self):
+        """Whether all paths of the picture are followed."""
+        return self._is_done and self._job is None
+
+    def is_due(self, now):
+        """Whether a redraw would be of use now."""
+        return not self.is_busy and (self._job is not None or now - self._acted >= _REST)
+
+    def stop(self):
+        """Ask the share that is under way to end."""
+        if self._job is not None:
+            self._job.stop()
+
+    def wait(self):
+        """Wait until no share is under way."""
+        if self._job is not None:
+            self._job.wait()
+
+    def lit(self, drawn, camera, count, now, may_follow=True):
+        """A `DrawnScene` lit by the paths followed so far. count: as of `light_paths.path_count`; now: a time [s]."""
+        self.asked = 0
+        self._turn_to(drawn, camera, now)
+        self._take()
+        is_due = not self._is_done and self._job is None and now - self._acted >= _REST
+        if may_follow and is_due and all(job.is_done for job in _jobs):
+            self._begin(drawn, camera, count)
+        return self._shown(drawn)
+
+    def _turn_to(self, drawn, camera, now):
+        is_first = self._content is None
+        content = self._content if drawn is self._drawn else _content_of(drawn)
+        is_same = not is_first and (content is self._content or content.is_same(self._content))
+        is_turned = is_first or not all(map(np.array_equal, camera, self._camera))
+        self._drawn = drawn
+        if is_same and not is_turned:
+            return
+        self._content, self._camera = self._content if is_same else content, camera
+        self._acted, self._is_done = now, False
+        self.obstacle = light_paths.obstacle(drawn)
+        self.stop()
+
+    def _begin(self, drawn, camera, count):
+        window = None if self.obstacle else light_paths.window_of(drawn.hair, *camera)
+        if window is None or not all(strands.has_points for strands, *_ in drawn.hair):
+            self._is_done = True
+            return
+        content, before = self._content, self._followed
+        request = {"content": content, "camera": camera, "seed": self._seed}
+        device = kernels.kernel_cache.default_device(preferences.device())
+        is_other = self._paths is None or self._paths.grid.device != device or not content.has_hair_of(before[0])
+        if is_other:
+            request["systems"] = (*light_paths.strands_of(drawn), device)
+        if is_other or content is not before[0]:
+            request["surroundings"] = light_paths.surroundings_of(drawn)
+        if "surroundings" in request or not all(map(np.array_equal, camera, before[1])):
+            samples = light_paths.SAMPLES_A_PATH * count
+            request["shown"] = seen_strands.draw(drawn, camera, window, samples, self._seed)
+            self._tried = self._goal = 0
+            if before is not None:
+                request["weight"] = content.part_since(before[0]) * _view_weight(camera, before[1], content.centre)
+                request["shift"] = content.centre - before[0].centre
+        share = min(max((self._goal or count) // _SHARES, _LEAST_SHARE), _MOST_SHARE)
+        work = _Request(count=share, **request)
+        self._seed += 1
+        self._job = Job(lambda progress: self._follow(work, progress))
+        _jobs[:] = [self._job]
+
+    def _follow(self, work, progress):
+        """In the thread: (paths of the share, paths of the picture, shares by voxel); None if no strand is in sight."""
+        if sys.platform == "linux":
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
+        with kernels.parallel.on_one_core():
+            found, former = self._paths, self._former
+            if work.surroundings is not None:
+                grid = self._paths.grid if work.systems is None else _grid_of(*work.systems)
+                if grid is None:
+                    return None
+                found, former = paths.gather.PathSums(grid, work.surroundings), None
+                if self._paths is not None and _are_alike(self._paths.grid, grid):
+                    former = self._paths, work.weight, work.shift
+                progress("", 0.0)
+            elif work.shown is not None:
+                found.fade(work.weight)
+            if work.shown is not None:
+                seen = work.shown.seen(found.grid)
+                found.see(seen)
+                self._paths, self._former, self._followed = found, former, (work.content, work.camera)
+                self._goal = -(-len(seen.segments) // light_paths.SAMPLES_A_PATH)
+            if not self._goal:
+                return None
+            taken = found.taken
+            at_once = _PATHS_AT_ONCE if found.grid.device.is_cpu else 0
+            found.follow(work.count, work.seed, progress, at_once)
+            if not found.taken:
+                return None
+            if former is None:
+                return found.taken - taken, found.shares()
+            sums, weight, shift = former
+            # What was measured in other light has no part in the last picture.
+            left = max(1.0 - found.taken / self._goal, 0.0)
+            return found.taken - taken, found.shares(sums, left * weight, shift)
+
+    def _take(self):
+        """Show the paths of the share that has ended, if any."""
+        if self._job is None or not self._job.is_done:
+            return
+        job, self._job = self._job, None
+        try:
+            result = job.result()
+        except Stopped:
+            return
+        except HairError as error:
+            say(str(error))
+            result = None
+        if result is None:
+            self._is_done = True
+            return
+        taken, means = result
+        self._textures, self._grid = tuple(light_grid.upload(of_hair) for of_hair in means), self._paths.grid
+        part = min(self._part() + min(taken * _SHARES / self._goal, 1.0) / _RAMP, 1.0)
+        self._known, self._scene = (self._content, part), (None, None)
+        self._tried += taken
+        if self._paths.taken >= self._goal:
+            self._former = None
+        is_known = self._paths.taken >= self._goal and self._paths.wanted < 1.0
+        self._is_done = part == 1.0 and (is_known or self._tried >= light_paths.MOST_TIMES * self._goal)
+
+    def _part(self):
+        """How much of the known light is shown."""
+        if self._known is None:
+            return 0.0
+        content, part = self._known
+        return part if content is self._content else part * self._content.part_since(content)
+
+    def _shown(self, drawn):
+        """The scene in the known light: the same object if nothing has changed."""
+        if self._scene[0] is drawn:
+            return self._scene[1]
+        found, part = drawn, 0.0 if self.obstacle else self._part()
+        if part > 0.0 and len(self._textures) == len(drawn.hair):
+            shift = self._content.centre - self._known[0].centre
+            found = light_paths.lit_by(drawn, self._grid, self._textures, part, shift)
+        self._scene = drawn, found
+        return found
+
+
+def _grid_of(systems, fibres, device):
+    """The `StrandGrid` of hair; None if paths cannot be followed in it."""
+    if not paths.strand_grid.has_area(systems):
+        return None
+    grid = paths.strand_grid.build(systems, fibres, device=device)
+    return grid if grid.is_resolved else None
+
+
+def _are_alike(grid, other):
+    """Whether sums of a grid can be added to those of another."""
+    return grid.device == other.device and len(grid.kept) == len(other.kept)

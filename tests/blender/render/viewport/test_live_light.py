@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light Grid in viewports: light as in renders, which stays while the view turns and falls with its causes."""
+
+import itertools
+from dataclasses import replace
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon import api
+from hair_addon.blender.data import scene as scene_data
+from hair_addon.blender.render import drawn_scene, light_paths
+from hair_addon.blender.render.viewport import hair_picture, live_light
+from hair_addon.core.shading.light_paths import gather
+from tests.blender.render.test_light_paths import BROWN, hair_of, light
+
+SIZE, PATHS = 48, 6_000
+BLOND = replace(BROWN, melanin=0.15)
+TIMES = itertools.count(0.0, 10.0)  # [s] of redraws, each long after the last
+
+
+@pytest.fixture
+def view(scene, rng):
+    """(camera, function that reads the scene as a viewport does) of blond hair in a lamp and a world."""
+    hair_of(scene, rng.uniform(-0.3, 0.3, (600, 3)), BLOND, radius=0.006)
+    light(scene, world=0.1, sun=4.0)
+
+    def read():
+        bpy.context.view_layer.update()
+        return drawn_scene.read(scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+
+    bpy.context.view_layer.update()
+    yield scene_data.read_camera(scene, bpy.context.evaluated_depsgraph_get(), SIZE, SIZE), read
+    live_light.end()
+
+
+def at_rest(live, drawn, camera):
+    """The scene once all paths are followed."""
+    for _share in range(100):
+        found = redrawn(live, drawn, camera)
+        live.wait()
+        if live.is_done:
+            return found
+    raise AssertionError("paths are followed without an end")
+
+
+def redrawn(live, drawn, camera, may_follow=True):
+    return live.lit(drawn, camera, PATHS, next(TIMES), may_follow)
+
+
+def picture_of(drawn, camera):
+    picture = hair_picture.HairPicture((SIZE, SIZE), 2)
+    for _ in range(4):
+        picture.add_pass(drawn, *camera)
+    return picture.read()[..., :3]
+
+
+def part_of(drawn):
+    """The part of dual scattering that paths replace in a scene."""
+    return float(drawn.lights["grid_corner"][3])
+
+
+def blocks(picture):
+    return picture.reshape(4, SIZE // 4, 4, SIZE // 4, 3).mean(axis=(1, 3))
+
+
+def turned(camera, degrees):
+    """A camera that has turned around the hair."""
+    angle = np.radians(degrees)
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    return camera[0] @ turn, camera[1]
+
+
+def test_at_rest_the_light_is_that_of_renders(view):
+    """To 3 % of the mean in blocks of pixels; dual scattering differs by more."""
+    camera, read = view
+    drawn = read()
+    found = at_rest(live_light.LiveLight(), drawn, camera)
+    live, render, dual = (
+        blocks(picture_of(one, camera)) for one in (found, light_paths.with_grid(drawn, *camera, 4 * PATHS), drawn)
+    )
+    scale = render.mean()
+    assert np.abs(live - render).mean() < 0.03 * scale
+    assert np.abs(dual - render).mean() > 0.06 * scale
+
+
+def test_the_picture_goes_over_to_paths_in_steps(view):
+    """The part of the light that paths have replaced grows by at most a quarter from redraw to redraw."""
+    camera, read = view
+    drawn, live = read(), live_light.LiveLight()
+    parts = [0.0]
+    while not live.is_done:
+        parts.append(part_of(redrawn(live, drawn, camera)))
+        live.wait()
+    assert parts[-1] == 1.0 and 0.0 <= np.diff(parts).min() and np.diff(parts).max() <= 0.25
+
+
+def test_a_view_that_turns_keeps_the_light(view):
+    """The first redraw of another view shows paths, and paths from there need not start anew."""
+    camera, read = view
+    drawn, live = read(), live_light.LiveLight()
+    found = at_rest(live, drawn, camera)
+    there = turned(camera, 15.0)
+    assert redrawn(live, drawn, there) is found
+    before = live._paths.taken
+    redrawn(live, drawn, there)
+    live.wait()
+    assert 0.5 * before < live._paths.taken < before + PATHS
+
+
+def test_changed_lights_are_forgotten(view):
+    """A lamp that is turned off leaves nothing of its light; one that dims a little leaves most."""
+    camera, read = view
+    live = live_light.LiveLight()
+    at_rest(live, read(), camera)
+    lamp = bpy.data.lights["Sun"]
+    parts = []
+    for energy in (3.9, 0.0):
+        lamp.energy = energy
+        parts.append(part_of(redrawn(live, read(), camera, may_follow=False)))
+    assert parts[0] > 0.75 and parts[1] < 0.1
+    found = at_rest(live, read(), camera)
+    expected = light_paths.with_grid(read(), *camera, 4 * PATHS)
+    found, expected = (blocks(picture_of(one, camera)) for one in (found, expected))
+    assert np.abs(found - expected).mean() < 0.04 * expected.mean()
+
+
+def test_light_moves_with_its_hair(view):
+    camera, read = view
+    live = live_light.LiveLight()
+    before = at_rest(live, read(), camera).lights["grid_corner"]
+    bpy.data.objects["Hair"].location.x = 0.25
+    after = redrawn(live, read(), camera).lights["grid_corner"]
+    np.testing.assert_allclose(after - before, [0.25, 0.0, 0.0, 0.0], atol=1e-5)
+
+
+@pytest.fixture
+def region(view, monkeypatch):
+    """A context with a region that Blender draws; timers that only count."""
+    timers = set()
+    monkeypatch.setattr(live_light.running, "has_window", lambda: True)
+    timing = SimpleNamespace(
+        is_registered=timers.__contains__,
+        register=lambda timer, **_options: timers.add(timer),
+        unregister=timers.discard,
+    )
+    monkeypatch.setattr(live_light, "bpy", SimpleNamespace(app=SimpleNamespace(timers=timing), context=bpy.context))
+    monkeypatch.setattr(live_light, "_REST", -1.0)
+    bpy.context.scene.vellus.multiple_scattering = "GRID"
+    place = SimpleNamespace(width=SIZE, height=SIZE, as_pointer=lambda: 7)
+    return SimpleNamespace(region=place, scene=bpy.context.scene), timers
+
+
+def test_nothing_is_followed_for_a_region_that_is_not_drawn(view, region, monkeypatch):
+    """Each share needs a redraw, and a region that is never drawn is asked for a while only."""
+    camera, read = view
+    context, _timers = region
+    followed = []
+    real = gather.PathSums.follow
+    monkeypatch.setattr(gather.PathSums, "follow", lambda *given: (followed.append(1), real(*given)))
+    live_light.lit(context, read(), camera)
+    (live,) = live_light.light_cache.values()
+    live.wait()
+    ticks = 0
+    while live_light._wake() is not None:
+        ticks += 1
+        assert ticks < 100
+    assert len(followed) == 1 and not live.is_busy
+
+
+@pytest.mark.parametrize("way", ["dual", "preference", "solid"])
+def test_nothing_is_followed_where_it_is_not_wanted(view, region, monkeypatch, way):
+    camera, read = view
+    drawn = read()
+    context, _timers = region
+    if way == "dual":
+        context.scene.vellus.multiple_scattering = "DUAL"
+    elif way == "preference":
+        monkeypatch.setattr(live_light.preferences, "has_live_light", lambda: False)
+    else:
+        drawn = replace(drawn, light=replace(drawn.light, kind="STUDIO"))
+    assert live_light.lit(context, drawn, camera) is drawn
+    assert not len(live_light.light_cache)
+
+
+def test_no_timer_and_no_light_are_left_after_unregistering(view, region):
+    camera, read = view
+    context, timers = region
+    live_light.lit(context, read(), camera)
+    (live,) = live_light.light_cache.values()
+    assert live.is_waiting and timers
+    live_light.unregister()
+    assert not timers and not live.is_busy and not len(live_light.light_cache)
+
+
+def test_a_setting_without_effect_says_so(view, region, monkeypatch):
+    """Light Grid in viewports is off in the preferences, or the hair has another model; not with Dual Scattering."""
+    camera, read = view
+    context, _timers = region
+    live_light.lit(context, read(), camera)
+    assert live_light.obstacles(context.scene) == []
+    api.shade(bpy.data.objects["Hair"].data, BLOND, model="KAJIYA_KAY")
+    drawn = read()
+    assert live_light.lit(context, drawn, camera) is drawn
+    (sentence,) = live_light.obstacles(context.scene)
+    assert "Marschner" in sentence
+    monkeypatch.setattr(live_light.preferences, "has_live_light", lambda: False)
+    (sentence,) = live_light.obstacles(context.scene)
+    assert "preferences" in sentence
+    context.scene.vellus.multiple_scattering = "DUAL"
+    assert live_light.obstacles(context.scene) == []
