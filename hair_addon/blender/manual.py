@@ -66,6 +66,8 @@ _OPERATORS = {
         "toggle_drawing",
         "edit_map",
         "paint_map",
+        "add_ramp",
+        "remove_ramp",
         "remove_map",
     ),
     "lookup_tables": ("bake_tables",),

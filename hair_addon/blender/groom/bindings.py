@@ -55,6 +55,7 @@ class BoundHair:
     straight: "BoundHair | None" = None  # the same without styles while viewports show it: only it follows strokes
     is_behind: bool = False  # whether points are older than `guides`, which only the display has followed
     thickness: np.ndarray | None = None  # (S,) float32 factors of radii by a map, None without it
+    course: np.ndarray | None = None  # (N,) float32 factors of the radius from root to tip, None without a ramp
     map_status: str = ""  # sentence about the map of the thickness
 
     @property
@@ -66,7 +67,9 @@ class BoundHair:
     @property
     def radii(self) -> np.ndarray:
         """(P,) float32 radii along each strand, or (S, P) if a map varies them, in the surface's local units."""
-        radii = self.styles.radius_factor * groom.strand_radii(self.settings) / np.float32(self.surface.scale)
+        radii = (
+            self.styles.radius_factor * groom.strand_radii(self.settings, self.course) / np.float32(self.surface.scale)
+        )
         return radii if self.thickness is None else self.thickness[:, None] * radii
 
     @property
@@ -174,13 +177,18 @@ class BoundHair:
             self.grow()
         self.is_written = self.has_moved_only = False
 
-    def thicken(self, thickness: np.ndarray | None, map_status: str = "") -> None:
-        """Multiply the radii of strands by factors (S,) float32; None for 1. map_status: sentence about their map."""
-        if map_status == self.map_status and is_same_thickness(thickness, self.thickness):
+    def thicken(self, thickness: np.ndarray | None, map_status: str = "", course: np.ndarray | None = None) -> None:
+        """Multiply the radii of strands by factors (S,) float32; None for 1.
+
+        map_status: sentence about their map; course: (N,) float32 factors from root to tip, None for those of the
+        settings.
+        """
+        is_same = map_status == self.map_status and is_same_thickness(course, self.course)
+        if is_same and is_same_thickness(thickness, self.thickness):
             return
-        self.thickness, self.map_status = thickness, map_status
+        self.thickness, self.map_status, self.course = thickness, map_status, course
         if self.straight is not None:
-            self.straight.thickness = thickness
+            self.straight.thickness, self.straight.course = thickness, course
         self.is_written = self.has_moved_only = False
 
     @property

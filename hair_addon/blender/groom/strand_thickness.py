@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Factors of the radii of bound hair by the map of *Thickness*."""
+"""Factors of the radii of bound hair by the map and the ramp of *Thickness*."""
 
 import numpy as np
 from bpy.types import Curves
@@ -7,8 +7,9 @@ from bpy.types import Curves
 from ...core.errors import HairError
 from ...core.maps import combination
 from ...core.params import Param
-from ..data.maps import sources
+from ..data.maps import ramps, sources
 from ..settings import map_items
+from . import bindings
 from .bindings import BoundHair
 
 SETTING = "strands.thickness"
@@ -45,5 +46,13 @@ def read(hair: Curves, bound: BoundHair) -> tuple[np.ndarray | None, str]:
 
 
 def apply(hair: Curves, bound: BoundHair) -> None:
-    """Give bound hair the thickness that the map of its Curves has now."""
-    bound.thicken(*read(hair, bound))
+    """Give bound hair the thickness that the map and the ramp of its Curves have now."""
+    bound.thicken(*read(hair, bound), ramps.samples(hair.vellus.thickness_ramp))
+
+
+def is_same(hair: Curves, bound: BoundHair) -> bool:
+    """Whether bound hair has the thickness that the map and the ramp of its Curves have now."""
+    thickness, map_status = read(hair, bound)
+    if map_status != bound.map_status or not bindings.is_same_thickness(thickness, bound.thickness):
+        return False
+    return bindings.is_same_thickness(ramps.samples(hair.vellus.thickness_ramp), bound.course)

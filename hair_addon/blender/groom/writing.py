@@ -12,7 +12,7 @@ from ...core.geometry.strands import Strands, lengths
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
 from ..data import guide_map_readers, scene, surface_space
-from ..data.maps import strand_maps
+from ..data.maps import ramps, strand_maps
 from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots
 from ..data.surfaces import Surface, cage_of
 from ..host.notices import name_of
@@ -98,6 +98,7 @@ def write_hair(target: Curves) -> None:
     if not bound.has_moved_only:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         state.status = bound.map_status
+        state.thickness_key = ramps.digest(state.thickness_ramp)
         size_fitting.keep(target, bound.fits)
         kept_shapes.forget(target)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key

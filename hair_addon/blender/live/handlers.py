@@ -83,6 +83,7 @@ def after_depsgraph_update(scene, depsgraph):
     stale_marks.follow_partings(moved, depsgraph)
     stale_marks.follow_flow(moved, depsgraph)
     stale_marks.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
+    stale_marks.follow_ramps()
     reported.remember_places()
     if _is_undone:
         _is_undone = False

@@ -234,10 +234,8 @@ def is_ahead(hair):
         return False  # `regenerate` handles it
     if bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
-    thickness, map_status = strand_thickness.read(hair, bound)
-    is_same = map_status == bound.map_status and bindings.is_same_thickness(thickness, bound.thickness)
     return (
-        is_same
+        strand_thickness.is_same(hair, bound)
         and bound.styles.read.styles == styles
         and bound.styles.read.has_length(*strand_lengths.read(hair, hair.surface, bound.surface, styles))
     )

@@ -7,6 +7,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import masks, scene, usable_surfaces
+from ..data.maps import ramps
 from ..data.strands import curves, drawn_lines
 from ..groom import bindings, frame_faces, staleness
 from ..groom.surfaces import applied_transforms, edited_surfaces
@@ -189,6 +190,22 @@ def follow_mapped_surfaces(surfaces):
             for item in datablock.vellus.maps:
                 if item.kind in {"GROUP", "ATTRIBUTE", "IMAGE"}:
                     marks.mark_changed_map(item)
+
+
+def follow_ramps():
+    """Mark hair as stale whose ramp of the thickness was edited, which Blender does not report.
+
+    A copy of hair gets a ramp of its own.
+    """
+    owners = {}
+    for hair in bpy.data.hair_curves:
+        state = hair.vellus
+        if state.kind != "HAIR" or state.thickness_ramp is None:
+            continue
+        if owners.setdefault(state.thickness_ramp, hair) != hair and hair.is_editable:
+            state.thickness_ramp = state.thickness_ramp.copy()
+        if not curves.is_combed(hair) and ramps.digest(state.thickness_ramp) != state.thickness_key:
+            state.is_stale = True
 
 
 def follow_styles(changed):

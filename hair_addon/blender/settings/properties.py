@@ -177,6 +177,15 @@ class VellusCurves(bpy.types.PropertyGroup):
     styles: bpy.props.CollectionProperty(type=style_items.VellusStyle)
     active_style: bpy.props.IntProperty(min=0, options=set())
     maps: bpy.props.CollectionProperty(type=map_items.VellusMap)
+    thickness_ramp: bpy.props.PointerProperty(
+        name="Thickness Curve",
+        description="Node group with the course of the thickness from root to tip",
+        translation_context=CONTEXT,
+        type=bpy.types.NodeTree,
+        options={"HIDDEN"},
+        update=mark_geometry,
+    )
+    thickness_key: bpy.props.StringProperty(description="Course of the stored radii", options={"HIDDEN"})
     layers: bpy.props.CollectionProperty(type=layer_items.VellusLayer)
     active_layer: bpy.props.IntProperty(min=0, options=set())
     layered: bpy.props.StringProperty(description="Fingerprint of the points that layers give", options={"HIDDEN"})

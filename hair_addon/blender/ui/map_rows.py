@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rows of a map: its kind, the picker of this kind, and how it changes its setting."""
+"""Rows of a map: its kind, the picker of this kind, and how it changes its setting; the curve of the thickness."""
 
 from ...core.maps import varied_settings
+from ..data.maps import ramps
 from ..groom.styles import painted_maps
 from ..settings import map_items
 
@@ -43,3 +44,13 @@ def draw(layout, item, hair):
         layout.prop(item, "high")
     layout.prop(item, "is_inverted")
     layout.operator("vellus.remove_map", icon="X").setting = item.setting
+
+
+def ramp_rows(layout, hair):
+    """Draw the curve of the thickness of hair Curves, or the button that adds it."""
+    node = ramps.node_of(hair.vellus.thickness_ramp)
+    if node is None:
+        layout.operator("vellus.add_ramp", icon="NORMALIZE_FCURVES")
+        return
+    layout.template_curve_mapping(node, "mapping")
+    layout.operator("vellus.remove_ramp", icon="X")

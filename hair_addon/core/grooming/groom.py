@@ -402,7 +402,14 @@ def _load_kernels(device, modules, progress, most_threads=kernel_setup.MOST_THRE
     kernel_setup.load([wp.get_module(module.__name__) for module in modules], device, progress, most_threads)
 
 
-def strand_radii(settings: HairSettings) -> np.ndarray:
-    """Return the radii (point_count,) float32 [m] along each strand, from `radius` to `radius` × `tip_taper`."""
+def strand_radii(settings: HairSettings, course: np.ndarray | None = None) -> np.ndarray:
+    """Return the radii (point_count,) float32 [m] along each strand, from `radius` to `radius` × `tip_taper`.
+
+    course: (N,) factors of the radius at even places from root to tip, in place of `tip_taper`; None for a straight
+    line.
+    """
     radius = groom_defaults.known(settings.radius)
-    return np.linspace(radius, radius * settings.tip_taper, settings.point_count, dtype=np.float32)
+    if course is None:
+        return np.linspace(radius, radius * settings.tip_taper, settings.point_count, dtype=np.float32)
+    along = np.linspace(0.0, 1.0, settings.point_count)
+    return (radius * np.interp(along, np.linspace(0.0, 1.0, len(course)), course)).astype(np.float32)

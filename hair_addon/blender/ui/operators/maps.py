@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators of maps: a popover with the map of a setting, its painting and its removal."""
+"""Operators of maps and ramps: a popover with the map of a setting, its painting and its removal; ramps."""
 
 import bpy
 
 from ....core.errors import HairError
 from ....core.maps import varied_settings
+from ...data.maps import ramps
 from ...data.strands.curves import require_editable
 from ...groom.selection import hair_of
 from ...groom.styles import painted_maps
+from ...host.notices import name_of
 from ...settings import map_items, properties
 from .. import map_rows
 from .base.hair_operator import HairOperator, needs_hair
@@ -67,6 +69,38 @@ class VELLUS_OT_paint_map(HairOperator, bpy.types.Operator):
         painted_maps.paint(hair, item, context)
 
 
+class VELLUS_OT_add_ramp(HairOperator, bpy.types.Operator):
+    """Set the thickness from root to tip by a curve, which begins as the present thickness"""
+
+    bl_idname = "vellus.add_ramp"
+    bl_label = "Thickness Curve"
+    applies = needs_hair
+
+    def change(self, context):
+        """Add a ramp of the thickness if there is none."""
+        hair = hair_of(context.object)
+        require_editable(hair)
+        state = hair.vellus
+        if ramps.node_of(state.thickness_ramp) is None:
+            state.thickness_ramp = ramps.new_ramp(f"{name_of(hair)} Thickness", state.hair.tip_taper)
+
+
+class VELLUS_OT_remove_ramp(HairOperator, bpy.types.Operator):
+    """Remove the curve of the thickness; the setting for the tip applies again"""
+
+    bl_idname = "vellus.remove_ramp"
+    bl_label = "Remove Thickness Curve"
+    applies = needs_hair
+
+    def change(self, context):
+        """Remove the ramp of the thickness, and its node group if nothing else uses it."""
+        hair = hair_of(context.object)
+        require_editable(hair)
+        tree, hair.vellus.thickness_ramp = hair.vellus.thickness_ramp, None
+        if tree is not None and tree.users == 0:
+            bpy.data.node_groups.remove(tree)
+
+
 class VELLUS_OT_remove_map(HairOperator, bpy.types.Operator):
     """Remove the map: all strands have the value of the setting"""
 
@@ -83,4 +117,10 @@ class VELLUS_OT_remove_map(HairOperator, bpy.types.Operator):
         map_items.remove(hair.vellus, self.setting)
 
 
-CLASSES = (VELLUS_OT_edit_map, VELLUS_OT_paint_map, VELLUS_OT_remove_map)
+CLASSES = (
+    VELLUS_OT_edit_map,
+    VELLUS_OT_paint_map,
+    VELLUS_OT_add_ramp,
+    VELLUS_OT_remove_ramp,
+    VELLUS_OT_remove_map,
+)

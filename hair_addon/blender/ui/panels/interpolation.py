@@ -12,7 +12,7 @@ from ...groom.systems.diagnostics import parting_warnings, sharing_note
 from ...host import memory
 from ...render import hair_cache
 from ...settings.translations import error_text, interface_text
-from .. import setting_rows
+from .. import map_rows, setting_rows
 from .tab import HairTab, draw_work, megabytes, split, write, write_stale, write_status
 
 
@@ -46,6 +46,7 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
             write(layout, context, shared, "INFO")
             layout.operator("vellus.make_own_guides")
         setting_rows.strand_rows(layout, state.hair, hair.surface)
+        map_rows.ramp_rows(layout, hair)
         setting_rows.row(layout, state, "is_live")
         write_stale(layout, context, state)
         _draw_cost(layout, state.hair, hair_cache.drawn_bytes(hair))
