@@ -59,6 +59,7 @@ OTHERS = (
     scene.faces_cache,
     scene.surface_cache,
     sources.texel_cache,
+    image_pixels.converted_cache,
     drawn_meshes.layout_cache,
     edited_faces.left_cache,
     frame_faces.count_cache,

@@ -28,6 +28,15 @@ def colors(
     return _reduced(pixels, lambda rows: _premultiplied(rows, is_srgb, has_alpha, is_premultiplied))
 
 
+def changed_rows(before: np.ndarray, now: np.ndarray) -> slice | None:
+    """Return the rows between the first and the last in which images (H, W, C) float32 differ; None if none do."""
+    bits = [
+        np.ascontiguousarray(pixels, np.float32).view(np.int32).reshape(len(pixels), -1) for pixels in (before, now)
+    ]
+    rows = np.flatnonzero((bits[0] != bits[1]).any(axis=1))
+    return slice(int(rows[0]), int(rows[-1]) + 1) if len(rows) else None
+
+
 def unpremultiplied(means: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return colors (S, 3) and alpha (S,) in [0, 1] of means (S, 4) of `colors`; colors without alpha are black."""
     alpha = means[:, 3]

@@ -3,6 +3,7 @@
 
 import hashlib
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -17,8 +18,23 @@ from ...host.notices import name_of
 pixel_cache = Cache(capacity=16)
 
 
+@dataclass(frozen=True, eq=False)
+class _Converted:
+    """Pixels of an image as Blender has them (H, W, C), and what they were converted to, in a way."""
+
+    raw: np.ndarray
+    way: dict
+    pixels: np.ndarray
+
+
+# (session_uid of an image, whether as colors) → `_Converted`, which is compared with the present pixels.
+converted_cache = Cache(capacity=4)
+
+
 def read(image, is_color):
     """{UDIM tile, or None without tiles: (H, W, C) float32 masks or colors of an image}. Raises `HairError`."""
+    if image.source != "TILED" and _may_be_painted(image):
+        return {None: _pixels_of(image, image, is_color, is_painted=True)}
     key, digest = (image.session_uid, is_color), _digest(image)
     known = pixel_cache.get(key)
     if known is None or known[0] != digest:
@@ -37,9 +53,13 @@ def load(path):
 def _digest(image):
     """What the pixels depend on; of the pixels themselves if they may be painted, which Blender may not report."""
     kinds = image.source, image.filepath_raw, image.colorspace_settings.name, image.alpha_mode, tuple(image.size)
-    if not (image.is_dirty or image.source == "GENERATED") or not all(image.size):
+    if not _may_be_painted(image):
         return kinds
     return *kinds, hashlib.sha1(_raw(image).data, usedforsecurity=False).digest()
+
+
+def _may_be_painted(image):
+    return (image.is_dirty or image.source == "GENERATED") and all(image.size)
 
 
 def _raw(image):
@@ -86,18 +106,35 @@ def _named(path, number):
     return path.replace("<UDIM>", str(number))
 
 
-def _pixels_of(image, named, is_color):
+def _pixels_of(image, named, is_color, is_painted=False):
+    """Converted pixels (H, W, C); of an image that is painted only rows that have changed are converted again."""
     width, height = image.size
     if not (width and height and image.channels):
         raise _without_pixels(named)
     convert = pixels.colors if is_color else pixels.masks
-    return convert(
-        _raw(image),
+    raw, way = _raw(image), _way_of(image)
+    if not is_painted or max(raw.shape[:2]) > pixels.MOST_SIDE:
+        return convert(raw, **way)
+    key = image.session_uid, is_color
+    known = converted_cache.get(key)
+    if known is None or known.way != way or known.raw.shape != raw.shape:
+        return converted_cache.keep(key, _Converted(raw, way, convert(raw, **way))).pixels
+    rows = pixels.changed_rows(known.raw, raw)
+    if rows is None:
+        return known.pixels
+    found = known.pixels.copy()  # others compare theirs with it
+    found[rows] = convert(raw[rows], **way)
+    return converted_cache.keep(key, _Converted(raw, way, found)).pixels
+
+
+def _way_of(image):
+    """How pixels of an image are converted: arguments of `pixels.colors`."""
+    return {
         # Blender converts floating-point images while it loads them.
-        is_srgb=not image.is_float and image.colorspace_settings.name == "sRGB",
-        has_alpha=image.alpha_mode in {"STRAIGHT", "PREMUL"},
-        is_premultiplied=image.is_float or image.alpha_mode == "PREMUL",
-    )
+        "is_srgb": not image.is_float and image.colorspace_settings.name == "sRGB",
+        "has_alpha": image.alpha_mode in {"STRAIGHT", "PREMUL"},
+        "is_premultiplied": image.is_float or image.alpha_mode == "PREMUL",
+    }
 
 
 def _without_pixels(image):

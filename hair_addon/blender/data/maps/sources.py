@@ -109,7 +109,9 @@ class Source:
             if self.pixels.keys() != other.pixels.keys():
                 return False
             pairs += [(self.pixels[tile], other.pixels[tile]) for tile in self.pixels]
-        return all(one is two if one is None or two is None else np.array_equal(one, two) for one, two in pairs)
+        return all(
+            one is two or (one is not None and two is not None and np.array_equal(one, two)) for one, two in pairs
+        )
 
     def _at_roots(self, roots):
         owned = self.corners[roots.triangle]
