@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """make compare: the same head, hair, lights and settings by Cycles and by Vellus, as numbers and side by side.
 
-Vellus renders as F12 does. Prints the mean colour of the hair in every picture and the ratio of the two, channel by
+Vellus renders as F12 does. Prints the mean color of the hair in every picture and the ratio of the two, channel by
 channel; writes compare.png, the pictures with Cycles above Vellus, and ratios.png, the ratios as a plot, to a folder.
 """
 
@@ -81,12 +81,12 @@ def main():
 
 
 def mean(picture):
-    """(3,) mean colour of the hair in a premultiplied picture (H, W, 4)."""
+    """(3,) mean color of the hair in a premultiplied picture (H, W, 4)."""
     return picture[..., :3].sum(axis=(0, 1)) / picture[..., 3].sum()
 
 
 def ratio(by_cycles, by_vellus):
-    """(3,) mean colour by Vellus, relative to that by Cycles."""
+    """(3,) mean color by Vellus, relative to that by Cycles."""
     return mean(by_vellus) / mean(by_cycles)
 
 

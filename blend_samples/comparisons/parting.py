@@ -123,7 +123,7 @@ def strays(strands, combed):
 
 
 def light():
-    """A camera above the head, a sun from the left and one from behind, and a grey world."""
+    """A camera above the head, a sun from the left and one from behind, and a gray world."""
     scene = bpy.context.scene
     top = Vector((head.PARTING - 0.012, -0.055, 0.80))
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes drawn at random: `recipe(seed)` draws one as plain values, `build(recipe)` makes it in Blender.
 
-A body of about two metres (a plane, a sphere or Suzanne), one or two systems of hair or a beard, styles, no to three
-lights of any kind, a grey world or a studio's picture, and a camera that may be close or without perspective.
+A body of about two meters (a plane, a sphere or Suzanne), one or two systems of hair or a beard, styles, no to three
+lights of any kind, a gray world or a studio's picture, and a camera that may be close or without perspective.
 """
 
 import math

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes drawn at random, by Cycles and by Vellus: python blend_samples/comparisons/random_scenes.py --seeds 0 30.
 
-Prints each scene with the ratio of its hair's mean colour (Vellus / Cycles, channel by channel) and the structural
+Prints each scene with the ratio of its hair's mean color (Vellus / Cycles, channel by channel) and the structural
 similarity, then the distribution; writes worst.png, the ten worst pairs with Cycles above Vellus, scenes.json, and
 distribution.png, the part of the scenes up to each deviation, with --dual beside that of a scenes.json by dual
 scattering. Cycles' pictures are kept in --references with the extent of their hair: another run, on any machine,
@@ -154,7 +154,7 @@ def key(values, options):
 
 
 def hair_extent(curves):
-    """Of each hair the number of its points, their mean and their spread along X, Y, Z [m]: plain values."""
+    """Return the number, mean and spread along X, Y, Z [m] of the points of each hair, as plain values."""
     found = [api.points(hair).reshape(-1, 3).astype(np.float64) for hair in curves]
     return [[len(points), points.mean(axis=0).tolist(), points.std(axis=0).tolist()] for points in found]
 

@@ -23,7 +23,7 @@ CAMERA = (0.86, 1.10, 0.78)  # [m]: from behind, where most of the hair is
 SEEN = (0.0, 0.015, 0.665)  # [m]: the middle of pictures
 LENS = 72.0  # [mm]
 LIGHTS = {"Key": ((1.25, 0.95, 1.25), 44.0), "Rim": ((-1.0, -0.75, 1.35), 12.0), "Fill": ((-0.5, 1.5, 0.7), 7.0)}  # [W]
-BROWN = (0.22, 0.46, 0.95)  # absorption per fibre radius
+BROWN = (0.22, 0.46, 0.95)  # absorption per fiber radius
 LONGER = 1.25  # than the sample's guides, which then end at the shoulders
 STIFFNESS = 20.0  # of bending: softer guides of this length that rise at the parting fall over
 

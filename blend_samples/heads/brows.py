@@ -10,7 +10,7 @@ from mathutils.bvhtree import BVHTree
 
 from hair_addon import api
 
-BROWN, BLACK = (1.1, 1.8, 2.9), (2.2, 2.9, 3.8)  # absorption per fibre radius: of brows, of lashes
+BROWN, BLACK = (1.1, 1.8, 2.9), (2.2, 2.9, 3.8)  # absorption per fiber radius: of brows, of lashes
 _DEPTH = 0.0003  # [m] of the patches below the skin
 
 # Of the left brow, from the nose outward: place along X and height [m], half width [m], direction of its hair [rad]

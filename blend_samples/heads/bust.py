@@ -7,7 +7,7 @@ import numpy as np
 _SEGMENTS = 48
 
 # Cross sections from the collar's inside down: height [m], middle along Y, half width, half depth, exponent of the
-# superellipse, rise toward the nape per metre of depth.
+# superellipse, rise toward the nape per meter of depth.
 _SECTIONS = np.array(
     [
         (0.602, -0.0250, 0.0470, 0.0460, 2.2, 0.22),

@@ -31,7 +31,7 @@ _HAIRLINE = np.array(
 _HAIRLINE_WIDTH = 0.008  # [m] over which hair thins out at its border
 
 PARTING = 0.018  # [m] left of the middle
-AUBURN = (0.20, 0.40, 0.85)  # absorption per fibre radius
+AUBURN = (0.20, 0.40, 0.85)  # absorption per fiber radius
 CHESTNUT = (0.11, 0.27, 0.70)
 
 LOOK_AT = Vector((0.012, -0.04, 0.715))

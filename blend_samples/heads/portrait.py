@@ -15,7 +15,7 @@ from hair_addon.core.shading.fibre.principled import roughness_from_beta_r
 SIZE = 720, 720  # pixels of a picture
 CAMERA, LOOK_AT, LENS = (0.42, -1.40, 0.745), Vector((0.0, -0.033, 0.692)), 126.0  # [m], [m], [mm]
 NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
-# Absorption per fibre radius at the roots, which a key light from above would else show brighter than the lengths, and
+# Absorption per fiber radius at the roots, which a key light from above would else show brighter than the lengths, and
 # the part of it at the tips, which the sun has bleached. Light that is scattered once takes little color from hair: the
 # classic model shows light brown lengths as olive, and has darker ones.
 # Kajiya-Kay's color is that of light scattered many times, which takes much: it has lighter hair.
@@ -126,7 +126,7 @@ def _comb(guides, solids, seed):
 
 
 def _lengths(roots, rng):
-    """(S,) [m]: shorter at the hairline, and none like its neighbours."""
+    """(S,) [m]: shorter at the hairline, and none like its neighbors."""
     inside = np.clip(head.above_hairline(roots) / _HAIRLINE_REACH, 0.0, 1.0)
     part = _HAIRLINE_LENGTH + (1.0 - _HAIRLINE_LENGTH) * np.sqrt(inside)
     return LENGTH * part * rng.uniform(0.88, 1.06, len(roots))

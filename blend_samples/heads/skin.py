@@ -71,7 +71,7 @@ def _places(mesh):
 
 
 def _spot(place, center, radius, change):
-    """What a soft spot, and its image on the other side, adds to the color."""
+    """Return the color that a soft spot and its mirror image add."""
     near = np.abs(place[..., :1]), place[..., 1:]
     squares = np.square(np.concatenate(near, axis=-1) - np.array(center)).sum(axis=-1) / radius**2
     return np.exp(-0.5 * squares)[..., None] * change
@@ -90,7 +90,7 @@ def _lips(place):
 
 
 def _blotches(place, rng):
-    """Noise of about unit size, some centimetres wide and finer."""
+    """Noise of about unit size, some centimeters wide and finer."""
     noise = np.zeros(place.shape[:2])
     for _wave in range(24):
         waves = rng.normal(0.0, 1.0, 3) * rng.choice([120.0, 300.0, 800.0])

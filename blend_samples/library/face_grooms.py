@@ -15,7 +15,7 @@ _BEARD_COVERAGE, _BROW_COVERAGE = 1.1, 0.065  # [m]: radii of all strands
 
 
 def beard(head_object, strand_count):
-    """A full beard of some centimetres, with a moustache."""
+    """A full beard of some centimeters, with a moustache."""
     _paint(head_object, "beard", _beard_weights)
     guides = api.distribute_guides(head_object, guide_count=420, density_group="beard", length=0.03)
     roots = combing.read(guides)[:, 0].astype(np.float64)
@@ -98,7 +98,7 @@ def eyebrows(head_object, strand_count):
 
 
 def _near(places, roots):
-    """(V,) in [0, 1]: 1 at places (V, 3) within half a millimetre of roots (G, 3), 0 beyond two."""
+    """(V,) in [0, 1]: 1 at places (V, 3) within half a millimeter of roots (G, 3), 0 beyond two."""
     weights = np.zeros(len(places))
     near = np.flatnonzero(
         (places > roots.min(axis=0) - 0.003).all(axis=1) & (places < roots.max(axis=0) + 0.003).all(axis=1)

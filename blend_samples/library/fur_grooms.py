@@ -80,7 +80,7 @@ def _give_materials(monkey):
 
 
 def short_fur(monkey, strand_count):
-    """Sleek fur of a centimetre that lies along the body."""
+    """Sleek fur of a centimeter that lies along the body."""
     guides, roots, normals, rng = _placed(monkey, 700)
     near_face = _near_face(roots)
     lengths = (0.007 + 0.008 * near_face) * rng.uniform(0.9, 1.1, len(roots))

@@ -114,7 +114,7 @@ def _deform(data):
 
 
 def deformed(place):
-    """Where a point of the first head is on the second."""
+    """Return the place on the second head of a point of the first head."""
     x, y, z = place
     high, low = max(z - 0.74, 0.0), max(0.70 - z, 0.0)
     jaw = 2.0 * min(low, 0.06) - 2.0 * min(max(low - 0.06, 0.0), 0.06)  # the neck is as narrow as it was

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Differences in colour and structure between two pictures of the same hair, and sheets of such pairs."""
+"""Differences in color and structure between two pictures of the same hair, and sheets of such pairs."""
 
 import numpy as np
 
@@ -11,12 +11,12 @@ _GREY = 0.22  # display value that the mean of the first picture is brought to
 
 
 def mean(picture):
-    """(3,) mean colour of the hair in a premultiplied picture (H, W, 4)."""
+    """(3,) mean color of the hair in a premultiplied picture (H, W, 4)."""
     return picture[..., :3].sum(axis=(0, 1)) / max(float(picture[..., 3].sum()), 1e-9)
 
 
 def ratio(reference, picture):
-    """(3,) mean colour of a picture, relative to that of a reference; one where both are black."""
+    """(3,) mean color of a picture, relative to that of a reference; one where both are black."""
     return (mean(picture) + _BLACK) / (mean(reference) + _BLACK)
 
 

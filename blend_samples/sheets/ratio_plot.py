@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A plot of ratios: a line for each comparison, a dot for each colour channel, the aim as a band."""
+"""A plot of ratios: a line for each comparison, a dot for each color channel, the aim as a band."""
 
 import numpy as np
 

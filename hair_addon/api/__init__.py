@@ -5,7 +5,7 @@ Plain arrays need no Blender:
 
 >>> import numpy as np
 >>> from hair_addon import api
->>> vertices = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]], np.float32)  # metres
+>>> vertices = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]], np.float32)  # meters
 >>> triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 >>> guides = api.distribute_guides((vertices, triangles), guide_count=20, length=0.03)
 >>> hair = api.interpolate_hair(guides, mesh=(vertices, triangles), strand_count=500, seed=2)

@@ -81,7 +81,7 @@ def unregister():
 
 
 def _unregister_after_render():
-    """For `bpy.app.timers`."""
+    """Unregister once no render runs; a function for `bpy.app.timers`."""
     if running.is_rendering():
         return _PATIENCE
     _show_in_status_bars(None)
@@ -90,7 +90,7 @@ def _unregister_after_render():
 
 
 def _show_usual_status_bars():
-    """For `bpy.app.timers`."""
+    """Remove our text from status bars; a function for `bpy.app.timers`."""
     _show_in_status_bars(None)
 
 

@@ -102,7 +102,7 @@ def changes(dice, settings_class, cheap, skip=()):
 
 
 def target(dice, kind):
-    """Mostly what is asked for, else anything."""
+    """Draw mostly a valid value, sometimes any value."""
     of_kind = [o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == kind]
     of_kind += [o for o in bpy.data.objects if kind == "MESH" and o.type == "MESH"]
     return dice.choice(of_kind if dice.random() < 0.85 else [*bpy.data.objects, dice.choice(OTHERS)])

@@ -111,7 +111,7 @@ def _animal():
 
 
 def _cloth():
-    """A skirt in folds, two millimetres thick."""
+    """A skirt in folds, two millimeters thick."""
     around, down = np.meshgrid(np.linspace(0, 2 * np.pi, 240, endpoint=False), np.linspace(0, 1, 60))
     radius = 0.19 + 0.14 * down + (0.004 + 0.045 * down) * np.sin(16 * around + 2 * down)
     radius += 0.01 * down * np.sin(5 * around)

@@ -68,7 +68,7 @@ class Way:
 
 
 def move(guides, chosen):
-    """Move some guides by a tenth of a millimetre, and let Blender update."""
+    """Move some guides by a tenth of a millimeter, and let Blender update."""
     points = curves.read_points(guides.data).reshape(GUIDE_COUNT, -1, 3)
     points[chosen, 1:, 2] += 1e-4
     guides.data.attributes["position"].data.foreach_set("vector", points.ravel())

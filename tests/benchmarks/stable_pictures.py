@@ -34,7 +34,7 @@ from hair_addon.blender.gpu import display_transform
 from hair_addon.blender.render import drawn_scene, offscreen
 from hair_addon.blender.render.viewport import hair_picture, view_film
 
-BEHIND = 0.05  # scene-linear grey behind the hair
+BEHIND = 0.05  # scene-linear gray behind the hair
 BLOCK = 12  # pixels along each side of a block
 
 

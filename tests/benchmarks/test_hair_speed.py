@@ -177,7 +177,7 @@ def test_editing_guides(head_and_guides, count, monkeypatch):
 @pytest.mark.long
 @pytest.mark.parametrize("count", [100_000, 1_000_000])
 def test_search(count):
-    """The nine guides nearest to each root, eight of which a strand follows, and how far they are; two workers each."""
+    """Both find the nine guides nearest to each root and their distances, with two workers each."""
     head = read_obj(HEAD)
     guides = groom.distribute_guides(head, groom.GuideSettings(guide_count=hair_peers.GUIDE_COUNT))
     points, queries = positions(head, guides.roots), positions(head, sample_surface(head, count, 1))

@@ -37,7 +37,7 @@ def styling_calls(hair, stacks):
     weights = following.weights_now(hair.binding, hair.guides)
     for name, styles in stacks.items():
         bound = hair.bound(*styles)
-        following.strands_now(hair.binding, bound.guides(hair.guides), weights, bound)  # centres, and what compiles
+        following.strands_now(hair.binding, bound.guides(hair.guides), weights, bound)  # centers, and what compiles
         calls[name] = lambda bound=bound: steps.apply_steps(points, bound.program, bound.data, bound.axes)
     return calls
 

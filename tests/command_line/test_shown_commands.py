@@ -50,3 +50,16 @@ def test_pages_show_commands_that_are_understood(capfd):
             command_line.parser("vellus").parse_args(words)
         except SystemExit:
             pytest.fail(capfd.readouterr().err)
+
+
+def test_the_page_has_every_option_that_is_no_setting():
+    """Options of settings are listed by --help alone: their help begins with the label. `import` is called by groom."""
+    text = PAGE.read_text(encoding="utf-8")
+    verbs = next(action for action in command_line.parser("vellus")._actions if action.choices).choices
+    missing = []
+    for verb, parser in verbs.items():
+        for action in parser._actions:
+            is_setting = re.match(r"[A-Z][^:]*: ", action.help or "")
+            if verb != "import" and action.option_strings and not is_setting:
+                missing += [(verb, action.option_strings[-1])] * (not any(o in text for o in action.option_strings))
+    assert len(verbs) > 8 and missing == []

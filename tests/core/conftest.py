@@ -10,13 +10,13 @@ from tests.support.meshes import HEAD, flat_grid, read_obj, subdivided_sphere
 
 @pytest.fixture(scope="session")
 def head():
-    """The sample head: 8,520 triangles, metres, facing -Y, with holes for eyes and mouth."""
+    """The sample head: 8,520 triangles, meters, facing -Y, with holes for eyes and mouth."""
     return read_obj(HEAD)
 
 
 @pytest.fixture(scope="session")
 def scalp(head):
-    """Density on the head: one above the ears, thinning out over a centimetre, nothing below."""
+    """Density on the head: one above the ears, thinning out over a centimeter, nothing below."""
     return np.clip((head.vertices[:, 2] - 0.755) / 0.01, 0.0, 1.0)
 
 

@@ -42,7 +42,7 @@ def shown(guides, hair):
 
 
 def assert_same(found, expected):
-    """To the last tenth of a micrometre, and to the last bits of widths."""
+    """To the last tenth of a micrometer, and to the last bits of widths."""
     for values, wanted, tolerance in zip(found, expected, (1e-6, 1e-9, 1e-6, 1e-9), strict=True):
         np.testing.assert_allclose(values, wanted, rtol=0.0, atol=tolerance)
 

@@ -48,7 +48,7 @@ def walk(request, desktop, extension, tmp_path_factory):
 
 
 def seen(walk, name):
-    """(height, width, 3) display colours of the screen after a step, 0 to 1, first row at the bottom."""
+    """(height, width, 3) display colors of the screen after a step, 0 to 1, first row at the bottom."""
     image = bpy.data.images.load(str(walk.folder / f"{name}.png"))
     try:
         width, height = image.size
@@ -125,7 +125,7 @@ def test_hair_is_where_it_should_be_and_nowhere_else(walk, step):
 
 
 def shown(light, transform):
-    """(N, 4) premultiplied linear light → (N, 3) display colours of what is covered."""
+    """(N, 4) premultiplied linear light → (N, 3) display colors of what is covered."""
     view, look, exposure, gamma = transform
     settings = display_transform.DisplayTransform("sRGB", view, "" if look == "None" else look, gamma, "Linear Rec.709")
     colors = 2.0**exposure * light[:, :3] / np.maximum(light[:, 3:], 1e-6)

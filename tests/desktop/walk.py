@@ -119,7 +119,7 @@ def grow():
         bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
         bpy.ops.object.select_all(action="DESELECT")
     yield
-    # Coloured guides would stand between the hair and what its pixels are held to.
+    # Colored guides would stand between the hair and what its pixels are held to.
     bpy.data.objects["Guides"].hide_set(True)
     show("grown", results=[list(distributed), list(interpolated)])
     facts["sidebar"] = {"rectangle": rectangle(sidebar), "category": sidebar.active_panel_category}

@@ -16,7 +16,7 @@ SCRIPTS = Path(__file__).parent
 _COMPLAINT = re.compile(r"Vellus:|Traceback|\w*(Error|Exception)\b(?! \(0x)|<\w+>: \(EXR_ERR")
 
 
-# For tests of what is the same with any driver: which parts a walk has with which is told by its file.
+# For tests that do not depend on the driver: the file of a walk lists its parts for each driver.
 with_opengl = pytest.mark.parametrize("walk", desktop_blender.BACKENDS[:1], indirect=True)
 
 # For walks that draw nothing of their own: Vulkan, in software, takes as long again and is left to the long run.

@@ -30,7 +30,7 @@ def subdivided_sphere(levels, radius=1.0):
     golden = (1.0 + 5.0**0.5) / 2.0
     vertices = [(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0)]
     vertices = np.array(vertices + [(z, x, y) for x, y, z in vertices] + [(y, z, x) for x, y, z in vertices])
-    # The 20 faces are the triples of neighbours, turned outwards.
+    # The 20 faces are the triples of neighbors, turned outwards.
     near = np.linalg.norm(vertices[:, None] - vertices[None], axis=-1) < 2.1
     triples = [
         (i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[k, i]
@@ -50,7 +50,7 @@ def subdivided_sphere(levels, radius=1.0):
 
 
 def split_in_four(mesh):
-    """The same surface, each triangle in four."""
+    """Return the same surface with each triangle split into four."""
     middles = 0.5 * (mesh.corners + np.roll(mesh.corners, -1, axis=1))
     vertices = np.concatenate([mesh.vertices, middles.reshape(-1, 3)])
     vertices, numbers = np.unique(vertices.astype(np.float32), axis=0, return_inverse=True)

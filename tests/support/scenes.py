@@ -48,7 +48,7 @@ STAGES = ("sphere", "guides", "hair")
 
 
 def add_sphere():
-    """Make a sphere of one metre with a UV map and a vertex group `top` on its upper half."""
+    """Make a sphere of one meter with a UV map and a vertex group `top` on its upper half."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=1.0)
     sphere = bpy.context.object
     sphere.name = "Sphere"
@@ -140,7 +140,7 @@ def made_anew():
 
 @pytest.fixture
 def sphere(scene):
-    """A sphere of one metre with a UV map and a vertex group `top` on its upper half; active."""
+    """A sphere of one meter with a UV map and a vertex group `top` on its upper half; active."""
     if "Sphere" not in bpy.data.objects:
         add_sphere()
     sphere = bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]

@@ -222,7 +222,7 @@ class Surface:
 
     @property
     def scale(self):
-        """The mean scale of the object: metres per unit of its local coordinates."""
+        """The mean scale of the object: meters per unit of its local coordinates."""
         return abs(np.linalg.det(self.to_world_axes)) ** (1.0 / 3.0)
 
     @cached_property

@@ -103,7 +103,7 @@ def prepare(kernel: wp.Kernel, given: Mapping[str, Any], triangles: np.ndarray |
 
 
 def _value_of(given, one):
-    """What a `glsl_text.Given` is."""
+    """Return the value of a `glsl_text.Given`."""
     value = given[one.path[0]]
     for name in one.path[1:]:
         value = getattr(value, name)

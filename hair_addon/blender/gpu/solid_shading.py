@@ -19,7 +19,7 @@ shading_cache = Cache(capacity=32)
 
 @dataclass(frozen=True)
 class Solid:
-    """What Solid shading changes: the tint of all strands, or a texture with one for each; and a matcap."""
+    """Changes by Solid shading: the tint of all strands, or a texture with a tint for each strand; and a matcap."""
 
     tint: tuple = (1.0, 1.0, 1.0)
     strand_tints: gpu.types.GPUTexture | None = None

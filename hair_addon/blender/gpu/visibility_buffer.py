@@ -209,7 +209,7 @@ class VisibilityBuffer:
         return [(placed.first, placed.segment_count) for placed in self._hair]
 
     def surfaces_of_part(self, texture_format=scene_programs.PICTURE_FORMAT, background=_NOTHING):
-        """`surfaces` for additional passes: `part_of_light`, `part_by`, `part`."""
+        """Clear and return the framebuffer of surfaces for `part_of_light`, `part_by` and `part`."""
         return drawing.cleared(self._part(texture_format, background)[0], background)
 
     def _part(self, texture_format, background):

@@ -12,7 +12,7 @@ from . import strand_arrays
 
 
 def new_object(name, placed, surface_object, guide_ids=None):
-    """Add an object for a `CurveSet` in metres with Z up to the scene, with the transform of a surface but its shear.
+    """Add an object for a `CurveSet` in meters with Z up to the scene, with the transform of a surface but its shear.
 
     guide_ids: (G,) IDs of the guides that the curves follow; their indices are stored with the weights.
     """

@@ -23,7 +23,7 @@ def path_beside(blend_path, hair):
 def playing(hair, motion, order, path: Path):
     """Return a function of (progress) that writes a `Motion`, lets hair play it and returns the number of samples.
 
-    motion: in metres with Z up; order: (N,) indices of its points in the order of the strands. Raises `HairError`.
+    motion: in meters with Z up; order: (N,) indices of its points in the order of the strands. Raises `HairError`.
     """
     hair_file.require_ours(path)
     blender_scene, shown = bpy.context.scene, selection.object_of(hair, bpy.context.view_layer)

@@ -89,7 +89,7 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
 
 
 def _placed(local, to_world) -> Rows:
-    """Return local `Rows` transformed by a (4, 4) matrix and to metres."""
+    """Return local `Rows` transformed by a (4, 4) matrix and to meters."""
     to_file = to_world * metres_per_unit(bpy.context.scene)
 
     def rows(some):
@@ -143,7 +143,7 @@ def shape_of(datablock):
 
 
 def world_scale(datablock):
-    """Return the mean number of metres per local unit of a Curves datablock. Raises `HairError`."""
+    """Return the mean number of meters per local unit of a Curves datablock. Raises `HairError`."""
     matrix = _to_world(datablock)[:3, :3]
     return float(abs(np.linalg.det(matrix))) ** (1.0 / 3.0) * metres_per_unit(bpy.context.scene)
 

@@ -28,7 +28,7 @@ INDICES = {"use_pass_object_index": "Object Index", "use_pass_material_index": "
 
 @dataclass(frozen=True)
 class Thing:
-    """What a label stands for: an object with one of its materials; indices are Blender's pass indices."""
+    """The object and material of a label; indices are Blender's pass indices."""
 
     object: str
     material: str

@@ -106,7 +106,7 @@ def levelled(flat: np.ndarray, labels: np.ndarray, found: Outlines, lifted: np.n
 
 
 def _nearness(along, onward, place):
-    """Return hat functions (S, P) at points (S, P): 1 at a place, 0 at its neighbours; along (S, n): the places."""
+    """Return hat functions (S, P) at points (S, P): 1 at a place, 0 at its neighbors; along (S, n): the places."""
     here, near = along[:, place, None], np.ones(onward.shape)
     if place:
         before = along[:, place - 1, None]

@@ -90,7 +90,7 @@ def _sampled(strands, segments, centres, texel):
 
 
 def _normals(edges, across):
-    """Return unit normals (N, 3) of fibres seen from above, at positions `across` their width in [-1, 1]."""
+    """Return unit normals (N, 3) of fibers seen from above, at positions `across` their width in [-1, 1]."""
     tangents = edges / np.maximum(np.linalg.norm(edges, axis=1, keepdims=True), 1e-12)
     facing = np.array([0.0, 0.0, 1.0]) - tangents[:, 2:] * tangents
     length = np.linalg.norm(facing, axis=1, keepdims=True)

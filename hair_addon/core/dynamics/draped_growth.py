@@ -28,7 +28,7 @@ from .rod import detail, rod_solver, rods
 from .rod.settings import DynamicsSettings
 
 SCALP = 0.055  # area of a human scalp [m²]
-# Loose hair, two millimetres from the skin: guides represent wisps, whose strands lie beside them.
+# Loose hair, two millimeters from the skin: guides represent wisps, whose strands lie beside them.
 _HAIR = DynamicsSettings(bend_stiffness=0.5, collision_distance=2e-3, substeps=2)
 _SECONDS = 1.0
 _EARTH = 9.81  # [m/s²]

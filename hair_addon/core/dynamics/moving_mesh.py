@@ -78,7 +78,7 @@ def _checked(given, number, vertex_count):
 
 
 class _Surface:
-    """A moving mesh; size: metres per unit of the mesh."""
+    """A moving mesh; size: meters per unit of the mesh."""
 
     def __init__(self, mesh, guides, size):
         self._mesh, self._size = mesh, size

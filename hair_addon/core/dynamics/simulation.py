@@ -2,7 +2,7 @@
 """`Simulation`: guides that move with their surface, frame by frame.
 
 Guides are simulated as strands with fewer points, `Rods`; the remaining detail of their shape is added to the result.
-All coordinates are in metres, in axes that do not turn with the surface. The solver uses single precision, with an
+All coordinates are in meters, in axes that do not turn with the surface. The solver uses single precision, with an
 origin near the hair that follows it in steps that are exact in single precision.
 """
 

@@ -109,7 +109,7 @@ class TriMesh:
 
     @cached_property
     def surface_order(self) -> np.ndarray:
-        """Indices (F,) of triangles along a Z-curve [Morton66]: neighbours on the surface are near in memory."""
+        """Indices (F,) of triangles along a Z-curve [Morton66]: neighbors on the surface are near in memory."""
         centres = self.corners.mean(axis=1)
         extent = max(float(np.ptp(centres, axis=0).max()), 1e-30)
         cells = ((centres - centres.min(axis=0)) * ((2**_HALVINGS - 1) / extent)).astype(np.uint32)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Section 2 of [Report12] as two functions: `distribute_guides` and `bind_hair`, with their settings.
 
-`bind_hair` computes everything that depends on the guides' roots: strand roots, neighbours, weights.
+`bind_hair` computes everything that depends on the guides' roots: strand roots, neighbors, weights.
 `following.follow_guides` evaluates strands, and is repeated by combing. Warp is slow to import, so the stages are
 imported late.
 """

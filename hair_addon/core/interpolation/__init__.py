@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands between guides: neighbours, weights and weighted sums  ([Report12] section 2.4)."""
+"""Strands between guides: neighbors, weights and weighted sums  ([Report12] section 2.4)."""
 
 from typing import TYPE_CHECKING
 

@@ -4,11 +4,11 @@
 The cell V_i of a site s_i is the part of the surface that is nearer to s_i than to any other site (voronoi.py). With a
 density rho, the energy is E = sum_i ∫_{V_i} rho(x) |x - s_i|² dA, and its gradient 2 m_i (s_i - c_i), with the centroid
 c_i and the mass m_i of the cell. Lloyd's step, to the surface point nearest to the centroid, never raises E. L-BFGS
-[Liu09] starts with the Hessian of springs between neighbours (preconditioner.py) and refines it; if a step raises E,
+[Liu09] starts with the Hessian of springs between neighbors (preconditioner.py) and refines it; if a step raises E,
 Lloyd's step is taken instead and L-BFGS restarts.
 
 From a random start any descent ends in mismatched honeycomb grains. Therefore a few distant sites (farthest.py) are
-relaxed first; then a site is repeatedly inserted between each pair of neighbours, which refines the honeycomb: a
+relaxed first; then a site is repeatedly inserted between each pair of neighbors, which refines the honeycomb: a
 multilevel method, as in [Du06].
 
 At the minimum of E, areas of cells are proportional to rho^(-1/2) [Gersho79]. The density of sites should be
@@ -39,8 +39,8 @@ LEAST_LATE_CELL = 0.6  # the same at the finest level
 # Fractions of the final rounds after which crowded sites move to gaps.
 SPREAD_AT_ONCE, SPREAD_AFTER_LEVELS = (0.25, 0.5), (0.5,)
 GAP_SAMPLES = 8  # for each site, to find the widest gaps
-RING = 7  # a site and its neighbours in a honeycomb
-LEAST_PAIR = 0.4  # of the surface shared by two neighbours in a honeycomb: smaller pairs are not refined
+RING = 7  # a site and its neighbors in a honeycomb
+LEAST_PAIR = 0.4  # of the surface shared by two neighbors in a honeycomb: smaller pairs are not refined
 GAP_ROUNDS = 4  # adjacent gaps are filled in succession
 START_SAMPLES = 16  # for each initial site
 SAMPLES_PER_SITE = 64  # at coarse levels
@@ -234,7 +234,7 @@ class _State:
 
 
 def _pairs(domain, cells, sites, device):
-    """Return the pair (Q,) of nearest sites of each sample, as neighbours.
+    """Return the pair (Q,) of nearest sites of each sample, as neighbors.
 
     A pair is encoded as n × the lower index + the higher index, or -1 for sites on different islands.
     """
@@ -250,7 +250,7 @@ def _pair_count(domain, cells, sites, device):
 
 
 def _thinned(domain, cells, sites, device):
-    """Remove crowded sites, the most crowded first, but no two neighbours.
+    """Remove crowded sites, the most crowded first, but no two neighbors.
 
     Thin parts and corners have too many sites of a coarse level, which no descent moves elsewhere.
     """
@@ -266,7 +266,7 @@ def _thinned(domain, cells, sites, device):
 
 
 def _crowded(amounts, least, on):
-    """Return sites whose cells have less than `least` of the mean amount, smallest first, without neighbours."""
+    """Return sites whose cells have less than `least` of the mean amount, smallest first, without neighbors."""
     crowded = np.flatnonzero(amounts < least * amounts.mean())
     rings = on.around.numpy()[crowded, :RING]
     is_kept = np.ones(len(amounts), bool)
@@ -277,7 +277,7 @@ def _crowded(amounts, least, on):
 
 
 def _refined(domain, cells, points, sites, count, device):
-    """Refine to `count` sites: one between each pair of neighbours, and the rest in the widest gaps.
+    """Refine to `count` sites: one between each pair of neighbors, and the rest in the widest gaps.
 
     Pairs that share little of the surface are not refined, which thins out sites that are too close, for example where
     the surface bends within the width of a cell. New sites are chosen among `points`, the samples of the cells, so

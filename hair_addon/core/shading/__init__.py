@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light scattering by fibres: the reference for the shaders."""
+"""Light scattering by fibers: the reference for the shaders."""
 
 from typing import TYPE_CHECKING
 

@@ -42,10 +42,10 @@ STRAND_FIELDS = ("random_color", "random_roughness", "tip_absorption", "tip_tint
 # Coat with another roughness than it weights it with (DECISIONS.md, Wet hair).
 _WET = {"roughness": 0.14, "cuticle_angle": math.radians(0.5), "ior": 1.38}
 
-# Fibres whose index is that of air reflect nothing.
+# Fibers whose index is that of air reflect nothing.
 _LEAST_SCATTERING = 1e-6
 
-# Fields that define the colour, by parametrization.
+# Fields that define the color, by parametrization.
 COLOR_FIELDS = {"MELANIN": ("melanin", "redness", "tint"), "COLOR": ("color",), "ABSORPTION": ("absorption",)}
 
 
@@ -197,9 +197,9 @@ def sigma_a(appearance: Appearance) -> tuple[float, ...]:
 
 
 def mean_color(appearance: Appearance) -> np.ndarray:
-    """Return the colour of a full head of this hair, RGB (3,), the mean over all strands from root to tip.
+    """Return the color of a full head of this hair, RGB (3,), the mean over all strands from root to tip.
 
-    Fibres reflect R and TRT, both in proportion to the reflectance of their surface, which water lowers.
+    Fibers reflect R and TRT, both in proportion to the reflectance of their surface, which water lowers.
     """
     sigma_a_everywhere = strand_variation.sample_sigma_a(strand_settings(appearance))
     color = color_from_sigma_a(sigma_a_everywhere, appearance.radial_roughness).reshape(-1, 3).mean(axis=0)
@@ -207,7 +207,7 @@ def mean_color(appearance: Appearance) -> np.ndarray:
 
 
 def dimmed(color: np.ndarray, appearance: Appearance) -> np.ndarray:
-    """Return the color (3,) of hair whose fibres reflect as much as those of a look, from that of dry fibres."""
+    """Return the color (3,) of hair whose fibers reflect as much as those of a look, from that of dry fibers."""
     scattering = _mean_reflectance(shaded(appearance).ior) / _mean_reflectance(FITTED_IOR)
     return color_of_scattering(color, max(scattering, _LEAST_SCATTERING))
 
@@ -277,7 +277,7 @@ def neutral(look: Appearance) -> Appearance:
 
 
 def kajiya_kay_settings(appearance: Appearance) -> kajiya_kay.Settings:
-    """Convert to `kajiya_kay.Settings`: the groom's colour, and a highlight with R's width and R's energy."""
+    """Convert to `kajiya_kay.Settings`: the groom's color, and a highlight with R's width and R's energy."""
     appearance = shaded(appearance)
     exponent = float(kajiya_kay.highlight_exponent((1.0 - appearance.coat) * appearance.roughness))
     peak = float(kajiya_kay.highlight_peak(_mean_reflectance(appearance.ior), exponent))
@@ -298,7 +298,7 @@ def kajiya_kay_strand_settings(appearance: Appearance) -> kajiya_kay.StrandSetti
 
 @lru_cache(maxsize=_CACHE_SIZE)
 def _mean_reflectance(eta):
-    """Return the directional albedo of a fibre's surface under uniform light."""
+    """Return the directional albedo of a fiber's surface under uniform light."""
     nodes, weights = np.polynomial.legendre.leggauss(32)
     theta, gamma = 0.25 * np.pi * (1.0 + nodes)[:, None], 0.25 * np.pi * (1.0 + nodes)[None, :]
     # Weights cos(theta) of directions and cos(gamma) of offsets across the width: both quadratures sum to one.

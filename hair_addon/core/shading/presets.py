@@ -12,7 +12,7 @@ _LIGHT_BROWN = Appearance(melanin=0.48, redness=0.3, random_color=0.1, random_ro
 _BLOND = Appearance(melanin=0.22, redness=0.3, random_color=0.15, random_roughness=0.1)
 _AUBURN = Appearance(melanin=0.68, redness=0.8, random_color=0.1)
 
-# Grey hair is a mixture of white and dark strands, and coarser. A little melanin in all strands would make it blond.
+# Gray hair is a mixture of white and dark strands, and coarser. A little melanin in all strands would make it blond.
 _GREY = Appearance(
     parametrization="COLOR", color=(0.02, 0.0185, 0.017), roughness=0.35, random_color=1.0, random_roughness=0.2
 )

@@ -104,7 +104,7 @@ class Step:
     """A row of a program: one run of a .strand file.
 
     kind: of `kinds.STEPS`; numbers: values of the file's own parameters, by the names in `NUMBERS` of its module;
-    level: of the clump centres that it needs, counted from the style's first; None for those of a style above it.
+    level: of the clump centers that it needs, counted from the style's first; None for those of a style above it.
     """
 
     kind: str

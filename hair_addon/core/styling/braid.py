@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Braid: the strands of a lock gather into tresses that weave around the lock's centre; two tresses are a rope.
+"""Braid: the strands of a lock gather into tresses that weave around the lock's center; two tresses are a rope.
 
     ρ = R (sin(φ + 2πg/n), b sin 2(φ + 2πg/n)) for three tresses,    ρ = R (cos(φ + πg), sin(φ + πg)) for two
 
-ρ is in the frames of the lock's centre, φ grows by 2π per pitch along it, and g is the tress of a strand, by its place
-in the lock. The distance a of a point along the centre depends only on its arc length s:
+ρ is in the frames of the lock's center, φ grows by 2π per pitch along it, and g is the tress of a strand, by its place
+in the lock. The distance a of a point along the center depends only on its arc length s:
 
     da/ds = 1 / sqrt(1 + |dρ/da|²)
 
-so no point slides along its tress when the hair swings; where strands gather, they stretch by half at most. Centre
+so no point slides along its tress when the hair swings; where strands gather, they stretch by half at most. Center
 lines of three tresses are at least 0.90 R apart for a pitch of 6 R, so a tress can have half of that as its radius.
 """
 

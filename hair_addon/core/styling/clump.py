@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clump: strands gather around centre strands, which are spaced evenly on the surface and are not part of the hair.
+"""Clump: strands gather around center strands, which are spaced evenly on the surface and are not part of the hair.
 
-At the arc length s_i of a point p_i, with C the centre strand of level k after the levels before, and c = C(s_i):
+At the arc length s_i of a point p_i, with C the center strand of level k after the levels before, and c = C(s_i):
 
     q_i = c + (1 - B_ki (1 - thickness)) Rot(t_c, 2π twist · profile(x_i)) (p_i - c)
 
-The strand follows the curve of these points up to its own length, so that strands that are drawn onto the centre lie on
-it (clump.strand). Roots do not move: a pull at the root grows over twice the distance to the centre. The fraction
+The strand follows the curve of these points up to its own length, so that strands that are drawn onto the center lie on
+it (clump.strand). Roots do not move: a pull at the root grows over twice the distance to the center. The fraction
 `stray` of strands joins no lock; a tenth more joins partly, so that it can be animated. Sites and levels are in
 clump_trees.py.
 """

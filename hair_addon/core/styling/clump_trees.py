@@ -114,7 +114,7 @@ class ClumpTrees:
         )
 
     def members(self, owner: Owner, strands: HairBinding, tree: TreeSettings) -> list[np.ndarray]:
-        """Return (S,) int32 per level, the coarsest first: the index of each strand's centre in its level, -1 for none.
+        """Return (S,) int32 per level, the coarsest first: the index of each strand's center in its level, -1 for none.
 
         owner: key of the strands.
         """

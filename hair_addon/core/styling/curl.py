@@ -8,12 +8,12 @@ With the arc of a turn ℓ = sqrt((2πR)² + h²), κ = keep_length and y the st
                   + (2π Σ (y_j - y_(j-1)) / h_j - φ_(i-1)) h_i² / ((2πR)² (1 + (1 - flatness)²) / 2 + h_i²)
     φ_0 = 2π (h_clump + (1 - coherence) (h_s - ½)),    ρ_i = R_i (cos φ_i, ± (1 - flatness) sin φ_i)
 
-The second line corrects the phase to one turn per pitch of y. Below a Clump, y is measured along the centre of the
-strand's lock, and ρ is in the centre's frames, so that strands with different roots wind together (beside.strand).
+The second line corrects the phase to one turn per pitch of y. Below a Clump, y is measured along the center of the
+strand's lock, and ρ is in the center's frames, so that strands with different roots wind together (beside.strand).
 Without a Clump, y is the strand's own.
 
 A straight strand of length L reaches L pitch / ℓ. It becomes the curve of curvature R / (R² + (h/2π)²) and torsion
-(h/2π) / (R² + (h/2π)²), the helix that natural curvature gives a fibre [Bertails06]. A twentieth of the locks, between
+(h/2π) / (R² + (h/2π)²), the helix that natural curvature gives a fiber [Bertails06]. A twentieth of the locks, between
 left and right, is flat, so that the fraction of left-handed locks can be animated. In coils whose handedness changes
 along the strand (switchbacks, or perversions), φ reverses where a one-dimensional noise of the lock changes sign.
 """

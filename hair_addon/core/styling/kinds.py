@@ -88,7 +88,7 @@ def module_of(settings: StyleSettings) -> Any:
 
 
 def needs_centre(step: str) -> bool:
-    """Whether a kind of step acts only on strands with a clump centre."""
+    """Whether a kind of step acts only on strands with a clump center."""
     return hasattr(STEPS[step], "NEEDS_CENTRE")
 
 

@@ -12,7 +12,7 @@ from . import clump, kinds, style_text, trim, wet
 from .base import Cutter, Step, StyleSettings, TreeSettings, has_effect
 
 # The whole numbers of a step: its kind, of `kinds.STEP_KINDS`; its seed; its row of masks or -1; its row of members or
-# -1; the first of the centres that members count from.
+# -1; the first of the centers that members count from.
 CHOICES = ("kind", "seed", "mask", "level", "first_centre")
 # The numbers that all steps have, before their own, and the total count.
 SHARED = ("amount", "vary", "at_root", "at_tip", "exponent", "is_flipped", "from", "keep_length")
@@ -46,7 +46,7 @@ def tree_settings(settings: StyleSettings) -> TreeSettings | None:
 
 
 def tree_levels(styles: Sequence[StyleSettings]) -> list[tuple[TreeSettings, int]]:
-    """Return [(tree, level)] of all styles that gather strands, in the order in which their centres are computed."""
+    """Return [(tree, level)] of all styles that gather strands, in the order in which their centers are computed."""
     trees = [tree_settings(settings) for settings in styles if has_effect(settings)]
     return [(tree, level) for tree in trees if tree is not None for level in range(len(tree.sizes))]
 
@@ -88,7 +88,7 @@ def compiled(
 ) -> Program:
     """Return the `Program` of steps.
 
-    masks: from `mask_keys`; first_centres: offset of the centres of each level, the guides' own last.
+    masks: from `mask_keys`; first_centres: offset of the centers of each level, the guides' own last.
     """
     choices = np.zeros((len(steps_made), len(CHOICES)), np.int32)
     numbers = np.zeros((len(steps_made), NUMBERS), np.float32)

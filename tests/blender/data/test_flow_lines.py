@@ -13,7 +13,7 @@ from tests.support.reading import points, write_points
 
 @pytest.fixture
 def plane(scene):
-    """A square of two metres, facing up; active."""
+    """A square of two meters, facing up; active."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=10, y_subdivisions=10, size=2.0)
     bpy.context.object.name = "Plane"
     return bpy.context.object
@@ -149,7 +149,7 @@ def test_a_moved_surface_with_its_lines_grows_the_same_guides(plane):
 
 
 def test_lines_are_drawn_on_the_surface_as_modifiers_leave_it(plane):
-    """A plane that a modifier lifts by two metres, and a line up there."""
+    """A plane that a modifier lifts by two meters, and a line up there."""
     drawn = spline("POLY")
     drawn.location.z = 2.0
     modifier = plane.modifiers.new("Up", "DISPLACE")

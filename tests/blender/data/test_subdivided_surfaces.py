@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on subdivided surfaces: neighbouring strands stay together at every level."""
+"""Hair on subdivided surfaces: neighboring strands stay together at every level."""
 
 import bpy
 import numpy as np

@@ -24,7 +24,7 @@ def unit(vectors):
 
 @pytest.fixture
 def fibres(rng):
-    """T, L, V, each (N, 3) float32: random, and L or V across the fibre, along it, almost along it and opposite."""
+    """T, L, V, each (N, 3) float32: random, and L or V across the fiber, along it, almost along it and opposite."""
     T, L, V = unit(rng.normal(size=(3, 3000, 3)))
     along = np.array([0.0, 0.0, 1.0])
     special = unit(np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0], [1e-3, 0, 1], [1, 0, 1e-4], [3, 4, 1]]))
@@ -75,7 +75,7 @@ def test_cosine_of_the_difference_angle(sines):
 def test_relative_azimuth(fibres):
     shader = glsl.evaluate(glsl.source("fibre/fibre.glsl"), "float", "relative_azimuth(T, L, V)", **fibres)
     T, L, V = doubles(fibres)
-    # The azimuth of a direction is as uncertain as the direction's part across the fibre is short.
+    # The azimuth of a direction is as uncertain as the direction's part across the fiber is short.
     across = np.minimum(angles.sin_from_cos(np.sum(T * L, axis=-1)), angles.sin_from_cos(np.sum(T * V, axis=-1)))
     error = np.abs(shader - np.abs(angles.relative_azimuth(T, L, V)))
     assert (error * np.maximum(across, 1e-2)).max() < 1e-5
@@ -88,7 +88,7 @@ def test_relative_azimuth(fibres):
 def test_kajiya_kay_diffuse(fibres):
     shader = glsl.evaluate(glsl.source("fibre/kajiya_kay.glsl"), "float", "kajiya_kay_diffuse(T, L)", **fibres)
     T, L, _V = doubles(fibres)
-    # Along the fibre sin(T, L) is the root of what rounding left of 1 - cos².
+    # Along the fiber sin(T, L) is the root of what rounding left of 1 - cos².
     assert_twins(shader**2, kajiya_kay.kajiya_kay_diffuse(T, L) ** 2, 1e-6)
 
 
@@ -202,7 +202,7 @@ def test_marschner_reflection_is_read_from_the_tables(fibres, axes):
     halves = lookup_tables.Tables(*(texels(table) for table in (tables.m, tables.n, tables.n_trt)), tables.settings)
     at = angles.fibre_angles(*doubles(fibres))
     python = lookup_tables.sample_scattering(halves, at) * np.cos(at.theta_i)[:, None]
-    # Along the fibre S cos(theta_i) is nothing times infinity; a degree away rounding is all that differs, and texture
+    # Along the fiber S cos(theta_i) is nothing times infinity; a degree away rounding is all that differs, and texture
     # units that keep eight bits of the place between two texels.
     regular = (np.minimum(np.cos(at.theta_i), np.cos(at.theta_o)) > 0.02) & (np.cos(at.theta_d) > 0.02)
     np.testing.assert_allclose(shader[regular], python[regular], rtol=5e-3, atol=1e-4)

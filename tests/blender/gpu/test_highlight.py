@@ -74,7 +74,7 @@ def test_kajiya_kay_is_brightest_on_the_mirror_cone(strand, no_shadow_maps, thet
     shading = hair_shading.kajiya_kay_shading(settings)
     brightest = brightest_theta_o(strand, shading, no_shadow_maps, theta_i)
     assert brightest == pytest.approx(-theta_i, abs=STEP)
-    # The colour of the highlight is its brightness there; the diffuse part, sin(T, L) / pi², comes on top.
+    # The color of the highlight is its brightness there; the diffuse part, sin(T, L) / pi², comes on top.
     seen = brightness(strand, shading, no_shadow_maps, towards(theta_i, 2.0), towards(-theta_i))
     expected = 0.5 + 0.2 * math.cos(theta_i) / math.pi**2
     np.testing.assert_allclose(seen, expected, rtol=2.0**-10)  # a half float, cut off
@@ -84,7 +84,7 @@ def test_kajiya_kay_is_brightest_on_the_mirror_cone(strand, no_shadow_maps, thet
 def test_the_first_highlight_of_marschner_is_shifted_towards_the_root_by_twice_the_tilt(
     strand, no_shadow_maps, theta_i, tilt
 ):
-    """M_R peaks where (theta_i + theta_o) / 2 = -tilt; in a black fibre there is no other path [Marschner03]."""
+    """M_R peaks where (theta_i + theta_o) / 2 = -tilt; in a black fiber there is no other path [Marschner03]."""
     settings = lookup_tables.Settings(sigma_a=(50.0, 50.0, 50.0), tilt=tilt, beta_r=math.radians(3.0), glint_gain=0.0)
     shading = hair_shading.marschner_shading(lookup_tables.bake(settings))
     # Half a degree of leave: 1 / cos²(theta_d) and Fresnel's factor vary across the lobe, and texels are 0.7° wide.

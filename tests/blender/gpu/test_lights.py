@@ -14,7 +14,7 @@ from hair_addon.core.imaging import lamps
 from tests.support.pictures import glsl
 
 SIZE = 17  # pixels along a side of the picture
-WALL = 4.0  # metres along a side of the picture
+WALL = 4.0  # meters along a side of the picture
 SMALL = 0.002  # of a light, which the shaders take for a point [m]
 ABOVE = Matrix.Translation((0.2, -0.1, 2.0))
 ASLANT = Matrix.Translation((-0.5, 0.3, 1.5)) @ Euler((0.5, 0.2, 0.3)).to_matrix().to_4x4()

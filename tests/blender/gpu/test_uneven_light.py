@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light that varies around a fibre, by the functions of shaders/fibre/zonal_light.glsl."""
+"""Light that varies around a fiber, by the functions of shaders/fibre/zonal_light.glsl."""
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def test_a_mirror_sees_light_that_varies_exponentially_as_it_is(rng):
 
 
 def test_light_from_behind_is_not_seen_by_what_sends_light_back(rng):
-    """Light is positive, and the more of it the more light there is where the fibre takes it from."""
+    """Light is positive, and the more of it the more light there is where the fiber takes it from."""
     first, turned = rng.uniform(-1.0, 1.0, (2, COUNT))
     found = evaluate("azimuthal_part(vec3(first), vec3(turned))", first=first, turned=turned)
     assert (found >= 0.0).all()

@@ -74,7 +74,7 @@ def tuft(rng, strand_count=60, point_count=33, thickness=0.004):
 
 @pytest.mark.parametrize("in_compute", [True, False])
 def test_a_sample_is_covered_if_its_centre_lies_in_the_strand(shading, in_compute):
-    """Straight strands across the picture in a parallel view: the distance of a centre from the axis decides."""
+    """Straight strands across the picture in a parallel view: the distance of a center from the axis decides."""
     height, width = np.indices(SIZE[::-1])
     centres = np.stack([(width + 0.5) / SIZE[0] * 2 - 1, (height + 0.5) / SIZE[1] * 2 - 1], axis=-1)
     centres *= [HALF_WIDTH, 0.2]

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("fine_world")
 
 
 def picture(rng):
-    """A smooth coloured picture with one bright spot, as an image of Blender's."""
+    """A Blender image of a smooth colored picture with one bright spot."""
     width, height = 64, 32
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     pixels = np.ones((height, width, 4), np.float32)

@@ -55,7 +55,7 @@ def test_properties_are_as_blender_writes_them(hair, tmp_path):
 
 
 def test_blender_takes_the_curves_back(twisted, tmp_path):
-    """Blender takes Alembic as Y up and in metres: its axes turn, and its unit is the file's."""
+    """Blender takes Alembic as Y up and in meters: its axes turn, and its unit is the file's."""
     wanted = {len(o.data.curves): (100.0 * world(o), 100.0 * widths(o)) for o in twisted}
     export(tmp_path / "groom.abc")
     before = set(bpy.data.objects)

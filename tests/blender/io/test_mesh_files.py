@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays are in metres and in the axes of the surface's file, whatever Blender's importer does."""
+"""Arrays are in meters and in the axes of the surface's file, whatever Blender's importer does."""
 
 import base64
 import json

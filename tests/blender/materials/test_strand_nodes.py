@@ -52,7 +52,7 @@ def patch(scene):
 
 
 def emission_of(material):
-    """An emission in place of a material's hair; its colour socket shows what a socket of the hair would receive."""
+    """An emission in place of a material's hair; its color socket shows what a socket of the hair would receive."""
     tree = material.node_tree
     emission = tree.nodes.new("ShaderNodeEmission")
     output = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputMaterial" and node.target == "ALL")

@@ -73,7 +73,7 @@ def mean_color():
 
 
 def light_from_below(tangent, towards):
-    """(3,) radiance of a fibre in even light of radiance one that comes from below: the integral of its BSDF."""
+    """(3,) radiance of a fiber in even light of radiance one that comes from below: the integral of its BSDF."""
     tables = lookup_tables.bake(appearance.table_settings(BLACK))
     z, turn = (np.arange(60) + 0.5) / 60, 2.0 * np.pi * (np.arange(120) + 0.5) / 120
     z, turn = (grid.ravel() for grid in np.meshgrid(-z, turn))

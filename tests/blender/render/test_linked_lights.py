@@ -17,7 +17,7 @@ NAMES = ("Hair", "Sphere")
 
 @pytest.fixture
 def suns(lit):
-    """{object's name: a sun of a colour of its own, beside the camera}, and the object is white."""
+    """{object's name: a sun of a color of its own, beside the camera}, and the object is white."""
     bpy.data.objects["Sun"].hide_render = True
     found = {}
     for name, color in zip(NAMES, ((1.0, 0.2, 0.2), (0.2, 0.2, 1.0)), strict=True):

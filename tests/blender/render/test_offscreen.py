@@ -113,7 +113,7 @@ def test_more_samples_than_the_driver_supports_are_refused(lit):
 
 
 def curtain(distance, count=400, width=1.0, radius=0.001):
-    """`count` vertical strands side by side over `width` metres, at a distance along +Y: (S, 3, 3) points, radii."""
+    """`count` vertical strands side by side over `width` meters, at a distance along +Y: (S, 3, 3) points, radii."""
     x = (np.arange(count) + 0.5) / count * width - 0.5 * width
     z = np.linspace(-0.5 * width, 0.5 * width, 3)
     strands = np.stack(np.broadcast_arrays(x[:, None], distance, z[None, :]), axis=-1).astype(np.float32)

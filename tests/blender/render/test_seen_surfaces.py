@@ -68,7 +68,7 @@ def hair_on(surface, **settings):
 
 @pytest.fixture
 def stage(scene):
-    """A blue wall in the sun, and an orthographic camera that looks along Y at two metres."""
+    """A blue wall in the sun, and an orthographic camera that looks along Y at two meters."""
     add_orthographic_camera(scene)
     sun(0.0)
     plane(matt(0.1, 0.2, 0.8), size=4.0, name="Wall")

@@ -54,7 +54,7 @@ def material_of(surface, **inputs):
 
 @pytest.fixture
 def stage(scene):
-    """A scene with an orthographic camera that looks along Y at two metres, without lights; nothing in it."""
+    """A scene with an orthographic camera that looks along Y at two meters, without lights; nothing in it."""
     add_orthographic_camera(scene)
     return scene
 

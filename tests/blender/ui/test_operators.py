@@ -31,7 +31,7 @@ def refusal(operator, **arguments):
 
 @pytest.fixture
 def camera(scene):
-    """The scene's camera, four metres in front of the origin."""
+    """The scene's camera, four meters in front of the origin."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = (0.0, -6.0, 0.0), (math.pi / 2, 0.0, 0.0)
     scene.collection.objects.link(camera)

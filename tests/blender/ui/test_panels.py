@@ -63,7 +63,7 @@ def test_every_setting_has_a_row(hair, settings_class, active):
 @pytest.mark.parametrize("parametrization", appearance.COLOR_FIELDS)
 @pytest.mark.parametrize("model", ["KAJIYA_KAY", "MARSCHNER"])
 def test_shading_offers_what_changes_the_picture(hair, model, parametrization):
-    """One kind of colour, and all else of the appearance once."""
+    """One kind of color, and all else of the appearance once."""
     state = hair.data.vellus
     state.model, state.appearance.parametrization = model, parametrization
     drawn = draw_all([panel for panel in TAB if panel.bl_idname.startswith("VELLUS_PT_shading")])

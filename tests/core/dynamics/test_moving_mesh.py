@@ -53,7 +53,7 @@ def test_without_inertia_guides_move_with_the_mesh(guides):
 
 
 def test_a_model_of_another_size_moves_as_its_original_does(guides):
-    """Vertices are in units of which `size` are a metre."""
+    """Vertices are in units of which `size` are a meter."""
     poses = [np.float32(turned(0.0, (0.01 * frame, 0.0, 0.0)).moved(BALL.vertices)) for frame in range(1, 6)]
     settings = DynamicsSettings(cell_size=0.02)
     large = replace(settings, size=0.125, collision_distance=8.0 * settings.collision_distance, cell_size=0.16)

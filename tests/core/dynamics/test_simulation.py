@@ -97,7 +97,7 @@ def test_a_jump_takes_hair_along_as_it_is(rng):
 
 
 def test_a_place_far_away_is_as_good(rng):
-    """A kilometre away single precision would be a tenth of a millimetre, were it not counted from near the hair."""
+    """A kilometer away single precision would be a tenth of a millimeter, were it not counted from near the hair."""
     groom, pose = fur(rng)
     ends = []
     for far in (np.zeros(3), np.array([1000.0, -512.0, 250.125])):
@@ -293,7 +293,7 @@ def test_pinned_points_only_follow_the_surface(rng, pinned):
 
 
 def test_a_number_of_substeps_that_is_set_is_taken_and_more_are_asked_for(rng):
-    """The number asked for is that of automatic substeps in fast frames."""
+    """Automatic substeps are the requested number in fast frames."""
     groom, pose = fur(rng)
     fixed, automatic = (
         Simulation(groom, DynamicsSettings(automatic_substeps=is_automatic), pose, World(), DEVICE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands on a deforming surface: rooted, rigid under rigid motion, and continuous between neighbours."""
+"""Strands on a deforming surface: rooted, rigid under rigid motion, and continuous between neighbors."""
 
 import numpy as np
 import pytest
@@ -105,7 +105,7 @@ def test_roots_stay_on_the_surface_and_strands_keep_their_shape(sphere, rng, kin
 
 
 def turns_along_a_line(square, after, count):
-    """Largest turn [rad] between neighbours of strands that stand close together along a line across a square."""
+    """Largest turn [rad] between neighbors of strands that stand close together along a line across a square."""
     place = np.linspace(0.05, 0.95, count)
     roots = [(x, 0.5 + 0.2 * (x - 0.5)) for x in place]
     # Cells of a grid of 16: the lower triangle of a cell is (corner, right, above), the upper (right, diagonal, above).

@@ -191,7 +191,7 @@ def test_wet_presets_are_soaked_hair(name):
 
 @pytest.mark.parametrize("name", NATURAL)
 def test_hair_darkens_with_each_step_of_wetness(name):
-    """What a fibre scatters and what it sends back, of all light; and R's share of it, for Kajiya and Kay's model."""
+    """What a fiber scatters and what it sends back, of all light; and R's share of it, for Kajiya and Kay's model."""
     looks = [appearance.wetted(presets.PRESETS[name][1], wetness) for wetness in STEPS]
     small = lookup_tables.Settings(size=32)
     tables = [lookup_tables.bake(appearance.table_settings(look, small)) for look in looks]

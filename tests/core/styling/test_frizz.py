@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Frizz: its size, its spectrum, and how alike neighbours are."""
+"""Laws of Frizz: its size, its spectrum, and how alike neighbors are."""
 
 import numpy as np
 import pytest

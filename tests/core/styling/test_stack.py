@@ -46,7 +46,7 @@ def combed_guides(hair, chosen, amount=0.01):
 
 @pytest.mark.parametrize("name", STACKS)
 def test_a_stroke_reaches_every_strand_that_moves(hair, name):
-    """Found by comparing all strands; and no strand is found that follows no moved guide and no moved centre."""
+    """Found by comparing all strands; and no strand is found that follows no moved guide and no moved center."""
     bound = hair.bound(*STACKS[name])
     followers = guide_weights.reach(hair.binding.guide_weights, len(hair.guides))
     before = hair.styled(*STACKS[name])

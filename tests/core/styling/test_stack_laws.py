@@ -56,7 +56,7 @@ def test_every_style_does_something(hair, style):
 
 
 def require_same_lengths(after, before):
-    """Of each segment, and of whole strands, but for the rounding of coordinates of up to a metre."""
+    """Of each segment, and of whole strands, but for the rounding of coordinates of up to a meter."""
     after, before = (segment_lengths(points.astype(np.float64)) for points in (after, before))
     np.testing.assert_allclose(after, before, rtol=2e-5, atol=1e-7)
     np.testing.assert_allclose(after.sum(axis=1), before.sum(axis=1), rtol=2e-6, atol=2e-7)
@@ -154,7 +154,7 @@ def test_the_width_of_vectors_does_not_matter(rng, width):
 def test_rounding_is_not_amplified(rng, point_count):
     """Strands whose coordinates are rounded the other way are styled alike, however many points they have.
 
-    Half of the strands are longer than their lock's centre: the direction of its last segment carries them on.
+    Half of the strands are longer than their lock's center: the direction of its last segment carries them on.
     """
     strands = curved_strands(rng, 100, point_count=point_count)
     members = rng.integers(0, 5, 100)

@@ -19,7 +19,7 @@ TOOLS = {(tool,): values for tool, values in SHAPING.items()} | {
     ("change_guide_count", "fewer"): {"factor": 0.5},
     ("change_guide_count", "more"): {"factor": 2.0},
 }
-# Values in metres, fitted to the size of the surface.
+# Values in meters, fitted to the size of the surface.
 SIZED = {"attract_guides": ["clearance"], "push_outside": ["clearance"]}
 
 

@@ -83,7 +83,7 @@ def mirrored():
 
 
 def rig_in_centimetres():
-    """The head on a rig whose unit is a centimetre, to which all transforms are applied with the rig."""
+    """The head on a rig whose unit is a centimeter, to which all transforms are applied with the rig."""
     rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.scene.collection.objects.link(rig)
     rig.scale, rig.location = (0.01,) * 3, (0.1, 0.2, 0.0)

@@ -111,7 +111,7 @@ def grown(surface, guides=None, hair=None, look=None):
 
 
 def cube(found, _folder):
-    """Kajiya-Kay; few neighbours; all settings that are fitted to the surface at their defaults."""
+    """Kajiya-Kay; few neighbors; all settings that are fitted to the surface at their defaults."""
     bpy.ops.mesh.primitive_cube_add()
     guides = api.distribute_guides(bpy.context.object, guide_count=50)
     hair = api.interpolate_hair(guides, strand_count=800, neighbour_limit=2, keep_length=0.3, guide_map=False)

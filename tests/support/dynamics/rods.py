@@ -13,9 +13,9 @@ from tests.support.devices import DEVICE
 
 FRAME = 1.0 / 24.0  # [s]
 GRAVITY = (0.0, 0.0, -9.81)
-SHEAR_MODULUS = 4.0 / 2.7  # [GPa] of an isotropic fibre with Poisson's ratio 0.35
+SHEAR_MODULUS = 4.0 / 2.7  # [GPa] of an isotropic fiber with Poisson's ratio 0.35
 FIBRE = DynamicsSettings(bend_stiffness=1.0, shear_modulus=SHEAR_MODULUS)
-BENDING = 4e9 * np.pi * 4e-5**4 / 4.0  # EI of one fibre [N m²]
+BENDING = 4e9 * np.pi * 4e-5**4 / 4.0  # EI of one fiber [N m²]
 TWISTING = SHEAR_MODULUS * 1e9 * np.pi * 4e-5**4 / 2.0
 LINE_MASS = 1300.0 * np.pi * 4e-5**2  # [kg/m]
 

@@ -29,7 +29,7 @@ def stepped(
     """Return (S, P, 3) float32: strands (S, P, 3) with styles.
 
     weights: (S,) of styles with a mask; members: (S,) locks of strands, by default all in the first; centres: (K, P, 3)
-    centre strands for every level of every gathering style, by default the mean of a lock's strands; without such a
+    center strands for every level of every gathering style, by default the mean of a lock's strands; without such a
     style locks are those of guides, without points; launch: other arguments of `steps.apply_steps`.
     """
     count, point_count = points.shape[:2]

@@ -60,7 +60,7 @@ class File:
 
 
 def of_maya(path, lines):
-    """Write a file in centimetres with Y up, an object for each curve, and diameters of a tenth of a millimetre."""
+    """Write a file in centimeters with Y up, an object for each curve, and diameters of a tenth of a millimeter."""
     file, children = File("Maya 2026"), []
     for number, line in enumerate(100.0 * lines[..., [0, 2, 1]] * [1.0, 1.0, -1.0]):
         width = file.writer.array("width", "float32", np.float32([0.01]))

@@ -15,7 +15,7 @@ class Traced(NamedTuple):
 
     phi: np.ndarray  # (3, N) azimuth between the exit and the way back to the light, [0, pi]
     light: np.ndarray  # (3, N, C) part of each ray's light
-    dh: np.ndarray  # (N,) width of fibre that each ray represents; sums to 2
+    dh: np.ndarray  # (N,) width of fiber that each ray represents; sums to 2
 
 
 def trace(theta_d, eta, sigma_a, ray_count):

@@ -13,7 +13,7 @@ from hair_addon.blender.render import hair_cache
 from tests.support.pictures import drawn_strands
 from tests.support.reading import points, write_points
 
-CLOSE = 1e-5  # [m] of strands of half a metre on a ball of one
+CLOSE = 1e-5  # [m] of strands of half a meter on a ball of one
 
 
 @pytest.fixture

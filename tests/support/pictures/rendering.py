@@ -9,7 +9,7 @@ import OpenEXR
 
 
 def add_orthographic_camera(scene):
-    """Add an orthographic camera along Y at two metres."""
+    """Add an orthographic camera along Y at two meters."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
     camera.location, camera.rotation_euler = (0.0, -4.0, 0.0), (math.pi / 2, 0.0, 0.0)
@@ -69,7 +69,7 @@ def _stacked(channels):
 
 
 def light_up(color=(0.2, 0.3, 0.4)):
-    """Set a world of this colour."""
+    """Set a world of this color."""
     world = bpy.context.scene.world or bpy.data.worlds.new("World")
     bpy.context.scene.world = world
     world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)

@@ -11,7 +11,7 @@ from hair_addon.core.placement.domain import Domain
 from hair_addon.core.placement.exact_cells import CutCells
 from hair_addon.core.placement.voronoi import sites_on
 
-# Second moment of a regular hexagon about its centre divided by its squared area: the minimum of plane tessellations.
+# Second moment of a regular hexagon about its center divided by its squared area: the minimum of plane tessellations.
 HEXAGON_MOMENT = 5.0 / (18.0 * np.sqrt(3.0))
 
 

@@ -51,7 +51,7 @@ def load(path):
 
 
 def _digest(image):
-    """What the pixels depend on; of the pixels themselves if they may be painted, which Blender may not report."""
+    """Return the source of the pixels; if they may be painted, which Blender may not report, also their digest."""
     kinds = image.source, image.filepath_raw, image.colorspace_settings.name, image.alpha_mode, tuple(image.size)
     if not _may_be_painted(image):
         return kinds

@@ -63,7 +63,7 @@ def stored_strands(hair):
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """What a map reads of Blender's data, from which its values at any roots follow.
+    """Data that a map reads from Blender, which determine its values at any roots.
 
     hair_uid: session UID of the hair; corners: (F, 3, C) float32 of a vertex group or attribute, or the UVs for an
     image; pixels: {UDIM tile: (H, W, C)} of an image; of_curves: (S, C) of an attribute of the hair; None for other

@@ -15,7 +15,7 @@ from . import guide_tools
 
 @dataclass(frozen=True)
 class GuideState:
-    """Whether settings do not apply to guides, and their median length [m] at the surface's scale."""
+    """Whether settings do not apply to guides, and the guides' median length [m] at the surface's scale."""
 
     is_combed: bool
     length: float

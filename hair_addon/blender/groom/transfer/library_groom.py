@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Grooms for an asset library: extraction from hair, and application to a mesh object.
 
-A groom is in metres and in the axes of its surface's object without that object's rotation, so that a rotated or scaled
+A groom is in meters and in the axes of its surface's object without that object's rotation, so that a rotated or scaled
 object reproduces it exactly.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms as USD: polylines with primvars, in metres with Z up, which Unreal, Houdini and Omniverse read.
+"""Grooms as USD: polylines with primvars, in meters with Z up, which Unreal, Houdini and Omniverse read.
 
     /groom                     Xform with the API schema GroomAPI, which identifies grooms in Unreal
     /groom/<group>             Xform

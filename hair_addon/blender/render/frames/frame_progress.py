@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Progress of a rendered frame in Blender's bar and text, and requests to stop.
 
-In a window Blender shows and hears nothing until the view layer is done: drawing windows waits for the engine that has
-the GPU context.
+In a window Blender draws nothing and reads no input until the view layer is done: drawing waits for the engine that
+has the GPU context.
 """
 
 import bpy

@@ -46,7 +46,7 @@ class QueryOptions:
 
 @wp.struct
 class Query:
-    """Which samples look for a plane, how, and the arrays that they are in."""
+    """The samples that search for a plane, the kind of search, and the arrays with the samples."""
 
     surface: Surface
     asking: QueryOptions

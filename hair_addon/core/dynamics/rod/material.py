@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Material of strands: masses, inertias, compliances and drag of each point and segment, from settings.
 
-With the radius r of a fibre of length L, its section A = π r², stiffness k and lengths l_j of segments:
+With the radius r of a fiber of length L, its section A = π r², stiffness k and lengths l_j of segments:
 
     EI = k E π r⁴ / 4,    GJ = k G π r⁴ / 2,    EA = E A
     m_i = ρ A (l_(i-1) + l_i) / 2,    I_j = ρ A l_j³ / 12
     b_0 = l_0 / 2,    b_j = (l_(j-1) + l_j) / 2                             length of strand that joint j bends
 
-A guide represents a wisp of n fibres; n scales weight and stiffness alike and cancels, and k describes how much fibres
-stick together. Wet hair weighs 1.3 times as much, and swollen fibres have half their stiffness [Robbins12].
+A guide represents a wisp of n fibers; n scales weight and stiffness alike and cancels, and k describes how much fibers
+stick together. Wet hair weighs 1.3 times as much, and swollen fibers have half their stiffness [Robbins12].
 
 Drag of a cylinder in air perpendicular to its axis, per length [N s/m²], with Re = 2 r |v| / ν [White06]:
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Curves of [Alembic26] files as a `CurveFile`, with their transforms and the groom attributes of [UnrealGroom26].
 
-Alembic files have no unit and no up axis. Files of Vellus are in centimetres with Z up; for other programs their
+Alembic files have no unit and no up axis. Files of Vellus are in centimeters with Z up; for other programs their
 default convention is assumed.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reader of untrusted [Alembic26] archives in Ogawa; alembic.py and ogawa.py document the layout.
+"""Reader of untrusted [Alembic26] archives in Ogawa; writer.py and ogawa.py document the layout.
 
 Every position, size and count is checked before it is used, and each object and property is visited once: memory and
 time are bounded by the size of the file. Damaged data raises `Damaged`.

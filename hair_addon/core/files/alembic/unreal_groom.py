@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms for Unreal: an Alembic file as specified in [UnrealGroom26], version 1.5, in centimetres with Z up.
+"""Grooms for Unreal: an Alembic file as specified in [UnrealGroom26], version 1.5, in centimeters with Z up.
 
     groom                    transform: version, tool, settings
       <group>_guides         transform

@@ -14,7 +14,7 @@ from .. import strands
 # Accuracy of polylines: for a strand of 20 cm 40 µm, half a hair's thickness. The relative error of the length is at
 # most the angle squared / 24, 0.1 %.
 SAGITTA = 2e-4  # largest distance from the curve, as a fraction of its length
-TURN = 0.15  # largest angle between neighbouring lines [rad]
+TURN = 0.15  # largest angle between neighboring lines [rad]
 
 _MOST_LINES = 128  # of a segment
 _AT_ONCE = 2048  # segments in a batch, which fits caches

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Search and order: sorting, nearest neighbours, clusters, trees of triangles."""
+"""Search and order: sorting, nearest neighbors, clusters, trees of triangles."""
 
 from typing import TYPE_CHECKING
 

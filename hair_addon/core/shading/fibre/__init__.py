@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light scattering by one fibre: the reference formulas of the shaders."""
+"""Light scattering by one fiber: the reference formulas of the shaders."""
 
 from typing import TYPE_CHECKING
 

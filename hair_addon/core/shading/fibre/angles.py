@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Marschner's angles about a fibre [Marschner03], from directions and back.
+"""Marschner's angles about a fiber [Marschner03], from directions and back.
 
-The tangent points from root to tip, `to_light` and `to_view` away from the fibre; all three are unit vectors (..., 3).
+The tangent points from root to tip, `to_light` and `to_view` away from the fiber; all three are unit vectors (..., 3).
 An inclination theta is measured from the normal plane, positive towards the tip. The azimuth phi is turned about the
 tangent from the light to the viewer: 0 looks back at the light, pi looks straight through. Radians everywhere.
 """

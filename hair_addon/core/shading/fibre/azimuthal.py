@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Azimuthal roughness: the trimmed logistic of [Chiang16], and its convolution with tables.
 
-A rough fibre's N_p is a smooth one's, convolved over the circle of phi. So tables of rough fibres come from those of
+A rough fiber's N_p is a smooth one's, convolved over the circle of phi. So tables of rough fibers come from those of
 smooth ones, whose texels are exact means, by one matrix: no energy is lost, and roughness 0 is the smooth table.
 """
 
@@ -29,8 +29,8 @@ def forward_mean(edges: np.ndarray) -> np.ndarray:
     """(W, W) matrix that averages N over light from around each phi that strands have scattered forward.
 
     The weight at a distance x is cos²(x) up to pi / 2. Its mean cosine, 8 / 3 pi or 0.85, is about that of light that a
-    fibre scatters into the half circle ahead, 0.80 to 0.83 for brown to white hair; N^G of [Zinke08] weights the half
-    circle evenly (0.64), which such light comes to after three fibres.
+    fiber scatters into the half circle ahead, 0.80 to 0.83 for brown to white hair; N^G of [Zinke08] weights the half
+    circle evenly (0.64), which such light comes to after three fibers.
     """
 
     def second_antiderivative(x):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Elliptic fibres: the internal reflection of a circular fibre with an effective index that depends on the azimuth
+"""Elliptic fibers: the internal reflection of a circular fiber with an effective index that depends on the azimuth
 [Marschner03].
 
 The index eta* is that of a circle that would bend light as the ellipse does where light and viewer are, on average, at
@@ -21,7 +21,7 @@ def layer_etas(eta: float, eccentricity: float) -> np.ndarray:
 
 
 def layer_weights(cosine: np.ndarray) -> np.ndarray:
-    """How much of each layer, (..., 4), a fibre shows at cos(2 phi_h) (...)."""
+    """How much of each layer, (..., 4), a fiber shows at cos(2 phi_h) (...)."""
     place = 0.5 * (LAYER_COUNT - 1) * (1.0 - np.asarray(cosine)[..., None])
     return np.maximum(0.0, 1.0 - np.abs(place - np.arange(LAYER_COUNT)))
 
@@ -29,7 +29,7 @@ def layer_weights(cosine: np.ndarray) -> np.ndarray:
 def major_axis(tangent: np.ndarray, random: Values) -> np.ndarray:
     """Unit vector (..., 3) of the section's major axis: a direction of the strand's own, across its tangent (..., 3).
 
-    It turns with the fibre, and has a seam only where a strand runs along that one direction.
+    It turns with the fiber, and has a seam only where a strand runs along that one direction.
     """
     z, turn = 2.0 * random - 1.0, 2.0 * np.pi * ((random * 1021.0) % 1.0)
     radius = np.sqrt(1.0 - z * z)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Energy-conserving rough fibre: R, TT, TRT and all longer paths [DEon11] [Chiang16], as in Cycles.
+"""Energy-conserving rough fiber: R, TT, TRT and all longer paths [DEon11] [Chiang16], as in Cycles.
 
 The radiance towards the viewer, for irradiance 1 on a plane facing the light, is the sum over the lobes p of
-M_p(theta_i, theta_o) N_p(theta_o, phi). It is a density of the light's direction, and a white fibre in a uniform
+M_p(theta_i, theta_o) N_p(theta_o, phi). It is a density of the light's direction, and a white fiber in a uniform
 surrounding returns exactly that surrounding, whatever its roughness and tilt. It isn't reciprocal: N is taken at
-theta_o, as the paths through the fibre are traced back from the viewer.
+theta_o, as the paths through the fiber are traced back from the viewer.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ LOBES = (paths.R, paths.TT, paths.TRT, paths.RESIDUAL)
 
 
 def lobes(settings: Settings, roughness: Values | None = None) -> list[tuple[float, Values]]:
-    """[(shift, v)] of the four lobes: centre [rad] and variance [rad²] in theta_i + theta_o.
+    """[(shift, v)] of the four lobes: center [rad] and variance [rad²] in theta_i + theta_o.
 
     roughness: (...) of strands that differ in it; None: the settings' own.
     """
@@ -44,7 +44,7 @@ def m_lobes(
 
 
 def near_field_lobes(h: Values, phi: Values, cos_theta_o: Values, settings: Settings) -> np.ndarray:
-    """A_p D_s (..., 4, C) of the one ray that meets the fibre at the offset h (...) in [-1, 1]."""
+    """A_p D_s (..., 4, C) of the one ray that meets the fiber at the offset h (...) in [-1, 1]."""
     gamma = np.arcsin(h)
     eta_prime, _ = bravais_indices(cos_theta_o, settings.eta)
     scale = scale_from_radial_roughness(settings.radial_roughness)
@@ -61,7 +61,7 @@ def near_field_lobes(h: Values, phi: Values, cos_theta_o: Values, settings: Sett
 
 
 def n_lobes(phi: Values, cos_theta_o: Values, settings: Settings, node_count: int = 200) -> np.ndarray:
-    """N_p (..., 4, C) by quadrature: the mean of `near_field_lobes` over the fibre's width.
+    """N_p (..., 4, C) by quadrature: the mean of `near_field_lobes` over the fiber's width.
 
     200 nodes leave less than 1e-4 from a radial roughness of 0.15 on; `lookup_tables` needs none.
     """
@@ -79,6 +79,6 @@ def lobe_sum(m: np.ndarray, n: np.ndarray, n_trt: np.ndarray, n_res: np.ndarray)
 
 
 def scattering(angles: FibreAngles, settings: Settings) -> np.ndarray:
-    """Radiance per irradiance (..., C) at `FibreAngles` (...) from a fibre narrower than a pixel."""
+    """Radiance per irradiance (..., C) at `FibreAngles` (...) from a fiber narrower than a pixel."""
     m = m_lobes(angles.theta_i, angles.theta_o, settings)
     return np.einsum("...p,...pc->...c", m, n_lobes(angles.phi, np.cos(angles.theta_o), settings))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fresnel reflectance of a dielectric, and the effective indices in the fibre's normal plane."""
+"""Fresnel reflectance of a dielectric, and the effective indices in the fiber's normal plane."""
 
 import numpy as np
 

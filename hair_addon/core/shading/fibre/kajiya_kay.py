@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The opaque cylinder of [Kajiya89], Eq. 11-13 of [Report12].
 
-Convention: light that falls on the fibre with irradiance E on a plane facing the light leaves it with the radiance
+Convention: light that falls on the fiber with irradiance E on a plane facing the light leaves it with the radiance
 `kajiya_kay(...) * E`. The cosine of the light's inclination is therefore already in it.
 """
 
@@ -20,7 +20,7 @@ _LEAST_EXPONENT, _GREATEST_EXPONENT = 1.0, 10000.0
 
 @dataclass(frozen=True)
 class Settings(_Settings):
-    """An opaque fibre. With the defaults, diffuse reflection returns 0.3 of red light and the highlight 0.1."""
+    """An opaque fiber. With the defaults, diffuse reflection returns 0.3 of red light and the highlight 0.1."""
 
     diffuse_color: tuple = param((0.30, 0.18, 0.10), "Diffuse albedo of the fiber", low=0.0, high=1.0, subtype="COLOR")
     specular_color: tuple = param(
@@ -70,7 +70,7 @@ def kajiya_kay_of_strands(
 def kajiya_kay_diffuse(tangent: np.ndarray, to_light: np.ndarray) -> np.ndarray:
     """sin(T, L), the cosine of the light's inclination, (...). Eq. 11.
 
-    Greatest for light across the fibre and zero along it: the report's text says the opposite.
+    Greatest for light across the fiber and zero along it: the report's text says the opposite.
     """
     return sin_from_cos(np.sum(tangent * to_light, axis=-1))
 
@@ -79,7 +79,7 @@ def kajiya_kay_specular(tangent: np.ndarray, to_light: np.ndarray, to_view: np.n
     """max(0, cos(theta_i + theta_o))^exponent, (...): 1 on the mirror cone theta_o = -theta_i. Eq. 12.
 
     Departs from the report: its second sine is of V, and the product of cosines is subtracted because L and V both
-    point away from the fibre.
+    point away from the fiber.
     """
     t_dot_l = np.sum(tangent * to_light, axis=-1)
     t_dot_v = np.sum(tangent * to_view, axis=-1)
@@ -88,10 +88,10 @@ def kajiya_kay_specular(tangent: np.ndarray, to_light: np.ndarray, to_view: np.n
 
 
 def kajiya_kay(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray, settings: Settings) -> np.ndarray:
-    """Radiance per irradiance towards the viewer, RGB (..., 3). Eq. 13, with K taken into the colours."""
+    """Radiance per irradiance towards the viewer, RGB (..., 3). Eq. 13, with K taken into the colors."""
     diffuse = kajiya_kay_diffuse(tangent, to_light)[..., None]
     specular = kajiya_kay_specular(tangent, to_light, to_view, settings.exponent)[..., None]
-    # The integral of sin(T, L) over the sphere is pi^2: divided by it, the diffuse colour is an albedo.
+    # The integral of sin(T, L) over the sphere is pi^2: divided by it, the diffuse color is an albedo.
     return np.asarray(settings.diffuse_color) * diffuse / np.pi**2 + np.asarray(settings.specular_color) * specular
 
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light scattered by a translucent fibre in three paths: R, TT and TRT [Marschner03], Eq. 14-17 of [Report12].
+"""Light scattered by a translucent fiber in three paths: R, TT and TRT [Marschner03], Eq. 14-17 of [Report12].
 
-S = sum over the paths p of M_p(theta_h) N_p(theta_d, phi) / cos^2(theta_d). Lengths are in fibre radii, so sigma_a is
+S = sum over the paths p of M_p(theta_h) N_p(theta_d, phi) / cos^2(theta_d). Lengths are in fiber radii, so sigma_a is
 per radius. Each function evaluates one point exactly and is vectorised over it; `lookup_tables` averages over texels.
 
-Convention: irradiance E on a plane facing the light leaves the fibre with the radiance
-`scattering(...) * cos(theta_i) * E`, averaged over the fibre's width.
+Convention: irradiance E on a plane facing the light leaves the fiber with the radiance
+`scattering(...) * cos(theta_i) * E`, averaged over the fiber's width.
 """
 
 import math
@@ -22,12 +22,12 @@ from .fresnel import bravais_indices, dielectric_reflectance
 from .pigment import sigma_a_from_melanin
 from .principled import beta_r_from_roughness
 
-# Shift of each lobe's centre in theta_h per cuticle tilt. A traced tilted wedge gives -1, eta - 1, 2 eta - 1
+# Shift of each lobe's center in theta_h per cuticle tilt. A traced tilted wedge gives -1, eta - 1, 2 eta - 1
 # (-1, +0.55, +2.10 for hair), which Cycles' set approaches more closely than the published one.
 _SHIFTS = {"CYCLES": (-1.0, 0.5, 2.0), "PUBLISHED": (-1.0, 0.5, 1.5)}
 _WIDTHS = (1.0, 0.5, 2.0)  # of each lobe, relative to R's [Marschner03]
 
-# Keeps 1 / cos^2(theta_d) finite where light and view run along the fibre, and cos(theta_i) takes it to nothing.
+# Keeps 1 / cos^2(theta_d) finite where light and view run along the fiber, and cos(theta_i) takes it to nothing.
 LEAST_COS_THETA_D = 1e-3
 
 LEAST_BETA_R, GREATEST_BETA_R = math.radians(1.0), math.radians(45.0)
@@ -37,7 +37,7 @@ _BROWN = tuple(round(float(channel), 3) for channel in sigma_a_from_melanin(0.65
 
 @dataclass(frozen=True)
 class Settings(_Settings):
-    """The optics of a fibre with a circular section.
+    """The optics of a fiber with a circular section.
 
     Both modes share index, absorption and tilt; what follows is of the energy-conserving mode, then of the classic one.
     """
@@ -163,7 +163,7 @@ def beta_r_of(roughness: Values) -> np.ndarray:
 
 
 def longitudinal_lobes(settings: Settings, beta_r: Values | None = None) -> list[tuple[float, Values]]:
-    """[(alpha, beta)] of R, TT and TRT: centre and standard deviation in theta_h.
+    """[(alpha, beta)] of R, TT and TRT: center and standard deviation in theta_h.
 
     beta_r: R's deviation (...) on strands that differ in it; None: the settings' own.
     """

@@ -2,7 +2,7 @@
 """Rays through a smooth cylinder, flattened into its normal plane by the Bravais indices [Marschner03].
 
 A path p crosses the inside p times: R, TT, TRT; RESIDUAL stands for all the longer ones together. A ray is named by
-gamma, its angle of incidence in the normal plane; h = sin(gamma) is its offset from the axis. Lengths are in fibre
+gamma, its angle of incidence in the normal plane; h = sin(gamma) is its offset from the axis. Lengths are in fiber
 radii. cos_theta_d (...) in (0, 1].
 """
 
@@ -22,7 +22,7 @@ def exit_angle(p: int, gamma: Values, eta_prime: Values) -> np.ndarray:
 
 
 def exit_angle_slope(p: int, gamma: Values, eta_prime: Values) -> np.ndarray:
-    """d(phi) / d(gamma), finite at the fibre's rim where d(phi) / d(h) is not."""
+    """d(phi) / d(gamma), finite at the fiber's rim where d(phi) / d(h) is not."""
     return 2.0 * p * np.cos(gamma) / np.sqrt(np.square(eta_prime) - np.square(np.sin(gamma))) - 2.0
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Absorption per fibre radius from pigment or from the overall colour of hair.
+"""Absorption per fiber radius from pigment or from the overall color of hair.
 
 The constants are those of Blender's Principled Hair, so that viewport and Cycles agree.
 """
@@ -13,36 +13,36 @@ from .angles import Values
 _EUMELANIN = np.array([0.506, 0.841, 1.653])
 _PHEOMELANIN = np.array([0.343, 0.733, 1.924])
 
-FITTED_IOR = 1.55  # of the fibres that [Chiang16] fitted colours to
+FITTED_IOR = 1.55  # of the fibers that [Chiang16] fitted colors to
 
 # Transmittance of full melanin, as its absorption is finite.
 LEAST_LIGHT = 1e-4
 
-# Colours are limited to below 1 and above 0: black would need infinite absorption, and white fibres scatter forever.
+# Colors are limited to below 1 and above 0: black would need infinite absorption, and white fibers scatter forever.
 _DARKEST = 1e-4
 _BRIGHTEST = 0.9999
 
 
 def sigma_a_from_melanin(melanin: Values, redness: Values) -> np.ndarray:
-    """Amount of pigment and its red share, both (...) in [0, 1] → sigma_a (..., 3) per fibre radius."""
+    """Amount of pigment and its red share, both (...) in [0, 1] → sigma_a (..., 3) per fiber radius."""
     concentration = -np.log(np.maximum(1.0 - np.asarray(melanin, float), LEAST_LIGHT))[..., None]
     redness = np.asarray(redness, float)[..., None]
     return concentration * ((1.0 - redness) * _EUMELANIN + redness * _PHEOMELANIN)
 
 
 def sigma_a_from_color(color: ArrayLike, azimuthal_roughness: Values = 0.3) -> np.ndarray:
-    """Colour of a groom, linear RGB (..., 3) → the sigma_a (..., 3) of its fibres [Chiang16]."""
+    """Colour of a groom, linear RGB (..., 3) → the sigma_a (..., 3) of its fibers [Chiang16]."""
     color = np.clip(color, _DARKEST, _BRIGHTEST)
     return np.square(np.log(color) / color_falloff(azimuthal_roughness))
 
 
 def color_from_sigma_a(sigma_a: ArrayLike, azimuthal_roughness: Values = 0.3) -> np.ndarray:
-    """The colour, linear RGB (..., 3), that light takes on among many fibres of sigma_a (..., 3) [Chiang16]."""
+    """The color, linear RGB (..., 3), that light takes on among many fibers of sigma_a (..., 3) [Chiang16]."""
     return color_from_falloff(sigma_a, color_falloff(azimuthal_roughness))
 
 
 def color_of_scattering(color: ArrayLike, scattering: Values) -> np.ndarray:
-    """The colour (..., 3) of hair whose fibres send back more light, or less; color (..., 3): where scattering is 1.
+    """The color (..., 3) of hair whose fibers send back more light, or less; color (..., 3): where scattering is 1.
 
     Kubelka and Munk's deep layer: where a part K of the light is absorbed and a part S sent back, the reflectance R
     follows from K / S = (1 - R)² / (2 R). Here K stays, and S is multiplied by `scattering`, positive.
@@ -53,10 +53,10 @@ def color_of_scattering(color: ArrayLike, scattering: Values) -> np.ndarray:
 
 
 def color_from_falloff(sigma_a: ArrayLike, falloff: Values) -> np.ndarray:
-    """The colour of many fibres of sigma_a (..., 3) by the `color_falloff` of their azimuthal roughness."""
+    """The color of many fibers of sigma_a (..., 3) by the `color_falloff` of their azimuthal roughness."""
     return np.exp(-falloff * np.sqrt(sigma_a))
 
 
 def color_falloff(roughness: Values) -> np.ndarray:
-    """Fit of [Chiang16] to path traced grooms: how fast ln(colour) falls with sqrt(sigma_a)."""
+    """Fit of [Chiang16] to path traced grooms: how fast ln(color) falls with sqrt(sigma_a)."""
     return np.polynomial.polynomial.polyval(roughness, [5.969, -0.215, 2.532, -10.73, 5.574, 0.245])

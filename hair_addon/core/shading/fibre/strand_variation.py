@@ -53,7 +53,7 @@ def strand_sigma_a(settings: Settings, random: Values, position: Values) -> np.n
 
 
 def sigma_a_along(settings: Settings, random: Values, gradient: Values) -> np.ndarray:
-    """sigma_a (..., 3) where the root's colour has turned into the tip's by a part (...)."""
+    """sigma_a (..., 3) where the root's color has turned into the tip's by a part (...)."""
     pigment = pigment_factor(settings.melanin, settings.random_color, random)[..., None] * settings.pigment
     gradient = np.asarray(gradient, float)[..., None]
     at_root = pigment + np.asarray(settings.dye)

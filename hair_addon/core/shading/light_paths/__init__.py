@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among strands: paths from the viewer through a grid of fibres, and their means by voxel.
+"""Light among strands: paths from the viewer through a grid of fibers, and their means by voxel.
 
 Kernels here run on CPU, on CUDA and, translated by `core/kernels/glsl_text.py`, on any graphics card: they use only
 what that supports (`tests/test_metal.py` translates them all).

@@ -70,7 +70,7 @@ def met_by(
 
 
 def seen_by(grid: StrandGrid, corners: np.ndarray, view: View, ray_count: int, seed: int = 0) -> Seen:
-    """`Seen` of `met_by`: nothing is drawn of the strands yet."""
+    """Return `Seen` with the segments and places of `met_by`, and black drawn light."""
     segments, places = met_by(grid, corners, view, ray_count, seed)
     area = AREA / max(1, round(ray_count**0.5)) ** 2
     with wp.ScopedDevice(grid.device):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where paths start: places that keep to their strands from frame to frame, and random numbers of paths from there.
+"""Start places of paths, which stay on their strands from frame to frame, and random numbers of paths from there.
 
 Each segment is taken as often as it is large in the picture, in sight or not; of its places those count that rays from
 the viewer meet first. A path is known by its segment and by its number there. All its random numbers follow from these,

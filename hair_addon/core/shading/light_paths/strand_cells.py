@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which segments of strands are in which cells: voxels that hold hair are divided into cells, all others are empty.
+"""The segments of strands in each cell: voxels with hair are divided into cells, other voxels are empty.
 
 A path waits for memory longer than for arithmetic. So each cell has the lines that its segments lie on next to each
 other, of eight bytes each: most segments are told from them not to be near a ray, without being read.

@@ -205,7 +205,7 @@ def _keep(
 
 
 def _thin(strands, kept, at, first_strand, outputs):
-    """Write the points, radii, sigma_a and strands of what is kept of a system; first_strand: number of its first."""
+    """Write the points, radii, sigma_a and strands of the kept part of a system; first_strand: its index."""
     device, count = outputs[0].device, len(strands.points)
     chosen = np.arange(0, count, kept.stride)
     sigma_a = np.asarray(strands.absorption(chosen), np.float32)

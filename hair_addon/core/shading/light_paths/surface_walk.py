@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path's turn at a surface: shaders/surface.frag's diffuse surface below a rough dielectric, or metal, its value and
-its sampling.
+"""Scattering of a path at a surface: value and sampling of a diffuse surface below a rough dielectric, or of metal, as
+in surface_light.glsl.
 
 Microfacets have the GGX distribution [Walter07]. Directions are of the microfacets that the viewer sees [Heitz18] or of
 the diffuse part, by what both send back; the density is that of either.

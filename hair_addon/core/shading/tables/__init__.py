@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lookup tables of shaders, for one fibre and for many."""
+"""Lookup tables of shaders, for one fiber and for many."""
 
 from typing import TYPE_CHECKING
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""N for a range of absorptions: one 3D texture for every strand, point and colour channel.
+"""N for a range of absorptions: one 3D texture for every strand, point and color channel.
 
 N depends only on each channel's absorption. So a slice of one scalar sigma_a serves red, green and blue, and a shader
 looks up three times instead of once in the three channels of `lookup_tables`.

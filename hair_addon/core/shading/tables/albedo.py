@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reflection and transmission of a fibre under uniform light."""
+"""Reflection and transmission of a fiber under uniform light."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ _INCLINATIONS = 181
 
 
 def mean_albedo(tables: lookup_tables.Tables) -> np.ndarray:
-    """Return the radiance of a fibre in uniform light of radiance one, RGB (3,), the mean over viewing directions."""
+    """Return the radiance of a fiber in uniform light of radiance one, RGB (3,), the mean over viewing directions."""
     forward, backward = mean_parts(tables.lobes, tables.settings)
     return forward + backward
 
 
 def mean_forward(tables: lookup_tables.Tables) -> np.ndarray:
-    """Return the part of `mean_albedo` scattered to the half space behind the fibre, RGB (3,): a_f of [Zinke08]."""
+    """Return the part of `mean_albedo` scattered to the half space behind the fiber, RGB (3,): a_f of [Zinke08]."""
     return mean_parts(tables.lobes, tables.settings)[0]
 
 
@@ -37,7 +37,7 @@ def azimuthal_moments(tables: lookup_tables.Tables) -> np.ndarray:
 
 
 def fibre_moments(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> np.ndarray:
-    """Return `azimuthal_moments` (4, K, C) of one fibre; lobes: from `azimuthal_lobes`."""
+    """Return `azimuthal_moments` (4, K, C) of one fiber; lobes: from `azimuthal_lobes`."""
     theta = dual_scattering.light_inclinations()
     rows = [dual_scattering.row_weights(settings, theta, degree) for degree in range(3)]
     edges = lookup_tables.phi_edges(settings)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Means of a smooth fibre's N_p over cells of phi: the texels of its tables.
+"""Means of a smooth fiber's N_p over cells of phi: the texels of its tables.
 
 The caustic of N_TRT is infinite in its middle and finite in the mean. Means are found by sending the light A dh of the
 rays that leave through a cell into that cell.
@@ -21,7 +21,7 @@ BAKING = "Baking tables"  # the progress step
 Absorptions = Sequence[float] | np.ndarray  # sigma_a (C,)
 
 _ROWS_AT_ONCE = 32  # keeps a block's rays in the processor's cache
-# Gauss-Legendre over half the fibre, for what leaves evenly.
+# Gauss-Legendre over half the fiber, for what leaves evenly.
 _WIDE_NODES, _WIDE_WEIGHTS = np.polynomial.legendre.leggauss(64)
 
 

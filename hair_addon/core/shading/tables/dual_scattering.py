@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Multiple scattering: the tables of dual scattering [Zinke08], from those of one fibre, and light among strands.
+"""Multiple scattering: the tables of dual scattering [Zinke08], from those of one fiber, and light among strands.
 
 Of the light that hits a strand, a_f is scattered forward and a_b backward, with variances beta_f² and beta_b². All are
-per colour channel, over the inclination of the light. Front and back are the two halves of the circle of phi; the
+per color channel, over the inclination of the light. Front and back are the two halves of the circle of phi; the
 light's azimuth may be anywhere in its half, so of light scattered by phi the fraction |phi| / pi goes forward. Both
 parts give the two fluxes through a layer of strands [Kubelka31]; [Zinke08] neglects repeated backward scattering, and
 assumes an infinitely deep layer behind a strand.

@@ -19,7 +19,7 @@ _MOST = 4.0  # sqrt(sigma_a) whose transmittance is below half floats
 
 @dataclass(frozen=True, eq=False)
 class LookTables:
-    """Tables over sqrt(sigma_a), and the fibre's settings without its absorption.
+    """Tables over sqrt(sigma_a), and the fiber's settings without its absorption.
 
     dual: rows as in `dual_scattering.QUANTITIES`; returned: as in `StrandTables`; parts: fractions (K,) of uniform
     light scattered forward and backward by strands of the slices' absorption.
@@ -33,7 +33,7 @@ class LookTables:
 
     @property
     def settings(self) -> lookup_tables.Settings:
-        """The fibre's settings."""
+        """The fiber's settings."""
         return self.slices.settings
 
     def mean_parts(self, sigma_a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -38,7 +38,7 @@ Lobes = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]
 
 @dataclass(frozen=True)
 class Settings(marschner.Settings):
-    """Settings of a fibre and its tables."""
+    """Settings of a fiber and its tables."""
 
     size: int = param(
         256,

@@ -2,7 +2,7 @@
 """Tables of varied strands: N for any absorption, and multiple scattering among all strands.
 
 A strand scatters with its own absorption. The strands in front of it and behind it have any random numbers, but the
-same position along the gradient from the root's colour to the tip's. So dual scattering uses means over the random
+same position along the gradient from the root's color to the tip's. So dual scattering uses means over the random
 numbers, at each position along the gradient.
 """
 
@@ -19,7 +19,7 @@ GREATEST_SIZE = 128  # of slices: leaves 0.3 % of a peak; see DECISIONS.md
 
 _BLACK = 16.0  # sigma_a whose transmittance is below half floats; the upper limit of slices
 
-_GRADIENT_STEPS = 9  # from the root's colour to the tip's
+_GRADIENT_STEPS = 9  # from the root's color to the tip's
 _RANDOM_STEPS = 12  # number of random samples
 _RETURN_STEPS = 32  # rows of `StrandTables.returned`
 
@@ -28,7 +28,7 @@ _RETURN_STEPS = 32  # rows of `StrandTables.returned`
 class StrandTables:
     """Tables of hair with the variation of `strand_variation.Settings`.
 
-    dual: rows as in `dual_scattering.QUANTITIES`, means over strands; its slices run from the root's colour (first) to
+    dual: rows as in `dual_scattering.QUANTITIES`, means over strands; its slices run from the root's color (first) to
     the tip's (last). returned: `albedo.fibre_moments` as channels, over theta_o (columns) and sqrt(sigma_a) (rows, from
     one end of the slices' range to the other).
     """
@@ -42,7 +42,7 @@ class StrandTables:
 
     @property
     def settings(self) -> lookup_tables.Settings:
-        """The fibre's settings, without its absorption."""
+        """The fiber's settings, without its absorption."""
         return self.slices.settings
 
 

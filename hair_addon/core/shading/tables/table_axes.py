@@ -44,7 +44,7 @@ _DUAL_AXES = (
 
 
 def tables_of(mode: str) -> tuple[str, ...]:
-    """Return the names of one fibre's tables."""
+    """Return the names of one fiber's tables."""
     return ("m", "n", "n_trt", "n_res") if mode == "energy" else ("m", "n", "n_trt")
 
 

@@ -28,7 +28,7 @@ def test_hair_follows_an_armature_in_every_frame(arm, scene):
 
 
 def test_strands_between_guides_stay_between(arm, scene):
-    """A strand's arm lies among its guides' arms, at rest and bent, as far as their neighbours lie apart.
+    """A strand's arm lies among its guides' arms, at rest and bent, as far as their neighbors lie apart.
 
     This holds for 98 of 100 strands: guides in the elbow's fold, and strands next to it, are random.
     """

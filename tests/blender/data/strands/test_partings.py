@@ -20,7 +20,7 @@ FREE = {"angle_limit": math.pi, "length_limit": 1e6}
 
 @pytest.fixture
 def ground(scene):
-    """A square of one metre, 40 faces to a side."""
+    """A square of one meter, 40 faces to a side."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=40, size=1.0)
     return bpy.context.object
 
@@ -206,7 +206,7 @@ ENDS = [(0.0, -0.5, 0.0), (0.0, 0.5, 0.0)]
 
 
 def test_a_part_line_on_a_posed_surface_parts_it_at_rest(guides, ground):
-    """A line drawn on a surface that a shape key has moved by one metre."""
+    """A line drawn on a surface that a shape key has moved by one meter."""
     ground.shape_key_add(name="Basis")
     key = ground.shape_key_add(name="Key")
     for point in key.data:

@@ -21,7 +21,7 @@ from tests.support.strands.styled import head
 # Of a strand's length, by which it may differ: sums in single precision, in another order.
 CLOSE = 1e-5
 # Where hair is more sensitive than that, it may differ by twice as much as by a change of its guides' last digits: at
-# tips of rolls, and where strands turn past the centre of their clump.
+# tips of rolls, and where strands turn past the center of their clump.
 SENSITIVE = 2.0
 STRANDS = 150
 
@@ -167,7 +167,7 @@ def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
         watched.setattr(gpu.types, "GPUUniformBuf", None)
         assert style_maker.maker_of(hair.binding, other, 41, np.eye(3), maker) is maker
         points = made(maker, hair, other, strands)
-    assert sizes == [uniforms.STYLING.dtype.itemsize] * 3  # of strands, and of centres on two levels
+    assert sizes == [uniforms.STYLING.dtype.itemsize] * 3  # of strands, and of centers on two levels
     assert len(shaders.program_cache) == programs
     assert np.quantile(errors(hair, points, hair.styled(*changed)), 0.95) <= CLOSE
 

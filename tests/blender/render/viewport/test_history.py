@@ -70,7 +70,7 @@ def comb(guides, way):
 
 
 def biggest_change(frames):
-    """The 99th percentile of how far a pixel with hair changes from frame to frame, as a display shows it on grey."""
+    """The 99th percentile of how far a pixel with hair changes from frame to frame, as a display shows it on gray."""
     frames = np.array(frames)
     shown = (frames[..., :3] + 0.05 * (1.0 - frames[..., 3:])) ** (1.0 / 2.2)
     is_hair = (frames[..., 3] > 0.02).any(axis=0)

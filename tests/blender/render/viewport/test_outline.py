@@ -30,7 +30,7 @@ def matrices():
 
 
 def shown(show):
-    """(SIZE, SIZE, 4) display colours that are laid over a black viewport."""
+    """(SIZE, SIZE, 4) display colors that are laid over a black viewport."""
     texture = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
     target = gpu.types.GPUFrameBuffer(color_slots=texture)
     with target.bind():

@@ -34,7 +34,7 @@ SIZE = 96
 
 @pytest.fixture
 def colors(rng):
-    """(20000, 3) scene-linear float32, from deep shadow to glints, grey to saturated."""
+    """(20000, 3) scene-linear float32, from deep shadow to glints, gray to saturated."""
     return (2.0 ** rng.uniform(-9.0, 5.0, (20_000, 1)) * rng.random((20_000, 3)) ** 2).astype(np.float32)
 
 
@@ -99,7 +99,7 @@ def test_without_opencolorio_colours_are_the_standard_view(blender_scene, colors
 
 
 def test_hair_is_laid_over_a_viewport_in_its_colours(lit):
-    """Over white: shown is the mix of white and the light's display colour, to the power that Blender undoes."""
+    """Over white: shown is the mix of white and the light's display color, to the power that Blender undoes."""
     picture = pictured(lit, 2, per_side=2)
     transform = display_transform.DisplayTransform.of(bpy.context.scene)
     table = hair_picture.table_texture(transform.table())
@@ -159,7 +159,7 @@ def pictured(hair, passes, per_side, size=SIZE):
 
 
 def sparkles(light):
-    """How many pixels are half as bright again as the brightest of their eight neighbours."""
+    """How many pixels are half as bright again as the brightest of their eight neighbors."""
     luminance = light[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
     around = [np.roll(luminance, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y]
     return np.count_nonzero((luminance > 1.5 * np.max(around, axis=0)) & (luminance > 0.1 * luminance.max()))

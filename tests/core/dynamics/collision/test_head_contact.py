@@ -53,7 +53,7 @@ def shaken(head, guides):
 
 @pytest.mark.gate(id="V12")
 def test_hair_on_a_shaken_head_stays_outside_and_whole(head):
-    """No vertex nearer than its distance by a micrometre, no segment 3 % longer, and none put back."""
+    """No vertex nearer than its distance by a micrometer, no segment 3 % longer, and none put back."""
     touching = 0
     for simulation, apart in shaken(head, grown(head)):
         assert apart.min() > -1e-6

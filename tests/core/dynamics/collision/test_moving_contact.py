@@ -202,7 +202,7 @@ def test_a_state_gives_the_same_planes(device, rng):
 
 
 def test_points_pushed_along_their_planes_stay_outside_of_a_shaken_mesh(device, rng):
-    """660°/s about one axis, 3 Hz along another: what the planes leave inside is below a micrometre."""
+    """660°/s about one axis, 3 Hz along another: what the planes leave inside is below a micrometer."""
     ball = subdivided_sphere(3)
     ball = TriMesh(ball.vertices * np.float32([0.08, 0.095, 0.12]), ball.triangles)
     colliders = Colliders(device)

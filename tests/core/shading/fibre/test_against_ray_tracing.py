@@ -19,7 +19,7 @@ THETA_D = {degrees: np.radians(degrees) for degrees in (0, 20, 40, 47, 60, 75)} 
 
 @pytest.fixture(scope="module", params=MELANIN)
 def hair(request):
-    """(sigma_a, tables without caustic treatment) of one hair colour."""
+    """(sigma_a, tables without caustic treatment) of one hair color."""
     sigma_a = tuple(map(float, sigma_a_from_melanin(MELANIN[request.param], 0.0)))
     tables = lookup_tables.bake(lookup_tables.Settings(eta=ETA, sigma_a=sigma_a, caustic="exact", size=SIZE))
     return sigma_a, tables

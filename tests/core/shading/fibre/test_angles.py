@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Angles about a fibre: from directions, back to directions, and the symmetries between."""
+"""Angles about a fiber: from directions, back to directions, and the symmetries between."""
 
 import numpy as np
 from hypothesis import given

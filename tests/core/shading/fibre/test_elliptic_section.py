@@ -32,7 +32,7 @@ def test_weights_say_the_index_that_is_linear_in_the_cosine(rng):
 
 
 def test_azimuth_from_the_major_axis(rng):
-    """Against the angles themselves, in the frame of the fibre."""
+    """Against the angles themselves, in the frame of the fiber."""
     phi_i, phi_o, theta_i, theta_o = rng.uniform(-1.5, 1.5, (4, 300))
     light, view = (
         np.stack([np.cos(t) * np.cos(p), np.cos(t) * np.sin(p), np.sin(t)], axis=-1)
@@ -41,7 +41,7 @@ def test_azimuth_from_the_major_axis(rng):
     tangent, axis = (np.broadcast_to(base, light.shape) for base in ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
     found = elliptic_section.cos_twice_phi_h(tangent, axis, light, view)
     np.testing.assert_allclose(found, np.cos(phi_i + phi_o), atol=1e-12)
-    # As everything about a fibre, the same in any frame, and when light and viewer change places.
+    # As everything about a fiber, the same in any frame, and when light and viewer change places.
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     turned = elliptic_section.cos_twice_phi_h(tangent @ turn, axis @ turn, view @ turn, light @ turn)

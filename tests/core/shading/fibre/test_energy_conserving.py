@@ -75,7 +75,7 @@ WIDE_TOLERANCES = {0.15: 0.03, 0.3: 5e-3, 0.7: 1e-3, 1.0: 1e-3}  # by radial rou
 
 @pytest.mark.parametrize(("row", "radial_roughness"), pairs([3, 90, 173, 255], WIDE_TOLERANCES))
 def test_texels_are_the_rays_of_the_whole_width(radial_roughness, row):
-    """The matrix over exact cells against quadrature over the fibre's width, which knows no cells."""
+    """The matrix over exact cells against quadrature over the fiber's width, which knows no cells."""
     settings = energy_settings(radial_roughness=radial_roughness)
     tables = lookup_tables.bake(settings)
     phi = (np.arange(256) + 0.5) / 256 * np.pi
@@ -118,7 +118,7 @@ def test_the_first_highlight_turns_to_the_root_and_a_coat_sharpens_it_alone():
 
 
 def test_transmitted_light_is_half_as_wide_and_inner_reflections_twice():
-    """Widths as of Marschner's lobes: the deviation of theta_i + theta_o from the lobe's centre."""
+    """Widths as of Marschner's lobes: the deviation of theta_i + theta_o from the lobe's center."""
     settings = energy_settings(roughness=0.15, tilt=0.05)
     theta_i = np.linspace(-1.5, 1.5, 6001)
     weights = energy_conserving.m_lobes(theta_i, 0.0, settings) * np.cos(theta_i)[:, None]

@@ -48,7 +48,7 @@ def test_light_along_the_fibre_gives_no_diffuse_light_and_light_across_gives_mos
 
 
 def test_diffuse_colour_is_an_albedo():
-    """A fibre without highlight in a white surrounding sends back its diffuse colour in every direction."""
+    """A fiber without highlight in a white surrounding sends back its diffuse color in every direction."""
     settings = kajiya_kay.Settings(diffuse_color=(0.9, 0.5, 0.1), specular_color=(0.0, 0.0, 0.0))
     theta = (np.arange(2000) + 0.5) / 2000 * np.pi - np.pi / 2
     to_light = direction(TANGENT, NORMAL, theta, np.zeros_like(theta))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rays through the fibre: energy, the caustic, the inverse of the exit angle."""
+"""Rays through the fiber: energy, the caustic, the inverse of the exit angle."""
 
 import numpy as np
 import pytest

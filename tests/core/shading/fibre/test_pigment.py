@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pigment and colour against absorption: published values, and there and back."""
+"""Pigment and color against absorption: published values, and there and back."""
 
 import numpy as np
 import pytest
@@ -60,7 +60,7 @@ colors = st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3)
 
 @given(colors, st.floats(1e-6, 10.0), st.floats(1e-6, 10.0))
 def test_less_that_is_sent_back_darkens_as_in_a_deep_layer(color, first, second):
-    """K / S of the colours differs by the scattering, and two changes are one."""
+    """K / S of the colors differs by the scattering, and two changes are one."""
     color = np.array(color)
     np.testing.assert_allclose(pigment.color_of_scattering(color, 1.0), color, rtol=1e-12, atol=1e-300)
     found = pigment.color_of_scattering(color, first)

@@ -390,7 +390,7 @@ def test_white_fur_sends_back_what_a_random_walk_finds(rng):
 
 
 def mean_even(settings, view):
-    """Return the part of uniform light that a fibre reflects."""
+    """Return the part of uniform light that a fiber reflects."""
     return (
         2.0
         * np.pi

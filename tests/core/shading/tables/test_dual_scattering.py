@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dual scattering: forward and backward scattering of one fibre and of many."""
+"""Dual scattering: forward and backward scattering of one fiber and of many."""
 
 from dataclasses import replace
 
@@ -123,7 +123,7 @@ def test_light_that_one_fibre_scatters_forward_is_as_narrow_as_the_tables_take_i
     edges = lookup_tables.phi_edges(tables.settings)
     phi = 0.5 * (edges[1:] + edges[:-1])
     ahead = np.abs(np.diff(edges)) * phi / np.pi
-    rows = [np.eye(tables.settings.size)[-1:]] * 4  # across the fibre
+    rows = [np.eye(tables.settings.size)[-1:]] * 4  # across the fiber
     energy, moment = (
         dual_scattering.lobe_albedos(tables.lobes, ahead * weight, rows).sum(axis=0)[0]
         for weight in (np.ones_like(phi), -np.cos(phi))
@@ -223,7 +223,7 @@ def moments(theta, radiance):
 
 @pytest.mark.parametrize("strand_count", [0.0, 3.0])
 def test_lobes_are_as_bright_as_wide_and_as_shifted_as_the_tables_say(strand_count):
-    """One lobe at a time: R of a black fibre, and what comes back from behind, with the same numbers for all lights."""
+    """One lobe at a time: R of a black fiber, and what comes back from behind, with the same numbers for all lights."""
     tables, dual = baked(sigma_a=(100.0, 100.0, 100.0), tilt=0.0, roughness=0.1)
     numbers = {"a_f": 0.8, "a_b": 0.1, "beta_f": 0.03, "beta_b": 0.05, "alpha_f": 0.002, "alpha_b": 0.004}
     for name, number in numbers.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among parallel strands, against random walks: by events alone, and by the fibre's own scattering."""
+"""Light among parallel strands, against random walks: by events alone, and by the fiber's own scattering."""
 
 import numpy as np
 import pytest

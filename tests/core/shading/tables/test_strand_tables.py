@@ -23,7 +23,7 @@ def bake(look, size=64):
 
 
 def exact(tables, sigma_a):
-    """`lookup_tables.Tables` of one absorption, of the same fibre."""
+    """`lookup_tables.Tables` of one absorption, of the same fiber."""
     return lookup_tables.bake(replace(tables.settings, sigma_a=tuple(map(float, sigma_a))))
 
 
