@@ -156,7 +156,7 @@ class _Target:
     def completed(self, before):
         """Return textures {sampler: texture} of the sums, and begin again from zero.
 
-        before: the textures shown so far. Strands' visibility is converted into them; surfaces use them for the next sums.
+        before: the textures shown so far. Strands' bytes are written into them; for surfaces they take the next sums.
         """
         found = self.textures
         if _is_surface((self.view, self.places)):
