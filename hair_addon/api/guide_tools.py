@@ -5,6 +5,7 @@ from typing import Any
 
 from ..core.grooming import guide_tool_settings
 from ..core.grooming.guide_tool_settings import CopySettings, ToolSettings
+from ..core.grooming.ties import gather_settings
 from ..core.params import require_class
 from .arguments import changed, choice
 from .blender_access import blender
@@ -25,6 +26,7 @@ TOOLS = {
     "ATTRACT": guide_tool_settings.AttractSettings,
     "DRAPE": guide_tool_settings.DrapeSettings,
     "OUTSIDE": guide_tool_settings.OutsideSettings,
+    "GATHER": gather_settings.GatherSettings,
 }
 
 
@@ -35,9 +37,9 @@ def change_guides(
 
     For "MIRROR" the number of mirrored guides is returned, for "COUNT" the new number of guides.
 
-    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT", "ATTRACT", "DRAPE" or "OUTSIDE"; settings: of
-    the tool, from core/grooming/guide_tool_settings.py; changes: its fields by name. Hair follows at the next update of
-    the view layer.
+    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT", "ATTRACT", "DRAPE", "OUTSIDE" or "GATHER";
+    settings: of the tool, from core/grooming/guide_tool_settings.py or ties/gather_settings.py; changes: its fields by
+    name. Hair follows at the next update of the view layer.
 
     >>> guides = bpy.data.objects["Guides"]
     >>> api.change_guides(guides, "LENGTH", method="MAXIMUM", length=0.2)
@@ -62,5 +64,6 @@ def change_guides(
         "ATTRACT": tools.attract,
         "DRAPE": blender.groom.dynamics.guide_draping.drape,
         "OUTSIDE": blender.groom.guides.outside_guides.push,
+        "GATHER": blender.groom.guides.gathered_guides.gather,
     }
     return functions[tool](target, wanted, depsgraph)

@@ -19,6 +19,7 @@ _GUIDE_TOOLS = (
         ("attract_guides", "SNAP_ON"),
         ("drape_guides", "FORCE_FORCE"),
         ("push_outside", "MOD_SHRINKWRAP"),
+        ("gather_guides", "FORCE_CURVE"),
     ),
     (
         ("change_guide_count", "PARTICLES"),

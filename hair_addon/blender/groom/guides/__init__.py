@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from . import (
         brushes,
         frozen_guides,
+        gathered_guides,
         guide_additions,
         guide_regions,
         guide_states,

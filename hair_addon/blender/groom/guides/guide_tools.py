@@ -295,6 +295,13 @@ def is_any_selected(datablock: Curves) -> bool:
     return guide_curves.selection(datablock, curves.curve_offsets(datablock)) is not None
 
 
+def surface_size(datablock: Curves) -> float:
+    """Return the longest side [m] of the bounding box of the surface of guides; 0 without one."""
+    if datablock.surface is None:
+        return 0.0
+    return float(max(datablock.surface.dimensions))
+
+
 def median_length(datablock: Curves) -> float:
     """Return the median length [m] of guides; 0 without guides."""
     starts, points = curves.curve_offsets(datablock), curves.read_points(datablock)

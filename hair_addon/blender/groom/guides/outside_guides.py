@@ -18,6 +18,7 @@ from ...data.strands import frozen_points
 from ...data.surfaces import Surface
 from ...host.caches import Cache
 from . import guide_tools
+from .guide_tools import CombedGuides
 
 _HEAD = 0.25  # [m] extent that surfaces are scaled to
 _SKIN = 5e-5  # [m] distance of guides from a surface of this extent
@@ -40,10 +41,10 @@ class _Barrier:
 def push(datablock: Curves, settings: OutsideSettings, depsgraph: Depsgraph) -> int:
     """Push guides out of their posed surface; returns the number changed. Raises `HairError`."""
     guides = guide_tools.read(datablock, settings, depsgraph)
-    prepared = _prepared(guides, settings.clearance, ())
+    barrier = prepared(guides, settings.clearance, ())
     after = guides.points.copy()
     for chosen, places in guide_tools.to_shape(guides):
-        pushed, is_moved = _pushed(guides, prepared, chosen, places)
+        pushed, is_moved = _pushed(guides, barrier, chosen, places)
         weights = guides.weights[chosen]
         partly = grooming.guide_shapes.blended(guides.points[places], pushed, weights)
         pushed = np.where((weights < 1.0)[:, None, None], partly, pushed)
@@ -57,20 +58,18 @@ def pushed_out(datablock: Curves, former: np.ndarray, points: np.ndarray, depsgr
     `points` itself if no guide is pushed. Guides without a surface, and broken ones, stay.
     """
     try:
-        prepared = _known(datablock, former, depsgraph)
-        guides = replace(guide_tools.on_surface(datablock, prepared.surface), local=points)
+        barrier = _known(datablock, former, depsgraph)
+        guides = replace(guide_tools.on_surface(datablock, barrier.surface), local=points)
     except HairError:
         return points  # panels report what is wrong with the guides or their surface
-    guides = replace(
-        guides, points=prepared.surface.from_local(points), weights=_changed(guides.starts, former, points)
-    )
+    guides = replace(guides, points=barrier.surface.from_local(points), weights=_changed(guides.starts, former, points))
     local = points.copy()
     is_pushed = False
     for chosen, places in guide_tools.to_shape(guides):
-        pushed, is_moved = _pushed(guides, prepared, chosen, places)
+        pushed, is_moved = _pushed(guides, barrier, chosen, places)
         rows = places[is_moved]
         moved = (pushed[is_moved] != guides.points[rows]).any(axis=2)
-        local[rows[moved]] = prepared.surface.to_local(pushed[is_moved][moved][:, None])[:, 0]
+        local[rows[moved]] = barrier.surface.to_local(pushed[is_moved][moved][:, None])[:, 0]
         is_pushed |= bool(moved.any())
     return local if is_pushed else points
 
@@ -98,11 +97,11 @@ def _known(datablock, former, depsgraph):
         guides = guide_tools.open_guides(datablock, depsgraph)
         if len(former) == len(guides.local):  # before the stroke
             guides = replace(guides, local=former, points=guides.surface.from_local(former))
-        known = barrier_cache.keep(datablock.session_uid, _prepared(guides, 0.0, key))
+        known = barrier_cache.keep(datablock.session_uid, prepared(guides, 0.0, key))
     return known
 
 
-def _prepared(guides, clearance, key):
+def prepared(guides: CombedGuides, clearance: float, key: tuple) -> _Barrier:
     """Return the `_Barrier` of guides with a clearance [m]. Raises `HairError` if it cannot be collided with."""
     surface = guides.surface
     mesh_math.require_finite(surface.posed)
@@ -120,14 +119,22 @@ def _prepared(guides, clearance, key):
     return _Barrier(key, surface, dynamics.outside.Barrier([obstacle], origin, _CELL_POINTS, "cpu"), factor)
 
 
-def _pushed(guides, prepared, chosen, places):
+def pushed_posed(barrier: _Barrier, posed: np.ndarray) -> np.ndarray:
+    """Return posed guides (M, P, 3) float32 [m] outside of the posed surface."""
+    after, is_moved = barrier.barrier.moved(barrier.factor * posed.astype(np.float64))
+    found = posed.copy()
+    found[is_moved] = (after[is_moved] / barrier.factor).astype(np.float32)
+    return found
+
+
+def _pushed(guides, barrier, chosen, places):
     """Return (points (M, P, 3) float32 [m] at rest outside of the posed surface, (M,) bool: which guides moved)."""
     posed = guides.posed_of(chosen, places)
     held = _held(guides.datablock, places)
-    after, is_moved = prepared.barrier.moved(prepared.factor * posed.astype(np.float64), held)
+    after, is_moved = barrier.barrier.moved(barrier.factor * posed.astype(np.float64), held)
     pushed = guides.points[places]
     if is_moved.any():
-        after = (after[is_moved] / prepared.factor).astype(np.float32)
+        after = (after[is_moved] / barrier.factor).astype(np.float32)
         is_same = (after == posed[is_moved]).all(axis=2)
         # Points that stay keep their bits, the root among them.
         at_rest = guides.carried_back(after, chosen[is_moved])

@@ -16,10 +16,11 @@ from ....core.grooming.guide_tool_settings import (
     ToolSettings,
     TrimSettings,
 )
+from ....core.grooming.ties.gather_settings import GatherSettings
 from ....core.params import declared
 from ...data import scene
 from ...groom.dynamics import guide_draping
-from ...groom.guides import guide_additions, guide_tools, outside_guides
+from ...groom.guides import gathered_guides, guide_additions, guide_tools, outside_guides
 from ...groom.selection import guides_of, surface_of
 from ...settings import setting_properties
 from .. import setting_rows
@@ -225,6 +226,52 @@ class VELLUS_OT_push_outside(GuideTool, bpy.types.Operator):
         return outside_guides.push(guides, settings, depsgraph)
 
 
+_HEAD = 0.25  # [m] extent of a surface that the lengths of Gather are made for
+_GATHERED = ("tie_radius", "tail_radius", "bun_radius", "pitch", "clearance")
+_ROWS_OF_SHAPES = {
+    "PONYTAIL": ("tie_radius", "tail_radius"),
+    "BRAID": ("tie_radius", "tail_radius", "pitch"),
+    "ROPE": ("tie_radius", "tail_radius", "pitch"),
+    "BUN": ("tie_radius", "tail_radius", "bun_radius", "turns"),
+}
+
+
+class VELLUS_OT_gather_guides(GuideTool, bpy.types.Operator):
+    """Gather guides at the start of a curve and lead them along it: a ponytail, a braid, a rope or a bun"""
+
+    bl_idname = "vellus.gather_guides"
+    bl_label = "Gather"
+    Settings = GatherSettings
+    __annotations__ = setting_properties.annotations(GatherSettings)
+
+    def invoke(self, context, event):
+        """Gather at the other selected curve, or open a dialog to pick one."""
+        others = [o for o in context.selected_objects if o.type == "CURVE" and o != context.object]
+        if len(others) == 1:
+            self.line = others[0].name
+        if not self.line and not bpy.app.background:
+            self.prefill(guides_of(context.object))
+            return context.window_manager.invoke_props_dialog(self)
+        return super().invoke(context, event)
+
+    def prefill(self, guides):
+        size = guide_tools.surface_size(guides)
+        for name in _GATHERED:
+            if size and not self.properties.is_property_set(name):
+                setattr(self, name, getattr(self, name) * size / _HEAD)
+
+    def apply(self, guides, settings, depsgraph):
+        return gathered_guides.gather(guides, settings, depsgraph)
+
+    def message(self, count):
+        return "{count} guides gathered", {"count": count}
+
+    def draw_settings(self, layout):
+        setting_rows.search_row(layout, self.properties, "line", bpy.data, "objects")
+        for name in ("shape", *_ROWS_OF_SHAPES[self.shape], "tightness", "clearance"):
+            setting_rows.row(layout, self.properties, name)
+
+
 _PART = 0.02  # default clearance as a fraction of the guides' length, which fits a surface of any size
 
 
@@ -284,4 +331,5 @@ CLASSES = (
     VELLUS_OT_attract_guides,
     VELLUS_OT_drape_guides,
     VELLUS_OT_push_outside,
+    VELLUS_OT_gather_guides,
 )

@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides gathered at ties: their way over the surface, through the tie, and on along a drawn line."""
+
+from typing import TYPE_CHECKING
+
+from ...lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        gather_settings,
+        gathering,
+        tie_tails,
+    )
+else:
+    __getattr__ = submodules(__name__)

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides gathered at ties: along the surface to the nearest tie, through it in order, and on along its line.
+
+The way of a root over the surface descends the distance from the tie (geometry/surface_distance.py). Its height grows
+toward the tie as the hair of all roots that are farther away passes there: its area over the circumference. Each guide
+keeps its angle around the tie, and its distance becomes its place in the disk of the tie by equal area. Segments keep
+their lengths; guides that are too short end on their way.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import warp as wp
+
+from ...errors import HairError
+from ...geometry import mesh as mesh_math
+from ...geometry import surface_distance
+from ...geometry.closest_point import SurfaceQuery
+from ...geometry.mesh import TriMesh
+from ...kernels import parallel
+from ...kernels.parallel import Rows
+from ..guide_shapes import joined, split, unit
+from . import tie_tails
+from .gather_settings import GatherSettings
+
+# No gradients are needed. Without fused multiply-add all devices round alike.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+_STEPS = 160  # over the surface, of the longest way
+_TAIL_POINTS = 300
+_BULGE = 0.25  # height of loose hair relative to its way
+
+
+def gathered(
+    mesh: TriMesh, points: np.ndarray, lines: Sequence[np.ndarray], settings: GatherSettings
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gather guides (S, P, 3) [m] → (points (S, P, 3) float32 [m], (S,) bool: which are gathered).
+
+    mesh: a checked `TriMesh`, the surface as it is seen; lines: (K, 3) [m] each, from the tie on. Guides on parts of
+    the surface without a tie stay. Raises `HairError` for lines without length.
+    """
+    lines = [_checked(line) for line in lines]
+    if not lines:
+        raise HairError("There is no curve to gather at: pick a curve that begins at the tie.")
+    points = np.asarray(points, np.float32)
+    after = points.copy()
+    query = SurfaceQuery(mesh)
+    roots = query.nearest(points[:, 0])
+    fields = [_field(mesh, query, line) for line in lines]
+    distances = np.stack([surface_distance.at(field, mesh, roots) for field in fields])
+    nearest = distances.argmin(axis=0)
+    is_gathered = np.isfinite(distances.min(axis=0))
+    for place, (line, field) in enumerate(zip(lines, fields, strict=True)):
+        rows = np.flatnonzero(is_gathered & (nearest == place))
+        if len(rows) and points.shape[1] > 1:
+            after[rows] = _at_line(mesh, query, points[rows], line, field, settings)
+    return after, is_gathered
+
+
+def _checked(line):
+    """Return a line without repeated points. Raises `HairError` if it has no length."""
+    line = np.asarray(line, np.float64)
+    if not np.isfinite(line).all():
+        raise HairError("The curve to gather at has non-finite coordinates: repair it.")
+    is_new = np.concatenate([[True], (np.diff(line, axis=0) != 0.0).any(axis=1)])
+    if is_new.sum() < 2:
+        raise HairError("A curve to gather at has no length: draw it from the tie on.")
+    return line[is_new]
+
+
+def _field(mesh, query, line):
+    """Return (V,) distances along the surface from the tie, the first point of a line."""
+    return surface_distance.spread(mesh, surface_distance.source_distances(mesh, query.nearest(line[:1])))
+
+
+def _at_line(mesh, query, points, line, field, settings):
+    """Return the guides (S, P, 3) that one line gathers."""
+    lengths = split(points)[1]
+    reach = float(lengths.sum(axis=1).max())
+    tie = query.nearest(line[:1])
+    tail = tie_tails.tail_line(line, mesh_math.normals(mesh, tie)[0], reach, settings)
+    ways, apart, normals = _traced(mesh, query, points[:, 0], field, settings)
+    sizes = apart[:, :1]
+    order = np.argsort(np.argsort(sizes[:, 0], kind="stable"))
+    ranks = (order + 0.5) / len(order)
+    ways += _heights(apart, settings)[..., None] * normals
+    angles = _angles(ways, tail, mesh_math.normals(mesh, tie)[0])
+    along = np.linspace(0.0, tie_tails.extent(reach, settings), _TAIL_POINTS)
+    along = np.broadcast_to(along, (len(ways), _TAIL_POINTS))
+    centers, sides, ups = tail.at(along)
+    offsets = tie_tails.offsets(tail, angles, ranks, along, settings)
+    ways = np.concatenate([ways, centers + offsets[..., :1] * sides + offsets[..., 1:] * ups], axis=1)
+    ways[:, 0] = points[:, 0]
+    laid = _walked(ways, lengths)
+    return joined(points, split(laid)[0], lengths)
+
+
+def _traced(mesh, query, roots, field, settings):
+    """Return ways (S, K, 3) from roots toward the tie, their distances (S, K) from it, and normals (S, K, 3).
+
+    A way ends a tie's radius before the tie; its last point is repeated.
+    """
+    directions = surface_distance.directions(mesh, field).astype(np.float32)
+    place = np.asarray(roots, np.float64)
+    found = query.nearest(place)
+    longest = float(surface_distance.at(field, mesh, found).max())
+    near = 1.5 * settings.tie_radius
+    step = max(longest / _STEPS, 1e-12)
+    ways, apart, normals = [], [], []
+    for _step in range(int(1.3 * _STEPS)):
+        here = mesh_math.positions(mesh, found).astype(np.float64)
+        distance = surface_distance.at(field, mesh, found)
+        normal = mesh_math.normals(mesh, found).astype(np.float64)
+        if apart:  # ways end where the distance stops to fall
+            is_ended = ~(distance < apart[-1]) | (apart[-1] < near)
+            here[is_ended], distance[is_ended], normal[is_ended] = (
+                ways[-1][is_ended],
+                apart[-1][is_ended],
+                normals[-1][is_ended],
+            )
+            if is_ended.all():
+                break
+        ways.append(here)
+        apart.append(distance)
+        normals.append(normal)
+        toward = -mesh_math.interpolate(directions, mesh, found).astype(np.float64)
+        toward = unit(toward - normal * np.sum(toward * normal, axis=1, keepdims=True))
+        found = query.nearest(here + step * toward)
+    return np.stack(ways, axis=1), np.stack(apart, axis=1), np.stack(normals, axis=1)
+
+
+def _heights(apart, settings):
+    """Return heights (S, K) above the surface: the clearance, the hair below, and the bulge of loose hair."""
+    whole = apart[:, :1]
+    behind = np.sort(whole[:, 0])
+    passed = (np.searchsorted(behind, whole) - np.searchsorted(behind, apart)) / len(behind)  # of hair that is nearer
+    radius = settings.tie_radius
+    pile = np.minimum(radius**2 / np.maximum(2.0 * apart, radius), radius)
+    part = np.clip(1.0 - apart / np.maximum(whole, 1e-12), 0.0, 1.0)
+    start = np.minimum(1.0, part * whole / max(4.0 * settings.clearance, 1e-12))  # hair rises from its root
+    bulge = (1.0 - settings.tightness) * _BULGE * whole * np.sin(np.pi * part)
+    return start * settings.clearance + np.maximum(passed, 0.0) * pile + bulge
+
+
+def _angles(ways, tail, normal):
+    """Return (S,) angles in the disk of the tie from which ways arrive.
+
+    The plane of the surface is turned into the disk, so that hair from above a tail that hangs lies on its outside.
+    """
+    arriving = ways[:, -1] - tail.centers[0]
+    arriving -= np.sum(arriving * normal, axis=1, keepdims=True) * normal
+    tangent = np.cross(tail.sides[0], tail.ups[0])
+    tangent *= np.sign(tangent @ (tail.centers[1] - tail.centers[0])) or 1.0
+    axis, cosine = np.cross(normal, tangent), float(normal @ tangent)
+    turned = arriving + np.cross(axis, arriving) + np.cross(axis, np.cross(axis, arriving)) / max(1.0 + cosine, 1e-6)
+    return np.arctan2(turned @ tail.ups[0], turned @ tail.sides[0])
+
+
+def _walked(ways, lengths):
+    """Return (S, P, 3) float32: points on ways (S, K, 3), as far apart as segments (S, P-1) are long."""
+    middle = ways.mean(axis=(0, 1))
+    shared = [np.ascontiguousarray(ways - middle, np.float32), np.ascontiguousarray(lengths, np.float32)]
+    out = parallel.empty_vectors((len(ways), lengths.shape[1] + 1), "cpu")
+    inputs = [
+        Rows(wp.array(shared[0], dtype=wp.vec3, device="cpu", copy=False)),
+        Rows(wp.array(shared[1], dtype=float, device="cpu", copy=False)),
+    ]
+    parallel.launch(_walk, len(ways), inputs, [out], "cpu", least_rows=256)
+    return (out.numpy() + middle).astype(np.float32)
+
+
+@wp.kernel
+def _walk(
+    ways: wp.array2d[wp.vec3],
+    lengths: wp.array2d[float],
+    # outputs
+    out_points: wp.array2d[wp.vec3],
+):
+    guide = wp.tid()
+    last = ways.shape[1] - 1
+    place = ways[guide, 0]
+    out_points[guide, 0] = place
+    segment = int(0)
+    onward = wp.vec3(0.0, 0.0, 0.0)
+    for i in range(lengths.shape[1]):
+        length = lengths[guide, i]
+        while segment < last and wp.length(ways[guide, segment + 1] - place) < length:
+            segment += 1
+        if segment < last:
+            # The place between two points of the way that is one length away.
+            start = ways[guide, segment] - place
+            step = ways[guide, segment + 1] - ways[guide, segment]
+            a = wp.dot(step, step)
+            b = wp.dot(start, step)
+            c = wp.dot(start, start) - length * length
+            t = float(1.0)
+            if a > 0.0:
+                t = wp.clamp((wp.sqrt(wp.max(b * b - a * c, 0.0)) - b) / a, 0.0, 1.0)
+            target = ways[guide, segment] + t * step
+        else:
+            target = ways[guide, last]
+            if wp.length(onward) > 0.0:
+                target = place + length * onward
+        if wp.length(target - place) > 0.0:
+            onward = wp.normalize(target - place)
+        place = place + length * onward
+        out_points[guide, i + 1] = place

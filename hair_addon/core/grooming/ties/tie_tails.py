@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The way of gathered hair behind its tie: along a drawn line, as one tail, a rope or a braid, or wound into a bun.
+
+Hair keeps its place in the disk of the tie, in frames that are carried along the line by least rotations [Bishop75].
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..guide_shapes import unit
+from .gather_settings import GatherSettings
+
+_SAMPLES = 800  # points of a line
+_LOCKS = {"BRAID": 3, "ROPE": 2}  # that a tail is divided into
+_INNER = 0.75  # radius of every other layer of a bun, relative to the outer ones
+_WOUND = 2.0  # length of the way of a bun, relative to its hair, whose segments cut its curves
+_MOST_LAYERS = 24  # of a bun
+_TAPER = 0.35  # radius of the tail's end, relative to its widest place
+
+
+@dataclass(frozen=True)
+class TailLine:
+    """A line with frames: along (M,) [m] from the tie, centers (M, 3) [m], sides and ups (M, 3) unit and perpendicular.
+
+    reach: length [m] that the widths of the tail refer to.
+    """
+
+    along: np.ndarray
+    centers: np.ndarray
+    sides: np.ndarray
+    ups: np.ndarray
+    reach: float
+
+    def at(self, along: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return centers, sides and ups (..., 3) at lengths (...) [m] from the tie."""
+        found = []
+        for values in (self.centers, self.sides, self.ups):
+            found.append(np.stack([np.interp(along, self.along, values[:, axis]) for axis in range(3)], axis=-1))
+        return found[0], found[1], found[2]
+
+
+def tail_line(line: np.ndarray, normal: np.ndarray, reach: float, settings: GatherSettings) -> TailLine:
+    """Return the `TailLine` of a drawn line (K, 3) [m] that begins at its tie, or of the bun there.
+
+    normal: (3,) unit, of the surface at the tie; reach: length [m] of the longest hair, for which the line goes on
+    straight at its end.
+    """
+    line = np.asarray(line, np.float64)
+    start = unit(line[1] - line[0])
+    normal = np.asarray(normal, np.float64)
+    across = float(np.linalg.norm(np.cross(start, normal)))
+    if settings.shape == "BUN":
+        points = _bun(line[0] + settings.clearance * normal, start, normal, reach, settings)
+    else:
+        shifted = line + (settings.clearance + settings.tie_radius * across) * normal
+        points = np.concatenate([shifted, shifted[-1:] + (reach + 1e-6) * unit(shifted[-1:] - shifted[-2:-1])])
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    lengths = np.concatenate([[0.0], np.cumsum(steps)])
+    along = np.linspace(0.0, lengths[-1], _SAMPLES)
+    centers = _smooth(np.stack([np.interp(along, lengths, points[:, axis]) for axis in range(3)], axis=1))
+    tangents = unit(np.gradient(centers, axis=0))
+    up = normal - tangents[0] * (normal @ tangents[0])
+    if np.linalg.norm(up) < 0.1:
+        up = np.eye(3)[np.abs(tangents[0]).argmin()]
+    ups = np.empty_like(centers)
+    for place, tangent in enumerate(tangents):
+        up = unit(up - tangent * (up @ tangent))
+        ups[place] = up
+    return TailLine(along, centers, unit(np.cross(tangents, ups)), ups, max(reach, 1e-9))
+
+
+def extent(reach: float, settings: GatherSettings) -> float:
+    """Return the length [m] of line that hair of a length takes up at most."""
+    return reach * (_WOUND if settings.shape == "BUN" else 1.0)
+
+
+def offsets(
+    line: TailLine, angles: np.ndarray, ranks: np.ndarray, along: np.ndarray, settings: GatherSettings
+) -> np.ndarray:
+    """Return (S, M, 2) [m]: the place of hair beside the line, on its sides and ups.
+
+    angles (S,), ranks (S,) in [0, 1]: the place in the disk of the tie by equal area; along: (S, M) [m] from the tie.
+    """
+    unit_radius = np.sqrt(ranks)
+    place = unit_radius[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    radius = _radius(line, along, settings)
+    gathered = radius[..., None] * place[:, None]
+    count = _LOCKS.get(settings.shape)
+    if count is None:
+        return gathered
+    turn = angles % (2.0 * np.pi) * count
+    lock = np.minimum((turn / (2.0 * np.pi)).astype(int), count - 1)
+    own = unit_radius[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    phase = 2.0 * np.pi * (along / settings.pitch + (lock / count)[:, None])
+    if settings.shape == "ROPE":
+        centers, size = 0.5 * np.stack([np.cos(phase), np.sin(phase)], axis=-1), 0.5
+    else:  # three locks that cross in turn over and under the middle
+        centers, size = np.stack([0.62 * np.sin(phase), 0.36 * np.sin(2.0 * phase)], axis=-1), 0.4
+    braided = radius[..., None] * (centers + size * own[:, None])
+    share = _ease(along / (0.5 * settings.pitch))[..., None]
+    return gathered + share * (braided - gathered)
+
+
+def _radius(line, along, settings):
+    """Return the radius (...) [m] of a tail: the tie's at first, then the tail's, smaller at the end."""
+    part = along / line.reach
+    grown = settings.tie_radius + _ease(part / 0.25) * (settings.tail_radius - settings.tie_radius)
+    return grown if settings.shape == "BUN" else grown * (1.0 - (1.0 - _TAPER) * _ease((part - 0.5) / 0.5))
+
+
+def _bun(tie, start, normal, reach, settings):
+    """Return points (M, 3) of spirals on a ball that rests on the surface, forth and back, each other one inside."""
+    side = start - normal * (start @ normal)
+    side = unit(side) if np.linalg.norm(side) > 0.1 else unit(np.cross(normal, np.eye(3)[np.abs(normal).argmin()]))
+    other = np.cross(normal, side)
+    outer = settings.bun_radius - settings.tail_radius
+    middle = tie + settings.bun_radius * normal
+    outer = max(outer, 0.3 * settings.bun_radius)
+    points, length, layer, turned = [tie], 0.0, 0, 0.0
+    while length < _WOUND * reach and layer < _MOST_LAYERS:
+        size = outer if layer % 2 == 0 else _INNER * outer
+        part = np.linspace(0.0, 1.0, 64)
+        polar = np.pi * (0.1 + 0.75 * (part if layer % 2 == 0 else 1.0 - part))
+        turn = turned + 2.0 * np.pi * settings.turns * part
+        ring = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * other
+        wound = middle + size * (np.sin(polar)[:, None] * ring - np.cos(polar)[:, None] * normal)
+        points += [*wound]
+        length += float(np.linalg.norm(np.diff(wound, axis=0), axis=1).sum())
+        layer, turned = layer + 1, turn[-1]
+    return np.array(points)
+
+
+def _smooth(centers):
+    """Round the corners of a line; its ends stay."""
+    for _ in range(12):
+        centers[1:-1] = 0.5 * centers[1:-1] + 0.25 * (centers[:-2] + centers[2:])
+    return centers
+
+
+def _ease(part):
+    part = np.clip(part, 0.0, 1.0)
+    return part * part * (3.0 - 2.0 * part)

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gather in Blender: on surfaces with any transform and pose, outside of them, recorded by layers."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix, Vector
+
+from hair_addon import api
+from hair_addon.core.errors import HairError
+from tests.support.reading import evaluated_points, points
+
+SIZES = {"tie_radius": 0.05, "tail_radius": 0.08, "bun_radius": 0.2, "pitch": 0.3, "clearance": 0.02}
+LINE = ((0.0, 0.6, 0.8), (0.0, 0.9, 1.1), (0.0, 1.3, 0.6), (0.0, 1.3, -1.0))
+
+
+@pytest.fixture
+def guides(hair):
+    """Guides on a sphere of radius 1, as long as half its circumference."""
+    found = bpy.data.objects["Guides"]
+    api.change_guides(found, "LENGTH", method="SET", length=3.0)
+    bpy.context.view_layer.update()
+    return found
+
+
+def add_line(matrix=None, lines=(LINE,)):
+    """A curve object whose points are at places in the coordinates of the sphere."""
+    data = bpy.data.curves.new("Tie", "CURVE")
+    data.dimensions = "3D"
+    for line in lines:
+        spline = data.splines.new("POLY")
+        spline.points.add(len(line) - 1)
+        for point, place in zip(spline.points, line, strict=True):
+            point.co = (*((matrix or Matrix()) @ Vector(place)), 1.0)
+    found = bpy.data.objects.new("Tie", data)
+    bpy.context.scene.collection.objects.link(found)
+    bpy.context.view_layer.update()
+    return found
+
+
+def gather(found, **settings):
+    count = api.change_guides(found, "GATHER", line="Tie", **{**SIZES, **settings})
+    bpy.context.view_layer.update()
+    return count
+
+
+def segments(shape):
+    return np.linalg.norm(np.diff(shape.astype(np.float64), axis=1), axis=2)
+
+
+@pytest.mark.parametrize("shape", ["PONYTAIL", "BUN"])
+def test_guides_are_gathered_outside_of_the_surface(guides, shape):
+    add_line()
+    before = points(guides)
+    assert gather(guides, shape=shape) == len(before)
+    after = points(guides)
+    assert np.array_equal(after[:, 0], before[:, 0])
+    np.testing.assert_allclose(segments(after), segments(before), rtol=0.01)
+    assert np.linalg.norm(after[:, 1:], axis=2).min() > 0.993
+    is_long = np.linalg.norm(before[:, 0] - LINE[0], axis=1) < 1.6
+    tips = after[is_long, -1]
+    if shape == "BUN":
+        assert np.linalg.norm(tips - 1.22 * np.array(LINE[0]), axis=1).max() < 0.4
+    else:
+        assert np.abs(tips[:, 0]).max() < 0.3 and tips[:, 1].min() > 0.5
+    hair = points(bpy.data.objects["Hair"])
+    assert np.abs(hair[:, -1, 0]).mean() < 0.3  # it follows
+
+
+def test_a_line_through_the_surface_keeps_guides_outside(guides):
+    add_line(lines=((LINE[0], (0.0, 0.7, 0.95), (0.0, -0.5, -0.5)),))
+    before = points(guides)
+    gather(guides)
+    assert np.linalg.norm(points(guides)[:, 1:], axis=2).min() > 0.993
+    np.testing.assert_allclose(segments(points(guides)), segments(before), rtol=0.01)
+
+
+@pytest.mark.parametrize("change", ["small", "uneven", "mirrored", "turned and parented"])
+def test_transformed_surfaces(guides, change):
+    """Guides are gathered at the drawn place of the world, with their lengths there."""
+    sphere = bpy.data.objects["Sphere"]
+    if change == "turned and parented":
+        parent = bpy.data.objects.new("Parent", None)
+        bpy.context.scene.collection.objects.link(parent)
+        parent.matrix_world = Matrix.Translation((3.0, 2.0, 1.0)) @ Matrix.Rotation(1.0, 4, "X")
+        sphere.parent = parent
+    else:
+        sphere.scale = {"small": [0.01] * 3, "uneven": [1.0, 1.2, 0.8], "mirrored": [-1.0, 1.0, 1.0]}[change]
+    bpy.context.view_layer.update()
+    before, size = points(guides), 0.01 if change == "small" else 1.0
+    add_line(sphere.matrix_world)
+    gather(guides, **{name: size * value for name, value in SIZES.items()})
+    after, axes = points(guides), np.array(sphere.matrix_world.to_3x3())
+    assert np.array_equal(after[:, 0], before[:, 0])
+    np.testing.assert_allclose(segments(after @ axes.T), segments(before @ axes.T), rtol=0.02)
+    near = np.linalg.norm(after - np.array(LINE[0]), axis=2).min(axis=1)
+    assert np.quantile(near, 0.9) < 0.2
+    assert np.linalg.norm(after[:, 1:], axis=2).min() > 0.99
+
+
+def test_guides_are_gathered_on_the_posed_surface(guides):
+    sphere = bpy.data.objects["Sphere"]
+    sphere.shape_key_add(name="Basis")
+    key = sphere.shape_key_add(name="Moved")
+    for point in key.data:
+        point.co = Matrix.Rotation(0.5, 3, "X") @ point.co + Vector((0.0, 0.0, 2.0))
+    key.value = 1.0
+    bpy.context.view_layer.update()
+    posed = Matrix.Translation((0.0, 0.0, 2.0)) @ Matrix.Rotation(0.5, 4, "X")
+    add_line(posed)
+    gather(guides)
+    near = np.linalg.norm(evaluated_points(guides) - np.array(posed @ Vector(LINE[0])), axis=2).min(axis=1)
+    assert np.quantile(near, 0.9) < 0.2
+
+
+def test_a_layer_loosens_gathered_guides(guides):
+    api.add_layer(guides)
+    api.add_layer(guides, "Gathered")
+    before = points(guides)
+    add_line()
+    gather(guides)
+    gathered = points(guides)
+    guides.data.vellus.layers[1].weight = 0.0
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(points(guides), before, atol=1e-5)
+    guides.data.vellus.layers[1].weight = 1.0
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(points(guides), gathered, atol=1e-4)
+
+
+def test_a_mask_and_several_ties(guides):
+    sides = [((sign, 0.0, 0.0), (1.4 * sign, 0.0, 0.0), (1.4 * sign, 0.0, -2.0)) for sign in (-1.0, 1.0)]
+    add_line(lines=sides)
+    before = points(guides)
+    gather(guides, mask="top", shape="BRAID")
+    after = points(guides)
+    low, top = before[:, 0, 2] < -0.1, before[:, 0, 2] > 0.1
+    assert np.array_equal(after[low], before[low])
+    is_aside = top & (np.abs(before[:, 0, 0]) > 0.2)
+    assert (np.sign(after[is_aside, -1, 0]) == np.sign(before[is_aside, 0, 0])).all()
+
+
+def test_what_cannot_be_gathered_is_refused(guides):
+    before = points(guides)
+    with pytest.raises(HairError, match="Pick the curve"):
+        api.change_guides(guides, "GATHER")
+    with pytest.raises(HairError, match="no object"):
+        api.change_guides(guides, "GATHER", line="Nothing")
+    add_line(lines=(LINE[:1],))
+    with pytest.raises(HairError):
+        gather(guides)
+    assert np.array_equal(points(guides), before)

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gathered guides keep roots and lengths, pass their tie in order, and go on along its line."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hair_addon.core.errors import HairError
+from hair_addon.core.geometry import surface_distance
+from hair_addon.core.geometry.closest_point import SurfaceQuery
+from hair_addon.core.geometry.mesh import TriMesh
+from hair_addon.core.grooming.ties.gather_settings import GatherSettings
+from hair_addon.core.grooming.ties.gathering import gathered
+from tests.support.meshes import subdivided_sphere
+
+RADIUS, LENGTH = 0.1, 0.3  # [m]
+SETTINGS = GatherSettings(clearance=0.002, tie_radius=0.008, tail_radius=0.015, tightness=1.0)
+TIE = np.array([0.0, 0.08, 0.06])  # on the sphere
+TAIL = TIE + np.array([(0.0, 0.0, 0.0), (0.0, 0.03, 0.02), (0.0, 0.05, -0.02), (0.0, 0.05, -0.2)])
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return subdivided_sphere(3, RADIUS)
+
+
+def guides_on(count, seed=3):
+    """(count, 31, 3): straight guides on the upper half, in mirrored pairs across the X axis."""
+    rng = np.random.default_rng(seed)
+    normals = rng.normal(size=(count // 2, 3))
+    normals[:, 2] = np.abs(normals[:, 2])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.concatenate([normals, normals * [-1.0, 1.0, 1.0]])
+    return (normals[:, None] * (RADIUS + np.linspace(0.0, LENGTH, 31))[:, None]).astype(np.float32)
+
+
+def segments(points):
+    return np.linalg.norm(np.diff(points.astype(np.float64), axis=1), axis=2)
+
+
+def from_tie(points, tie=TIE):
+    """(S,) the least distance of each guide's segments from the tie."""
+    starts, steps = points[:, :-1].astype(np.float64), np.diff(points.astype(np.float64), axis=1)
+    part = np.sum((tie - starts) * steps, axis=2) / np.sum(steps * steps, axis=2)
+    return np.linalg.norm(starts + np.clip(part, 0.0, 1.0)[..., None] * steps - tie, axis=2).min(axis=1)
+
+
+def test_distances_on_a_plane_are_exact_and_on_a_sphere_within_three_percent(ball):
+    side = np.linspace(0.0, 1.0, 12)
+    places = np.stack([*np.meshgrid(side, side), np.zeros((12, 12))], axis=-1).reshape(-1, 3).astype(np.float32)
+    corner = (np.arange(11)[:, None] * 12 + np.arange(11)).ravel()
+    quads = corner[:, None] + [0, 1, 13, 0, 13, 12]
+    plane = TriMesh(places, quads.reshape(-1, 3).astype(np.int32))
+    sources = np.full(144, np.inf)
+    sources[0] = 0.0
+    np.testing.assert_allclose(surface_distance.spread(plane, sources), np.linalg.norm(places, axis=1), atol=1e-6)
+    found = surface_distance.source_distances(ball, SurfaceQuery(ball).nearest(np.array([[0.0, 0.0, 1.0]])))
+    spread = surface_distance.spread(ball, found)
+    arcs = RADIUS * np.arccos(np.clip(ball.vertices[:, 2] / RADIUS, -1.0, 1.0))
+    np.testing.assert_allclose(spread, arcs, rtol=0.03, atol=0.004)
+
+
+@pytest.mark.parametrize("shape", ["PONYTAIL", "BRAID", "ROPE", "BUN"])
+def test_roots_and_lengths_stay_and_guides_pass_the_tie(ball, shape):
+    guides = guides_on(80)
+    after, is_gathered = gathered(ball, guides, [TAIL], replace(SETTINGS, shape=shape))
+    assert is_gathered.all()
+    np.testing.assert_array_equal(after[:, 0], guides[:, 0])
+    np.testing.assert_allclose(segments(after), segments(guides), rtol=1e-4)
+    lifted = TIE * (1.0 + SETTINGS.clearance / RADIUS)
+    assert from_tie(after, lifted).max() < 2.0 * SETTINGS.tie_radius
+    assert (
+        np.linalg.norm(after, axis=2).min() > (0.9 if shape == "BUN" else 0.97) * RADIUS
+    )  # coils are pushed out later
+    if shape == "BUN":
+        middle = TIE * (1.0 + (SETTINGS.clearance + SETTINGS.bun_radius) / RADIUS)
+        is_near = np.linalg.norm(guides[:, 0] - TIE, axis=1) < 0.1
+        tips = np.linalg.norm(after[is_near, -1] - middle, axis=1)
+        assert tips.max() < 1.5 * SETTINGS.bun_radius
+    else:
+        is_near = np.linalg.norm(guides[:, 0] - TIE, axis=1) < 0.1
+        assert after[is_near, -1, 2].max() < TIE[2]  # where the line leads
+
+
+def test_symmetric_guides_stay_symmetric(ball):
+    """Up to the asymmetry of the mesh's triangles."""
+    after, _all = gathered(ball, guides_on(80), [TAIL], SETTINGS)
+    mirrored = after[:40] * np.float32([-1.0, 1.0, 1.0])
+    assert np.quantile(np.linalg.norm(mirrored - after[40:], axis=2), 0.95) < 0.01
+
+
+def test_a_tie_that_moves_by_a_millimeter_moves_no_point_far(ball):
+    guides = guides_on(80)
+    after, _all = gathered(ball, guides, [TAIL], SETTINGS)
+    moved, _all = gathered(ball, guides, [TAIL + np.array([0.001, 0.0, 0.0])], SETTINGS)
+    assert np.linalg.norm(moved - after, axis=2).max() < 0.01
+
+
+def test_guides_go_to_the_nearest_of_several_ties(ball):
+    guides = guides_on(80)
+    ties = [np.array([[sign * 0.1, 0.0, 0.0], [sign * 0.14, 0.0, -0.02], [sign * 0.14, 0.0, -0.2]]) for sign in (-1, 1)]
+    after, is_gathered = gathered(ball, guides, ties, SETTINGS)
+    is_far = np.abs(guides[:, 0, 0]) > 0.01
+    assert is_gathered.all() and (np.sign(after[is_far, -1, 0]) == np.sign(guides[is_far, 0, 0])).all()
+
+
+def test_short_guides_end_on_their_way_and_other_parts_stay(ball):
+    guides = guides_on(80)
+    short = guides[:, :1] + 0.05 * (guides - guides[:, :1])
+    after, _all = gathered(ball, short, [TAIL], SETTINGS)
+    np.testing.assert_allclose(segments(after), segments(short), rtol=1e-3)
+    assert np.linalg.norm(after, axis=2).max() < RADIUS + 4.0 * SETTINGS.tie_radius
+    apart = TriMesh(
+        np.concatenate([ball.vertices, ball.vertices + np.float32([1.0, 0.0, 0.0])]),
+        np.concatenate([ball.triangles, ball.triangles + len(ball.vertices)]),
+    )
+    both = np.concatenate([guides, guides + np.float32([1.0, 0.0, 0.0])])
+    after, is_gathered = gathered(apart, both, [TAIL], SETTINGS)
+    assert is_gathered[:80].all() and not is_gathered[80:].any()
+    np.testing.assert_array_equal(after[80:], both[80:])
+
+
+@pytest.mark.parametrize("scale", [0.01, 100.0])
+def test_the_shape_does_not_depend_on_the_scale(ball, scale):
+    guides, lengths = guides_on(60), ("tie_radius", "tail_radius", "bun_radius", "pitch", "clearance")
+    settings = replace(SETTINGS, **{name: scale * getattr(SETTINGS, name) for name in lengths})
+    large = TriMesh((scale * ball.vertices).astype(np.float32), ball.triangles)
+    after, _all = gathered(large, np.float32(scale) * guides, [scale * TAIL], settings)
+    expected, _all = gathered(ball, guides, [TAIL], SETTINGS)
+    assert np.quantile(np.abs(after / scale - expected), 0.95) < 1e-3
+
+
+def test_lines_without_length_are_refused(ball):
+    for lines in ([], [TAIL[:1]], [np.repeat(TAIL[:1], 3, axis=0)], [np.full((2, 3), np.nan)]):
+        with pytest.raises(HairError, match="curve"):
+            gathered(ball, guides_on(4), lines, SETTINGS)
