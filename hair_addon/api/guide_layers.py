@@ -23,8 +23,9 @@ def layers(guides: Curves) -> dict[str, float]:
     >>> api.layers(guides)
     {}
     """
-    target = _target(guides)
-    return {item.name: item.weight if item.is_on else 0.0 for item in target.vellus.layers}
+    state = _target(guides).vellus
+    names = blender.settings.layer_items.names_of(state)
+    return {name: item.weight if item.is_on else 0.0 for name, item in zip(names, state.layers, strict=True)}
 
 
 def add_layer(guides: Curves, name: str = "") -> str:
@@ -55,7 +56,7 @@ def set_layer(guides: Curves, name: str, *, weight: float | None = None, is_acti
     name, is_active = plain_value("name", name, "", _SWITCH), plain_value("is_active", is_active, False, _SWITCH)
     weight = None if weight is None else plain_value("weight", weight, 1.0, _WEIGHT)
     target = _target(guides)
-    names = [item.name for item in target.vellus.layers]
+    names = blender.settings.layer_items.names_of(target.vellus)
     if name not in names:
         raise HairError(f"There is no layer {name!r}: add it first.")
     place = names.index(name)

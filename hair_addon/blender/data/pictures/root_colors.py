@@ -30,7 +30,7 @@ class _Corners:
     corners: np.ndarray
 
 
-# session_uid of an image, and of a hair → `_Sampled`; dropped when Blender reports a change of an image.
+# session_uid of an image and of a hair, slot, extension, interpolation → `_Sampled`; dropped when an image changes.
 sample_cache = Cache(capacity=32)
 corner_cache = Cache(capacity=32)  # session_uid of a hair → `_Corners`
 
@@ -122,7 +122,7 @@ def _of_materials(hair_object, evaluated, slots, uvs):
         if node is None:
             colors[rows] = material.diffuse_color[:3]
         else:
-            key = node.image.original.session_uid, hair_object.session_uid, slot
+            key = node.image.original.session_uid, hair_object.session_uid, slot, node.extension, node.interpolation
             colors[rows] = _sampled(key, node, uvs[rows])
     return colors
 

@@ -89,6 +89,18 @@ def test_an_image_is_looked_up_at_the_uv_of_roots(ball):  # noqa: F811
     np.testing.assert_allclose(colors[clear], expected[clear], atol=1e-6)
 
 
+def test_a_changed_node_is_followed_without_a_change_of_its_image(ball):  # noqa: F811
+    """Roots between texels get other colors when the interpolation of the node changes."""
+    _image, _material, node = image_material()
+    colors = []
+    for interpolation in ("Linear", "Closest", "Linear"):
+        node.interpolation = interpolation
+        bpy.context.view_layer.update()
+        colors.append(at_roots("TEXTURE"))
+    assert np.abs(colors[1] - colors[0]).max() > 0.01
+    np.testing.assert_array_equal(colors[2], colors[0])
+
+
 def test_images_extend_as_their_nodes_say():
     pixels = np.zeros((1, 4, 3), np.float32)
     pixels[0, :, 0] = (1.0, 2.0, 3.0, 4.0)
