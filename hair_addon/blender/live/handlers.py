@@ -16,7 +16,7 @@ from ..materials import looks
 from ..render import refused_strands
 from ..render.frames import composite
 from ..render.viewport import viewport
-from ..settings import animated, style_items
+from ..settings import animated, layer_items, style_items
 from . import (
     copied_faces,
     events,
@@ -342,11 +342,13 @@ def before_saving(*_args):
 
 @persistent
 def after_import(*_args):
-    """Make names of styles readable for Blender's rename operators; show hair that was saved hidden."""
+    """Make names of styles and layers readable for Blender's rename operators; show hair that was saved hidden."""
     _show_hidden()
     file_changes.accept_state()
     for hair in _of_kind("HAIR"):
-        style_items.make_names_readable(hair.vellus)
+        style_items.make_names_readable(hair.vellus.styles, style_items.default_name)
+    for guides in _of_kind("GUIDES"):
+        style_items.make_names_readable(guides.vellus.layers, lambda _item: layer_items.FIRST_NAME)
 
 
 @persistent

@@ -79,13 +79,21 @@ def names_of(state):
     return tuple(text_of(item, "name") for item in state.styles)
 
 
-def make_names_readable(state):
-    """Replace invalid UTF-8 bytes in names, as in a damaged file: renaming such a style crashes Blender."""
-    for item in state.styles:
+def make_names_readable(items, default_of):
+    """Replace invalid UTF-8 bytes in names of a list, as in a damaged file: renaming such an item crashes Blender.
+
+    default_of: function of an item that returns the name of an item without any.
+    """
+    for item in items:
         if not text_of(item, "name"):
             stored = item.bl_system_properties_get()
             name = stored.get("name", "").encode(errors="surrogateescape").decode(errors="replace")
-            stored["name"] = unique_name(name or LABELS[item.kind], names_of(state))
+            stored["name"] = unique_name(name or default_of(item), [text_of(other, "name") for other in items])
+
+
+def default_name(item):
+    """Return the name of a style without any."""
+    return LABELS[item.kind]
 
 
 def active_of(state):
