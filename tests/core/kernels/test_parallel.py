@@ -3,6 +3,7 @@
 
 import os
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -90,3 +91,12 @@ def test_what_any_thread_raises_is_raised_when_all_are_done(failing):
     with pytest.raises(ValueError, match="this part"):
         parallel._on_threads(run, 4, 2)
     assert failing not in done
+
+
+def test_on_one_core_only_the_calling_thread_has_a_single_part():
+    """Shares of a thread are one on one core, and as many as before after it and in other threads."""
+    usual = parallel.part_count(1_000_000, "cpu")
+    with ThreadPoolExecutor(1) as pool, parallel.on_one_core():
+        assert parallel.part_count(1_000_000, "cpu") == parallel.share_count(1_000_000, "cpu") == 1
+        assert pool.submit(parallel.part_count, 1_000_000, "cpu").result() == usual
+    assert parallel.part_count(1_000_000, "cpu") == usual
