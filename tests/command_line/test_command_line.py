@@ -312,7 +312,7 @@ def test_an_empty_background_is_empty(shot, tmp_path):
         (["groom", HEAD, "--influence-distance", "nan", "--out", "x.npz"], "--influence-distance must be"),
         (["groom", HEAD, "--influence-distance", 0, "--out", "x.npz"], "--influence-distance must be"),
         (["groom", HEAD, "--influence-distance", -1, "--out", "x.npz"], "--influence-distance must be"),
-        (["groom", HEAD, "--density-group", "scalp", "--out", "x.npz"], 'no vertex group "scalp"'),
+        (["groom", HEAD, "--density-group", "scalp", "--out", "x.npz"], 'no vertex group or attribute "scalp"'),
         (["groom", HEAD, "--settings", "missing.json", "--out", "x.npz"], "missing.json does not exist"),
         (["bake-tables", "--ior", 0.9, "--out", "x"], "--ior must be"),
         (["bake-tables", "--sigma-a", -1, 0, 0, "--out", "x"], "--sigma-a must be"),

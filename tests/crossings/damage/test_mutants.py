@@ -48,6 +48,9 @@ OTHERS = {
     "core/files/atomic_file.py": "writes",
     "core/kernels/kernel_entries.py": "compared with a digest: test_kernel_cache.py",
     "core/kernels/native_code.py": "the add-on's own sources",
+    # Written by this process, or by another for it, and read at once.
+    "blender/host/other_process.py": "the errors of a process that it started",
+    "blender/io/pictures/world_panorama.py": "the world that another process has written for it",
 }
 
 
