@@ -194,7 +194,9 @@ def test_selected_hair_is_outlined_by_its_silhouette(walk):
     distance = distance_transform_edt(np.load(walk.folder / "not_outlined_hair.npy") < 0.01)
     # Before the head hair that it hides is outlined too, and hair that is seen there has gaps.
     is_background = np.abs(bare - np.median(bare, axis=(0, 1))).max(axis=-1) <= 2.0 / 255.0
-    assert distance[is_line & is_background].max() < 8.0
+    # The outline of hidden hair reaches over the rim of the head by its width.
+    is_off_head = distance_transform_edt(is_background) > 3.0
+    assert distance[is_line & is_off_head].max() < 6.0
     assert is_line[is_background & (np.abs(distance - 3.0) < 0.2)].mean() > 0.8
 
 
