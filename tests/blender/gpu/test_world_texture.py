@@ -165,6 +165,42 @@ def test_cycles_renders_a_world_of_other_nodes(scene, tmp_path, monkeypatch):
     np.testing.assert_allclose(unrolled, rendered, rtol=0.02, atol=0.01)
 
 
+def test_the_digest_of_a_world_does_not_depend_on_the_order_of_its_links(scene):
+    mixed_world(scene)
+    before, tree = world_digest.digest_of(scene.world), scene.world.node_tree
+    first = tree.links[0]
+    ends = first.from_socket, first.to_socket
+    tree.links.remove(first)
+    assert world_digest.digest_of(scene.world) != before
+    tree.links.new(*ends)
+    assert tree.links[0].from_socket != ends[0]
+    assert world_digest.digest_of(scene.world) == before
+
+
+def test_a_view_has_one_process_while_nodes_change(scene, monkeypatch):
+    """Each step of a dragged slider is another world: the next process begins when the last has ended."""
+    rotation, _part = mixed_world(scene)
+    started = []
+    real = world_panoramas.OtherProcess
+
+    def start(*arguments):
+        started.append(real(*arguments))
+        return started[-1]
+
+    monkeypatch.setattr(world_panoramas, "OtherProcess", start)
+    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "import time; time.sleep(60)"])
+    for angle in (0.11, 0.12, 0.13):
+        rotation.default_value = (angle, 0.0, 0.0)
+        assert world_panoramas.file_of(scene.world, 1.0, waits=False) is None
+    assert len(started) == 1
+    started[0].wait(0.0)
+    assert world_panoramas.look() is None
+    assert world_panoramas.file_of(scene.world, 1.0, waits=False) is None
+    assert len(started) == 2
+    started[1].wait(0.0)
+    assert world_panoramas.look() is None
+
+
 def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, monkeypatch):
     """Until then, the world has its viewport color, which it keeps with a message if Cycles cannot render it."""
     mixed_world(scene)[0].default_value = (0.1, 0.0, 0.0)

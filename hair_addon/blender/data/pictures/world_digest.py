@@ -16,7 +16,10 @@ def digest_of(world):
 
 
 def _of_tree(tree, above):
-    """Nodes and links of a tree; above: names of the trees that contain it, as a damaged file may be circular."""
+    """Nodes and links of a tree, sorted, as a click on a node changes their order.
+
+    above: names of the trees that contain it, as a damaged file may be circular.
+    """
     if tree is None or tree.name in above:
         return None
     nodes = [(node.name, node.bl_idname, node.mute, _of_node(node, (*above, tree.name))) for node in tree.nodes]
@@ -24,7 +27,7 @@ def _of_tree(tree, above):
         (link.from_node.name, link.from_socket.identifier, link.to_node.name, link.to_socket.identifier, link.is_muted)
         for link in tree.links
     ]
-    return nodes, links
+    return sorted(nodes, key=lambda node: node[0]), sorted(links)
 
 
 def _of_node(node, above):

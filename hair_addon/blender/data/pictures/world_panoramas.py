@@ -39,6 +39,11 @@ class _Rendering:
         except (OSError, RuntimeError) as error:
             self._process, self.reason = None, cause_of(error)
 
+    @property
+    def is_running(self):
+        """Whether nobody has noticed its end yet."""
+        return self._process is not None
+
     def is_ended(self, waits):
         """Whether it has ended, after waiting if `waits`; the file is then in its place, or there is a reason."""
         if self._process is not None and waits:
@@ -46,10 +51,10 @@ class _Rendering:
         if self._process is None or self._process.is_running:
             return self._process is None
         complaint, self._process = self._process.complaint(), None
-        if self._made.is_file():
+        try:
             self._made.replace(self._path)
-        else:
-            self.reason = complaint or "the process ended without a picture"
+        except OSError as error:
+            self.reason = complaint or cause_of(error)
         self._folder.cleanup()
         return True
 
@@ -64,8 +69,10 @@ def file_of(world, frame, waits):
     if path.is_file():
         process_cache.invalidate(digest)
         return path
-    rendering = process_cache.get(digest, lambda: _Rendering(world, path, frame))
-    if not rendering.is_ended(waits):
+    rendering = process_cache.get(digest)
+    if rendering is None and (waits or not _running()):  # a view has one process, as dragged or played nodes change
+        rendering = process_cache.keep(digest, _Rendering(world, path, frame))
+    if rendering is None or not rendering.is_ended(waits):
         if not bpy.app.timers.is_registered(look):
             bpy.app.timers.register(look, first_interval=_LOOK, persistent=True)
         return None
@@ -79,12 +86,15 @@ def file_of(world, frame, waits):
 
 def look():
     """Timer: show panoramas that are done. Returns the time to the next look, None after the last."""
-    renderings = [one for one in process_cache.values() if isinstance(one, _Rendering)]
-    ended = [one.is_ended(waits=False) for one in renderings]
+    ended = [one.is_ended(waits=False) for one in _running()]
     if any(ended):
         for world in bpy.data.worlds:
             world.update_tag()
-    return None if all(ended) else _LOOK
+    return _LOOK if _running() else None
+
+
+def _running():
+    return [one for one in process_cache.values() if isinstance(one, _Rendering) and one.is_running]
 
 
 def _folder():
