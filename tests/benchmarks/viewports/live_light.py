@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light Grid in a viewport on the sample head: time to the first and to the last light, a frame's time, and the
-difference to a render's light.
+"""Light Grid in a viewport on the sample head: time to the first and to the last light, the time of frames while light
+is followed beside that of frames without, in pairs, and the difference to a render's light.
 
 .venv/bin/python tests/benchmarks/viewports/live_light.py --strands 100000 --device cuda
+
+First of all the same is measured in a small scene, which compiles all kernels and programs; `--compile` ends there.
 """
 
 import argparse
@@ -25,23 +27,32 @@ from hair_addon.blender.data import scene
 from hair_addon.blender.render import drawn_scene, light_paths
 from hair_addon.blender.render.viewport import hair_picture, live_light
 from hair_addon.blender.settings import preferences
+from hair_addon.core import kernels
 from hair_addon.core.shading import presets
 
-FRAMES = 30
+PAIRS = 30  # of frames
 TURN = 0.02  # of the view from frame to frame [radians]
+SMALL = (2_000, (160, 100))  # strands and size of the scene that compiles
+
+_started = time.perf_counter()
+
+
+def say(text):
+    """Print a line with the time since the start [s], at once."""
+    print(f"{time.perf_counter() - _started:7.1f} s  {text}", flush=True)
 
 
 class View:
     """A viewport's picture of the scene, from its camera or turned from there."""
 
-    def __init__(self, size):
-        self.size = size
+    def __init__(self, size, per_side):
+        self.size, self.per_side = size, per_side
         depsgraph = bpy.context.evaluated_depsgraph_get()
         self.camera = scene.read_camera(bpy.context.scene, depsgraph, *size)
         self.drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
         self.count = light_paths.path_count(bpy.context.scene, size)
         self.live = live_light.LiveLight()
-        self._picture = hair_picture.HairPicture(size, 2)
+        self._picture = hair_picture.HairPicture(size, per_side)
 
     def turned(self, angle):
         """The camera, turned around the world's Z axis."""
@@ -60,7 +71,7 @@ class View:
 
     def picture(self, drawn):
         """(H, W, 3) light of all passes."""
-        picture = hair_picture.HairPicture(self.size, 2)
+        picture = hair_picture.HairPicture(self.size, self.per_side)
         while not picture.is_fine:
             picture.add_pass(drawn, *self.camera)
         return picture.read()[..., :3]
@@ -75,44 +86,97 @@ def differences(picture, other):
     return float(np.abs(change).mean() / scale), float(np.abs(blocks).mean() / scale)
 
 
+def rest(view):
+    """Rest until all light is known, and print times of frames; returns the lit scene."""
+    started, first = time.perf_counter(), None
+    kinds = {"while a share is followed": [], "that show a share, begin one, or both": []}
+    waiting, showing = kinds.values()
+    while not view.live.is_done:
+        was_busy = view.live.is_busy
+        found, seconds = view.draw(view.camera)
+        (waiting if was_busy and view.live.is_busy else showing).append(seconds)
+        if first is None and found is not view.drawn:
+            first = time.perf_counter() - started
+            say(f"first light of paths after {first:.2f} s, of which {live_light._REST} s at rest")
+    say(f"all light after {time.perf_counter() - started:.2f} s, {view.live._paths.taken:.0f} paths")
+    for name, times in kinds.items():
+        if times:
+            high = f"95th percentile {1e3 * np.quantile(times, 0.95):.2f}"
+            say(f"{len(times)} frames {name}: median {1e3 * np.median(times):.2f} ms, {high}")
+    return found
+
+
+def pairs_of_frames(view, count):
+    """Print the time of frames while a share is followed, each beside a frame without."""
+    ratios, ended = [], 0
+    for _ in range(count):
+        view.live.stop()
+        view.live.wait()
+        _found, without = view.draw(view.camera, is_followed=False)
+        view.live._is_done, view.live._acted = False, -np.inf
+        view.draw(view.camera)  # begins a share
+        _found, beside = view.draw(view.camera)
+        ended += not view.live.is_busy
+        ratios.append(beside / without)
+    low, middle, high = np.quantile(ratios, (0.25, 0.5, 0.75))
+    say(f"{count} pairs, frame while followed / without: {middle:.3f} ({low:.3f} to {high:.3f}); {ended} shares ended")
+
+
+def measure(strand_count, size, device, per_side):
+    """Measure a head with so many strands, and print the figures."""
+    preferences.device = lambda: "cpu"  # hair is made on the processor
+    _guides, hair = head.grow(head.build(), strand_count=strand_count)
+    api.shade(hair.data, presets.PRESETS["BROWN"][1], model="MARSCHNER", mode="energy")
+    head.light()
+    say(f"{strand_count} strands grown")
+    preferences.device = lambda: device
+    view = View(size, per_side)
+    say(f"scene read; {size}, {view.per_side}² samples, {gpu.platform.renderer_get()}, paths on {device}")
+    for _ in range(3):  # programs are compiled
+        view.draw(view.camera, is_followed=False)
+    say("programs compiled")
+    pairs_of_frames(view, PAIRS)
+    found = rest(view)
+    orbit = [view.draw(view.turned(TURN * frame))[1] for frame in range(1, PAIRS)]
+    say(f"orbit: median {1e3 * np.median(orbit):.2f} ms, 95th percentile {1e3 * np.quantile(orbit, 0.95):.2f}")
+    light = view.picture(found)
+    paths = view.picture(light_paths.with_grid(view.drawn, *view.camera, view.count))
+    for name, shown in (("dual scattering", view.picture(view.drawn)), ("the viewport", light)):
+        pixels, blocks = differences(shown, paths)
+        say(f"{name} against a render's light: pixels {pixels:.4f}, blocks {blocks:.4f} of the mean")
+    live_light.end()
+
+
+def _say_what_is_compiled():
+    """Print the time that each Warp module takes to compile."""
+    compile_anew = kernels.kernel_entries.compile_anew
+
+    def timed(device, module):
+        started = time.perf_counter()
+        compile_anew(device, module)
+        say(f"compiled {module.name.rpartition('.')[2]} for {device} in {time.perf_counter() - started:.1f} s")
+
+    kernels.kernel_entries.compile_anew = timed
+
+
 def main():
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--strands", type=int, default=100_000)
     parser.add_argument("--size", type=int, nargs=2, default=[1920, 1080], metavar=("WIDTH", "HEIGHT"))
     parser.add_argument("--device", default="cpu", help="the Warp device that follows paths")
+    parser.add_argument("--compile", action="store_true", help="measure the small scene only")
     options = parser.parse_args()
+    wp.config.log_level = wp.LOG_WARNING
+    _say_what_is_compiled()
     hair_addon.register()
     gpu.init()
-    wp.config.log_level = wp.LOG_WARNING
-    preferences.device = lambda: options.device
-    _guides, hair = head.grow(head.build(), strand_count=options.strands)
-    api.shade(hair.data, presets.PRESETS["BROWN"][1], model="MARSCHNER", mode="energy")
-    head.light()
-    view = View(tuple(options.size))
-    print(f"{view.size}, {gpu.platform.renderer_get()}, paths on {options.device}, {options.strands} strands")
-    for _ in range(3):  # programs are compiled
-        view.draw(view.camera, is_followed=False)
-    still = [view.draw(view.camera, is_followed=False)[1] for _ in range(FRAMES)]
-    started, frames, first = time.perf_counter(), [], None
-    while not view.live.is_done:
-        found, seconds = view.draw(view.camera)
-        frames.append(seconds)
-        if first is None and found is not view.drawn:
-            first = time.perf_counter() - started
-    last = time.perf_counter() - started
-    print(f"first light of paths {first:.2f} s, all {last:.2f} s, of which {live_light._REST} s at rest")
-    print(f"frame [ms]: without {1e3 * np.median(still):.2f}, while followed {1e3 * np.median(frames):.2f}", end="")
-    print(f", 95th percentile {1e3 * np.quantile(still, 0.95):.2f} and {1e3 * np.quantile(frames, 0.95):.2f}")
-    light = view.picture(found)
-    for name, other in (("dual scattering", view.drawn), ("the viewport", found)):
-        paths = light_paths.with_grid(view.drawn, *view.camera, view.count)
-        shown = light if other is found else view.picture(other)
-        pixels, blocks = differences(shown, view.picture(paths))
-        print(f"{name} against a render's light: pixels {pixels:.4f}, blocks {blocks:.4f} of the mean")
-    orbit = [view.draw(view.turned(TURN * frame))[1] for frame in range(1, FRAMES)]
-    print(f"orbit [ms]: {1e3 * np.median(orbit):.2f}, 95th percentile {1e3 * np.quantile(orbit, 0.95):.2f}")
-    live_light.end()
+    per_side = hair_picture.samples_per_side()
+    say("registered; a small scene first")
+    measure(*SMALL, options.device, per_side)
+    if not options.compile:
+        measure(options.strands, tuple(options.size), options.device, per_side)
+    say("done")
 
 
 if __name__ == "__main__":
