@@ -63,14 +63,14 @@ def walk(extension, bare_python, tmp_path_factory):
         return json.loads(done.stdout.splitlines()[-1])
 
     run.profile, run.home = profile, home
-    run.installed = run("install")
+    run.used = run("install")
     return run
 
 
 @pytest.fixture(scope="session")
 def used(walk):
-    """Return what the operators and scripts made, in one Blender."""
-    return walk("use")
+    """What the operators and scripts made, in the Blender that installed the extension."""
+    return walk.used
 
 
 def test_zip_holds_what_blender_runs_and_nothing_else(extension):
@@ -107,7 +107,7 @@ def test_bare_python_has_neither_warp_nor_openexr(bare_python):
 
 
 def test_installs_and_enables(walk):
-    assert walk.installed == {"result": ["FINISHED"], "enabled": True}
+    assert walk.used["installed"] == {"result": ["FINISHED"], "enabled": True}
 
 
 def test_installed_operators_run(walk, used):

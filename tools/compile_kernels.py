@@ -90,7 +90,8 @@ def compile_into(folder, processors, is_for_tests=False):
     """Write the folder that `compiled_kernels` reads: an index, and each Warp module for each `Processor`.
 
     is_for_tests: for other processors than this one, compile only the modules that tests compare. Each processor's
-    modules are compiled by a process of their own: a module may take half of its time, which one thread takes.
+    modules are compiled by a process of their own: a module may take half of its time, which one thread takes. All of
+    them run at once, also on fewer cores: a process that begins late would work alone at the end.
     """
     import warp as wp
 
@@ -99,13 +100,14 @@ def compile_into(folder, processors, is_for_tests=False):
 
     features = compiled_kernels.processor_features()
     here = next((processor for processor in processors if features.issuperset(processor.features)), None)
-    threads = -(-(os.process_cpu_count() or 1) // len(processors))
+    cores = os.process_cpu_count() or 1
     entries = {}
-    with ProcessPoolExecutor(
-        os.process_cpu_count(), multiprocessing.get_context("spawn"), max_tasks_per_child=1
-    ) as pool:
+    with ProcessPoolExecutor(len(processors), multiprocessing.get_context("spawn"), max_tasks_per_child=1) as pool:
         jobs = [
-            pool.submit(_compile_for, processor, folder, is_for_tests and processor != here, threads)
+            pool.submit(
+                *(_compile_for, processor, folder, is_for_tests and processor != here),
+                cores if is_for_tests and processor == here else -(-cores // len(processors)),
+            )
             for processor in processors
         ]
         for processor, job in zip(processors, jobs, strict=True):

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.io.pictures import frames, sequence
+from hair_addon.command_line import render
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import file_lock
 from hair_addon.core.files.atomic_file import atomic_file, partial_of
@@ -70,10 +71,11 @@ def words(turning, folder, *more, ending="png"):
     return ("render", turning, "--frames", f"1-{COUNT}", "--out", folder / f"f_###.{ending}", "--json", *more)
 
 
-def start(turning, folder, *more):
+def start(turning, folder):
     """The command in a process of its own, whose standard output may be read."""
-    line = list(map(str, command(*words(turning, folder, *more))))
-    return subprocess.Popen(line, stdout=subprocess.PIPE, env=ENVIRONMENT, cwd=ROOT)
+    line = list(map(str, command(*words(turning, folder))))
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(line, text=True, env=ENVIRONMENT, cwd=ROOT, **pipes)
 
 
 def pixels(path):
@@ -125,11 +127,16 @@ def test_a_frame_does_not_depend_on_those_before(turning, whole, tmp_path):
 @pytest.mark.parametrize("asked", [signal.SIGKILL, signal.SIGINT], ids=["killed", "Ctrl-C"])
 def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
     with start(turning, tmp_path) as process:
-        first = [json.loads(process.stdout.readline())["frame"] for _ in range(2)]
+        lines = [process.stdout.readline() for _ in range(2)]
         process.send_signal(asked)
-        first += [json.loads(line)["frame"] for line in process.stdout]
+        printed, errors = process.communicate(timeout=60)
+    told = [json.loads(line) for line in [*lines, *printed.splitlines()]]
+    first = [values["frame"] for values in told]
     there = {name: (tmp_path / name).stat().st_mtime_ns for name in pictures(tmp_path)}
     assert 2 <= len(there) < COUNT
+    if asked == signal.SIGINT:
+        assert (process.returncode, errors) == (130, "vellus: stopped: unfinished results were not written.\n")
+        assert sorted(values["out"] for values in told) == [str(tmp_path / name) for name in there]
     ended = run_here(*words(turning, tmp_path))
     assert ended.status == 0, ended.errors
     assert set(frame_numbers(ended)).isdisjoint(first)
@@ -154,14 +161,21 @@ def test_another_machine_goes_on(turning, whole, tmp_path):
         np.testing.assert_array_equal(pixels(there / name), pixels(whole / name))
 
 
-def test_processes_share_the_frames(turning, whole, tmp_path):
-    """Those of one command, and another command that runs at the same time."""
-    with start(turning, tmp_path, "--jobs", 2) as other:
-        made = [json.loads(other.stdout.readline())["frame"]]
-        ended = run_here(*words(turning, tmp_path))
-        made += frame_numbers(ended) + [json.loads(line)["frame"] for line in other.stdout]
-    assert (ended.status, other.returncode) == (0, 0), ended.errors
-    assert sorted(made) == list(range(1, COUNT + 1))
+def test_processes_share_the_frames(turning, whole, tmp_path, monkeypatch):
+    """Workers of one command, and another command that runs at the same time: here once the first frame is there."""
+    others, sentence_of = [], render._sentence
+
+    def told(values):
+        if not others:
+            others.append(None)
+            others[0] = run_here(*words(turning, tmp_path))
+        return sentence_of(values)
+
+    monkeypatch.setattr(render, "_sentence", told)
+    monkeypatch.setenv("PYTHONPATH", PYTHONPATH)
+    ended = run_here(*words(turning, tmp_path, "--jobs", 2))
+    assert (ended.status, others[0].status) == (0, 0), ended.errors + others[0].errors
+    assert sorted(frame_numbers(ended) + frame_numbers(others[0])) == list(range(1, COUNT + 1))
     for name in ALL:
         np.testing.assert_array_equal(pixels(tmp_path / name), pixels(whole / name))
     assert hidden(tmp_path) == [".f_###.png.json"]

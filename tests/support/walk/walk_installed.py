@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Use of the installed extension as an artist does, in a Python with only the bpy wheel.
 
-    python -I walk_installed.py install|use|twice ZIP FOLDER
+    python -I walk_installed.py install|twice ZIP FOLDER
 
 Prints one line of JSON at the end, which test_install.py checks.
 """
@@ -41,16 +41,21 @@ API_FILES = (
 )
 
 
-def install(zip_path, _folder):
+def install(zip_path):
     """Install from disk into an empty profile and enable, as the Preferences do."""
     result = bpy.ops.extensions.package_install_files(filepath=zip_path, repo="user_default", enable_on_install=True)
+    bpy.ops.wm.save_userpref()
     return {"result": list(result), "enabled": MODULE in bpy.context.preferences.addons}
 
 
-def use(_zip_path, folder):
-    """Run operators, then scripts, in one Blender: each start unpacks the wheels of the extension for four seconds."""
+def install_and_use(zip_path, folder):
+    """Install, run operators, then scripts, in one Blender: each start unpacks the wheels of the extension."""
+    return {"installed": install(zip_path), **use(folder)}
+
+
+def use(folder):
+    """Run operators, then scripts."""
     gpu.init()
-    bpy.ops.preferences.addon_enable(module=MODULE)
     _draw_coarse_shadows()
     return {"operators": _operators(folder), "scripts": _scripts(folder)}
 
@@ -203,8 +208,6 @@ def _count_draw_handlers():
 
 if __name__ == "__main__":
     verb, zip_argument, folder_argument = sys.argv[1:]
-    verbs = {"install": install, "use": use, "twice": twice}
+    verbs = {"install": install_and_use, "twice": twice}
     outcome = verbs[verb](zip_argument, Path(folder_argument))
-    if verb == "install":
-        bpy.ops.wm.save_userpref()
     print(json.dumps(outcome))

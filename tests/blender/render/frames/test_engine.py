@@ -2,6 +2,7 @@
 """The render engine's picture equals the offscreen picture, at any size, in tiles and over any backdrop."""
 
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ from hair_addon.blender.gpu import drawing
 from hair_addon.blender.render import film, offscreen
 from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
+from tests.support.commands import PYTHONPATH
 from tests.support.pictures.rendering import configure, layers_of, light_up, read_layers, rendered
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -355,5 +357,6 @@ def test_a_script_that_renders_exits_normally():
         "render.engine, render.resolution_x, render.resolution_y = 'VELLUS', 16, 16\n"
         "assert bpy.ops.render.render() == {'FINISHED'}\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120)
+    line, environment = [sys.executable, "-c", script], os.environ | {"PYTHONPATH": PYTHONPATH}
+    done = subprocess.run(line, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr[-2000:]
