@@ -3,14 +3,8 @@
 // samples other than background.
 
 #include "picture/film_filter.glsl"
+#include "picture/sample_distance.glsl"
 #include "visibility/sample_values.glsl"
-
-// clip: last two rows and columns of the view-to-clip matrix, row by row.
-float distance_at(float depth, vec4 clip)
-{
-  float ndc = 2.0 * depth - 1.0;
-  return (clip.w * ndc - clip.y) / (clip.z * ndc - clip.x);
-}
 
 void main()
 {

@@ -3,9 +3,7 @@
 
 #include "shadows/surface_visibility.glsl"
 #include "light/world.glsl"
-#include "surfaces/surface_reflection.glsl"
-#include "surfaces/surface_material.glsl"
-#include "surfaces/surface_point.glsl"
+#include "surfaces/surface_colors.glsl"
 
 // Maximum light, within the range of a picture's half floats.
 const float BRIGHTEST = 6e4;
@@ -29,24 +27,16 @@ struct SurfaceLight {
 SurfaceLight surface_light(SurfacePoint point, vec2 turn)
 {
   vec3 N = point.N;
-  vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - point.position) : view.eye.xyz;
+  vec3 V = to_viewer(point.position);
   float n_dot_v = max(abs(dot(N, V)), 1e-4);
-  vec3 albedo = base_color(point.uv, point.uv_right, point.uv_up);
-  float roughness = base_roughness(point.uv, point.uv_right, point.uv_up);
-  float alpha = filtered_alpha(roughness, point.normal_variance);
-  vec4 share = directional_albedo(surface_albedo, n_dot_v, roughness);
-  // A surface without reflectance at normal incidence reflects nothing at any angle.
-  float grazing = share.z * min(50.0 * surface.reflectance, 1.0);
-  float coat = surface.reflectance * (share.x - share.z) + grazing;
-  vec3 reflectance = mix(vec3(surface.reflectance), albedo, surface.metallic);
-  vec3 gain = multiple_reflections(share, reflectance);
-  vec3 reflected = gain * mix(vec3(coat), albedo * (share.x - share.y) + share.y, surface.metallic);
+  SurfaceColors colors = surface_colors(point, n_dot_v);
+  float alpha = filtered_alpha(colors.roughness, point.normal_variance);
 
   mat3 plus;
   mat3 minus;
   world_sides(point.seen_x_y, point.seen_z.xy, view.seen_opacity, view.hair_forward.rgb, plus, minus);
   vec3 irradiance = surface_irradiance(plus, minus, N);
-  vec3 highlight = reflected * surface_irradiance(plus, minus, reflect(-V, N)) / PI;
+  vec3 highlight = colors.reflected * surface_irradiance(plus, minus, reflect(-V, N)) / PI;
   float variance = 0.0;
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
@@ -72,7 +62,7 @@ SurfaceLight surface_light(SurfacePoint point, vec2 turn)
       // A light's size widens its highlight, by half its angle in terms of the microfacets' normals.
       float widened = min(sqrt(alpha * alpha + 0.5 * blur), 1.0);
       vec3 dielectric = vec3(F_dielectric(v_dot_h, surface.reflectance));
-      vec3 fresnel = mix(dielectric, F_schlick(v_dot_h, albedo), surface.metallic);
+      vec3 fresnel = mix(dielectric, F_schlick(v_dot_h, colors.base), surface.metallic);
       float n_dot_h = clamp(dot(N, H), 0.0, 1.0);
       float facets = D_ggx(n_dot_h, widened);
       float mirrored = smoothstep(0.25, 1.0, 0.5 * blur / (alpha * alpha));
@@ -80,13 +70,13 @@ SurfaceLight surface_light(SurfacePoint point, vec2 turn)
         facets = mix(facets, D_ggx_of_disk(n_dot_h, sqrt(blur), alpha), mirrored);
       }
       facets *= V_smith(n_dot_l, n_dot_v, alpha);
-      highlight += arriving * gain * fresnel * facets;
+      highlight += arriving * colors.gain * fresnel * facets;
     }
   }
   SurfaceLight light_here;
-  light_here.below = (1.0 - surface.metallic) * max(1.0 - coat, 0.0) * albedo * irradiance / PI;
+  light_here.below = colors.diffuse * irradiance / PI;
   light_here.highlight = highlight;
-  light_here.coat = coat;
+  light_here.coat = colors.coat;
   light_here.alpha = alpha;
   light_here.noise = variance / max(squared_mean(irradiance), 1e-20);
   return light_here;

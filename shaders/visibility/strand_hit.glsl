@@ -8,6 +8,8 @@ float strand_position;  // root 0 to tip 1
 vec3 strand_tangent;
 vec3 drawn_position;
 float drawn_radius;
+Segment drawn_segment;  // of the picture
+vec2 sample_at;  // [samples]
 
 // Unnormalized direction of a strand at a point; arbitrary where the strand folds back on itself.
 vec3 tangent_at(vec3 before, vec3 after)
@@ -37,10 +39,10 @@ void find_place(int index, vec2 at, vec2 size)
   vec4 head = packed_head(strands, texel);
   vec4 first = strand_point(strand_index, texel, head, start);
   vec4 second = strand_point(strand_index, texel, head, end);
-  Segment segment;
+  sample_at = at;
   vec2 radii = vec2(first.w, second.w);
-  bool is_in_front = segment_in_front(to_clip(first), to_clip(second), radii, size, axis_place(size), segment);
-  float t = is_in_front ? place_on_segment(segment, at) : 0.0;
+  bool is_in_front = segment_in_front(to_clip(first), to_clip(second), radii, size, axis_place(size), drawn_segment);
+  float t = is_in_front ? place_on_segment(drawn_segment, at) : 0.0;
   vec3 before = packed_place(strands, texel, head, max(start - 1, 0));
   vec3 after = packed_place(strands, texel, head, min(end + 1, view.point_count - 1));
   vec3 near_start = packed_place(strands, texel, head, start + 1);

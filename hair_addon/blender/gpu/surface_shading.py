@@ -63,6 +63,16 @@ def draw_clear(surface, parts, view, lights, samplers):
             surface.corners.bare.draw_range(program, elem_start=first, elem_count=count)
 
 
+def draw_data(surface, parts, view, lights, samplers, record):
+    """Draw a pass of data of a `SurfaceOnGPU` into the bound framebuffer; record: of `uniforms.DATA`."""
+    blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "lights": uniforms.uniform_buffer(lights)}
+    blocks["data"] = uniforms.uniform_buffer(record)
+    program = surface_programs.data_program()
+    for first, count, material in parts:
+        with drawing.bound(program, blocks, surface.samplers | samplers | _of_material(blocks, material)):
+            surface.corners.bare.draw_range(program, elem_start=first, elem_count=count)
+
+
 def _of_material(blocks, material):
     """{sampler: texture} of a material; adds its block to `blocks`."""
     images = {name: _texture(getattr(material, name)) for name in surface_programs.SURFACE_IMAGES}

@@ -9,6 +9,7 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.long_work import no_progress, part_of
 from ..data.pictures import drawn_meshes, viewport_shading
+from ..data.pictures.mist import WITHOUT_WORLD, Mist, read_mist
 from ..gpu import ambient_visibility, drawing, scene_lights, strand_textures, studio_lights, surface_textures, windows
 from ..gpu import lights as blender_lights
 from ..gpu.programs import uniforms
@@ -49,6 +50,7 @@ class DrawnScene:
     is_shadowed: tuple = ()  # whether hair darkens each of `surfaces` in viewports; (): all of them
     hair_lights: np.ndarray | None = None  # uniforms.LIGHTS of each hair; None: `lights` for all
     surface_lights: np.ndarray | None = None  # the same for `surfaces`, then for `clear`
+    mist: Mist = WITHOUT_WORLD  # in renders
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,6 +266,7 @@ def read_render(depsgraph, known, refused, noted, progress=no_progress):
     hair_seen, surfaces_seen = visibility(unlit)
     progress("Drawing shadows", 0.7)
     drawn = replace(unlit, world=world, hair_visibility=hair_seen, surface_visibility=surfaces_seen)
+    drawn = replace(drawn, mist=read_mist(depsgraph.scene_eval, depsgraph.view_layer_eval))
     return _lit(drawn, lamps, scene_lights.new_maps(lamps.record, is_wide=True), hair_receivers)
 
 

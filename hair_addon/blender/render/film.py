@@ -8,7 +8,7 @@ from ...core.imaging import pixel_sampling
 from ..gpu import drawing
 from ..gpu.programs import picture_programs, surface_programs
 from ..gpu.visibility_buffer import VisibilityBuffer
-from . import mattes, motion_vectors, scene_drawing
+from . import data_passes, mattes, motion_vectors, scene_drawing
 
 _MOST_SAMPLES = 4096  # along a tile's side: textures take 340 MB, 870 MB with all passes
 
@@ -22,6 +22,11 @@ _CHANNELS = {
     "Depth": ("Z", "VALUE"),
     "Hair Mask": ("X", "VALUE"),
     "Vector": ("XYZW", "VECTOR"),
+    "Mist": ("Z", "VALUE"),
+    "Position": ("XYZ", "VECTOR"),
+    "Normal": ("XYZ", "VECTOR"),
+    "Noisy Image": ("RGBA", "COLOR"),
+    "Denoising Normal": ("XYZ", "VECTOR"),
 }
 
 # Passes of hair's light: factors of (R, TT, TRT, all other light from lamps), and of the world's light.
@@ -41,11 +46,19 @@ def channels_of(name):
     return _CHANNELS.get(name, ("RGB", "COLOR"))
 
 
+_OWN_PROGRAMS = {"Depth", "Hair Mask", "Position", "Noisy Image"}  # passes that are no sums of pictures
+
+
+def _count_of(name):
+    """Number of channels in a film."""
+    return 4 if name == "Position" else len(channels_of(name)[0])
+
+
 class Film:
     """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
 
     border: extra samples around the tile; passes: names out of "Combined", "Depth", "Hair Mask", "Hair Shadow",
-    "Shadow", "Vector" and `LOBES`; is_transparent: leave the background empty; filter_width: of
+    "Shadow", "Vector", `LOBES` and `data_passes`; is_transparent: leave the background empty; filter_width: of
     `pixel_sampling.filter_weights` [pixels]; labels: `mattes.Labels` if mattes are wanted. The attribute
     `motion` is the `Motion` for the pass "Vector".
     """
@@ -56,7 +69,8 @@ class Film:
         self._border = border
         sides = (length * per_side + 2 * (self._margin + border) for length in size)
         self.samples = VisibilityBuffer(*sides, is_coarse=per_side > 1)
-        self._sums = {name: self._texture() for name in passes if name not in {"Depth", "Hair Mask"}}
+        self._sums = {name: self._texture() for name in passes if name not in _OWN_PROGRAMS}
+        self._positions = self._texture() if "Position" in passes else None
         self._depth = self._texture() if {"Depth", "Hair Mask", "Vector"} & set(passes) else None
         self._mattes = None if labels is None else mattes.MatteFilm(size, labels)
         self._passes, self.motion = passes, None
@@ -72,6 +86,8 @@ class Film:
             texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
         if self._depth is not None:
             self._depth.clear(format="FLOAT", value=(0.0, FAR, 0.0, 0.0))
+        if self._positions is not None:
+            self._positions.clear(format="FLOAT", value=(0.0, 0.0, 0.0, FAR))
         if self._mattes is not None:
             self._mattes.clear()
 
@@ -82,6 +98,7 @@ class Film:
         passes over it; place: (left, bottom) of the tile in it [pixels]; lens: a `Lens`, of which each pass samples
         another point, None: all in focus.
         """
+        central = world_to_view
         if lens is not None:
             world_to_view = lens.world_to_view(world_to_view, turn)
         whole = tuple(length * self._per_side for length in size)
@@ -94,14 +111,14 @@ class Film:
         ]
         weighting = _weights_texture(weights)
         for name, texture in self._sums.items():
-            samplers = {"picture": self._picture(name, drawn, view), "filter_weights": weighting}
+            samplers = {"picture": self._picture(name, drawn, view, central), "filter_weights": weighting}
             self._add(picture_programs.film_program(), samplers, texture)
         if self._depth is not None:
-            program = picture_programs.film_depth_program()
-            program.bind()
-            program.uniform_float("view_to_clip", view_to_clip[2:, 2:].ravel())
-            samplers = {"segments": self.samples.segments, "depths": self.samples.nearest_depths()}
-            self._add(program, {**samplers, "filter_weights": weighting}, self._depth)
+            samplers = {"segments": self.samples.segments, "filter_weights": weighting}
+            self._add_depths(picture_programs.film_depth_program(), samplers, self._depth, view_to_clip)
+        if self._positions is not None:
+            samplers = {"picture": self._picture("Position", drawn, view, central), "filter_weights": weighting}
+            self._add_depths(picture_programs.film_position_program(), samplers, self._positions, view_to_clip)
         if self._mattes is not None:
             self._mattes.add(drawn, self.samples, weighting, self._per_side, self._margin, self._border)
         self.pass_count += 1
@@ -113,10 +130,12 @@ class Film:
         """Number of samples per pixel so far."""
         return self.pass_count * self._per_side**2
 
-    def _picture(self, name, drawn, view):
-        """The samples of a pass, as a texture."""
+    def _picture(self, name, drawn, view, world_to_view):
+        """The samples of a pass, as a texture; world_to_view: of the camera without its lens."""
         if name == "Combined":
             return self.samples.color
+        if name in data_passes.KINDS:
+            return data_passes.draw(drawn, name, world_to_view, view, self.samples)
         if name == "Vector":
             return motion_vectors.draw(drawn, self.motion, view, self.samples)
         if name == "Shadow":
@@ -124,6 +143,11 @@ class Film:
         if name == "Hair Shadow":
             return scene_drawing.draw_hair_shadow(drawn, view, self.samples)
         return self.samples.part_of_light(*LOBES[name])
+
+    def _add_depths(self, program, samplers, sums, view_to_clip):
+        program.bind()
+        program.uniform_float("view_to_clip", view_to_clip[2:, 2:].ravel())
+        self._add(program, {"depths": self.samples.nearest_depths(), **samplers}, sums)
 
     def _add(self, program, samplers, sums):
         with drawing.bound(program, {}, samplers):
@@ -151,7 +175,10 @@ class Film:
             drawing.cover(program)
 
     def read(self):
-        """{pass: (height, width, channels) float32}, bottom row first: means over the samples, least depths."""
+        """{pass: (height, width, channels) float32}, bottom row first: means over the samples, least depths.
+
+        "Position" is that of the nearest sample, and as a fourth channel its distance, `FAR` without one.
+        """
         found = {name: self._read(texture) for name, texture in self._sums.items()}
         for values in found.values():
             values /= self._weight_sum  # in place: another picture of this size takes as long to allocate
@@ -160,7 +187,13 @@ class Film:
             found |= {"Hair Mask": mask / self._weight_sum, "Depth": depth}
             if "Vector" in found:  # of objects, not of the background
                 found["Vector"] *= self._weight_sum / np.maximum(covered, 1e-6)
-        return {name: found[name][..., : len(channels_of(name)[0])] for name in self._passes}
+        if self._positions is not None:
+            found["Position"] = self._read(self._positions)
+        if "Mist" in found:
+            found["Mist"] = 1.0 - found["Mist"]
+        if "Noisy Image" in self._passes:
+            found["Noisy Image"] = found["Combined"]
+        return {name: found[name][..., : _count_of(name)] for name in self._passes}
 
     def read_mattes(self):
         """Return (labels, coverages), each (height, width, slots), bottom row first; None without labels."""

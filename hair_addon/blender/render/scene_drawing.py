@@ -148,7 +148,7 @@ def _draw_by_lights(drawn, view, fragment, is_left_out=None):
     _see_through_hair(drawn, view)
     program = surface_programs.arrival_program(fragment)
     is_left_out = is_left_out or [False] * len(drawn.surfaces)
-    lit = zip(drawn.surfaces, *_light_of(drawn, solid=True), is_left_out, strict=True)
+    lit = zip(drawn.surfaces, *light_of(drawn, solid=True), is_left_out, strict=True)
     for (surface, _parts), lights, samplers, is_empty in lit:
         if is_empty:
             surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag")
@@ -156,7 +156,7 @@ def _draw_by_lights(drawn, view, fragment, is_left_out=None):
         surface_textures.draw_lit(surface, program, view, lights, samplers)
 
 
-def _light_of(drawn, solid):
+def light_of(drawn, solid):
     """(`uniforms.LIGHTS` records, {sampler: texture} dictionaries) of all solid, or all clear surfaces."""
     count = len(drawn.surfaces)
     of_all = [drawn.lights] * len(drawn.surface_visibility) if drawn.surface_lights is None else drawn.surface_lights
@@ -179,7 +179,7 @@ def _see_through_hair(drawn, view):
 def _shade_surfaces(drawn, view, buffer, picture):
     """Shade all surfaces except holdouts where they are nearest, below clear surfaces."""
     first_triangle = 0
-    for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
+    for (surface, parts), lights, samplers in zip(drawn.surfaces, *light_of(drawn, solid=True), strict=True):
         if parts is not None:
             arguments = view, lights, samplers, buffer, picture, bool(drawn.clear)
             surface_shading.shade(surface, parts, first_triangle, *arguments)
@@ -201,9 +201,9 @@ def _nearer(view):
 def _draw_over_surfaces(drawn, view):
     """Draw holdouts into the bound framebuffer, and then clear surfaces over all surfaces."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, parts), lights in zip(drawn.surfaces, _light_of(drawn, solid=True)[0], strict=True):
+        for (surface, parts), lights in zip(drawn.surfaces, light_of(drawn, solid=True)[0], strict=True):
             if parts is None:
                 surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag")
     with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA_PREMULT"):
-        for (surface, parts), lights, samplers in zip(drawn.clear, *_light_of(drawn, solid=False), strict=True):
+        for (surface, parts), lights, samplers in zip(drawn.clear, *light_of(drawn, solid=False), strict=True):
             surface_shading.draw_clear(surface, parts, view, lights, samplers)

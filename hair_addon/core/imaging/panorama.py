@@ -198,14 +198,26 @@ class FaceLookup:
     def distances(self, pictures: dict[int, np.ndarray], far: float) -> np.ndarray:
         """Return distances (height, width, 1) float32 at pixel centers from depths {face: array}; `far` if unseen."""
         found = np.full((self._window[3], self._window[2], 1), far, np.float32)
+        for rows, chosen, depths, stretch in self._middles(pictures):
+            found[rows][chosen] = np.minimum(depths * stretch[:, None], far)
+        return found
+
+    def nearest(self, pictures: dict[int, np.ndarray], channels: int) -> np.ndarray:
+        """Return values (height, width, channels) float32 at pixel centers from {face: array}; zero if unseen."""
+        found = np.zeros((self._window[3], self._window[2], channels), np.float32)
+        for rows, chosen, values, _stretch in self._middles(pictures):
+            found[rows][chosen] = values
+        return found
+
+    def _middles(self, pictures):
+        """Yield (rows, pixels of these on a face, values at their centers, distance / depth) of each face."""
         for first, last in self._rows():
             faces, places, stretch, is_seen = (values[:, :, 0] for values in self._places(first, last, 1))
             for face, picture in pictures.items():
                 chosen = is_seen & (faces == face)
                 x, y = np.floor(places[chosen] + 0.5).astype(int).T - np.array(self.windows[face][:2])[:, None]
-                depths = picture[np.clip(y, 0, len(picture) - 1), np.clip(x, 0, picture.shape[1] - 1)]
-                found[first:last][chosen] = np.minimum(depths * stretch[chosen][:, None], far)
-        return found
+                values = picture[np.clip(y, 0, len(picture) - 1), np.clip(x, 0, picture.shape[1] - 1)]
+                yield slice(first, last), chosen, values, stretch[chosen]
 
 
 def _between_texels(picture, places):

@@ -109,6 +109,12 @@ class PassSettings(Settings):
         "Fraction of the light on surfaces that hair lets through, by which they are multiplied",
         label="Hair Shadow",
     )
+    has_denoising_data: bool = param(
+        False,
+        "Image, albedo and normal for the Denoise node of the compositor: Noisy Image, Denoising Albedo and Denoising "
+        "Normal",
+        label="Denoising Data",
+    )
 
 
 def samples_per_side(sample_count: int, least_passes: int = 1) -> int:

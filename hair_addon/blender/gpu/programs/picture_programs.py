@@ -22,6 +22,13 @@ def film_depth_program():
 
 
 @shaders.cached
+def film_position_program():
+    """The compute program of the nearest position in each pixel: see picture/film_position.comp."""
+    samplers = (("picture", "FLOAT_2D"), ("depths", "UINT_2D"))
+    return _film("picture/film_position.comp", samplers, (("VEC4", "view_to_clip"),))
+
+
+@shaders.cached
 def film_mattes_program():
     """The compute program that adds the coverage of pixels by labels: see picture/film_mattes.comp."""
     samplers = (("segments", "UINT_2D"), ("matte_ranges", "FLOAT_2D"))
@@ -73,6 +80,17 @@ def surface_motion_program():
         varying.smooth("VEC4", name)
     info.vertex_out(varying)
     return shaders.compile_drawing(info, "picture/surface_motion.vert", "picture/surface_motion.frag")
+
+
+DATA_FORMAT = "RGBA32F"  # of passes of data
+
+
+@shaders.cached
+def strand_data_program():
+    """The compute program of passes of data of strands: see picture/strand_data.comp."""
+    info = scene_programs.strand_samples_info(uniforms.DATA.source, (), DATA_FORMAT)
+    info.uniform_buf(2, uniforms.DATA.type_name, "data")
+    return shaders.compile_compute(info, "picture/strand_data.comp")
 
 
 @shaders.cached

@@ -54,6 +54,16 @@ def clear_program():
 
 
 @cached
+def data_program():
+    """The program of passes of data of a surface: see picture/surface_data.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    _declare_material(info, uniforms.DATA.source)
+    info.uniform_buf(3, uniforms.DATA.type_name, "data")
+    info.vertex_out(_lit_varying())
+    return compile_drawing(info, "surfaces/lit_surface.vert", "picture/surface_data.frag")
+
+
+@cached
 def arrival_program(fragment):
     """The program that measures the light on surfaces with a .frag."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -76,10 +86,10 @@ def depth_program(fragment="shadows/shadow_surface.frag", is_clipped=False):
     return compile_drawing(info, "surfaces/surface_depth.vert", fragment, replaced=replaced)
 
 
-def _declare_material(info):
+def _declare_material(info, structs=""):
     """Declare the inputs of shading programs; returns the first free sampler slot."""
     info.uniform_buf(2, "Surface", "surface")
-    return _declare_lit(info, uniforms.SURFACE.source, _MATERIAL_SAMPLERS)
+    return _declare_lit(info, uniforms.SURFACE.source + structs, _MATERIAL_SAMPLERS)
 
 
 def _declare_lit(info, structs="", samplers=()):

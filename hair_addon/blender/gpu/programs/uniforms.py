@@ -161,6 +161,16 @@ MOTION = Block(
     },
 )
 
+DATA = Block(
+    "DataPass",
+    {
+        "camera": "vec4",  # its center
+        "view_rows": ("vec4", 3),  # axes of the camera in the world
+        "mist": "vec4",  # start [m], 1 / depth [1/m], exponent
+        "kind": "int",  # index of `data_passes.KINDS`
+    },
+)
+
 MAKING = Block(
     "Making",
     {

@@ -19,6 +19,7 @@ from ...data.strands import curves
 from ...groom.dynamics import frame_folders
 from ...host import scene_time
 from ...live import live_hair
+from ...render import data_passes
 from ...render.frames import engine as render_engine
 from ...render.viewport import viewport
 from . import view_files
@@ -203,7 +204,7 @@ def _sample_property(blender_scene, engine):
 
 
 def _of_layer(view_layer):
-    for name in ("use_pass_z", "use_pass_vector", "use_pass_shadow"):
+    for name in ("use_pass_z", *data_passes.SETTINGS, "use_pass_vector", "use_pass_shadow"):
         yield view_layer, name, True
     for name, _default, _details in declared(PassSettings):
         yield view_layer.vellus, name, True

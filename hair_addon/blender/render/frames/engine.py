@@ -16,7 +16,7 @@ from ...groom.dynamics import frame_folders
 from ...host import scene_time
 from ...settings import setting_properties
 from ...settings.translations import error_text, interface_text
-from .. import drawn_scene, film, light_paths, mattes, motion_vectors
+from .. import data_passes, drawn_scene, film, light_paths, mattes, motion_vectors
 from ..viewport import rendered_view, viewport
 from . import composite, frame_progress
 from .frame_progress import FrameProgress
@@ -224,6 +224,9 @@ def _passes(view_layer, is_blurred):
     names = ["Combined"]
     if view_layer.use_pass_z:
         names.append("Depth")
+    names += [name for setting, name in data_passes.SETTINGS.items() if getattr(view_layer, setting)]
+    if wanted.has_denoising_data:
+        names += data_passes.DENOISING
     if view_layer.use_pass_vector and not is_blurred:
         names.append("Vector")
     if view_layer.use_pass_shadow:

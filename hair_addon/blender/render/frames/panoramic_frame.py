@@ -45,7 +45,10 @@ class PanoramicFrame:
     def _array(self, name, pictures):
         if name == "Depth":
             return self._lookup.distances(pictures, film.FAR)
-        unseen = {"Combined": (0.0, 0.0, 0.0, self._outside), "Hair Mask": (0.0,), "Hair Shadow": (1.0, 1.0, 1.0)}
+        if name == "Position":
+            return self._lookup.nearest(pictures, 3)
+        unseen = {"Hair Mask": (0.0,), "Mist": (1.0,), "Hair Shadow": (1.0, 1.0, 1.0)}
+        unseen |= dict.fromkeys(("Combined", "Noisy Image"), (0.0, 0.0, 0.0, self._outside))
         return self._lookup.means(pictures, unseen.get(name, (0.0, 0.0, 0.0)))
 
 

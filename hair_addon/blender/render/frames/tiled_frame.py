@@ -10,6 +10,7 @@ from .. import film, light_paths
 
 _LIGHT = 0.3  # share of tracing light among strands in the progress of a motion step
 _PASS = "Pass {number} of {count}"
+_NEAREST = {"Depth", "Position"}  # passes of the nearest sample, whose last channel is the distance
 
 
 class Frame:
@@ -88,10 +89,10 @@ class Frame:
         for name, values in arrays.items():
             if name not in self._sums:
                 shape = (self._window[3], self._window[2], values.shape[-1])
-                self._sums[name] = np.full(shape, film.FAR if name == "Depth" else 0.0, np.float32)
+                self._sums[name] = np.full(shape, film.FAR if name in _NEAREST else 0.0, np.float32)
             part = self._sums[name][bottom : bottom + height, left : left + width]
-            if name == "Depth":
-                np.minimum(part, values, out=part)
+            if name in _NEAREST:
+                np.copyto(part, values, where=values[..., -1:] < part[..., -1:])
             else:
                 part += values
 
@@ -112,5 +113,9 @@ class Frame:
         return labels, coverages / np.float32(self._moment_count)
 
     def arrays(self):
-        """{pass: array}: means over the motion steps so far, and the nearest depths."""
-        return {n: a if n == "Depth" else a / np.float32(self._moment_count) for n, a in self._sums.items()}
+        """{pass: array}: means over the motion steps so far, and the nearest depths and positions."""
+        found = {n: a if n in _NEAREST else a / np.float32(self._moment_count) for n, a in self._sums.items()}
+        if "Position" in found:
+            places, distances = np.split(found["Position"], [3], axis=-1)
+            found["Position"] = np.where(distances < film.FAR, places, np.float32(0.0))
+        return found

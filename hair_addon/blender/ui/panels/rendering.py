@@ -4,6 +4,7 @@
 import bpy
 
 from ....core.imaging.pixel_sampling import PassSettings, RenderSettings
+from ...render import data_passes
 from ...render.frames.engine import NAME
 from ...render.viewport import live_light
 from ...settings.setting_properties import names_of
@@ -79,7 +80,7 @@ class VELLUS_PT_passes(_OfEngine, bpy.types.Panel):
 
     def draw(self, context):
         layout, view_layer = split(self.layout), context.view_layer
-        for name in ("use_pass_z", "use_pass_vector", "use_pass_shadow"):
+        for name in ("use_pass_z", *data_passes.SETTINGS, "use_pass_vector", "use_pass_shadow"):
             layout.prop(view_layer, name)
         for name in names_of(PassSettings):
             layout.prop(view_layer.vellus, name)
