@@ -8,6 +8,7 @@ struct SampleData {
   vec3 N;  // on the viewer's side
   vec3 diffuse;  // color of diffuse reflection
   vec3 albedo;  // color of all rough reflection
+  vec2 uv;
 };
 
 // Indices of `data_passes.KINDS`.
@@ -17,6 +18,7 @@ const int NORMAL = 2;
 const int DIFFUSE_COLOR = 3;
 const int DENOISING_NORMAL = 4;
 const int DENOISING_ALBEDO = 5;
+const int UV = 6;
 
 // The fraction of light that mist lets through.
 float clear_of_mist(vec3 position)
@@ -45,6 +47,9 @@ vec4 data_value(SampleData found)
   }
   else if (data.kind == DENOISING_ALBEDO) {
     value = found.albedo;
+  }
+  else if (data.kind == UV) {
+    value = (data.has_uvs != 0) ? vec3(found.uv, 1.0) : vec3(0.0);
   }
   return vec4(value, 1.0);
 }

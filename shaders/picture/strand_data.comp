@@ -54,6 +54,8 @@ vec4 sample_value()
   found.position = drawn_position + drawn_radius * (across * beside + beyond + rise * to_eye);
   found.diffuse = vec3(0.0);
   found.albedo = view.hair_reflectance.rgb;
+  ivec2 texel = ivec2(strand_index % view.row_strands, strand_index / view.row_strands);
+  found.uv = (data.has_uvs != 0) ? texelFetch(root_uvs, texel, 0).xy : vec2(0.0);
   return data_value(found);
 }
 

@@ -15,5 +15,6 @@ void main()
   found.N = point.N;
   found.diffuse = colors.diffuse;
   found.albedo = min(colors.diffuse + colors.reflected, vec3(1.0));
+  found.uv = point.uv;
   color = data_value(found);
 }

@@ -184,6 +184,13 @@ def numbers_texture(values, row_strands):
     return driver_textures.made(numbers.shape[::-1], "R32F", numbers)
 
 
+def pairs_texture(values, row_strands):
+    """A texture with two numbers per strand, `row_strands` per row; values: (S, 2)."""
+    pairs = np.zeros((-(-len(values) // row_strands), row_strands, 2), np.float32)
+    pairs.reshape(-1, 2)[: len(values)] = values
+    return driver_textures.made(pairs.shape[1::-1], "RG32F", pairs)
+
+
 def row_strands_of(point_count, others=0):
     """Whole strands per row of a texture of packed strands; others: extra texels before each strand."""
     return TEXTURE_WIDTH // (others + geometry.packed_strands.texel_count(point_count))

@@ -8,13 +8,14 @@ from ..gpu.programs import picture_programs, uniforms
 from . import scene_drawing
 
 # Passes by their index in shaders/picture/data_value.glsl.
-KINDS = ("Position", "Mist", "Normal", "Diffuse Color", "Denoising Normal", "Denoising Albedo")
+KINDS = ("Position", "Mist", "Normal", "Diffuse Color", "Denoising Normal", "Denoising Albedo", "UV")
 
 # Settings of a view layer → pass.
 SETTINGS = {
     "use_pass_mist": "Mist",
     "use_pass_position": "Position",
     "use_pass_normal": "Normal",
+    "use_pass_uv": "UV",
     "use_pass_diffuse_color": "Diffuse Color",
 }
 DENOISING = ("Noisy Image", "Denoising Albedo", "Denoising Normal")
@@ -33,9 +34,18 @@ def draw(drawn, name, world_to_view, view, buffer):
             if parts is None:
                 surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag")
             else:
+                record["has_uvs"] = surface.corners.uvs is not None
                 surface_shading.draw_data(surface, parts, view, lights, samplers, record)
-    inputs = [({"data": record}, {}) for _hair in drawn.hair]
+    textures = drawn.root_uvs or [None] * len(drawn.hair)
+    inputs = [_of_hair(record, texture) for texture in textures]
     return buffer.part_by(picture_programs.strand_data_program(), picture_programs.DATA_FORMAT, inputs)
+
+
+def _of_hair(record, root_uvs):
+    """({instance: record}, {sampler: texture}) of a hair; root_uvs: its texture, or None."""
+    own = record.copy()
+    own["has_uvs"] = root_uvs is not None
+    return {"data": own}, {"root_uvs": root_uvs or surface_shading.white()}
 
 
 def _record(mist, name, world_to_view):

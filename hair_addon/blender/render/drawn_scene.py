@@ -51,6 +51,7 @@ class DrawnScene:
     hair_lights: np.ndarray | None = None  # uniforms.LIGHTS of each hair; None: `lights` for all
     surface_lights: np.ndarray | None = None  # the same for `surfaces`, then for `clear`
     mist: Mist = WITHOUT_WORLD  # in renders
+    root_uvs: tuple = ()  # texture of each hair, or None without UVs, if a pass needs them
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,11 +280,13 @@ def read_unlit(depsgraph, known, refused, noted, progress=no_progress):
         found.append(one)
         progress("Reading hair", 0.6 * len(found) / count)
     progress("Reading surfaces", 0.6)
-    meshes = drawn_meshes.split_clear(drawn_meshes.read_drawn_meshes(depsgraph))
+    has_uvs = depsgraph.view_layer.use_pass_uv
+    meshes = drawn_meshes.split_clear(drawn_meshes.read_drawn_meshes(depsgraph, has_uvs=has_uvs))
     if depsgraph.scene.vellus.is_hair_only:
         meshes = drawn_meshes.as_holdouts(meshes)
-    hair, owners = [hair for hair, _owner in found], tuple(owner for _hair, owner in found)
-    return replace(_EMPTY, hair=hair, owners=owners, **_upload(meshes, is_shaded=True, has_paths=True))
+    hair, owners, root_uvs = zip(*found, strict=True) if found else ((), (), ())
+    lists = {"hair": list(hair), "owners": owners, "root_uvs": root_uvs}
+    return replace(_EMPTY, **lists, **_upload(meshes, is_shaded=True, has_paths=True))
 
 
 _SURROUNDINGS = ("surfaces", "clear", "receivers", "surface_owners", "blockers")
@@ -366,6 +369,8 @@ def _is_hair(evaluated):
 
 
 def _read_rendered_hair(depsgraph, known, refused, noted):
+    """Yield (hair, owner, texture of UVs or None) as in a `DrawnScene`."""
+    has_uvs = depsgraph.view_layer.use_pass_uv
     for instance in depsgraph.object_instances:
         hair_object = instance.object
         if not _is_hair(hair_object):
@@ -386,7 +391,9 @@ def _read_rendered_hair(depsgraph, known, refused, noted):
         except HairError as error:
             refused(original, error)
             continue
-        yield (strands, shading, to_world, 1.0), drawn_meshes.owner_of(instance)
+        uvs = read_strands.read_root_uvs(hair_object.data, read.is_sound) if has_uvs else None
+        texture = None if uvs is None else strand_textures.pairs_texture(uvs, strands.row_strands)
+        yield (strands, shading, to_world, 1.0), drawn_meshes.owner_of(instance), texture
 
 
 def _read_hair(places, viewport, refused, shown, depsgraph):

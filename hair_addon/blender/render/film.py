@@ -25,6 +25,7 @@ _CHANNELS = {
     "Mist": ("Z", "VALUE"),
     "Position": ("XYZ", "VECTOR"),
     "Normal": ("XYZ", "VECTOR"),
+    "UV": ("UVA", "VECTOR"),
     "Noisy Image": ("RGBA", "COLOR"),
     "Denoising Normal": ("XYZ", "VECTOR"),
 }

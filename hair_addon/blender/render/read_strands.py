@@ -76,6 +76,14 @@ def read(datablock: Any) -> ReadStrands:
     return ReadStrands(points, radii, randoms, wetness, looks, is_sound, note)
 
 
+def read_root_uvs(datablock: Any, is_sound: np.ndarray | None) -> np.ndarray | None:
+    """Return the UVs (S, 2) float32 of the roots of `ReadStrands`, or None; is_sound: theirs."""
+    uvs = attributes.read(datablock, "surface_uv_coordinate", "FLOAT2", "CURVE")
+    if uvs is None:
+        return None
+    return np.nan_to_num(uvs if is_sound is None else uvs[is_sound], posinf=0.0, neginf=0.0)
+
+
 def _are_sound(points, counts):
     """(N,) bool: whether all points of a curve are valid; None if all are. points: (M, 3), curve after curve."""
     flat = points.ravel()

@@ -64,7 +64,7 @@ def read_layers(path):
 
 
 def _stacked(channels):
-    order = sorted(channels, key="RGBAXYZW".index)
+    order = sorted(channels, key="UVRGBAXYZW".index)
     return channels[order[0]] if len(order) == 1 else np.stack([channels[letter] for letter in order], axis=-1)
 
 

@@ -96,11 +96,12 @@ class _Layout:
 layout_cache = Cache(capacity=64)  # session_uid of a mesh object → `_Layout`
 
 
-def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=True):
+def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=True, has_uvs=False):
     """A `DrawnMesh` for every mesh, including instances, that a 3D viewport shows as a surface; None: a render.
 
     is_moving: reuse the last triangulation of polygons if their corners are the same; has_normals: whether normals are
-    needed, which Blender computes for each pose, or the session_uids of objects whose normals are.
+    needed, which Blender computes for each pose, or the session_uids of objects whose normals are; has_uvs: whether
+    UVs are needed without images too.
     """
     meshes, override = [], depsgraph.view_layer_eval.material_override
     for instance in depsgraph.object_instances:
@@ -112,7 +113,7 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
             needs_normals = has_normals
             if not isinstance(has_normals, bool):
                 needs_normals = instance.object.original.session_uid in has_normals
-            mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, needs_normals, override)
+            mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, needs_normals, override, has_uvs)
             rays = {} if viewport is not None else _rays_of(instance, depsgraph.view_layer)
             meshes.append(replace(mesh, owner=owner_of(instance), **rays))
     return [mesh for mesh in meshes if len(mesh.triangles)]
@@ -182,7 +183,7 @@ def _some_parts(mesh, parts):
     )
 
 
-def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, override):
+def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, override, has_uvs):
     mesh = mesh_object.to_mesh()
     try:
         vertices = scene.vertex_positions(mesh)
@@ -190,7 +191,7 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, 
         has_vertex_normals = not has_normals or mesh.normals_domain == "POINT"
         normals = _normals(mesh, layout, has_vertex_normals) if has_normals else None
         parts = _parts(mesh_object, layout.runs, override)
-        uvs = _read_uvs(mesh, layout.loops, () if is_holdout else parts)
+        uvs = _read_uvs(mesh, layout.loops, () if is_holdout else parts, has_uvs)
     finally:
         mesh_object.to_mesh_clear()
     materials = tuple((count, material) for _first, count, material in parts)
@@ -250,9 +251,13 @@ def _parts(mesh_object, runs, override):
     )
 
 
-def _read_uvs(mesh, loops, parts):
-    """(3 F, 2) float32 UVs of drawn corners, for each part from the UV map of its images; None without UV maps."""
+def _read_uvs(mesh, loops, parts, has_uvs):
+    """(3 F, 2) float32 UVs of drawn corners, for each part from the UV map of its images; None without UV maps.
+
+    has_uvs: whether parts without images have those of the active UV map.
+    """
     names = [material.uv_map for _first, _count, material in parts]
+    names = ["" if name is None and has_uvs else name for name in names]
     layers = [None if name is None else (mesh.uv_layers.get(name) or _active_uvs(mesh)) for name in names]
     if all(layer is None for layer in layers):
         return None

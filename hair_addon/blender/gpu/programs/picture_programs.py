@@ -88,7 +88,7 @@ DATA_FORMAT = "RGBA32F"  # of passes of data
 @shaders.cached
 def strand_data_program():
     """The compute program of passes of data of strands: see picture/strand_data.comp."""
-    info = scene_programs.strand_samples_info(uniforms.DATA.source, (), DATA_FORMAT)
+    info = scene_programs.strand_samples_info(uniforms.DATA.source, (("root_uvs", "FLOAT_2D"),), DATA_FORMAT)
     info.uniform_buf(2, uniforms.DATA.type_name, "data")
     return shaders.compile_compute(info, "picture/strand_data.comp")
 

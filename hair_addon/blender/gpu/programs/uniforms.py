@@ -168,6 +168,7 @@ DATA = Block(
         "view_rows": ("vec4", 3),  # axes of the camera in the world
         "mist": "vec4",  # start [m], 1 / depth [1/m], exponent
         "kind": "int",  # index of `data_passes.KINDS`
+        "has_uvs": "int",  # whether the surface, or the roots of the hair, have UVs
     },
 )
 
