@@ -198,7 +198,7 @@ def _is_shown(shader, tree):
 
 
 def _panorama_of(world, time, waits):
-    """The `World` of a panorama that Cycles renders of a world at a time [frames]."""
+    """The `World` of a panorama that Cycles renders of a world at a time [frames]; the last panorama meanwhile."""
     try:
         path = world_panoramas.file_of(world, time, waits)
     except HairError as error:
@@ -206,6 +206,8 @@ def _panorama_of(world, time, waits):
             raise
         say(str(error))
         path = None
+    else:
+        path = path or world_panoramas.last_of(world)
     if path is None:
         return World(np.array(world.color))
     return World(np.ones(3), image_of(str(path)), np.eye(4))

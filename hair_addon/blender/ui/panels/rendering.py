@@ -5,6 +5,7 @@ import bpy
 from bl_ui import properties_view_layer
 
 from ....core.imaging.pixel_sampling import PassSettings, RenderSettings
+from ...data.pictures import world_panoramas
 from ...render import data_passes, mattes
 from ...render.frames.engine import NAME
 from ...render.viewport import live_light
@@ -35,8 +36,10 @@ class VELLUS_PT_sampling(_OfEngine, bpy.types.Panel):
     def draw(self, context):
         names = ("sample_count", "multiple_scattering")
         setting_rows.rows(self.layout, context.scene.vellus, RenderSettings, names)
-        for sentence in live_light.obstacles(context.scene):
-            write(self.layout, context, interface_text(sentence), "INFO")
+        for sentence in map(interface_text, live_light.obstacles(context.scene)):
+            write(self.layout, context, sentence, "INFO")
+        for sentence in world_panoramas.sentences():
+            write(self.layout, context, sentence, "INFO")
 
 
 class VELLUS_PT_film(_OfEngine, bpy.types.Panel):
