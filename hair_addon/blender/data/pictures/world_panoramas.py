@@ -94,11 +94,14 @@ def last_of(world):
 
 def sentences():
     """Translated sentences about panoramas that are rendered now, for panels."""
-    text = (
-        'Cycles renders the nodes of the world "{world}" as a panorama. '
-        "Until it is ready, views have the last one, or the viewport color."
-    )
-    return [interface_text(text, world=name) for name in sorted({one.world for one in _running()})]
+    return [
+        interface_text(
+            'Cycles renders the nodes of the world "{world}" as a panorama. '
+            "Until it is ready, views have the last one, or the viewport color.",
+            world=name,
+        )
+        for name in sorted({one.world for one in _running()})
+    ]
 
 
 def look():
