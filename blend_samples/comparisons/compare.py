@@ -32,7 +32,7 @@ _SHOWN = slice(110, 310)  # columns of a picture that hair is in
 # (melanin, redness) of Principled Hair.
 COLORS = {"black": (0.985, 0.1), "brown": (0.66, 0.25), "blond": (0.22, 0.3), "red": (0.5, 0.95)}
 
-# Where the sun stands [rad], turned about X and about Z, its strength, and the world: a grey, or a studio's picture.
+# Where the sun stands [rad], turned about X and about Z, its strength, and the world: a gray, or a studio's picture.
 LIGHTS = {
     "front": (math.radians(60.0), math.radians(36.0), 3.0, 0.0),
     "back": (math.radians(-60.0), math.radians(36.0), 3.0, 0.0),

@@ -205,7 +205,7 @@ def _lid_material():
 
 
 def eye_image():
-    """An image of an eye by distance and azimuth from its pupil: iris with its fibres, sclera, shadow of the lid."""
+    """An image of an eye by distance and azimuth from its pupil: iris with its fibers, sclera, shadow of the lid."""
     x, y = np.meshgrid(*[2.0 * (np.arange(_IMAGE_SIZE) + 0.5) / _IMAGE_SIZE - 1.0] * 2)
     distance, azimuth = np.hypot(x, y), np.arctan2(y, x)
     iris = distance / _IRIS_PART
@@ -229,7 +229,7 @@ def eye_image():
 
 
 def _fibres(azimuth, iris):
-    """Brightness from 0 to 1 of an iris' fibres, which run from the pupil outward."""
+    """Brightness from 0 to 1 of an iris' fibers, which run from the pupil outward."""
     rng = np.random.default_rng(4)
     waves = np.zeros_like(azimuth)
     for count, strength in ((23, 0.5), (41, 0.6), (67, 0.6), (109, 0.5), (173, 0.35)):

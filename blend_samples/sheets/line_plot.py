@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lines and dots in pictures: alone, and as plots with labelled axes, several side by side."""
+"""Lines and dots in pictures: alone, and as plots with labeled axes, several side by side."""
 
 import numpy as np
 

@@ -147,7 +147,7 @@ def simulate(
     poses: vertices (V, 3) [m] for each frame, read on demand; triangles: (F, 3) indices of vertices, wound so that
     normals point outward; guides: `Strands` on the first pose, as from `distribute_guides`, yielded unchanged for it;
     settings: `DynamicsSettings`; changes: its fields by name; frame_rate: of the poses [1/s]; gravity: [m/s²]; regions:
-    (G,) integers; guides of different regions do not rub or press on each other, as across a parting; None for one
+    (G,) integers; no friction or pressure acts between guides of different regions, as across a parting; None for one
     region. Raises `HairError` for invalid arguments, and during iteration for a pose with another number of vertices or
     non-finite ones.
 
@@ -173,7 +173,7 @@ def simulate(
     except TypeError as error:
         raise HairError("poses must be an iterable of vertices (V, 3), one array for each frame.") from error
     if first is None:
-        raise HairError("poses has no frame: give the vertices that the guides were grown on.")
+        raise HairError("poses is empty: begin with the vertices that the guides were grown on.")
     mesh = mesh_of((first, triangles))
     dynamics.moving_mesh.require(mesh, guides)
     parted = None if regions is None else _regions_of(regions, len(guides))
@@ -184,5 +184,5 @@ def _regions_of(given, guide_count):
     """Return consecutive regions (G,) int32 from 0. Raises `HairError`."""
     regions = array_of(given)
     if regions is None or regions.dtype.kind not in "iu" or regions.shape != (guide_count,):
-        raise HairError(f"regions must be whole numbers of shape ({guide_count},), one of each guide.")
+        raise HairError(f"regions must be whole numbers of shape ({guide_count},), one for each guide.")
     return np.unique(regions, return_inverse=True)[1].astype(np.int32)

@@ -153,8 +153,8 @@ def import_curves(
     choice(kind, "kind", ("GUIDES", "HAIR"))
     if up is not None:
         choice(up, "axis", tuple(TO_Z_UP))
-    metres = None if unit is None else parsed_unit(str(unit))
-    wanted = blender.io.curve_files.Wanted(kind, name, Convention(metres, up))
+    meters = None if unit is None else parsed_unit(str(unit))
+    wanted = blender.io.curve_files.Wanted(kind, name, Convention(meters, up))
     with blender.io.curve_files.curves_of(
         path_of(path), wanted, blender.data.arguments.surface_object(surface)
     ) as found:

@@ -79,7 +79,7 @@ def styles_of(hair: Curves) -> tuple[StyleSettings, ...]:
 
 
 def set_styles(hair: Curves, styles: Sequence[StyleSettings], *, progress: Progress = no_progress) -> None:
-    """Replace the styles of hair Curves; a style inherits name and keyframes of a previous one of its kind.
+    """Replace the styles of hair Curves; a style inherits the name and the keyframes of a previous style of its kind.
 
     progress: as in `add_style`.
 
@@ -150,4 +150,4 @@ def _require_arrays(style):
     if (isinstance(style, trim.Settings) and style.cutter) or (
         isinstance(style, lean.Settings) and style.direction == "OBJECT"
     ):
-        raise HairError("Plain arrays have no objects: styles can name objects in Blender only.")
+        raise HairError("Styles can refer to objects only in Blender: clear the object's name.")

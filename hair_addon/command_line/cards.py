@@ -15,10 +15,12 @@ def add(verbs):
     parser = verbs.add_parser(
         "cards",
         help="make hair cards for games",
-        description="Make ribbons in place of clumps of strands, with textures drawn of the strands.",
+        description="Make ribbons that replace clumps of strands, with textures of the strands.",
     )
     mesh_output.add(parser)
-    parser.add_argument("--textures", metavar="FOLDER", help="folder of the textures [in .blend and .glb, or beside]")
+    parser.add_argument(
+        "--textures", metavar="FOLDER", help="folder of the textures [inside .blend and .glb, beside other files]"
+    )
     options.add_settings(parser, declared(CardSettings))
     options.add_common(parser)
     parser.set_defaults(run=run)

@@ -13,7 +13,7 @@ def add_axis(parser):
     parser.add_argument(
         "--up",
         choices=("X", "Y", "Z"),
-        help="axis that points up in an .obj, .ply or .stl [Z], else in the file of curves [as it says]",
+        help="axis that points up in an .obj, .ply or .stl [Z], else in the file of curves [that file's own]",
     )
 
 
@@ -25,7 +25,7 @@ def add_curves(parser):
     parser.add_argument(
         "--hair-from",
         metavar="FILE",
-        help="use the curves of such a file as hair, as they are, with its guides, or derive --guides",
+        help="use the curves of such a file as hair, unchanged, with its guides or with derived ones (--guides)",
     )
     parser.add_argument(
         "--object",
@@ -36,7 +36,9 @@ def add_curves(parser):
         help="object or group in either file [all]",
     )
     parser.add_argument(
-        "--unit", metavar="UNIT", help=f"unit in either file: {', '.join(UNITS)}, or meters in it [as it says]"
+        "--unit",
+        metavar="UNIT",
+        help=f"unit in either file: {', '.join(UNITS)}, or the number of meters in a unit [the file's own]",
     )
 
 
@@ -56,7 +58,7 @@ def checked(given):
     if given.up and not blender.io.mesh_files.lacks_up_axis(given.input) and (is_blend or not came_from):
         raise HairError(f"--up has no effect: {given.input} has its own axes.")
     if given.up == "X" and blender.io.mesh_files.lacks_up_axis(given.input):
-        raise HairError("--up X is not known for a mesh: Y or Z points up there.")
+        raise HairError("--up X is not supported for a mesh file: use Y or Z.")
     return came_from
 
 

@@ -35,7 +35,7 @@ def add(verbs):
     parser.add_argument("--preset", choices=PRESETS, metavar="NAME", help=f"a look: {', '.join(PRESETS)}")
     curve_options.add_curves(parser)
     parser.add_argument(
-        "--from-library", metavar="FILE[:NAME]", help="put on a groom that was saved to an asset library's .blend"
+        "--from-library", metavar="FILE[:NAME]", help="apply a groom from a .blend file of an asset library"
     )
     style_options.add_styles(parser, has_surface=True)
     map_options.add_maps(parser)
@@ -55,7 +55,7 @@ def run(given, console):
     came_from = curve_options.checked(given)
     if given.from_library and (came_from or given.settings):
         raise HairError(
-            "--from-library brings guides and settings: leave out --guides-from, --hair-from and --settings."
+            "--from-library includes guides and settings: leave out --guides-from, --hair-from and --settings."
         )
     if came_from:
         blender.io.curve_files.require_readable(came_from)

@@ -46,7 +46,7 @@ def add(verbs):
         "--allow-missing",
         action=_Flag,
         default=False,
-        help="render also where linked libraries, images or caches are missing, with a warning",
+        help="render despite missing linked libraries, images or caches, with a warning",
     )
     parser.add_argument(
         "--dry-run",

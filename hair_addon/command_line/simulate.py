@@ -15,7 +15,7 @@ def add(verbs):
         "simulate",
         help="simulate the guides of a .blend file",
         description="Simulate the guides of a .blend file and bake the frames into its cache folder, where render "
-        "finds them. Running the same command again goes on where it stopped.",
+        "finds them. Running the same command again resumes where it stopped.",
     )
     parser.add_argument("input", help=".blend file")
     last = parser.add_mutually_exclusive_group()
@@ -28,17 +28,17 @@ def add(verbs):
     )
     last.add_argument("--last-frame", type=int, metavar="N", help="the same as --frames N")
     parser.add_argument(
-        "--guides", action="append", metavar="NAME", help="guides to simulate; may be repeated [all that simulate]"
+        "--guides", action="append", metavar="NAME", help="guides to simulate; may be repeated [all with Dynamics on]"
     )
     parser.add_argument(
         "--deliver",
         metavar="FILE",
-        help="also write a .blend whose hair plays the frames without Vellus, and beside it the files that it plays",
+        help="also write a .blend whose hair plays the frames without Vellus, and the played files beside it",
     )
     parser.add_argument(
         "--if-needed",
         action="store_true",
-        help="simulate only guides whose baked frames are rendered; without any, do nothing",
+        help="simulate only guides whose baked frames are rendered; do nothing if there are none",
     )
     parser.add_argument("--overwrite", action="store_true", help="simulate existing frames again")
     options.add_scripts(parser)
@@ -64,7 +64,7 @@ def run(given, console):
         if not guides and given.deliver is None:
             return
     if not guides:
-        raise HairError(f"{given.input} has no guides that simulate: switch Dynamics on, or name them by --guides.")
+        raise HairError(f"{given.input} has no guides with Dynamics on: turn it on, or name guides with --guides.")
     _warn_of_memory(guides, console)
 
     def report(baked):

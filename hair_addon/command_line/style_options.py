@@ -29,7 +29,7 @@ def add_styles(parser, has_surface):
         "--style-preset", choices=style_presets.PRESETS, metavar="NAME", help=f"a style preset{lengths}: {presets}"
     )
     if has_surface:
-        parser.add_argument("--no-style-fit", action="store_true", help="keep lengths that are for a head")
+        parser.add_argument("--no-style-fit", action="store_true", help="use the lengths for a head unchanged")
 
 
 def style(text):

@@ -14,7 +14,7 @@ def add(verbs):
     """Add the command's options."""
     parser = verbs.add_parser("bake-tables", help="bake the Marschner model's tables to OpenEXR")
     parser.add_argument("--out", required=True, help="folder for the tables: m.exr, n.exr, n_trt.exr, …")
-    parser.add_argument("--plot", action="store_true", help="also write a picture of each table, with labelled axes")
+    parser.add_argument("--plot", action="store_true", help="also write a picture of each table, with labeled axes")
     options.add_settings_file(parser)
     options.add_settings(parser, declared(lookup_tables.Settings))
     options.add_common(parser)

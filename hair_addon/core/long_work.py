@@ -20,7 +20,7 @@ Work = Generator[Compute, Any, T]
 
 
 class Stopped(Exception):
-    """Raised inside a computation that was cancelled."""
+    """Raised inside a computation that was canceled."""
 
 
 def no_progress(_step: str, _part: float) -> None:
@@ -29,7 +29,7 @@ def no_progress(_step: str, _part: float) -> None:
 
 @dataclass(frozen=True)
 class Stage:
-    """Yielded before a stage that must run on the caller's thread, to report progress and allow cancelling."""
+    """Yielded before a stage that must run on the caller's thread, to report progress and allow canceling."""
 
     step: str
     part: float

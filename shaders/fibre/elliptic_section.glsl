@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Elliptic fibres [Marschner03]: the effective index of the internal reflection depends on the azimuth.
+// Elliptic fibers [Marschner03]: the effective index of the internal reflection depends on the azimuth.
 
 #include "fibre/constants.glsl"
 
-// The section's major axis: a random direction per strand, perpendicular to the fibre. It rotates with the fibre, with a
+// The section's major axis: a random direction per strand, perpendicular to the fiber. It rotates with the fiber, with a
 // seam only where a strand runs along that direction.
 vec3 major_axis(vec3 T, float random)
 {

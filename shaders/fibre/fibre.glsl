@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Angles of a fibre. T is the tangent from root to tip; L and V point away from the fibre; all unit vectors.
+// Angles of a fiber. T is the tangent from root to tip; L and V point away from the fiber; all unit vectors.
 
 #include "fibre/constants.glsl"
 
@@ -23,8 +23,8 @@ float cos_theta_d(float sin_theta_i, float sin_theta_o)
   return sqrt(max(0.0, 0.5 * (1.0 + cosines + sin_theta_i * sin_theta_o)));
 }
 
-// Uniform light from below a plane with normal N on a fibre's mirror cone, sin(theta_i) = -sin(theta_o), softened as by
-// roughness: the fraction of the cone, and its moment with the cosine of phi, both as factors of the fibre's response.
+// Uniform light from below a plane with normal N on a fiber's mirror cone, sin(theta_i) = -sin(theta_o), softened as by
+// roughness: the fraction of the cone, and its moment with the cosine of phi, both as factors of the fiber's response.
 vec2 light_from_below(vec3 T, vec3 V, vec3 N)
 {
   const float SOFTNESS = 0.05;
@@ -37,7 +37,7 @@ vec2 light_from_below(vec3 T, vec3 V, vec3 N)
   return vec2(atan(sine, cosine), 2.0 * sine * cos_phi) / PI;
 }
 
-// |phi| in [0, pi]: the angle between L and V seen along the fibre. Zero where either is parallel to it.
+// |phi| in [0, pi]: the angle between L and V seen along the fiber. Zero where either is parallel to it.
 float relative_azimuth(vec3 T, vec3 L, vec3 V)
 {
   vec3 l = L - dot(T, L) * T;

@@ -3,7 +3,7 @@
 
 #include "fibre/light_highlight.glsl"
 
-// N of a fibre at one azimuth and inclination.
+// N of a fiber at one azimuth and inclination.
 struct FibreLobes {
   vec4 n;  // N_TT red, green, blue, N_R
   vec3 n_trt;

@@ -44,7 +44,7 @@ vec3 gaussian_lobes(float theta_h, float tilt, float tilt_trt, float beta_r, flo
 // S = sum over p of M_p N_p / cos²(theta_d), from texels m = (M_R, M_TT, M_TRT), n = (N_TT rgb, N_R), n_trt.
 vec3 marschner_scattering(vec3 m, vec4 n, vec3 n_trt, float cos_theta_d)
 {
-  // cos(theta_d) only approaches zero for light along the fibre; the clamp keeps half floats finite.
+  // cos(theta_d) only approaches zero for light along the fiber; the clamp keeps half floats finite.
   float cosine = max(cos_theta_d, 1e-3);
   return (m.r * vec3(n.a) + m.g * n.rgb + m.b * n_trt) / (cosine * cosine);
 }

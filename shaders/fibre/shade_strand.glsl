@@ -3,10 +3,10 @@
 // picture in which a strand of this hair is nearest. Models define
 //
 // vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float front, float behind, float blur)
-//     light leaving the fibre towards V for unit irradiance from around L outside the hair, with a mean of `front` strands
+//     light leaving the fiber towards V for unit irradiance from around L outside the hair, with a mean of `front` strands
 //     in front of it and `behind` strands behind it; blur: variance of the light's direction along an axis [rad²]
 // void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
-//     the fibre's response to uniform light: the integral over phi, the integral weighted with the cosine of phi, and the
+//     the fiber's response to uniform light: the integral over phi, the integral weighted with the cosine of phi, and the
 //     responses to light that varies as P1 and P2 of sin(theta_i)
 // vec3 returned_from_behind(float sin_theta_o, float behind)
 //     light that `behind` strands add to `returned`

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Response of a fibre to nonuniform light, relative to the response to uniform light.
+// Response of a fiber to nonuniform light, relative to the response to uniform light.
 
 #include "fibre/constants.glsl"
 
@@ -27,7 +27,7 @@ vec3 bessel_i0(vec3 x)
 }
 
 // Response to light that varies with the azimuth, relative to uniform light. first: mean cosine of the azimuth phi of the
-// light, relative to the viewer; turned: mean of cos(phi) over the light that the fibre scatters. Reflected light is spread
+// light, relative to the viewer; turned: mean of cos(phi) over the light that the fiber scatters. Reflected light is spread
 // widely: the first harmonic. Transmitted light comes from straight behind: light is assumed to vary as exp(k cos(phi)).
 vec3 azimuthal_part(vec3 first, vec3 turned)
 {

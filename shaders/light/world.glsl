@@ -94,7 +94,7 @@ vec3 surface_irradiance(mat3 plus, mat3 minus, vec3 N)
 // positive if the strand scatters more light backward.
 vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 towards)
 {
-  // A fibre receives light in proportion to the sine of the angle between tangent and direction.
+  // A fiber receives light in proportion to the sine of the angle between tangent and direction.
   vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
   float sin_theta_o = dot(T, V);
   // sin(T, side) cos(phi) of each side, times the cosine of the mirror cone: V across the strand. Sides have 3/4 of the

@@ -194,7 +194,7 @@ def test_failures_are_one_sentence_and_change_nothing(hair, call, reported, tmp_
     assert [path.name for path in tmp_path.iterdir()] == ["pyproject.toml"]
 
 
-def test_points_are_metres_in_the_world(hair):
+def test_points_are_meters_in_the_world(hair):
     sphere = bpy.data.objects["Sphere"]
     sphere.location, sphere.rotation_euler, sphere.scale = (1.0, 2.0, 3.0), (0.3, 0.2, 0.5), (2.0, 2.0, 2.0)
     bpy.context.scene.unit_settings.scale_length = 0.01

@@ -150,7 +150,7 @@ REFUSED = {
     "guides to export": (lambda: api.export_groom("a.abc", [data("Guides")]), "'Guides' is not Vellus hair"),
     "a mesh's format": (lambda: api.export_groom("a.obj"), "exported as .abc"),
     "a number for hair in a file": (lambda: api.export_groom("a.abc", has_hair=1), "Hair must be True or"),
-    "no poses": (lambda: simulate([]), "poses has no frame"),
+    "no poses": (lambda: simulate([]), "poses is empty"),
     "a number for poses": (lambda: simulate(3), "poses must be an iterable"),
     "flat poses": (lambda: simulate([np.arange(9.0)]), "A mesh is vertices"),
     "an infinite pose": (lambda: simulate([np.full((3, 3), np.inf)]), "non-finite"),

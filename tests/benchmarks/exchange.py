@@ -72,14 +72,14 @@ def _errors(path, hair):
     """Largest differences of what a file has from what the hair has."""
     if path.suffix == ".abc":
         found = shape(alembic_reader.read(path), hair.name)
-        arrays, per_metre = {name: one.only for name, one in found.items() if one.samples}, 100.0
+        arrays, per_meter = {name: one.only for name, one in found.items() if one.samples}, 100.0
     else:
-        arrays, per_metre = _of_usd(path, hair.name), 1.0
+        arrays, per_meter = _of_usd(path, hair.name), 1.0
     points = api.points(hair).reshape(-1, 3)
-    widths = _values(hair, "radius") * 2.0 * np.float32(per_metre)
+    widths = _values(hair, "radius") * 2.0 * np.float32(per_meter)
     weights = np.asarray(arrays["groom_guide_weights"]).reshape(-1, 3).sum(axis=1)
     return {
-        "points": _far(np.asarray(arrays["P"]).reshape(-1, 3) / per_metre, points),
+        "points": _far(np.asarray(arrays["P"]).reshape(-1, 3) / per_meter, points),
         "widths": f"{np.abs(np.ravel(arrays['groom_width']) / widths - 1.0).max():.1e} of them",
         "weights": f"{np.abs(weights - 1.0).max():.1e}",
         "root UVs": float(

@@ -36,7 +36,7 @@ AGREEMENT = 2e-6  # of the size
 
 @dataclass(frozen=True)
 class Hair:
-    """Strands as arrays: points (S, P, 3), normals (S, 3), identities and locks (S,), centres (K, P, 3) [m]."""
+    """Strands as arrays: points (S, P, 3), normals (S, 3), identities and locks (S,), centers (K, P, 3) [m]."""
 
     points: np.ndarray
     normals: np.ndarray
@@ -92,7 +92,7 @@ def hair(strand_count, point_count):
 
 
 def program_of(styles, centre_count):
-    """The `Program` of styles whose levels all have the same centres; guides are as many again, without points."""
+    """The `Program` of styles whose levels all have the same centers; guides are as many again, without points."""
     first_centres = [0] * len(programs.tree_levels(styles)) + [centre_count]
     return programs.compiled(programs.strand_steps(styles, {}), [], first_centres)
 

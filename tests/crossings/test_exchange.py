@@ -104,7 +104,7 @@ def test_usd_keeps_what_strands_carry(sphere, tmp_path):
         np.testing.assert_array_equal(attribute(came, name, width), attribute(hair, name, width))
 
 
-def test_usd_is_z_up_and_in_metres_and_widths_are_diameters(sphere, tmp_path):
+def test_usd_is_z_up_and_in_meters_and_widths_are_diameters(sphere, tmp_path):
     bpy.utils.expose_bundled_modules()
     from pxr import Usd, UsdGeom
 

@@ -66,7 +66,7 @@ def _on_a_rig(scale, has_inverse):
     return place
 
 
-def _in_centimetres(body):
+def _in_centimeters(body):
     bpy.context.scene.unit_settings.scale_length = 0.01
     body.location, body.scale = (150.0, 20.0, -30.0), (100.0, 100.0, 100.0)
 
@@ -92,10 +92,10 @@ PLACES = {
     "mirrored": placed(_FAR, _TURNED, (-1.0, 1.0, 1.0)),
     "mirrored and uneven": placed(_FAR, _TURNED, (1.5, -0.8, 1.0)),
     "on a scaled rig": _on_a_rig((2.0, 2.0, 2.0), False),
-    "on a rig in centimetres": _on_a_rig((0.01, 0.01, 0.01), False),
+    "on a rig in centimeters": _on_a_rig((0.01, 0.01, 0.01), False),
     "on a sheared rig": _on_a_rig((2.0, 0.6, 1.0), False),
     "with a parent inverse": _on_a_rig((2.0, 2.0, 2.0), True),
-    "in a scene of centimetres": _in_centimetres,
+    "in a scene of centimeters": _in_centimeters,
 }
 
 # The same with a modifier that subdivides the surface.

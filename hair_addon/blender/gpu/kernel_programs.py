@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Warp kernels run by any graphics card: compute programs of the text that Warp compiles for CPU and CUDA.
+"""Warp kernels on any graphics card: compute programs from the source that Warp compiles for CPU and CUDA.
 
-The arrays of a kernel follow each other in three textures: numbers, vectors, and whole numbers as their high and low
-16 bits. So a kernel needs three samplers, however many arrays it has.
+The arrays of a kernel are concatenated in three textures: floats, vectors, and integers as their high and low 16 bits.
+A kernel therefore needs only three samplers.
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ from .strand_textures import TEXTURE_WIDTH, run_for_each
 
 _GROUP_SIZE = 64
 
-# Of each kind of element: the texture that has it.
+# Type of an element → the texture that contains it.
 _TEXTURE_OF = {"float": "floats", **dict.fromkeys(("vec2", "vec3", "vec4"), "vectors"), "int": "words", "uint": "words"}
 _FORMATS = {"floats": ("R32F", 1), "vectors": ("RGBA32F", 4), "words": ("RG32F", 2)}
 
@@ -38,7 +38,7 @@ class _Program:
 
 @dataclass(frozen=True, eq=False)
 class KernelOnGPU:
-    """A kernel with what it is given in textures; made by `prepare`."""
+    """A kernel whose parameters are on the GPU; made by `prepare`."""
 
     program: _Program
     textures: dict[str, gpu.types.GPUTexture]
@@ -49,13 +49,13 @@ class KernelOnGPU:
         return uniforms.uniform_buffer(self.record)
 
     def run(self, count: int, first: int = 0) -> dict[str, np.ndarray]:
-        """Run `count` threads and return what they write, {array: (count,) or (count, 3)}; zero where they do not.
+        """Run `count` threads and return the arrays that they write: {name: (count,) or (count, 3)}, zero where nothing
+        is written.
 
-        first: the kernel's parameter of this name, to which it adds the thread's index: the first element that is
-        written and returned.
+        first: the kernel's parameter of this name, the index of the first thread's element.
         """
         if first and "first" not in self.program.text.members:
-            raise ValueError(f"the kernel has no parameter `first` to begin at {first}")
+            raise ValueError(f"the kernel has no parameter `first`, so it cannot begin at element {first}")
         self.record["first"] = first
         self.record["thread_count"] = count
         self._buffer.update(uniforms.bytes_of(self.record))
@@ -73,10 +73,11 @@ class KernelOnGPU:
 
 
 def prepare(kernel: wp.Kernel, given: Mapping[str, Any], triangles: np.ndarray | None = None) -> KernelOnGPU:
-    """Upload what a kernel is given, {parameter: value} as for `wp.launch`, without `first` and arrays that it writes.
+    """Upload a kernel's parameters; given: {parameter: value} as for `wp.launch`, without `first` and the arrays that
+    it writes.
 
-    triangles: (F, 3, 3) corners of the mesh that it traces rays through. Raises `HairError` where the driver does not
-    compile it, or has no memory.
+    triangles: (F, 3, 3) corners of the mesh that it traces rays through. Raises `HairError` if the driver cannot
+    compile the kernel, or memory is insufficient.
     """
     program = _program(kernel)
     record = program.block.record()
@@ -137,7 +138,7 @@ def _texture(parts, texture_format, channels):
 
 
 def _empty(count, kind):
-    """An image of zeros for what threads write."""
+    """Return an image of zeros for the values that threads write."""
     texture_format, channels = _FORMATS[_TEXTURE_OF[kind]]
     size = TEXTURE_WIDTH, max(-(-count // TEXTURE_WIDTH), 1)
     return driver_textures.made(size, texture_format, np.zeros(size[0] * size[1] * channels, np.float32))

@@ -23,10 +23,10 @@ def steps_of(strands, view, object_to_world, part=1.0):
     view: a `uniforms.VIEW` record; object_to_world: (4, 4); part: maximum fraction of all strands.
     """
     count = strands.strand_count
-    samples_per_metre = _closest(strands, view, object_to_world) * drawing.scale_of(object_to_world)
-    wanted = 2.0 * strands.mean_radius * samples_per_metre / _FULL_WIDTH
+    samples_per_meter = _closest(strands, view, object_to_world) * drawing.scale_of(object_to_world)
+    wanted = 2.0 * strands.mean_radius * samples_per_meter / _FULL_WIDTH
     strand_count = int(np.clip(count * min(wanted, part), min(_LEAST_STRANDS, count * part), count))
-    pieces = strands.mean_length * samples_per_metre / _PIECE_LENGTH
+    pieces = strands.mean_length * samples_per_meter / _PIECE_LENGTH
     point_count = int(np.clip(np.ceil(min(pieces, strands.point_count)) + 1, _LEAST_POINTS, strands.point_count))
     # With a limit by the artist each pass draws the same strands.
     turn = float(view["coverage_turn"]) % 1.0 if part == 1.0 else 0.0

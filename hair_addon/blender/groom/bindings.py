@@ -52,8 +52,9 @@ class BoundHair:
     is_written: bool = False  # whether the datablock holds these points
     has_moved_only: bool = False  # whether only points, and possibly the guide map, are unwritten
     is_map_written: bool = False  # whether the datablock holds this guide map
-    straight: "BoundHair | None" = None  # the same without styles while viewports show it: only it follows strokes
-    is_behind: bool = False  # whether points are older than `guides`, which only the display has followed
+    # The same hair without styles while viewports show it: only this hair follows strokes.
+    straight: "BoundHair | None" = None
+    is_behind: bool = False  # whether only the display, not `points`, has followed `guides`
     thickness: np.ndarray | None = None  # (S,) float32 factors of radii by a map, None without it
     course: np.ndarray | None = None  # (N,) float32 factors of the radius from root to tip, None without a ramp
     map_status: str = ""  # sentence about the map of the thickness
@@ -180,7 +181,7 @@ class BoundHair:
     def thicken(self, thickness: np.ndarray | None, map_status: str = "", course: np.ndarray | None = None) -> None:
         """Multiply the radii of strands by factors (S,) float32; None for 1.
 
-        map_status: sentence about their map; course: (N,) float32 factors from root to tip, None for those of the
+        map_status: sentence about their map; course: (N,) float32 factors from root to tip, None for the taper of the
         settings.
         """
         is_same = map_status == self.map_status and is_same_thickness(course, self.course)

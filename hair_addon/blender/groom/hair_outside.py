@@ -31,8 +31,8 @@ def keep_outside(hair: Curves, bound: BoundHair) -> None:
     try:
         settings = properties.dynamics_of(hair.vellus.guide_curves.vellus)
         blender_scene, depsgraph = scene_time.present_scene(), scene.present_depsgraph()
-        metres = simulated_world.metres_of(blender_scene, settings)
-        pose = guide_poses.read(hair, depsgraph, metres)
+        meters = simulated_world.meters_of(blender_scene, settings)
+        pose = guide_poses.read(hair, depsgraph, meters)
         ways = bound.points[:, 1] - bound.points[:, 0]
         world, _errors = simulated_world.read(blender_scene, depsgraph, settings, pose, hair.surface, ways)
         obstacles = [replace(one, distance=_SKIN) if one.vertices is pose.vertices else one for one in world.obstacles]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fractions of the length that strands keep, by the map of *Strand Length*."""
+"""Lengths of strands, as fractions of the full length, by the map of *Strand Length*."""
 
 from collections.abc import Sequence
 

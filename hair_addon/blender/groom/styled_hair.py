@@ -35,7 +35,8 @@ class ReadStyles:
     """Styles of a hair, and the inputs that they refer to.
 
     applied: from the local coordinates in which the hair was generated, which define the axes and the origin of random
-    shapes, to the present ones; length: of the map of the strands' length; map_status: sentence about its source.
+    shapes, to the present ones; length: source of the map of the strands' length; map_status: sentence about that
+    source.
     """
 
     styles: tuple[StyleSettings, ...] = ()
@@ -79,7 +80,7 @@ class StyledHair:
         return np.float32(program.radius_factor(self.read.styles))
 
     def continue_from(self, other: "StyledHair") -> None:
-        """Reuse the guides that another `StyledHair` has computed, where styles lean them equally."""
+        """Reuse the guides that another `StyledHair` has computed, if the same styles lean them."""
         if self.styling is not None and other.styling is not None:
             self.styling.followed.continue_from(other.styling.followed)
 

@@ -57,9 +57,9 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Found:
-    """Objects of the requested curves and of their guides in the file, with notes for the user.
+    """Objects of the requested curves and of the file's guides, with notes for the user.
 
-    motion: of curves that play, in metres with Z up; starts: (C+1,) offsets of the curves in its points.
+    motion: of curves that play, in meters with Z up; starts: (C+1,) offsets of the curves in its points.
     """
 
     curves: bpy.types.Object
@@ -75,7 +75,7 @@ def require_readable(path):
     if not path.is_file():
         raise HairError("{path} is not a file: check the path.", path=path)
     if path.suffix.lower() not in ENDINGS:
-        sentence = "{path} has a format that curves cannot be read from: use {endings}."
+        sentence = "Curves cannot be read from the format of {path}: use {endings}."
         raise HairError(sentence, path=path, endings=", ".join(ENDINGS))
 
 
@@ -128,7 +128,7 @@ def curves_of(path, wanted, surface_object, is_open=False):
         yield made_of(path, read(path, wanted.axis), wanted, surface_object)
         return
     if wanted.convention != Convention():
-        raise HairError("{path} has its own unit and axes: leave out those that were given.", path=path)
+        raise HairError("{path} has its own unit and axes: leave out the options for unit and axis.", path=path)
     before = set(bpy.data.objects)
     if not is_open:
         _append(path)
@@ -175,7 +175,7 @@ def made_of(path, file, wanted, surface_object):
     chosen, guides = _chosen_sets(path, file.sets, wanted)
     reading = curve_units.choose(file, [*chosen, *guides], wanted.convention, _mesh(surface_object), str(path))
     notes = [*file.notes, *reading.notes, *_notes_on_groups(path, chosen)]
-    curves, its_guides = ([_now(one.placed(reading.metres, reading.up)) for one in sets] for sets in (chosen, guides))
+    curves, its_guides = ([_now(one.placed(reading.meters, reading.up)) for one in sets] for sets in (chosen, guides))
     joined, made_guides, guide_ids = curve_file.join(curves), None, None
     motion = None
     if wanted.plays and joined.motion is not None:
@@ -213,7 +213,7 @@ def _present_index(motion):
 def _note_on_motion(path, motion):
     frames = np.round(motion.times * scene_time.frame_rate(bpy.context.scene), 3)
     first, last, frame = frames[0], frames[-1], frames[_present_index(motion)]
-    sentence = "{path} moves from frame {first:g} to {last:g}: its curves are read at frame {frame:g} alone."
+    sentence = "{path} moves from frame {first:g} to {last:g}: its curves are read only at frame {frame:g}."
     return HairError(sentence, path=path, first=first, last=last, frame=frame)
 
 
@@ -254,7 +254,7 @@ def _listed(names):
 def _mesh(surface_object):
     """Evaluated surface as a `TriMesh` in world space [m]."""
     surface = scene.read_surface(surface_object, scene.present_depsgraph())
-    matrix = np.array(surface_object.matrix_world) * strand_arrays.metres_per_unit(bpy.context.scene)
+    matrix = np.array(surface_object.matrix_world) * strand_arrays.meters_per_unit(bpy.context.scene)
     return TriMesh((surface.posed @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32), surface.mesh.triangles)
 
 

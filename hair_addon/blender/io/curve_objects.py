@@ -17,7 +17,7 @@ def new_object(name, placed, surface_object, guide_ids=None):
     guide_ids: (G,) IDs of the guides that the curves follow; their indices are stored with the weights.
     """
     matrix = _without_shear(surface_object.matrix_world)
-    to_world = np.array(matrix, np.float64) * strand_arrays.metres_per_unit(bpy.context.scene)
+    to_world = np.array(matrix, np.float64) * strand_arrays.meters_per_unit(bpy.context.scene)
     to_world[3, 3] = 1.0
     back, scale = np.linalg.inv(to_world), abs(np.linalg.det(to_world[:3, :3])) ** (1.0 / 3.0)
     with np.errstate(over="ignore", invalid="ignore"):

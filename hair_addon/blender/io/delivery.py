@@ -80,7 +80,7 @@ def delivering(guides, path, blender_scene):
     with contextlib.ExitStack() as stack:
         stack.callback(_go_back, its_scene, present)
         tasks = [_begin(hair, stack) for hair in chosen]
-        units = scene_time.frame_rate(blender_scene), strand_arrays.metres_per_unit(blender_scene)
+        units = scene_time.frame_rate(blender_scene), strand_arrays.meters_per_unit(blender_scene)
         yield Stage("Delivering", 0.0)
         with atomic_file(path) as partial:
             with hair_file.HairFile(partial, path, *units) as file:

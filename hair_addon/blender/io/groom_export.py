@@ -57,11 +57,11 @@ def exporting(path, chosen, settings, blender_scene):
     if not chosen:
         raise HairError("There is no hair to export: add hair to the mesh.")
     if _is_strands(path) and settings.animation != "NONE":
-        sentence = "{path} can hold one frame only: choose Nothing in Animation, or write .abc or .usd."
+        sentence = "{path} can hold only one frame: choose Nothing in Animation, or write .abc or .usd."
         raise HairError(sentence, path=path)
     frames = [None] if settings.animation == "NONE" else list(scene_time.scene_frames())
     simulated = _simulated(chosen, frames)
-    per_metre = _per_metre(path)
+    per_meter = _per_meter(path)
     remembered = [Remembered(hair) for hair in chosen]
     with contextlib.ExitStack() as stack:
         stack.callback(_go_to, blender_scene, None if frames == [None] else scene_time.time_of(blender_scene))
@@ -69,7 +69,7 @@ def exporting(path, chosen, settings, blender_scene):
         yield Stage("Exporting", 0.0)
         strand_arrays.bring_up_to_date()
         chosen = [one.find() for one in remembered]
-        sources = groom_sources.sources_of(chosen, settings, per_metre)
+        sources = groom_sources.sources_of(chosen, settings, per_meter)
         notes, instances = list(groom_sources.notes_of(chosen, sources, settings)), groom_sources.instances_of(chosen)
         if not sources:
             raise HairError("Neither hair nor guides would be exported: choose one of them.")
@@ -83,7 +83,7 @@ def exporting(path, chosen, settings, blender_scene):
                 _go_to(blender_scene, frame if index else None)
                 for guides in simulated:
                     delivery.require_shown(guides.find(), frame)
-                read = _read(sources, numbers, per_metre, is_first=index == 0)
+                read = _read(sources, numbers, per_meter, is_first=index == 0)
                 yield _writing(writer, read, path, frame, index / len(frames))
     guide_count, strand_count = groom_sources.counts_of(sources)
     group_count = len({source.curves.group_id for source in sources})
@@ -99,7 +99,7 @@ def _is_usd(path):
     return path.suffix.lower() != ".abc" and not _is_strands(path)
 
 
-def _per_metre(path):
+def _per_meter(path):
     if _is_strands(path):
         return writers.PER_METRE
     return usd_groom.PER_METRE if _is_usd(path) else unreal_groom.PER_METRE
@@ -136,12 +136,12 @@ def _simulated(chosen, frames):
     return [Remembered(one) for one in simulated]
 
 
-def _read(sources, numbers, per_metre, is_first):
+def _read(sources, numbers, per_meter, is_first):
     """Return [(number, points)] of the curves to write at this time."""
     read = []
     for source, number in zip(sources, numbers, strict=True):
         if is_first or source.moves:
-            read.append((number, groom_sources.points_of(source, per_metre)))
+            read.append((number, groom_sources.points_of(source, per_meter)))
     return read
 
 

@@ -105,7 +105,7 @@ def _kinds_marked(guides, hair):
 
 
 def _export(partial, ending, guides, hair):
-    scale = strand_arrays.metres_per_unit(bpy.context.scene)
+    scale = strand_arrays.meters_per_unit(bpy.context.scene)
     if ending == ".abc":
         # The exporter crashes on a full disk: reserve space for the file first.
         require_room(partial, _alembic_bytes(guides, hair))
@@ -122,7 +122,7 @@ def _export(partial, ending, guides, hair):
 
 
 def _set_unit(path, scale):
-    """Set metersPerUnit of a USD file: Blender always writes one metre."""
+    """Set metersPerUnit of a USD file: Blender always writes one meter."""
     if path.suffix.lower() == ".usdz":
         raise HairError("Blender cannot store this scene's unit in a .usdz file: write a .usdc file.")
     bpy.utils.expose_bundled_modules()

@@ -57,7 +57,7 @@ def _is_of_others(path, name):
 
 
 def _require_replaceable(path):
-    """Raise `HairError` if the file is open or holds more than grooms."""
+    """Raise `HairError` if the file is open or contains other data than grooms."""
     if not path.is_file():
         return
     if bpy.data.filepath and path.resolve() == Path(bpy.data.filepath).resolve():
@@ -72,7 +72,7 @@ def _require_replaceable(path):
     with bpy.data.libraries.load(str(path)) as (there, _wanted):
         has_scenes = bool(there.scenes)
     if has_scenes or not names or not all(is_groom):
-        raise HairError("{path} has more than grooms in it: choose another file.", path=path)
+        raise HairError("{path} contains other data than grooms: choose another file.", path=path)
 
 
 @whole_changes.whole
@@ -213,7 +213,7 @@ def _require_blend(path):
     except OSError as error:
         raise HairError("{path} cannot be read: {cause}.", path=path, cause=cause_of(error)) from error
     if not first.startswith(_BLEND):
-        raise HairError("{path} is not a .blend file: pick an asset library's.", path=path)
+        raise HairError("{path} is not a .blend file: pick a file of an asset library.", path=path)
 
 
 def read(path: Path, name: str = "") -> LibraryGroom:
@@ -224,7 +224,7 @@ def read(path: Path, name: str = "") -> LibraryGroom:
     if not names:
         raise HairError("{path} has no grooms: pick a file of an asset library.", path=path)
     if not name and len(names) > 1:
-        sentence = "{path} has {count} assets ({names}): say which one."
+        sentence = "{path} has {count} assets ({names}): choose one by name."
         raise HairError(sentence, path=path, count=len(names), names=", ".join(names[:10]))
     before = _datablocks()
     try:

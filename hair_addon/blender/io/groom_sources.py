@@ -57,17 +57,17 @@ def all_hair():
     return sorted(found, key=lambda hair: hair.session_uid)
 
 
-def sources_of(chosen, settings, per_metre):
+def sources_of(chosen, settings, per_meter):
     """Return the `Source`s of the guides and strands of each hair; IDs are unique in the file."""
     names, sources, first_id = group_names(chosen), [], 0
     for group, (hair, name) in enumerate(zip(chosen, names, strict=True)):
         guides = hair.vellus.guide_curves
         if settings.has_guides and guides is not None:
-            made = _guide_curves(guides, group, name, first_id, per_metre)
+            made = _guide_curves(guides, group, name, first_id, per_meter)
             sources.append(Source(Remembered(guides), made, settings.moves(True)))
         if settings.has_hair:
             shown = modified_strands.curves_of(hair)
-            made = _strand_curves(hair, shown or hair, group, name, first_id, per_metre, settings)
+            made = _strand_curves(hair, shown or hair, group, name, first_id, per_meter, settings)
             sources.append(Source(Remembered(hair), made, settings.moves(False), shown not in (None, hair)))
         first_id += (len(guides.curves) if guides is not None else 0) + len(hair.curves)
     return sources
@@ -78,7 +78,7 @@ def group_names(chosen):
     return groom_curves.group_names([name_of(hair) for hair in chosen], _RESERVED)
 
 
-def _guide_curves(guides, group, name, first_id, per_metre):
+def _guide_curves(guides, group, name, first_id, per_meter):
     local = _guides_at_rest(guides)
     counts = strand_arrays.counts_of(guides) if local is None else np.full(*local.shape[:2], np.int32)
     return GroomCurves(
@@ -87,14 +87,14 @@ def _guide_curves(guides, group, name, first_id, per_metre):
         is_guide=True,
         counts=counts,
         first_id=first_id,
-        widths=_widths(guides, guides, counts, per_metre),
+        widths=_widths(guides, guides, counts, per_meter),
         root_uvs=exported_curves.read_root_uvs(guides),
     )
 
 
-def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
+def _strand_curves(hair, shown, group, name, first_id, per_meter, settings):
     counts = strand_arrays.counts_of(hair)
-    widths = _widths(hair, shown, counts, per_metre)  # first: later calls may evaluate again
+    widths = _widths(hair, shown, counts, per_meter)  # first: later calls may evaluate again
     guides = hair.vellus.guide_curves
     guide_count = 0 if guides is None else len(guides.curves)
     # Strands name guides only if the file has guides.
@@ -120,13 +120,13 @@ def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
     )
 
 
-def _widths(datablock, shown, counts, per_metre):
+def _widths(datablock, shown, counts, per_meter):
     """Return a function of a slice of curves that gives diameters in the file's units; shown: Curves with radii."""
     if np.array_equal(counts, exported_curves.counts_kept(shown)):
         radii = exported_curves.radii_kept(shown)
     else:  # simulated guides, which are resampled to equal point counts
         radii = exported_curves.read_radii(shown, int(counts[0]))(slice(None)).ravel()
-    factor = np.float32(2.0 * strand_arrays.world_scale(datablock) * per_metre)
+    factor = np.float32(2.0 * strand_arrays.world_scale(datablock) * per_meter)
     return lambda some: radii[_points_of(counts, some)] * factor
 
 
@@ -173,7 +173,7 @@ def _guides_at_rest(guides):
     return curves.even_points(curves.read_points(guides), offsets, lambda: attributes.are_smooth(guides))
 
 
-def points_of(source, per_metre):
+def points_of(source, per_meter):
     """Return the present points of a `Source`, as `Rows` (see `strand_arrays.shown_rows`). Raises `HairError`."""
     datablock, exported = source.datablock.find(), source.curves
     if source.is_modified and modified_strands.curves_of(datablock) is None:
@@ -183,11 +183,11 @@ def points_of(source, per_metre):
     if not np.array_equal(counts, exported.counts):
         raise HairError('The number of strands of "{name}" changes: remove its keys.', name=name_of(datablock))
     if exported.is_guide:
-        rows = strand_arrays.world_rows(datablock, per_metre, local)
+        rows = strand_arrays.world_rows(datablock, per_meter, local)
     else:
-        rows = strand_arrays.shown_rows(datablock, per_metre)
+        rows = strand_arrays.shown_rows(datablock, per_meter)
     matrix = source.matrix
-    return rows if matrix is None else lambda some: rows(some) @ matrix[:3, :3].T + matrix[:3, 3] * per_metre
+    return rows if matrix is None else lambda some: rows(some) @ matrix[:3, :3].T + matrix[:3, 3] * per_meter
 
 
 def instances_of(chosen):
@@ -248,7 +248,7 @@ def notes_of(chosen, sources, settings):
         if not (settings.has_hair and settings.has_guides):
             continue
         if hair.vellus.guide_curves is None:
-            yield HairError('"{name}" has no guides: Unreal makes some of its strands.', name=name)
+            yield HairError('"{name}" has no guides: Unreal creates guides from its strands.', name=name)
         elif group in without_map:
             yield HairError(
                 '"{name}" has no guide weights: Unreal computes its own. Regenerate the strands first.', name=name
@@ -259,5 +259,5 @@ def _notes_of_guides(guides):
     """Notes on guides that are written with other point counts than their own."""
     local = _guides_at_rest(guides)
     if local is not None and (curves.point_counts(guides) != local.shape[1]).any():
-        sentence = '"{name}" is written with {count} points a guide, as it is simulated.'
+        sentence = '"{name}" is written with {count} points per guide, as it is simulated.'
         yield HairError(sentence, name=name_of(guides), count=local.shape[1])

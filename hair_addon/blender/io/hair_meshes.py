@@ -58,12 +58,12 @@ def read_hair(hair):
     surface_object = hair.surface
     if surface_object is None:
         raise HairError('"{name}" has no surface: attach it to a mesh.', name=name_of(hair))
-    metres = strand_arrays.metres_per_unit(scene_time.present_scene())
-    points = strand_arrays.shown_points(hair) / metres - np.array(surface_object.matrix_world.translation)
+    meters = strand_arrays.meters_per_unit(scene_time.present_scene())
+    points = strand_arrays.shown_points(hair) / meters - np.array(surface_object.matrix_world.translation)
     if not np.isfinite(points).all():
         raise HairError('"{name}" has points with non-finite coordinates: regenerate the hair.', name=name_of(hair))
     shown = modified_strands.curves_of(hair) or hair
-    radii = exported_curves.read_radii(shown, points.shape[1])(slice(None)) * (strand_arrays.world_scale(hair) / metres)
+    radii = exported_curves.read_radii(shown, points.shape[1])(slice(None)) * (strand_arrays.world_scale(hair) / meters)
     is_hair = np.linalg.norm(np.diff(points, axis=1), axis=-1).sum(axis=1) > 1e-9
     if not is_hair.any():
         raise HairError('"{name}" has no strands.', name=name_of(hair))

@@ -24,7 +24,7 @@ def open_file():
     """Return {name: value} of the surfaces, guides, hair and other curves in the open file."""
     shown = bpy.context.scene.objects
     return {
-        "metres_per_unit": strand_arrays.metres_per_unit(bpy.context.scene),
+        "meters_per_unit": strand_arrays.meters_per_unit(bpy.context.scene),
         "surfaces": [_surface(o) for o in shown if o.type == "MESH"],
         "guides": [_guides(c) for c in bpy.data.hair_curves if c.vellus.kind == "GUIDES"],
         "hair": [_hair(c) for c in bpy.data.hair_curves if c.vellus.kind == "HAIR"],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opening of .blend files, and import of mesh files into an empty scene, in Blender's axes and in metres."""
+"""Opening of .blend files, and import of mesh files into an empty scene, in Blender's axes and in meters."""
 
 import contextlib
 import io
@@ -62,7 +62,7 @@ _FORMATS = {
 # Formats whose importers can crash Blender on damaged files despite all checks.
 _MAY_CRASH_BLENDER = {".ply", ".usd", ".usdc", ".usda", ".usdz", ".abc", ".glb", ".gltf"}
 
-# Files without axes and units: read in metres.
+# Files without axes and units: read in meters.
 _WITHOUT_UP_AXIS = {".obj", ".ply", ".stl"}
 
 

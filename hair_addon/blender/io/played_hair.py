@@ -27,7 +27,7 @@ def playing(hair, motion, order, path: Path):
     """
     hair_file.require_ours(path)
     blender_scene, shown = bpy.context.scene, selection.object_of(hair, bpy.context.view_layer)
-    rate, scale = scene_time.frame_rate(blender_scene), strand_arrays.metres_per_unit(blender_scene)
+    rate, scale = scene_time.frame_rate(blender_scene), strand_arrays.meters_per_unit(blender_scene)
     matrix, radii, counts = np.array(shown.matrix_world, np.float64), curves.read_radii(hair), curves.point_counts(hair)
     back = np.linalg.inv(matrix)
 

@@ -18,8 +18,8 @@ from ..live import live_hair
 from . import modified_strands
 
 
-def metres_per_unit(blender_scene):
-    """Metres per unit of a scene."""
+def meters_per_unit(blender_scene):
+    """Meters per unit of a scene."""
     units = blender_scene.unit_settings
     return 1.0 if units.system == "NONE" else units.scale_length
 
@@ -56,17 +56,17 @@ def counts_of(datablock):
     return exported_curves.counts_kept(datablock)
 
 
-def shown_rows(datablock, per_metre=1.0) -> Rows:
+def shown_rows(datablock, per_meter=1.0) -> Rows:
     """Like `world_rows`, with the artist's modifiers where `modified_strands` provides curves."""
     shown = _shown(datablock)
     if shown is None:
-        return world_rows(datablock, per_metre)
+        return world_rows(datablock, per_meter)
     points, starts = exported_curves.points_kept(shown), strands.curve_offsets(exported_curves.counts_kept(shown))
-    return _placed(lambda some: points[starts[some.start] : starts[some.stop]], _to_world(datablock) * per_metre)
+    return _placed(lambda some: points[starts[some.start] : starts[some.stop]], _to_world(datablock) * per_meter)
 
 
-def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
-    """Return a function of a slice of curves that gives their (N, 3) float32 points [m] times `per_metre`.
+def world_rows(datablock, per_meter=1.0, local=None) -> Rows:
+    """Return a function of a slice of curves that gives their (N, 3) float32 points [m] times `per_meter`.
 
     Like `world_points`, but without resampling: point counts are those of `counts_of`. local: (S, P, 3) float32 points
     at rest, None for those of the datablock.
@@ -85,12 +85,12 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
         its = points[starts[some.start] : starts[some.stop]]
         return pose.carry_rooted(its, counts[some], places, some)
 
-    return _placed(carried, _to_world(datablock) * per_metre)
+    return _placed(carried, _to_world(datablock) * per_meter)
 
 
 def _placed(local, to_world) -> Rows:
     """Return local `Rows` transformed by a (4, 4) matrix and to meters."""
-    to_file = to_world * metres_per_unit(bpy.context.scene)
+    to_file = to_world * meters_per_unit(bpy.context.scene)
 
     def rows(some):
         return (local(some).astype(np.float64) @ to_file[:3, :3].T + to_file[:3, 3]).astype(np.float32)
@@ -120,7 +120,7 @@ def other_places(datablock):
     except np.linalg.LinAlgError as error:
         raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(shown)) from error
     matrices = np.stack([np.array(other.matrix_world, np.float64) @ back for other in others])
-    matrices[:, :3, 3] *= metres_per_unit(bpy.context.scene)
+    matrices[:, :3, 3] *= meters_per_unit(bpy.context.scene)
     return [*matrices]
 
 
@@ -145,7 +145,7 @@ def shape_of(datablock):
 def world_scale(datablock):
     """Return the mean number of meters per local unit of a Curves datablock. Raises `HairError`."""
     matrix = _to_world(datablock)[:3, :3]
-    return float(abs(np.linalg.det(matrix))) ** (1.0 / 3.0) * metres_per_unit(bpy.context.scene)
+    return float(abs(np.linalg.det(matrix))) ** (1.0 / 3.0) * meters_per_unit(bpy.context.scene)
 
 
 def _to_world(datablock):

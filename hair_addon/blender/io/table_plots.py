@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plots of tables: tone-mapped, with labelled axes. They need no GPU."""
+"""Plots of tables: tone-mapped, with labeled axes. They need no GPU."""
 
 import blf
 import imbuf

@@ -46,12 +46,15 @@ def update(guides: Curves, depsgraph: Depsgraph) -> bool:
         return False
     state, points = guides.vellus, curves.read_points(guides)
     identities = layer_items.identities_of(state)
+    had_status = bool(state.status)
     state.status = ""
     layers = read(guides, depsgraph, is_shown=True)
     is_recorded = is_edited(guides) and np.isfinite(points).all()
     if is_recorded:
         layers, refusal = _recorded(layers, state, points)
-        state.status = refusal
+        if had_status:
+            read(guides, depsgraph)  # reports masks that are still missing
+        state.status = " ".join(sentence for sentence in (refusal, state.status) if sentence)
         layer_attributes.write(guides, layers, identities)
     if layer_items.is_reweighed(state):
         layers = read(guides, depsgraph)

@@ -328,7 +328,7 @@ def before_rendering(*_args):
 
 @persistent
 def before_rendered_frame(scene, *_args):
-    """Refuse a frame, or say so, whose baked hair another engine would render as it is combed."""
+    """Refuse or report a frame in which another engine would render baked hair as it is combed."""
     unbaked_renders.before_frame(scene)
 
 

@@ -13,7 +13,7 @@ from ..groom import hidden_hair
 from ..host import running
 from ..host.caches import Cache
 
-_PERIOD = 0.25  # seconds between two looks at the windows
+_PERIOD = 0.25  # seconds between two checks of the windows
 # Maximum seconds between two moves of one slider; software rendering takes long to draw a picture.
 _TOGETHER = 4.0
 
@@ -24,7 +24,7 @@ changed_cache = Cache()
 
 
 def register():
-    """Look at every redraw of a viewport whether hair must be hidden."""
+    """Check with every redraw of a viewport whether hair must be hidden."""
     _handles.append(bpy.types.SpaceView3D.draw_handler_add(look, (), "WINDOW", "POST_VIEW"))
 
 

@@ -10,7 +10,7 @@ from ..host.notices import say
 from ..render.frames import composite
 from ..settings.translations import error_text
 
-noted_cache = Cache()  # session_uid of a scene → sentences on its render, which others than Vellus make
+noted_cache = Cache()  # session_uid of a scene that another engine renders → messages about its last render
 
 
 def begin():

@@ -22,7 +22,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
 
     is_mesh_edited: whether the mesh itself has changed, not only modifiers, so that its weights may have changed too.
     """
-    carried = set()  # guides that are not live, and have followed
+    carried = set()  # guides without Auto Update that have followed
     in_place = set()  # hair that an applied transform has left in place
     for guides in bpy.data.hair_curves:
         state = guides.vellus
@@ -46,9 +46,9 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
             state.status = str(error)
             continue
         if was_edited:
-            gone_along = set(applied_transforms.followed_by(guides)) if followed is Followed.APPLIED else set()
-            mark_followers(guides, gone_along)
-            in_place |= gone_along
+            redrawn = set(applied_transforms.followed_by(guides)) if followed is Followed.APPLIED else set()
+            mark_followers(guides, redrawn)
+            in_place |= redrawn
     edited_surfaces.follow_alone(surface_object, depsgraph, reported.place_before)
     for hair in bpy.data.hair_curves if is_mesh_edited else ():
         state = hair.vellus
@@ -219,10 +219,13 @@ def follow_styles(changed):
             state.is_stale = True
 
 
-def mark_followers(guide_curves, gone_along=()):
-    """Mark all hair between some guides as stale, except kept hair that has followed them; redraw `gone_along`."""
+def mark_followers(guide_curves, redrawn=()):
+    """Mark all hair between some guides as stale, except kept hair that has followed them.
+
+    Only redraw hair in `redrawn`.
+    """
     for hair in curves.followers(guide_curves):
-        if hair in gone_along:
+        if hair in redrawn:
             events.strands_made(hair)
         elif not (curves.is_hand_made(hair) and hair.vellus.followed == staleness.guides_digest(guide_curves)):
             _mark(hair)

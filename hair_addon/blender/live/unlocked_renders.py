@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders from a window without Lock Interface, in which hair cannot follow its baked frames; the user is told."""
+"""Renders from a window without Lock Interface, in which hair cannot follow its baked frames.
+
+A message informs the user.
+"""
 
 import bpy
 

@@ -81,9 +81,10 @@ def strands_of(drawn):
 
 
 def lit_by(drawn, grid, textures, part=1.0, shift=0.0):
-    """A `DrawnScene` whose hair is lit by `light_grid.upload` of each hair, over a `StrandGrid`.
+    """A `DrawnScene` whose hair is lit by textures of `light_grid.upload`, one for each hair, over a `StrandGrid`.
 
-    part: how much of this light replaces dual scattering, from 0 to 1; shift: (3,) of hair since [m].
+    part: how much of this light replaces dual scattering, from 0 to 1; shift: (3,) motion of the hair since the grid
+    was built [m].
     """
     visibility = [
         {**seen, "light_grid": texture} for seen, texture in zip(drawn.hair_visibility, textures, strict=True)
@@ -114,7 +115,7 @@ def _strands_of(strands, shading, to_world, first):
     randoms = np.full(count, 0.5) if strands.randoms_here is None else strands.randoms_here
     layers = shading.layers
     is_wettest = np.zeros(count, int)
-    if len(layers) > 1:  # strands between two looks randomly get either, by their share
+    if len(layers) > 1:  # a strand between two looks gets one of them at random, by its share
         shares = appearance.wet_share(strands.wetness_here, *shading.wetness_range)
         is_wettest = (np.random.default_rng(0).random(count) < shares).astype(int)
     fibres = [layer.fibre for layer, _mix in layers]

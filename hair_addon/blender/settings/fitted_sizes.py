@@ -42,7 +42,7 @@ def group_properties(names, update):
     return {
         flag_of(name): bpy.props.BoolProperty(
             name="Fitted",
-            description="Fit this to the surface and its mask. Off once it is set by hand",
+            description="Fit this setting to the surface and its mask. Turned off when the setting is changed",
             translation_context=CONTEXT,
             options=set(),
             update=refit,

@@ -57,7 +57,7 @@ class VellusLayer(bpy.types.PropertyGroup):
             translation_context=CONTEXT,
             update=mark_shown,
         ),
-        "identity": bpy.props.IntProperty(description="Number in names of attributes", options={"HIDDEN"}),
+        "identity": bpy.props.IntProperty(description="Number of the layer in names of attributes", options={"HIDDEN"}),
         "shown_weight": bpy.props.FloatProperty(description="Weight in the present guides", options={"HIDDEN"}),
         "shown_mask": bpy.props.StringProperty(description="Mask in the present guides", options={"HIDDEN"}),
         "is_painted": bpy.props.BoolProperty(
@@ -146,6 +146,6 @@ def remove(state, place):
 
 
 def _follow(state, names, order):
-    """Update keys; order: previous index of each layer in the list, None for a new layer."""
+    """Update the keys of layers; order: previous index of each layer in the list, None for a new layer."""
     places = [order.index(index) if index in order else None for index in range(len(names))]
     style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, names_of(state), "layers"))

@@ -81,7 +81,7 @@ def read_faces(state) -> bool:
 
 
 def add(state, setting: str) -> VellusMap:
-    """Add a map without a source for a setting without a map; returns the item."""
+    """Add a map without a source for a setting that has no map; returns the item."""
     item = state.maps.add()
     item.setting = setting
     return item

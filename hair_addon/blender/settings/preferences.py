@@ -27,7 +27,7 @@ class VellusPreferences(bpy.types.AddonPreferences):
         description="Device that makes strands in viewports while guides are combed or styles change",
         translation_context=CONTEXT,
         items=[
-            ("AUTOMATIC", "Automatic", "The graphics card where it is faster"),
+            ("AUTOMATIC", "Automatic", "Use the graphics card if it is faster"),
             ("GPU", "Graphics Card", "The graphics card that draws, of any vendor"),
             ("COMPUTE", "Compute Device", "The device that computes hair"),
         ],

@@ -179,13 +179,15 @@ class VellusCurves(bpy.types.PropertyGroup):
     maps: bpy.props.CollectionProperty(type=map_items.VellusMap)
     thickness_ramp: bpy.props.PointerProperty(
         name="Thickness Curve",
-        description="Node group with the course of the thickness from root to tip",
+        description="Node group with the thickness curve from root to tip",
         translation_context=CONTEXT,
         type=bpy.types.NodeTree,
         options={"HIDDEN"},
         update=mark_geometry,
     )
-    thickness_key: bpy.props.StringProperty(description="Course of the stored radii", options={"HIDDEN"})
+    thickness_key: bpy.props.StringProperty(
+        description="Digest of the thickness curve of the stored radii", options={"HIDDEN"}
+    )
     layers: bpy.props.CollectionProperty(type=layer_items.VellusLayer)
     active_layer: bpy.props.IntProperty(min=0, options=set())
     layered: bpy.props.StringProperty(description="Fingerprint of the points that layers give", options={"HIDDEN"})
@@ -236,9 +238,9 @@ class VellusCurves(bpy.types.PropertyGroup):
         description="Colors of guides in viewports",
         translation_context=CONTEXT,
         items=[
-            ("PLAIN", "Plain", "One calm color"),
+            ("PLAIN", "Plain", "One muted color for all guides"),
             ("SYSTEM", "Hair System", "One color for the guides of each hair system"),
-            ("GUIDE", "Guide", "Another color for each guide"),
+            ("GUIDE", "Guide", "A different color for each guide"),
         ],
         default="PLAIN",
         update=mark_shown,

@@ -129,7 +129,7 @@ def _title(label):
 
 
 def _limits(details, is_integer):
-    # Blender has no exclusive limits; ten nanometres represent "above zero".
+    # Blender has no exclusive limits; ten nanometers represent "above zero".
     low = max(details.low, details.above + 1e-8) if math.isfinite(details.above) else details.low
     limits = {"min": low, "max": details.high, "soft_max": min(details.soft_high, details.high)}
     finite = {key: value for key, value in limits.items() if math.isfinite(value)}

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's panels that support our render engine: output, colour management, lights, materials."""
+"""Blender's panels that support our render engine: output, color management, lights, materials."""
 
 import bpy
 
 from ..render.frames.engine import NAME
 
-# Blender's panels list their engines. Panels for engines in general also apply to ours, except unsupported features;
-# and a few of EEVEE's, which have no general version.
+# Blender's panels list their engines. Ours is added to panels for all engines, except those of unsupported features,
+# and to a few of EEVEE's that have no general version.
 _GENERAL = "BLENDER_RENDER"
 _NOT_OURS = (
     *("RENDER_PT_freestyle", "VIEWLAYER_PT_freestyle", "MATERIAL_PT_freestyle", "RENDER_PT_stereoscopy"),

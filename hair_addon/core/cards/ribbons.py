@@ -17,7 +17,7 @@ _TINY = 1e-9
 
 @dataclass(frozen=True)
 class Axes:
-    """Middle lines of C ribbons of n points: centres, tangents, normals, (C, n, 3) each."""
+    """Middle lines of C ribbons of n points: centers, tangents, normals, (C, n, 3) each."""
 
     centres: np.ndarray
     tangents: np.ndarray

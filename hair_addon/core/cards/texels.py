@@ -66,7 +66,7 @@ class TexelSums:
 
 
 def _sampled(strands, segments, centres, texel):
-    """Return (9, N) color, normal, depth, fraction from root to tip and ID of samples at centres (N, 2).
+    """Return (9, N) color, normal, depth, fraction from root to tip and ID of samples at centers (N, 2).
 
     texel: its width. Thinner strands are shaded as flat, because both sides fall into one texel.
     """

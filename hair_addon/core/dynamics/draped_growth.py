@@ -62,20 +62,20 @@ def settled(
     """
     device = guides.points.device
     load_kernels(device, progress)
-    metres = math.sqrt(SCALP / groom_defaults.grown_area(mesh, density, texture))  # per unit of the mesh
+    meters = math.sqrt(SCALP / groom_defaults.grown_area(mesh, density, texture))  # per unit of the mesh
     gravity = (0.0, 0.0, -_EARTH * groom_defaults.known(settings.gravity))
     used, triangles = np.unique(mesh.triangles[within_reach(mesh, settings, density)], return_inverse=True)
     center = mesh.vertices[used].mean(axis=0, dtype=np.float64)
     surface = TriMesh(
-        (metres * (mesh.vertices[used] - center)).astype(np.float32), triangles.reshape(-1, 3).astype(np.int32)
+        (meters * (mesh.vertices[used] - center)).astype(np.float32), triangles.reshape(-1, 3).astype(np.int32)
     )
     grown = guides.numpy()
 
     def report(part):
         progress("Draping guides", part)
 
-    points = draping.draped(metres * (grown - center), surface, _HAIR, gravity, _SECONDS, device, report)
-    points = (points / metres + center).astype(np.float32)
+    points = draping.draped(meters * (grown - center), surface, _HAIR, gravity, _SECONDS, device, report)
+    points = (points / meters + center).astype(np.float32)
     points[:, 0] = grown[:, 0]  # roots stay bit-identical
     if settings.symmetric:
         points = grooming.guide_growth.mirrored(points, positions(mesh, guides.roots), mirror)

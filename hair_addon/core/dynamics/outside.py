@@ -137,7 +137,7 @@ def _keep_outside(
     last = points[strand, 0]
     out_points[strand, 0] = last
     is_moved = int(0)
-    clear = float(0.0)  # distance that can be travelled before a surface may be near
+    clear = float(0.0)  # distance that can be traveled before a surface may be near
     for i in range(1, first_moved[strand]):
         last = points[strand, i]
         out_points[strand, i] = last

@@ -305,7 +305,10 @@ class Simulation:
         self._rods.carry(is_chosen, turns, pivots, places)
 
     def renew_obstacles(self, others: Mapping[str, Obstacle]) -> None:
-        """Let obstacles of the last frame have other faces from now on, where they are; others: by their names."""
+        """Replace obstacles of the last frame by obstacles in the same pose with other faces.
+
+        others: {name: obstacle}.
+        """
         if others:
             self.world = replace(self.world, obstacles=tuple(others.get(one.name, one) for one in self.world.obstacles))
             self._read_obstacles([one for one in self.world.obstacles if one.name not in others])

@@ -13,10 +13,10 @@ from .simulation import Obstacle
 def stopped(
     obstacles: Sequence[Obstacle], last: Mapping[str, Obstacle], frame: int
 ) -> tuple[tuple[Obstacle, ...], list[HairError]]:
-    """(obstacles of a frame, those of another topology in the place where they were; a note for each of these).
+    """Return (obstacles of a frame, a note for each obstacle whose topology has changed, which keeps its last pose).
 
-    last: {name: obstacle} of the frame before, as this function returned them: another topology is another than there.
-    One that was missing then, or whose vertices were not finite, begins anew.
+    last: {name: obstacle} that this function returned for the previous frame. Obstacles that were missing there, or had
+    non-finite vertices, are new.
     """
     taken, notes = [], []
     for obstacle in obstacles:
@@ -31,9 +31,10 @@ def stopped(
 
 
 def divided(obstacles: Sequence[Obstacle], last: Mapping[str, Obstacle]) -> dict[str, Obstacle]:
-    """{name: obstacle of the frame before, with the faces of now} of those with as many vertices and other faces.
+    """Return the obstacles of the previous frame whose faces changed, with their present faces, by name.
 
-    For where local coordinates have changed: Blender divides quads otherwise, and the mesh is the same.
+    Only obstacles with the same number of vertices are included. In changed local coordinates Blender may triangulate
+    quads differently, although the mesh is the same.
     """
     found = {}
     for obstacle in obstacles:

@@ -19,7 +19,7 @@ ENDINGS = (".abc", ".usd", ".usdc", ".usda", ".usdz", ".npz", ".hair", ".data", 
 # The warning for animated splines: Blender plays only polylines.
 SPLINES_MOVE = "{path} is animated: its Catmull-Rom splines become polylines."
 
-# Metres in a unit, by its name in the interface.
+# Meters in a unit, by its name in the interface.
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048, "km": 1000.0}
 
 # Up axis → matrix (3, 3) from such coordinates to Blender's, with Z up.
@@ -31,35 +31,35 @@ TO_Z_UP = {
 
 
 def parsed_unit(text: str) -> float:
-    """Return the metres in a unit, given by its name or as a number. Raises `HairError`."""
+    """Return the meters in a unit, given by its name or as a number. Raises `HairError`."""
     if text in UNITS:
         return UNITS[text]
     try:
-        metres = float(text)
+        meters = float(text)
     except ValueError:
-        metres = 0.0
-    if not 0.0 < metres < 1e9:
+        meters = 0.0
+    if not 0.0 < meters < 1e9:
         raise HairError(
             "{unit} is not a unit: use {names}, or meters in a unit as a number.",
             unit=" ".join(text.split()),
             names=", ".join(UNITS),
         )
-    return metres
+    return meters
 
 
 @dataclass(frozen=True)
 class Convention:
     """Unit and up axis of coordinates; None where unspecified.
 
-    metres: in a unit; up: X, Y or Z.
+    meters: in a unit; up: X, Y or Z.
     """
 
-    metres: float | None = None
+    meters: float | None = None
     up: str | None = None
 
     def over(self, other: "Convention") -> "Convention":
         """Return this convention with unspecified values taken from another."""
-        return Convention(other.metres if self.metres is None else self.metres, self.up or other.up)
+        return Convention(other.meters if self.meters is None else self.meters, self.up or other.up)
 
 
 @dataclass(frozen=True)
@@ -98,9 +98,9 @@ class CurveSet:
     def __len__(self) -> int:
         return len(self.counts)
 
-    def placed(self, metres: float, up: str) -> "CurveSet":
-        """Return the curves in metres with Z up, float32; metres: in a unit of the file; up: axis of the file."""
-        turn, motion = TO_Z_UP[up] * metres, self.motion
+    def placed(self, meters: float, up: str) -> "CurveSet":
+        """Return the curves in meters with Z up, float32; meters: in a unit of the file; up: axis of the file."""
+        turn, motion = TO_Z_UP[up] * meters, self.motion
 
         def turned(points):
             with np.errstate(over="ignore", invalid="ignore"):  # non-finite points are reported and skipped later
@@ -110,7 +110,7 @@ class CurveSet:
             points_at = motion.points_at
             motion = Motion(motion.times, lambda index: turned(points_at(index)))
         with np.errstate(over="ignore", invalid="ignore"):
-            radii = None if self.radii is None else (self.radii.astype(np.float64) * metres).astype(np.float32)
+            radii = None if self.radii is None else (self.radii.astype(np.float64) * meters).astype(np.float32)
         return replace(self, points=turned(self.points), radii=radii, motion=motion)
 
     def some(self, is_chosen: np.ndarray) -> "CurveSet":

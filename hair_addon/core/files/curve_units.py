@@ -30,7 +30,7 @@ _WORDS = {
 class Reading:
     """The chosen unit and axis, with notes for the user."""
 
-    metres: float
+    meters: float
     up: str
     notes: list[HairError]
 
@@ -45,28 +45,28 @@ def choose(file: CurveFile, sets: Sequence[CurveSet], given: Convention, mesh: T
     ends = _Ends(sets, mesh)
     usual = known.over(file.usual)
     taken, notes = usual, []
-    if known.metres is None or known.up is None:
+    if known.meters is None or known.up is None:
         taken = next((one for one in _conventions(known, usual) if ends.lie_on_surface(one)), usual)
         sentence = "{file} does not state its unit and axis: it is read in {unit} with {up} up"
         sentence += ", which puts roots on the surface." if ends.lie_on_surface(taken) else ", the most common ones."
-        notes.append(HairError(sentence, file=name, unit=_named(taken.metres), up=taken.up))
-    assert taken.metres is not None and taken.up is not None
+        notes.append(HairError(sentence, file=name, unit=_named(taken.meters), up=taken.up))
+    assert taken.meters is not None and taken.up is not None
     if not ends.lie_on_surface(taken):
         notes += ends.complaints(taken, name)
-    return Reading(taken.metres, taken.up, notes)
+    return Reading(taken.meters, taken.up, notes)
 
 
 def _conventions(known, usual) -> Iterator[Convention]:
     """Yield the possible conventions, the most usual first."""
-    units = [usual.metres, *UNITS.values()] if known.metres is None else [known.metres]
+    units = [usual.meters, *UNITS.values()] if known.meters is None else [known.meters]
     axes = [usual.up, "Z", "Y", "X"] if known.up is None else [known.up]
-    for metres, up in itertools.product(dict.fromkeys(units), dict.fromkeys(axes)):
-        yield Convention(metres, up)
+    for meters, up in itertools.product(dict.fromkeys(units), dict.fromkeys(axes)):
+        yield Convention(meters, up)
 
 
-def _named(metres):
+def _named(meters):
     """Return a unit in words."""
-    return next((_WORDS[name] for name, one in UNITS.items() if one == metres), f"units of {metres:g} m")
+    return next((_WORDS[name] for name, one in UNITS.items() if one == meters), f"units of {meters:g} m")
 
 
 class _Ends:
@@ -97,12 +97,12 @@ class _Ends:
         best = int(np.argmin(distances))
         distance = self._measured(taken)[0]
         values = {"file": name, "distance": distance, "size": self._size}
-        values |= {"unit": _named(taken.metres), "up": taken.up}
+        values |= {"unit": _named(taken.meters), "up": taken.up}
         sentence = "The roots in {file} lie {distance:.3g} m from the surface, which is {size:.3g} m large, "
         sentence += "in {unit} with {up} up"
         if np.isfinite(distances[best]):
             sentence += ": they would lie on it in {other} with {other_up} up."
-            values |= {"other": _named(others[best].metres), "other_up": others[best].up}
+            values |= {"other": _named(others[best].meters), "other_up": others[best].up}
         elif distance > self._size:
             sentence += ": check the unit, the axis and the surface."
         else:
@@ -116,7 +116,7 @@ class _Ends:
         """Return (median distance of roots to the surface, extent of all curves) [m]; roots are the nearer ends."""
         if not len(self._ends):
             return 0.0, 0.0
-        ends = self._ends @ (TO_Z_UP[convention.up] * convention.metres).T
+        ends = self._ends @ (TO_Z_UP[convention.up] * convention.meters).T
         extent = float(np.ptp(ends.reshape(-1, 3), axis=0).max())
         outside = np.maximum(np.maximum(self._low - ends, ends - self._high), 0.0)
         distances = np.linalg.norm(outside, axis=2)  # to the bounding box: sufficient for distant ends

@@ -3,7 +3,7 @@
 
 Away from extraordinary vertices, a Catmull-Clark surface [Catmull78] is the bicubic B-spline of the cage, and the faces
 of the cage are the bilinear one. B-splines are convolutions of boxes, so the bicubic is the bilinear surface convolved
-with a hat as wide as two faces, whose variance is 1/6 of a face squared along each axis. Repeated means of neighbouring
+with a hat as wide as two faces, whose variance is 1/6 of a face squared along each axis. Repeated means of neighboring
 vertices with the same variance approximate the hat. Normals are within a degree of the surface's, and within ten
 degrees at the corners of a cube. follow_nodes.py of blender/data/strands uses the same blur.
 """
@@ -21,13 +21,13 @@ from .mesh import Faces
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 HAT_VARIANCE = 1.0 / 6.0  # of a face of the cage, squared
-MOST_VARIANCE = 0.4  # of an edge squared: the mean of a vertex and its four neighbours with equal weights
+MOST_VARIANCE = 0.4  # of an edge squared: the mean of a vertex and its four neighbors with equal weights
 MOST_ROUNDS = 128  # enough for four levels; more levels are smoothed too little
 LEAST_REFINEMENT = 2.0  # 4 × faces / corners of the cage: at least 4 with one level, at most 4/3 without
 
 
 def rounds(face_count: int, cage_corners: int) -> tuple[int, float]:
-    """Return the number of smoothing rounds and the weight of a neighbour, in single precision.
+    """Return the number of smoothing rounds and the weight of a neighbor, in single precision.
 
     face_count: of the subdivided mesh; cage_corners: corners of all faces of the cage, 0 for a mesh without smoothing.
     (0, 0) without smoothing or subdivision.
@@ -69,7 +69,7 @@ def _ints(array):
 
 
 def _neighbours(faces, vertex_count):
-    """Return the neighbours by edges (N,) int32, concatenated over vertices, and starts (V + 1,) int32."""
+    """Return the neighbors by edges (N,) int32, concatenated over vertices, and starts (V + 1,) int32."""
     corners = faces.corner_vertices.astype(np.int64)
     following = np.roll(corners, -1)
     following[faces.starts[1:] - 1] = corners[faces.starts[:-1]]

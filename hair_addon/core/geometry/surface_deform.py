@@ -4,11 +4,11 @@
 A face's deformation gradient maps two of its edges and its unit normal to their present directions. The rotation at a
 vertex is the polar factor U V^T of the mean over its faces (vertex_turns.py) [Higham86]; between vertices two of its
 columns are interpolated and orthonormalized. Thus rigid motion is reproduced exactly, shear and stretch rotate no more
-than necessary, and neighbouring roots do not separate, as they do with frames of single triangles or of a UV map.
+than necessary, and neighboring roots do not separate, as they do with frames of single triangles or of a UV map.
 blender/data/strands/follow_nodes.py implements the same in geometry nodes.
 
 A deformed subdivided surface is smooth, but at rest its vertices lie on the flat faces of its cage, from which
-neighbouring roots would turn apart. Its rotation is measured from the smooth surface of the cage (smooth_surface.py).
+neighboring roots would turn apart. Its rotation is measured from the smooth surface of the cage (smooth_surface.py).
 """
 
 from dataclasses import dataclass

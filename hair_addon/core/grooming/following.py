@@ -139,7 +139,7 @@ def follow_some(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return points (M, P, 3) float32 of some strands, as `growing_points`, and their weights (M, k) float32.
 
-    Only these strands and the centres of their clumps are computed. guides and styling: as in `strands_now`; chosen:
+    Only these strands and the centers of their clumps are computed. guides and styling: as in `strands_now`; chosen:
     (M,) indices of strands, for example from `guide_weights.Reach` for moved guides.
     """
     read = [] if styling is None else styling.centres_of(chosen)

@@ -12,7 +12,7 @@ With λ_i as above each segment has the average length of its guides' segments. 
 
 R_j is the minimal rotation from the guide's normal to the strand's: it needs no UV map and is continuous wherever
 normals are. With a frame F (tangent, bitangent, normal) at either root it is F_strand Z F_guide^T, Z being a rotation
-about the normal. So guides are transformed to their frames once, a neighbour costs five multiplications per point
+about the normal. So guides are transformed to their frames once, a neighbor costs five multiplications per point
 instead of nine, and the strand's frame is applied to the sum.
 
 interpolation.cpp computes eight segments of a strand at once, in vector registers of a processor (Clang's vectors,

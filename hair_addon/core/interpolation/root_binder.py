@@ -51,7 +51,7 @@ class RootBinder:
         return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored)
 
     def nearest(self, strands: HairBinding, centres: HairBinding) -> np.ndarray:
-        """Return (S, 2) int32: the two centres nearest to each strand, in its region and on its side of part lines.
+        """Return (S, 2) int32: the two centers nearest to each strand, in its region and on its side of part lines.
 
         -1 if there are fewer.
         """
@@ -74,7 +74,7 @@ class RootBinder:
         return geometry.root_frames.rooted(self.mesh, self.guide_roots, self.device)
 
     def _with_guide_regions(self, strands, centres):
-        """Return the regions (S,) and (K,) of the first guides of strands and centres; None without regions."""
+        """Return the regions (S,) and (K,) of the first guides of strands and centers; None without regions."""
         kept_apart = interpolation.regions.kept_apart(self.regions, self.guide_roots, self.guide_roots)
         if kept_apart is None:
             return None

@@ -2,8 +2,8 @@
 """Warp kernels → GLSL: a compute program has the same source as the kernel on CPU and CUDA.
 
 A kernel and all functions that it calls are translated from their syntax trees; types follow from their annotations.
-Structs and arrays that a kernel is given are global in GLSL, so a function with such parameters is written once for
-each combination of them that it is called with. shaders/kernels/kernel_language.glsl defines what GLSL lacks.
+A kernel's structs and arrays are global in GLSL, so a function with such parameters is written once for each
+combination of arguments. shaders/kernels/kernel_language.glsl defines what GLSL lacks.
 
 Supported: numbers, vectors, structs, reading arrays, writing elements of arrays, `if`, `while`, `for` over ranges,
 several return values, random numbers and `mesh_query_ray`. Anything else raises `NotImplementedError` with its line.
@@ -19,7 +19,12 @@ import numpy as np
 import warp as wp
 
 _KINDS = dict.fromkeys((float, wp.float32, wp.float64), "float") | dict.fromkeys((int, wp.int32, wp.uint8), "int")
-_KINDS |= {wp.uint32: "uint", bool: "bool", wp.bool: "bool", wp.uint64: "int"}  # the last: a mesh, which is not read
+_KINDS |= {
+    wp.uint32: "uint",
+    bool: "bool",
+    wp.bool: "bool",
+    wp.uint64: "int",
+}  # uint64: the id of a mesh, unused in GLSL
 _KINDS |= {wp.vec2: "vec2", wp.vec3: "vec3", wp.vec4: "vec4", wp.vec3i: "ivec3"}
 _ELEMENTS = {"vec2": "float", "vec3": "float", "vec4": "float", "ivec3": "int"}
 _ZERO = {"float": "0.0", "int": "0", "uint": "0u", "bool": "false"}
@@ -32,7 +37,7 @@ _SIGNS = (
 ).split()
 _OPERATORS = {getattr(ast, name): sign for name, sign in zip(_SIGNS[::2], _SIGNS[1::2], strict=True)}
 _COMPARISONS = "<", "<=", ">", ">=", "==", "!="
-# Functions of Warp: their form in GLSL, and what they return: a type, or None for that of the first argument.
+# (function of Warp, number of arguments) → (GLSL, type of the result; None: the type of the first argument).
 _CALLS = {
     **{(name, 1): (f"{name}({{0}})", None) for name in ("sqrt", "exp", "log", "sin", "cos", "atan", "abs", "floor")},
     ("asin", 1): ("arc_sine({0})", None),
@@ -53,7 +58,7 @@ _CALLS = {
 
 @dataclass(frozen=True)
 class Given:
-    """A kernel's parameter, or a member of one: a path of names, whose first is the parameter's."""
+    """A kernel parameter, or a member of one; path: the name of the parameter, then names of members."""
 
     path: tuple[str, ...]
     kind: Any  # a type of GLSL, `wp.struct` or `wp.array`
@@ -68,9 +73,9 @@ class Given:
 class KernelText:
     """GLSL of a kernel: `source` defines `run_kernel()`, which reads `given`.
 
-    members: numbers of `given`; arrays: those that are read, each with a member for its place among all of its kind and
-    one for each side; written: {array: type} of those that are written, by `write_NAME(index, value)`; has_mesh:
-    whether rays are traced through the triangles of a mesh.
+    members: numbers in the block `given`; arrays: arrays that the kernel reads: for each, `given` has the index of its
+    first element in the texture of its type, and its size along each further axis; written: {name: type} of arrays that
+    the kernel writes by `write_NAME(index, value)`; has_mesh: whether it traces rays through the triangles of a mesh.
     """
 
     source: str
@@ -84,10 +89,10 @@ class KernelText:
 class _Value:
     text: str
     kind: Any  # a type of GLSL, or `wp.struct`
-    operator: str = ""  # that was applied last
+    operator: str = ""  # the outermost operator
 
-    def inside(self, *operators):
-        """The text as a part of a longer one; operators: those that need no parentheses around them."""
+    def operand(self, *operators):
+        """Return the text as an operand, in parentheses unless its outermost operator is among `operators`."""
         return f"({self.text})" if self.operator and self.operator not in operators else self.text
 
 
@@ -104,7 +109,7 @@ def kernel_text(kernel: wp.Kernel) -> KernelText:
 
 
 def function_text(*functions: wp.Function) -> str:
-    """GLSL of functions of numbers alone, each in single precision, and of those that they call."""
+    """Return GLSL of functions of numbers, in single precision, and of the functions that they call."""
     program = _Program()
     for function in functions:
         arguments = [_Value("", "float" if kind is Any else kind_of(kind)) for kind in function.input_types.values()]
@@ -113,13 +118,13 @@ def function_text(*functions: wp.Function) -> str:
 
 
 def _writing(name, kind):
-    """The function that writes an element of an array, of which an image has those from the first thread's on."""
+    """Return GLSL that writes an element of an array to an image, which begins at the first thread's element."""
     store = f"imageStore({name}, element_texel(index - given.first), texel_of_{kind}(value));"
     return f"void write_{name}(int index, {kind} value)\n{{\n  {store}\n}}\n"
 
 
 def kind_of(annotation: Any) -> Any:
-    """The GLSL type of an annotation; structs and arrays stay what they are."""
+    """Return the GLSL type of an annotation; structs and arrays are returned unchanged."""
     return annotation if _is_struct(annotation) or _is_array(annotation) else _KINDS[annotation]
 
 
@@ -137,18 +142,18 @@ def _type_name(kind):
 
 @dataclass
 class _Program:
-    """Structs and functions in the order in which they need each other, and what of the kernel's parameters is used."""
+    """Structs and functions, each after those that it uses, and the kernel parameters that are used."""
 
     structs: dict[str, str] = field(default_factory=dict)
     texts: list[str] = field(default_factory=list)
-    known: dict[tuple, tuple] = field(default_factory=dict)  # function, what it is called with → name, what it returns
+    known: dict[tuple, tuple] = field(default_factory=dict)  # function, arguments → name, types of results
     members: dict[str, Given] = field(default_factory=dict)
     arrays: dict[str, Given] = field(default_factory=dict)
     written: dict[str, str] = field(default_factory=dict)
     has_mesh: bool = False
 
     def call(self, function, arguments):
-        """(name, types that are returned) of a function for arguments, which are `Given` or have a type."""
+        """Translate a function for arguments, `Given` or `_Value`; returns (name, types of results)."""
         key = function.key, id(function.func), *(a if isinstance(a, Given) else _type_name(a.kind) for a in arguments)
         if key not in self.known:
             taken = sum(known[0] == function.key and known[1] != id(function.func) for known in self.known)
@@ -169,7 +174,7 @@ class _Program:
         return self.known[key]
 
     def struct(self, struct):
-        """Declare a struct, and the function that returns an empty one."""
+        """Declare a struct, and a function that returns it with all members zero."""
         name = _type_name(struct)
         if name not in self.structs:
             fields = {label: kind_of(variable.type) for label, variable in struct.vars.items()}
@@ -183,15 +188,15 @@ class _Program:
         return name
 
     def array_place(self, array, indices):
-        """The index of an element among all of its kind."""
+        """Return the index of an element in the texture of its type."""
         self.arrays[array.name] = array
-        place = indices[0].inside("*")
+        place = indices[0].operand("*")
         for axis, index in enumerate(indices[1:], start=1):
-            place = f"({place}) * {self.side(array, axis)} + {index.inside('*')}"
+            place = f"({place}) * {self.side(array, axis)} + {index.operand('*')}"
         return f"given.{array.name}_first + {place}"
 
     def side(self, array, axis):
-        """Number of elements along an axis."""
+        """Return the number of elements along an axis."""
         self.arrays[array.name] = array
         return f"given.{array.name}_side_{axis}"
 
@@ -203,7 +208,7 @@ def _zero(kind):
 
 
 class _Function:
-    """One function, for what it is called with: a syntax tree whose names have types."""
+    """A function for given arguments: its syntax tree, and the types of its variables."""
 
     def __init__(self, program, function, given):
         lines, self.first_line = inspect.getsourcelines(function)
@@ -211,18 +216,18 @@ class _Function:
         self.tree: Any = ast.parse(textwrap.dedent("".join(lines))).body[0]
         self.globals = inspect.getclosurevars(function).nonlocals | function.__globals__
         self.program, self.given = program, given
-        self.kinds, self.returned = {}, ()  # of variables; of what is returned
-        self.declared: set[str] = set()  # where they are first assigned
-        self.before: list[str] = []  # statements that the present one needs first
+        self.kinds, self.returned = {}, ()  # types of variables; types of results
+        self.declared: set[str] = set()  # variables declared by their first assignment
+        self.before: list[str] = []  # statements to insert before the present one
         self.random_count = 0
-        self.turns: dict[str, int] = {}  # of loops that are written turn by turn
+        self.turns: dict[str, int] = {}  # present values of the variables of unrolled loops
 
     def text(self, kind, name, parameters):
         lines = self.block(self.tree.body, 1)
         return self.joined(f"{kind} {name}({', '.join(parameters)})", lines, {})
 
     def comment(self):
-        """The docstring, as a comment."""
+        """Return the docstring as a comment."""
         lines = (ast.get_docstring(self.tree) or "").splitlines()
         return "".join(f"// {line}\n" if line else "//\n" for line in lines)
 
@@ -234,7 +239,7 @@ class _Function:
 
     @staticmethod
     def local(name):
-        """A variable in GLSL: no function, and no keyword, is called so."""
+        """Return the name of a variable in GLSL, which differs from functions and keywords."""
         return f"{name.lstrip('_')}_"
 
     def refuse(self, node, why):
@@ -244,12 +249,12 @@ class _Function:
     # Statements
 
     def block(self, statements, depth):
-        """Lines of statements."""
+        """Translate statements; returns lines."""
         lines = []
         for statement in statements:
             own = getattr(self, f"_{type(statement).__name__.lower()}", None)
             if own is None:
-                self.refuse(statement, "a statement that GLSL kernels do not have")
+                self.refuse(statement, "unsupported statement")
             outer, self.before = self.before, []
             found = own(statement, depth)
             lines += ["  " * depth + line for line in self.before] + found
@@ -259,7 +264,7 @@ class _Function:
     def _expr(self, statement, depth):
         if isinstance(statement.value, ast.Constant):
             return []  # a docstring
-        return self.refuse(statement, "a value that nothing takes")
+        return self.refuse(statement, "unused value")
 
     def _assign(self, statement, depth):
         (target,) = statement.targets
@@ -273,7 +278,7 @@ class _Function:
             return [line for target, one in pairs for line in self._stored(target, self.value(one), depth)]
         function = self.object_of(value.func) if isinstance(value, ast.Call) else None
         if not isinstance(function, wp.Function):
-            self.refuse(value, "several values that no function returns")
+            self.refuse(value, "only the results of a function can be assigned to several variables")
         arguments = [self.value(argument) for argument in value.args]
         name, kinds = self.program.call(function, arguments)
         for target, kind in zip(targets, kinds, strict=True):
@@ -284,7 +289,7 @@ class _Function:
 
     def _know(self, target, kind):
         if not isinstance(target, ast.Name):
-            self.refuse(target, "no variable")
+            self.refuse(target, "not a variable")
         if self.kinds.setdefault(target.id, kind) != kind:
             self.refuse(target, f"{_type_name(self.kinds[target.id])} before, {_type_name(kind)} here")
         if _is_struct(kind):
@@ -292,7 +297,7 @@ class _Function:
 
     def _stored(self, target, value, depth):
         if isinstance(value, Given):
-            self.refuse(target, "a name for what the kernel is given")
+            self.refuse(target, "a kernel parameter cannot be assigned to a variable")
         array = self.value(target.value) if isinstance(target, ast.Subscript) else None
         if isinstance(array, Given):
             self.program.written[array.name] = kind_of(array.kind.dtype)
@@ -300,7 +305,7 @@ class _Function:
         if isinstance(target, ast.Name):
             is_new = depth == 1 and target.id not in self.kinds
             self._know(target, value.kind)
-            if is_new:  # others are declared at the top, as Python has no scope of blocks
+            if is_new:  # others are declared at the top, as Python has no block scope
                 self.declared.add(target.id)
             kind = f"{_type_name(value.kind)} " if is_new else ""
             return ["  " * depth + f"{kind}{self.local(target.id)} = {value.text};"]
@@ -308,7 +313,7 @@ class _Function:
 
     def _augassign(self, statement, depth):
         if isinstance(statement.target, ast.Subscript) and isinstance(self.value(statement.target.value), Given):
-            self.refuse(statement, "an array that is read and written")
+            self.refuse(statement, "an array is both read and written")
         changed = self.value(statement.target).text
         sign = _OPERATORS[type(statement.op)]
         return ["  " * depth + f"{changed} {sign}= {self.value(statement.value).text};"]
@@ -318,7 +323,7 @@ class _Function:
         values = [self.value(part) for part in parts if part is not None]
         kinds = tuple(value.kind for value in values)
         if self.returned not in ((), kinds):
-            self.refuse(statement, "other types than those returned before")
+            self.refuse(statement, "the types differ from those of another return")
         self.returned = kinds
         indent = "  " * depth
         if len(values) < 2:
@@ -340,14 +345,14 @@ class _Function:
         return [f"{indent}while ({condition}) {{", *self.block(statement.body, depth + 1), indent + "}"]
 
     def _has_constants(self, node):
-        """Whether a loop reads vectors of constants, for which it is written turn by turn, as Warp does it."""
+        """Whether a loop reads constant vectors: it is then unrolled, as by Warp."""
         subscripts = [part for part in ast.walk(node) if isinstance(part, ast.Subscript)]
         return any(hasattr(self.object_of(part.value), "_length_") for part in subscripts)
 
     def _for(self, statement, depth):
         is_range = isinstance(statement.iter, ast.Call) and self.object_of(statement.iter.func) is range
         if not is_range or len(statement.iter.args) > 2 or statement.orelse:
-            self.refuse(statement, "no loop over a range")
+            self.refuse(statement, "not a loop over a range")
         ends = [self.value(argument).text for argument in statement.iter.args]
         if len(ends) == 1 and ends[0].isdecimal() and self._has_constants(statement):
             lines = []
@@ -359,7 +364,7 @@ class _Function:
         self._know(statement.target, "int")
         turn, indent = self.local(statement.target.id), "  " * depth
         first, last = ends[0] if len(ends) > 1 else 0, ends[-1]
-        if not last.isdecimal():  # a range is looked at once
+        if not last.isdecimal():  # evaluated once, as in Python
             last = self.local(f"{statement.target.id}_end")
             self.kinds[f"{statement.target.id}_end"] = "int"
             self.before.append(f"{last} = {ends[-1]};")
@@ -369,7 +374,7 @@ class _Function:
     # Expressions
 
     def object_of(self, node):
-        """The Python object of a global name, or of an attribute of one; None for others."""
+        """Return the Python object of a global name or of its attribute; None for other nodes."""
         known = self.kinds, self.given, self.turns
         if isinstance(node, ast.Name) and not any(node.id in names for names in known):
             builtins = {"range": range, "int": int, "float": float, "type": type}
@@ -379,24 +384,24 @@ class _Function:
         return None
 
     def value(self, node):
-        """The `_Value` of an expression, or what is `Given`."""
+        """Return the `_Value` of an expression, or its `Given`."""
         constant = self.object_of(node)
         if constant is not None:
             return self._constant(node, constant)
         own = getattr(self, f"_{type(node).__name__.lower()}_value", None)
         if own is None:
-            self.refuse(node, "an expression that GLSL kernels do not have")
+            self.refuse(node, "unsupported expression")
         return own(node)
 
     def _constant(self, node, constant):
-        constant = getattr(constant, "value", constant)  # of Warp's scalars
+        constant = getattr(constant, "value", constant)  # for scalars of Warp
         if isinstance(constant, bool):
             return _Value("true" if constant else "false", "bool")
         if isinstance(constant, int | float):
             kind = "int" if isinstance(constant, int) else "float"
             text = str(constant) if kind == "int" else str(np.float32(constant))
             return _Value(text, kind, "unary" if constant < 0 else "")
-        return self.refuse(node, "no number")
+        return self.refuse(node, "not a number")
 
     def _constant_value(self, node):
         return self._constant(node, node.value)
@@ -407,23 +412,23 @@ class _Function:
         if node.id in self.turns:
             return _Value(str(self.turns[node.id]), "int")
         if node.id not in self.kinds:
-            self.refuse(node, "unknown here")
+            self.refuse(node, "unknown name")
         return _Value(self.local(node.id), self.kinds[node.id])
 
     def _given(self, given):
-        """A number that the kernel is given; structs and arrays as they are."""
+        """Return the `_Value` of a number that the kernel is given; structs and arrays are returned unchanged."""
         if not isinstance(given.kind, str):
             return given
         if self.program.members.setdefault(given.name, given) != given:
-            raise NotImplementedError(f"two members that are called {given.name}")
+            raise NotImplementedError(f"two members have the name {given.name}")
         return _Value(f"given.{given.name}", given.kind)
 
     def _attribute_value(self, node):
         whole = self.value(node.value)
         if whole.kind == _RAY:
-            return _Value(f"{whole.inside()}.{node.attr}", _RAY_FIELDS[node.attr])
+            return _Value(f"{whole.operand()}.{node.attr}", _RAY_FIELDS[node.attr])
         if not _is_struct(whole.kind):
-            self.refuse(node, "no member")
+            self.refuse(node, "not a member of a struct")
         kind = kind_of(whole.kind.vars[node.attr].type)
         if isinstance(whole, Given):
             return self._given(Given((*whole.path, node.attr), kind))
@@ -443,12 +448,12 @@ class _Function:
         if isinstance(whole, Given):
             kind = kind_of(whole.kind.dtype)
             return _Value(f"{kind}_at({self.program.array_place(whole, indices)})", kind)
-        return _Value(f"{whole.inside()}[{indices[0].text}]", _ELEMENTS[whole.kind])
+        return _Value(f"{whole.operand()}[{indices[0].text}]", _ELEMENTS[whole.kind])
 
     def _constant_element(self, node, vector):
         place = self.value(node.slice).text
         if not place.isdecimal():
-            self.refuse(node, "a constant that is not known here")
+            self.refuse(node, "the index of a constant vector must be constant")
         return _Value(str(np.float32(vector[int(place)])), "float")
 
     def _binop_value(self, node):
@@ -459,17 +464,17 @@ class _Function:
         operator = _OPERATORS[type(node.op)]
         products = ("*", "/") if operator in "+-*/" else ()
         sums = ("+", "-") if operator in "+-" else ()
-        left_text = left.inside(*products, *sums)
-        right_text = right.inside(*(products if operator in "+-" else ()))
+        left_text = left.operand(*products, *sums)
+        right_text = right.operand(*(products if operator in "+-" else ()))
         return _Value(f"{left_text} {operator} {right_text}", kind, operator)
 
     def _unaryop_value(self, node):
         value = self.value(node.operand)
-        return _Value(f"{_OPERATORS[type(node.op)]}{value.inside()}", value.kind, "unary")
+        return _Value(f"{_OPERATORS[type(node.op)]}{value.operand()}", value.kind, "unary")
 
     def _boolop_value(self, node):
         known = len(self.before)
-        values = [self.value(part).inside(*_COMPARISONS) for part in node.values]
+        values = [self.value(part).operand(*_COMPARISONS) for part in node.values]
         if len(self.before) > known:
             self.refuse(node, "a random number in a condition")
         operator = _OPERATORS[type(node.op)]
@@ -477,7 +482,7 @@ class _Function:
 
     def _compare_value(self, node):
         (other,), (operator,) = node.comparators, node.ops
-        sides = [self.value(side).inside("+", "-", "*", "/") for side in (node.left, other)]
+        sides = [self.value(side).operand("+", "-", "*", "/") for side in (node.left, other)]
         sign = _OPERATORS[type(operator)]
         return _Value(f"{sides[0]} {sign} {sides[1]}", "bool", sign)
 
@@ -496,7 +501,7 @@ class _Function:
         arguments = [self.value(argument) for argument in node.args]
         name, kinds = self.program.call(function, arguments)
         if len(kinds) != 1:
-            self.refuse(node, "several values in an expression")
+            self.refuse(node, "a function with several results in an expression")
         return _Value(f"{name}({', '.join(a.text for a in arguments if isinstance(a, _Value))})", kinds[0])
 
     def _converted(self, kind, arguments):
@@ -515,19 +520,19 @@ class _Function:
         arguments = [self.value(argument) for argument in node.args]
         texts = [argument.text for argument in arguments if isinstance(argument, _Value)]
         if name == "randf":
-            # GLSL does not say which part of an expression comes first.
+            # GLSL does not define the order of evaluation within an expression.
             self.random_count += 1
             number = f"random_{self.random_count}"
             self.kinds[number] = "float"
             self.before.append(f"{self.local(number)} = randf({texts[0]});")
             return _Value(self.local(number), "float")
         if name == "where":
-            chosen = [argument.inside() for argument in arguments]
+            chosen = [argument.operand() for argument in arguments]
             return _Value(f"{chosen[0]} ? {chosen[1]} : {chosen[2]}", arguments[1].kind, "?")
         form, kind = _CALLS.get((name, len(texts)), (None, None))
         if name in ("cw_mul", "cw_div"):
             sign = "*" if name == "cw_mul" else "/"
-            return _Value(f"{arguments[0].inside('*', '/')} {sign} {arguments[1].inside()}", arguments[0].kind, sign)
+            return _Value(f"{arguments[0].operand('*', '/')} {sign} {arguments[1].operand()}", arguments[0].kind, sign)
         if form is None:
-            self.refuse(node, "a function of Warp that kernel_language.glsl does not have")
+            self.refuse(node, "unsupported function of Warp")
         return _Value(form.format(*texts), kind or arguments[0].kind)

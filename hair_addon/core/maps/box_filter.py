@@ -196,7 +196,7 @@ def _on_level(uvs, sides, islands_of, covered, level, repeats):
 
 
 def _along(centre, half):
-    """Return (texels (N, K), their parts (N, K)) of the interval from centre - half to centre + half."""
+    """Return (texels (N, K), their parts (N, K)) of the interval from center - half to center + half."""
     texels = np.floor(centre - half).astype(np.int64)[:, None] + np.arange(_TAPS)
     ends = np.minimum((centre + half)[:, None], texels + 1), np.maximum((centre - half)[:, None], texels)
     return texels, np.maximum(ends[0] - ends[1], 0.0)

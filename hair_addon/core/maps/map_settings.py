@@ -28,7 +28,9 @@ class MapSettings(Settings):
     low: float = param(0.0, "Factor of the setting where the map is black", label="From", high=1e6, low=-1e6)
     high: float = param(1.0, "Factor of the setting where the map is white", label="To", high=1e6, low=-1e6)
     is_inverted: bool = param(False, "Exchange black and white", label="Invert")
-    amount: float = param(1.0, "Share of the map in a color", low=0.0, high=1.0, subtype="FACTOR")
+    amount: float = param(
+        1.0, "How much of the map's color replaces the color of the setting", low=0.0, high=1.0, subtype="FACTOR"
+    )
     seed: int = param(0, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
 
     @property

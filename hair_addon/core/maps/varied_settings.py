@@ -10,9 +10,9 @@ from ..params import Param, Settings, declared
 from ..shading.appearance import COLOR_FIELDS, Appearance
 from . import map_settings
 
-SECTIONS = {"look": Appearance, "strands": HairSettings}  # first parts of the names of settings: their settings
+SECTIONS = {"look": Appearance, "strands": HairSettings}  # first part of a setting's name → class of settings
 
-# Way to set the color that a setting needs.
+# Setting → the color parametrization that uses it.
 _PARAMETRIZATION = {f"look.{name}": way for way, names in COLOR_FIELDS.items() for name in names}
 
 
@@ -52,7 +52,7 @@ def parsed_source(text: str) -> tuple[str, str]:
     found = known.get(kind.strip().lower())
     if found is None or (found in (*map_settings.NAMED, "IMAGE") and not name):
         sources = "image:NAME, group:NAME, attribute:NAME, curves:NAME, strand or clump"
-        raise HairError('"{source}" is no source of a map: use {sources}.', source=text, sources=sources)
+        raise HairError('"{source}" is not a map source: use {sources}.', source=text, sources=sources)
     return found, name
 
 
@@ -62,5 +62,5 @@ def is_color(setting: str) -> bool:
 
 
 def is_used(setting: str, parametrization: str) -> bool:
-    """Return whether a setting takes part in the color that is set in a way of `Appearance.parametrization`."""
+    """Return whether a value of `Appearance.parametrization` uses a setting."""
     return _PARAMETRIZATION.get(setting, parametrization) == parametrization

@@ -6,7 +6,7 @@ import numpy as np
 from .. import geometry
 from ..geometry.mesh import TriMesh
 
-_NEIGHBOURS = 4  # neighbours of a guide that define the guide spacing
+_NEIGHBOURS = 4  # neighbors of a guide that define the guide spacing
 _END = 1.3  # limit of hair, in guide spacings
 LEVELS = 8  # of positive weights: Blender assigns each weight of a vertex group by a separate call
 _WHOLE = 0.95  # mean weight above which the whole mesh counts as covered

@@ -60,7 +60,7 @@ class Parts:
 
 
 class Domain:
-    """A checked `TriMesh` at unit size with a density D, normalised by `densest`, cut for a number of sites.
+    """A checked `TriMesh` at unit size with a density D, normalized by `densest`, cut for a number of sites.
 
     mesh: scaled by 1 / `size` [m]; normals: (F, 3), unit; islands: (F,); parts: `Parts` of positive density, on one
     side of the mirror if there is one; densities (Q,): mean of D; amounts (Q,): ∫ D dA; mass: ∫ D² dA; query: closest

@@ -71,7 +71,7 @@ class CutCells:
         for name, vectors in (("centres", centres), ("first_axes", first_axes), ("second_axes", second_axes)):
             setattr(self._pieces, name, wp.array(vectors, dtype=wp.vec3, device=device))
         squares = np.einsum("qcx,qcx->qc", flat, flat)
-        # A triangle's second moment about its centre is a twelfth of its area times its corners' squares.
+        # A triangle's second moment about its center is a twelfth of its area times its corners' squares.
         inertias = parts.areas * squares.sum(axis=1) / 12.0
         numbers = {"radii": np.sqrt(squares.max(axis=1)), "areas": parts.areas, "inertias": inertias}
         for name, values in numbers.items():
@@ -96,13 +96,13 @@ class CutCells:
 
 @wp.struct
 class Polygon:
-    """A part of a piece, in the plane of the piece and from its centre."""
+    """A part of a piece, in the plane of the piece and from its center."""
 
     xs: ring
     ys: ring
     across: labels  # the site beyond the edge that starts at each corner, -1: an edge of the piece
     count: int  # corners; 0: nothing is left
-    farthest: float  # squared distance of a corner from the site, less that of the centre
+    farthest: float  # squared distance of a corner from the site, less that of the center
 
 
 @wp.func
@@ -197,7 +197,7 @@ def _reach(farthest: float, power: float, own_detour: float):
 def _cell_of(
     site: int, piece: int, pieces: Pieces, sites: Sites, sx: float, sy: float, power: float, own_detour: float
 ):
-    """The `Polygon` of a piece that is in a site's cell; power: squared distance from its centre, with the detour."""
+    """The `Polygon` of a piece that is in a site's cell; power: squared distance from its center, with the detour."""
     centre = pieces.centres[piece]
     e1 = pieces.first_axes[piece]
     e2 = pieces.second_axes[piece]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Approximate Hessian of the energy, as a preconditioner: a network of springs between neighbouring sites.
+"""Approximate Hessian of the energy, as a preconditioner: a network of springs between neighboring sites.
 
 When two sites approach each other, the energy grows in proportion to the mass on both sides of their border; sideways
 motion is free. The Hessian of the energy [Liu09] is therefore close to that of springs, with stiffnesses in proportion

@@ -23,12 +23,12 @@ from .domain import Domain
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-SITES_AROUND = 16  # neighbours of a site, itself included, found in one search
-MOST_AROUND = 48  # neighbours before a search of all sites: a thin part has neighbours on its other side too
-ENOUGH_AROUND = 12  # neighbours on the site's own side
-FIRST_RING = 6  # neighbours in a honeycomb
+SITES_AROUND = 16  # neighbors of a site, itself included, found in one search
+MOST_AROUND = 48  # neighbors before a search of all sites: a thin part has neighbors on its other side too
+ENOUGH_AROUND = 12  # neighbors on the site's own side
+FIRST_RING = 6  # neighbors in a honeycomb
 MOST_FAR = 256  # of the sites in the disk or ball around a site that are searched before all sites are
-FAR = 1.7  # radius of the search for them, in distances of the last neighbour
+FAR = 1.7  # radius of the search for them, in distances of the last neighbor
 FAR_MARGIN = 1.01  # of this radius, against rounding
 FARTHEST = 4.0  # largest radius, in radii of the search for neighbours: a larger one visits too many cells of the grid
 EVERYWHERE = 4.0  # a distance larger than a surface of unit size
@@ -37,7 +37,7 @@ DETOUR = 2.0  # added distance of a site on the other side of a thin part, in sp
 
 UNIT = wp.constant(wp.float64(2.0**54))  # sums over a surface with a mass of one stay below 2^63
 
-_FIRST_FAR = MOST_AROUND + 1  # slots of candidates: neighbours, then far sites or all sites
+_FIRST_FAR = MOST_AROUND + 1  # slots of candidates: neighbors, then far sites or all sites
 _FIRST_OF_ALL = _FIRST_FAR + MOST_FAR
 
 near_keys = wp.types.vector(length=SITES_AROUND, dtype=wp.uint64)
@@ -45,10 +45,10 @@ near_keys = wp.types.vector(length=SITES_AROUND, dtype=wp.uint64)
 
 @wp.struct
 class Sites:
-    """Positions of sites, their normals and islands, and `counts` neighbours of each in order of distance.
+    """Positions of sites, their normals and islands, and `counts` neighbors of each in order of distance.
 
-    gaps: distance of the nearest neighbour on the site's own side; spacings: mean distance of the first ring; far:
-    `far_counts` sites within `far_radii`, neighbours included, in order of index; a radius of -1: none are stored.
+    gaps: distance of the nearest neighbor on the site's own side; spacings: mean distance of the first ring; far:
+    `far_counts` sites within `far_radii`, neighbors included, in order of index; a radius of -1: none are stored.
     """
 
     places: wp.array[wp.vec3]
@@ -87,7 +87,7 @@ def candidate(sites: Sites, site: int, slot: int):
 def next_slot(sites: Sites, site: int, slot: int, reach: float):
     """Return the slot of the next candidate that may be within a distance of a site, -1 for none.
 
-    Candidates are first the neighbours, in order of distance, then in order of index all sites, or only the far sites
+    Candidates are first the neighbors, in order of distance, then in order of index all sites, or only the far sites
     if these include all sites within the distance: the others would change nothing.
     """
     following = slot + 1
@@ -284,7 +284,7 @@ def _find_around(
 ):
     site = wp.tid()
     place = own_places[site]
-    last = wp.uint64(0)  # key of the farthest known neighbour
+    last = wp.uint64(0)  # key of the farthest known neighbor
     radius = first_radius
     known = int(0)
     own_count = int(0)
@@ -363,7 +363,7 @@ def _find_far(
     least = own_apart[site, neighbour_count - 1]
     out_counts[site] = 0
     out_radii[site] = -1.0
-    # If the first search found enough neighbours on the site's side, these nearly always suffice.
+    # If the first search found enough neighbors on the site's side, these nearly always suffice.
     if neighbour_count <= wp.static(SITES_AROUND):
         return
     radius = wp.min(wp.static(FAR) * least, farthest)

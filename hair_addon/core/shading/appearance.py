@@ -162,7 +162,7 @@ def shown_changes(changes: dict[str, Any], name_of: Callable[[str], str] = str) 
 
 @lru_cache(maxsize=_CACHE_SIZE)
 def wetted(look: Appearance, wetness: float) -> Appearance:
-    """Return the dry look that shows a look at a wetness from 0 to 1, linear between dry and soaked hair."""
+    """Return the dry look that represents a look at a wetness from 0 to 1, linear between dry and soaked hair."""
     if wetness == 0.0:
         return replace(look, wetness=0.0)
     dry = {name: getattr(look, name) for name in _WET}
@@ -175,7 +175,8 @@ _LEAST_SHARE = 1.0 / 1024.0
 
 
 def wet_share(wetness: np.ndarray, least: float, most: float) -> np.ndarray:
-    """Return (S,) float32 in [0, 1]: the share of the wettest look, against the driest, of strands of a wetness (S,).
+    """Return (S,) float32 in [0, 1]: the share of the wettest look in a mix with the driest look, for strands with
+    wetness (S,).
 
     least, most: wetness of both looks, least < most.
     """
@@ -207,7 +208,7 @@ def mean_color(appearance: Appearance) -> np.ndarray:
 
 
 def dimmed(color: np.ndarray, appearance: Appearance) -> np.ndarray:
-    """Return the color (3,) of hair whose fibers reflect as much as those of a look, from that of dry fibers."""
+    """Return the color (3,) of hair whose fibers reflect as much as those of a look; color: of dry fibers."""
     scattering = _mean_reflectance(shaded(appearance).ior) / _mean_reflectance(FITTED_IOR)
     return color_of_scattering(color, max(scattering, _LEAST_SCATTERING))
 

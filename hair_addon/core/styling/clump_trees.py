@@ -26,7 +26,7 @@ MOST_SITES = 20_000  # of the finest level: placing them takes a second, and 50,
 MOST_SPARE = 2  # unused trees to keep: for a slider that goes back, or a style switched off and on
 _HEXAGON = 0.866  # area of a site's cell divided by the square of the distance between sites
 
-HAIR = "hair"  # owner of the hair's strands; centres have their tree and level as owner
+HAIR = "hair"  # owner of the hair's strands; centers have their tree and level as owner
 Owner = str | tuple[TreeSettings, int]
 
 
@@ -56,7 +56,7 @@ class ClumpTrees:
     _parents: dict[tuple[TreeSettings, int], np.ndarray] = field(default_factory=dict)
 
     def levels(self, tree: TreeSettings, progress: Progress = no_progress) -> list[HairBinding]:
-        """Return the centres of each level, the coarsest first, bound to guides.
+        """Return the centers of each level, the coarsest first, bound to guides.
 
         progress(step, part): called while they are placed; if it raises, nothing of the tree is stored.
         """
@@ -77,7 +77,7 @@ class ClumpTrees:
         return [site_count(self.area, factor * size) for size in tree.sizes]
 
     def search(self, trees: Collection[TreeSettings], progress: Progress = no_progress) -> None:
-        """Compute the centres of trees that are missing; progress as in `levels`."""
+        """Compute the centers of trees that are missing; progress as in `levels`."""
         missing = self.lacks(trees)
         for place, tree in enumerate(missing):
             self.levels(tree, part_of(progress, place / len(missing), (place + 1) / len(missing)))
@@ -129,7 +129,7 @@ class ClumpTrees:
         return self._members[key]
 
     def parents(self, tree: TreeSettings, level: int) -> list[np.ndarray]:
-        """Return (K,) int32 per level, the coarsest first: the centres above those of a level, themselves last."""
+        """Return (K,) int32 per level, the coarsest first: the centers above those of a level, themselves last."""
         own = np.arange(len(self.levels(tree)[level].roots), dtype=np.int32)
         return self._upward(tree, own, level)
 

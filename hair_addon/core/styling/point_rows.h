@@ -8,7 +8,7 @@
 
 #if defined(__CUDA_ARCH__)
   // Rows of a warp's threads are adjacent in memory. Its threads copy some points of all rows together through shared
-  // memory, so that neighbouring threads access neighbouring numbers (coalescing).
+  // memory, so that neighboring threads access neighboring numbers (coalescing).
   constexpr int THREADS = 32, NUMBERS_AT_ONCE = 3 * POINTS_AT_ONCE, STRIDE = NUMBERS_AT_ONCE | 1;  // no bank conflicts
   __shared__ float shared_rows[WP_TILE_BLOCK_DIM / THREADS][THREADS * STRIDE];
   const int thread = threadIdx.x % THREADS;

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A stack of styles on one hair: its program, clump trees and masks, and the order in which they are applied.
 
-Centre strands of clumps come first, level by level: each is styled by the steps above its own and by earlier levels.
+Center strands of clumps come first, level by level: each is styled by the steps above its own and by earlier levels.
 Then one launch runs the whole program on all strands.
 """
 
@@ -35,7 +35,7 @@ wp.set_module_options({"enable_backward": False})
 
 _AGAINST = -0.5  # mean cosine between guides and normals below which hair grows on the surface's other side
 
-# Points (N, P) [m] of a level's centre strands without styles, for the present guides, and (N,) indices of these
+# Points (N, P) [m] of a level's center strands without styles, for the present guides, and (N,) indices of these
 # strands, None for all.
 Centres = tuple["wp.array2d[wp.vec3]", np.ndarray | None]
 
@@ -45,13 +45,13 @@ class _Level:
     """Centre strands of one level of a clump tree."""
 
     binding: HairBinding
-    first: int  # index of its first centre among all
+    first: int  # index of its first center among all
     steps: Program  # applied to them
     data: StrandData
 
     @cached_property
     def reach(self) -> "Reach":
-        """The centres that follow each guide."""
+        """The centers that follow each guide."""
         return interpolation.guide_weights.reach(self.binding.guide_weights, len(self.binding.guide_positions))
 
 
@@ -93,9 +93,9 @@ class Styling:
         )
 
     def centres_of(self, chosen: np.ndarray) -> list[np.ndarray]:
-        """Return for each level the indices of the centres that strands (M,) need, directly or through other centres.
+        """Return for each level the indices of the centers that strands (M,) need, directly or through other centers.
 
-        A centre is styled like a strand, so it reads the centres of levels before its own. Raises `HairError` for
+        A center is styled like a strand, so it reads the centers of levels before its own. Raises `HairError` for
         indices that do not exist.
         """
         require_indices("strands", chosen, len(self.data.normals))
@@ -107,7 +107,7 @@ class Styling:
         return read
 
     def _keep_centres(self, centres, rows, first):
-        """Write the points and arc lengths of a level's centres to the array that the kernel reads."""
+        """Write the points and arc lengths of a level's centers to the array that the kernel reads."""
         if not len(centres):
             return
         into = self.data.centre_points
@@ -120,7 +120,7 @@ class Styling:
     def reached(self, combed: np.ndarray, moved: np.ndarray) -> np.ndarray:
         """Return the rising indices (M,) of the strands that move when guides are combed.
 
-        combed: (C,) indices of guides; moved: indices of the strands that follow them. Strands whose clump centres
+        combed: (C,) indices of guides; moved: indices of the strands that follow them. Strands whose clump centers
         follow them move too.
         """
         if not self.levels:
@@ -141,7 +141,7 @@ class Styling:
 
     @cached_property
     def _members_of(self):
-        """Return for each level the strands that belong to each centre."""
+        """Return for each level the strands that belong to each center."""
         rows = self.data.members.numpy()[: len(self.levels)]
         return [
             interpolation.guide_weights.reach_by(members[:, None], len(level.binding.roots))
@@ -234,7 +234,7 @@ def bind(
     }
 
     def data_of(owner: Owner, bound: HairBinding, known: int) -> StrandData:
-        """Return the `StrandData` of strands that may belong to centres of the first `known` levels."""
+        """Return the `StrandData` of strands that may belong to centers of the first `known` levels."""
         rows = np.zeros((len(levels) + 1, len(bound.roots)), np.int32)
         for row in range(known):
             tree, level = levels[row]
@@ -302,7 +302,7 @@ def _side(guides, normals):
 
 
 def _steps_before(program, made, level):
-    """Return the steps above the one that gathers strands around the centres of a level."""
+    """Return the steps above the one that gathers strands around the centers of a level."""
     rows = (row for row, step in enumerate(made) if step.level == level and kinds.needs_centre(step.kind))
     return program.before(next(rows))
 

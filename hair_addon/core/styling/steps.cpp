@@ -3,7 +3,7 @@
 // A program of styles on LANES strands at once: the lanes of a processor's vectors, or one strand per thread of a GPU.
 //
 // The body of `_apply_steps` in steps.py. Parameters, for S strands of which M are styled, P points per strand, N steps
-// and K clump centres of all levels:
+// and K clump centers of all levels:
 //
 //   int block                           index of a group of LANES of the M strands
 //   array_t<vec3> points                (M, P) [m], styled in place
@@ -11,8 +11,8 @@
 //   array_t<vec3> normals               (S,) unit normals of the surface at the roots
 //   array_t<int> identities             (S,) IDs of strands
 //   array_t<float> masks                (masks, S) weights
-//   array_t<int> members                (levels, S) the clump centre that each strand belongs to, per level; -1: none
-//   array_t<vec4> centre_points         (K, P) points of centre strands [m], and the arc length from the root
+//   array_t<int> members                (levels, S) the clump center that each strand belongs to, per level; -1: none
+//   array_t<vec4> centre_points         (K, P) points of center strands [m], and the arc length from the root
 //   array_t<vec3> centre_normals        (K,)
 //   array_t<int> centre_identities      (K,)
 //   array_t<int> choices                (N, CHOICES) of steps.py
@@ -108,8 +108,8 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
       set_lane(base, lane, get_lane(base, lane) * masks.data[size_t(mask) * masks.shape[1] + strand[lane]]);
     }
   }
-  // The clump centre of each lane: its ID, and the reference of frames from its normal, which all strands of a clump
-  // share. A strand without a centre is its own.
+  // The clump center of each lane: its ID, and the reference of frames from its normal, which all strands of a clump
+  // share. A strand without a center is its own.
   int centre[LANES];
   vector centre_normal = normal;
   ints lock = identity;

@@ -41,20 +41,20 @@ _CONSTANTS = style_text.constants() | {
 class StrandData:
     """Inputs of a program for S strands, except their points: arrays on one device.
 
-    The arrays of centres contain the K clump centres of all levels.
+    The arrays of centers contain the K clump centers of all levels.
     """
 
     normals: "wp.array[wp.vec3]"  # (S,) unit
     identities: "wp.array[int]"  # (S,)
     masks: "wp.array2d[float]"  # (masks, S)
-    members: "wp.array2d[int]"  # (levels, S) index of the strand's centre in its level, -1: none
+    members: "wp.array2d[int]"  # (levels, S) index of the strand's center in its level, -1: none
     centre_points: "wp.array2d[wp.vec4]"  # (K, P) x, y, z [m] and the arc length [m]
     centre_normals: "wp.array[wp.vec3]"  # (K,)
     centre_identities: "wp.array[int]"  # (K,)
 
     @cached_property
     def member_limits(self) -> tuple[np.ndarray, np.ndarray]:
-        """(levels,) least (at most 0) and greatest member of each level, -1 if no strand has a centre."""
+        """(levels,) least (at most 0) and greatest member of each level, -1 if no strand has a center."""
         members = self.members.numpy()
         return members.min(axis=1, initial=0), members.max(axis=1, initial=-1)
 
@@ -206,6 +206,6 @@ def _check(points, program, data, chosen, most_points):
     needs_points = (_CONSTANTS["NEEDING_CENTRE"] >> step_kinds) & 1 == 1
     require_indices("clump levels", levels[needs_points], len(data.members))
     if needs_points.any():
-        # The last centres may be guides, which have no points here.
+        # The last centers may be guides, which have no points here.
         require_indices("clump centres", last_centres[needs_points], min(len(data.centre_points), centre_count))
         require_count("points of a centre strand", data.centre_points.shape[1], point_count)

@@ -115,7 +115,7 @@ const auto offset_v_at = [&](int i) { return next[i].y; };
 const auto keep_number = [&](int k, lanes value) { spare[k] = value; };
 const auto kept_number = [&](int k) { return spare[k]; };
 
-// Points of the strands' clump centres, and the arc lengths there. Whether there are any.
+// Points of the strands' clump centers, and the arc lengths there. Whether there are any.
 const bool has_centre_points = level >= 0 && first_centre < centre_points.shape[0];
 const float* centre_rows[LANES];
 if (has_centre_points) {

@@ -142,7 +142,7 @@ def test_a_mask_and_several_ties(guides):
 
 def test_what_cannot_be_gathered_is_refused(guides):
     before = points(guides)
-    with pytest.raises(HairError, match="Pick the curve"):
+    with pytest.raises(HairError, match="Pick a curve"):
         api.change_guides(guides, "GATHER")
     with pytest.raises(HairError, match="no object"):
         api.change_guides(guides, "GATHER", line="Nothing")

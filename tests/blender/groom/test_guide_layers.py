@@ -160,6 +160,25 @@ def test_a_mask_limits_a_layer(layered):
     assert np.array_equal(points(layered)[height < -0.2], base[height < -0.2])
 
 
+def test_the_status_names_a_missing_mask_until_it_is_restored(layered):
+    """Combing does not clear the status about a missing mask, and adds that a layer without weight is not combed."""
+    layered.data.vellus.layers[0].mask = "top"
+    update()
+    sphere = bpy.data.objects["Sphere"]
+    sphere.vertex_groups["top"].name = "gone"
+    set_weight(layered, 0, 0.5)
+    comb(layered)
+    assert '"top"' in layered.data.vellus.status
+    api.add_layer(layered)
+    set_weight(layered, 1, 0.0)
+    comb(layered, (1.0, 0.0, 0.0))
+    assert "has no weight" in layered.data.vellus.status and '"top"' in layered.data.vellus.status
+    sphere.vertex_groups["gone"].name = "top"
+    set_weight(layered, 1, 1.0)
+    comb(layered)
+    assert not layered.data.vellus.status
+
+
 def test_a_mask_can_be_painted_later(layered):
     """Guides follow a mask that is painted, and without their surface they keep the weights of its mask."""
     base, shape = points(layered), comb(layered)

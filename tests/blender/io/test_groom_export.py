@@ -21,7 +21,7 @@ NAMES = ("P", "nVertices", "curveBasisAndType", "width", ".selfBnds")  # of curv
 # What is written.
 
 
-def test_curves_are_in_centimetres_where_they_are_seen(twisted, tmp_path):
+def test_curves_are_in_centimeters_where_they_are_seen(twisted, tmp_path):
     hair, guides = twisted
     made = export(tmp_path / "groom.abc")
     assert (made.groups, made.guides, made.strands, made.notes) == (1, 60, 500, [])

@@ -245,7 +245,7 @@ def test_files_with_more_than_grooms_are_not_replaced(groom, library, tmp_path):
     bpy.data.libraries.write(str(asset), {bpy.data.objects["Sphere"]})
     bpy.ops.wm.save_as_mainfile(filepath=str(scene), copy=True)
     for path in (scene, asset):
-        refuse(path, "more than grooms")
+        refuse(path, "other data than grooms")
     bpy.ops.wm.save_as_mainfile(filepath=str(scene))
     refuse(scene, "is the open file")
     assert api.save_groom(groom[1], library, name="Other", picture=PICTURE) == library

@@ -160,15 +160,15 @@ FILES = {
     "stl as text": ("a.stl", stl_text, Z, ()),
     "gltf": ("a.gltf", gltf, Y, ()),
     "glb": ("a.glb", glb, Y, ()),
-    "usda, Y up, centimetres": ("a.usda", usd("Y", 0.01), Y, ()),
-    "usda, Z up, metres": ("a.usda", usd("Z", 1.0), Z, ()),
-    "blend, centimetres": ("a.blend", blend, Z, ()),
+    "usda, Y up, centimeters": ("a.usda", usd("Y", 0.01), Y, ()),
+    "usda, Z up, meters": ("a.usda", usd("Z", 1.0), Z, ()),
+    "blend, centimeters": ("a.blend", blend, Z, ()),
     "abc": ("a.abc", alembic, Y, ()),
 }
 
 
 @pytest.mark.parametrize("kind", FILES)
-def test_arrays_are_in_metres_and_the_axes_of_the_file(scene, tmp_path, kind):
+def test_arrays_are_in_meters_and_the_axes_of_the_file(scene, tmp_path, kind):
     name, write, up, options = FILES[kind]
     expected = write(tmp_path / name)
     # As long a strand for the surface whatever the unit; hanging straight down, or growing straight out.
@@ -213,7 +213,7 @@ def test_arrays_are_in_metres_and_the_axes_of_the_file(scene, tmp_path, kind):
 
 
 @pytest.mark.parametrize(("ending", "scale_length"), pairs([".usda", ".usdc", ".usdz", ".abc"], [1.0, 0.01], 2))
-def test_exchange_files_hold_the_same_points_in_metres(scene, tmp_path, ending, scale_length):
+def test_exchange_files_hold_the_same_points_in_meters(scene, tmp_path, ending, scale_length):
     build(scale_length)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     groom = ("groom", tmp_path / "a.blend", "--guides", 12, "--strands", 50, "--length", 0.4)

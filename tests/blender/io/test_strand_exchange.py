@@ -62,11 +62,11 @@ def put(
 def test_strands_lie_where_the_file_has_them(scene, sphere, rng, tmp_path, place):
     """Each format in centimeters with Y up gives positions within 1e-5 of the surface's size, and the file's widths."""
     put(sphere, **PLACES[place])
-    metres = PLACES[place].get("scene", 1.0)
+    meters = PLACES[place].get("scene", 1.0)
     lines = [np.float32(line) for line in lines_on(sphere, rng, 8, 5, 5)]
     size = float(np.ptp(np.concatenate(lines), axis=0).max())
-    in_file = [np.float32(100.0 * metres * line[:, [0, 2, 1]] * [1.0, 1.0, -1.0]) for line in lines]
-    diameters = np.float32(100.0 * metres * np.linspace(1e-4, 2e-4, 40) * size)
+    in_file = [np.float32(100.0 * meters * line[:, [0, 2, 1]] * [1.0, 1.0, -1.0]) for line in lines]
+    diameters = np.float32(100.0 * meters * np.linspace(1e-4, 2e-4, 40) * size)
     for ending, made in FORMATS.items():
         path = tmp_path / f"strands{ending}"
         path.write_bytes(made(in_file, **({WIDTHS[ending]: diameters} if ending in WIDTHS else {})))
@@ -76,7 +76,7 @@ def test_strands_lie_where_the_file_has_them(scene, sphere, rng, tmp_path, place
         if ending in WIDTHS:
             scale = abs(np.linalg.det(np.array(found.curves.matrix_world)[:3, :3])) ** (1.0 / 3.0)
             radii = np.array([one.value for one in found.curves.data.attributes["radius"].data])
-            np.testing.assert_allclose(2.0 * radii * scale * metres * 100.0, diameters, rtol=1e-6, err_msg=ending)
+            np.testing.assert_allclose(2.0 * radii * scale * meters * 100.0, diameters, rtol=1e-6, err_msg=ending)
         bpy.data.objects.remove(found.curves)
 
 
@@ -106,9 +106,9 @@ def test_written_strands_come_back(hair, tmp_path, ending):
     path = tmp_path / f"groom{ending}"
     notes = api.export_groom(path, [hair])
     file = curve_files.read(path)
-    metres, up = (file.stated.metres or 1.0), (file.stated.up or {".data": "Y"}.get(ending, "Z"))
+    meters, up = (file.stated.meters or 1.0), (file.stated.up or {".data": "Y"}.get(ending, "Z"))
     strands = [one for one in file.sets if not one.is_guide]
-    (read,) = [one.placed(metres, up) for one in strands]
+    (read,) = [one.placed(meters, up) for one in strands]
     np.testing.assert_array_equal(read.points, api.points(hair).reshape(-1, 3))
     assert any("strands alone" in note for note in notes) == (ending in (".hair", ".data"))
     if ending != ".data":

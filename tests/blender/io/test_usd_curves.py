@@ -16,14 +16,14 @@ from hair_addon.core.geometry.strands import curve_offsets
 bpy.utils.expose_bundled_modules()  # for pxr, which ships with Blender
 
 
-def stage_at(path, up="Z", metres=1.0):
+def stage_at(path, up="Z", meters=1.0):
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.CreateInMemory() if path is None else Usd.Stage.CreateNew(str(path))
     if up:
         UsdGeom.SetStageUpAxis(stage, up)
-    if metres:
-        UsdGeom.SetStageMetersPerUnit(stage, metres)
+    if meters:
+        UsdGeom.SetStageMetersPerUnit(stage, meters)
     return stage
 
 
@@ -183,7 +183,7 @@ def test_transforms_move_points_and_widths_and_resets_end_them(rng, tmp_path):
     from pxr import Gf, UsdGeom
 
     points = wandering(rng, 4)
-    stage = stage_at(tmp_path / "a.usdc", up="Y", metres=0.01)
+    stage = stage_at(tmp_path / "a.usdc", up="Y", meters=0.01)
     top = UsdGeom.Xform.Define(stage, "/top")
     top.AddTranslateOp().Set((1.0, 2.0, 3.0))
     top.AddScaleOp().Set((2.0, 2.0, 2.0))
@@ -199,16 +199,16 @@ def test_transforms_move_points_and_widths_and_resets_end_them(rng, tmp_path):
     for one, wanted, radius in zip(read.sets, (turned, points + np.array([5.0, 0.0, 0.0])), (0.5, 0.25), strict=True):
         np.testing.assert_allclose(one.points, wanted, atol=1e-6)
         np.testing.assert_allclose(one.radii, radius, rtol=1e-6)
-    assert (read.stated.metres, read.stated.up) == (pytest.approx(0.01), "Y")
+    assert (read.stated.meters, read.stated.up) == (pytest.approx(0.01), "Y")
 
 
 def test_what_a_file_does_not_say_is_usual_of_usd(rng, tmp_path):
-    stage = stage_at(tmp_path / "a.usda", up=None, metres=None)
+    stage = stage_at(tmp_path / "a.usda", up=None, meters=None)
     add(stage, "/hair", wandering(rng, 4), [4])
     stage.Save()
     read = usd_curves.read(tmp_path / "a.usda")
-    assert (read.stated.metres, read.stated.up) == (None, None)
-    assert (read.usual.metres, read.usual.up) == (0.01, "Y")
+    assert (read.stated.meters, read.stated.up) == (None, None)
+    assert (read.usual.meters, read.usual.up) == (0.01, "Y")
 
 
 def test_instances_are_read_and_what_is_not_drawn_is_not(rng, tmp_path):

@@ -9,7 +9,7 @@ from hair_addon.core.files import curve_units
 from hair_addon.core.files.curve_file import TO_Z_UP, Convention, CurveFile, CurveSet, join, parsed_unit
 from hair_addon.core.geometry.mesh import TriMesh
 
-SIZE, CENTRE = 0.2, np.array([0.3, 0.1, 1.6])  # of a head on a body, in metres, Z up
+SIZE, CENTRE = 0.2, np.array([0.3, 0.1, 1.6])  # of a head on a body, in meters, Z up
 NOTHING = Convention()
 
 
@@ -18,11 +18,11 @@ def head(sphere):
     return TriMesh((0.5 * SIZE * sphere.vertices + CENTRE).astype(np.float32), sphere.triangles)
 
 
-def curves_in(head, metres, up, count=30):
+def curves_in(head, meters, up, count=30):
     """Curves that stand on a head, as a file of some unit and axis has them."""
     roots = head.vertices[:: len(head.vertices) // count].astype(np.float64)
     lines = np.stack([roots, CENTRE + 1.5 * (roots - CENTRE)], axis=1).reshape(-1, 3)
-    lines = lines @ TO_Z_UP[up] / metres  # the inverse of a rotation
+    lines = lines @ TO_Z_UP[up] / meters  # the inverse of a rotation
     return CurveSet("curves", lines, np.full(len(roots), 2), np.zeros(len(roots), bool))
 
 
@@ -36,19 +36,19 @@ def choose(head, curves, reported=NOTHING, stated=NOTHING):
 def test_unit_and_axis_are_found_that_put_roots_on_the_surface(head, unit, up):
     curves = curves_in(head, parsed_unit(unit), up)
     found = choose(head, curves)
-    assert (found.metres, found.up) == (parsed_unit(unit), up)
+    assert (found.meters, found.up) == (parsed_unit(unit), up)
     (note,) = found.notes
     assert "does not state" in str(note) and f"with {up} up" in str(note)
-    points = curves.placed(found.metres, found.up).points
+    points = curves.placed(found.meters, found.up).points
     assert abs(np.linalg.norm(points[::2] - CENTRE, axis=1) - 0.5 * SIZE).max() < 1e-4
 
 
 def test_what_is_said_or_stated_is_not_guessed(head):
     curves = curves_in(head, 0.01, "Z")
     found = choose(head, curves, stated=Convention(0.01, "Z"))
-    assert (found.metres, found.up, found.notes) == (0.01, "Z", [])
+    assert (found.meters, found.up, found.notes) == (0.01, "Z", [])
     found = choose(head, curves, reported=Convention(0.01), stated=Convention(1.0, "Z"))
-    assert (found.metres, found.up, found.notes) == (0.01, "Z", [])
+    assert (found.meters, found.up, found.notes) == (0.01, "Z", [])
 
 
 def test_roots_beyond_the_size_of_the_surface_are_refused_with_what_fits(head):
@@ -67,7 +67,7 @@ def test_curves_that_shrink_into_the_surface_do_not_count_as_on_it(sphere):
     roots = head.vertices[::30].astype(np.float64)
     lines = np.stack([roots, 1.3 * roots], axis=1).reshape(-1, 3) @ TO_Z_UP["Y"]
     found = choose(head, CurveSet("curves", lines, np.full(len(roots), 2), np.zeros(len(roots), bool)))
-    assert (found.metres, found.up) == (1.0, "Y")
+    assert (found.meters, found.up) == (1.0, "Y")
 
 
 def test_somewhat_off_is_a_note_with_what_fits(head):
@@ -78,7 +78,7 @@ def test_somewhat_off_is_a_note_with_what_fits(head):
         CurveSet("curves", moved.points - CENTRE / 0.0254, moved.counts, moved.is_smooth),
         reported=Convention(0.01, "Z"),
     )
-    assert found.metres == 0.01 and "they would lie on it in inches with Z up" in str(found.notes[0])
+    assert found.meters == 0.01 and "they would lie on it in inches with Z up" in str(found.notes[0])
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "yards", "", "1e400"])

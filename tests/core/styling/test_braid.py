@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Braid: tresses, their distances, and the course of their centre lines."""
+"""Laws of Braid: tresses, their distances, and the course of their center lines."""
 
 import numpy as np
 import pytest

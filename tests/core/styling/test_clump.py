@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Clump: strands gather on their centre's line, in locks of whole smaller locks."""
+"""Laws of Clump: strands gather on their center's line, in locks of whole smaller locks."""
 
 from dataclasses import replace
 from itertools import pairwise

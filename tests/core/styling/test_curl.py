@@ -205,7 +205,7 @@ def test_strands_of_a_lock_that_are_cut_wind_as_the_others(rng):
 
 
 def test_strands_that_leave_their_lock_go_on_by_themselves(rng):
-    """Those that grow opposite to their centre wind as often as strands alone do."""
+    """Those that grow opposite to their center wind as often as strands alone do."""
     strands, centre, _ = bent_lock(rng, count=8)
     away = strands * (-1.0, 1.0, 1.0)
     tilted = clump.Settings(levels=1, amount=1e-6, stray=0.0)

@@ -117,7 +117,7 @@ def test_an_unusable_surface_is_reported(scene, name, operator):
 
 @pytest.mark.parametrize("scale", [1e6, 3.7, 1e-6])
 def test_hair_scales_with_its_surface(sphere, scale):
-    """A head has the same hair if it is modeled in nanometres or in thousands of kilometers."""
+    """A head has the same hair if it is modeled in nanometers or in thousands of kilometers."""
     sphere.rotation_euler = (0.4, 0.0, 0.3)
     bpy.context.view_layer.update()
     expected = [points(curves_object) for curves_object in grow(length=0.3, gravity=0.0, angle_limit=math.pi)]

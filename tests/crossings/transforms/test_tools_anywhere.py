@@ -60,7 +60,7 @@ def after_tool(path, tool, values, is_applied):
 )
 def test_tools_do_the_same_in_the_world(placed_files, place, name):
     tool, values = name[0], TOOLS[name]
-    if tool == "drape_guides" and place in {"small", "on a rig in centimetres"}:
+    if tool == "drape_guides" and place in {"small", "on a rig in centimeters"}:
         pytest.skip("contacts of hair of 3 mm follow the last bits of coordinates at 3 m")
     path = placed_files(place)
     applied = after_tool(path, tool, values, True)

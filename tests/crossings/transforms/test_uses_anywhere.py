@@ -57,16 +57,16 @@ def usd_curves(path):
     from pxr import Usd, UsdGeom
 
     stage, places, found = Usd.Stage.Open(str(path)), UsdGeom.XformCache(), {}
-    metres = UsdGeom.GetStageMetersPerUnit(stage)
+    meters = UsdGeom.GetStageMetersPerUnit(stage)
     for prim in stage.Traverse():
         if prim.IsA(UsdGeom.BasisCurves):
             made, matrix = UsdGeom.BasisCurves(prim), np.array(places.GetLocalToWorldTransform(prim)).T
             points, widths = np.array(made.GetPointsAttr().Get()), np.array(made.GetWidthsAttr().Get())
-            found[str(prim.GetPath())] = in_world(points, widths, matrix, metres)
+            found[str(prim.GetPath())] = in_world(points, widths, matrix, meters)
     return found
 
 
-def alembic_curves(path, metres, axes):
+def alembic_curves(path, meters, axes):
     """The same of an Alembic file in some unit, by (3, 3) axes of the file → Blender's."""
     objects, found = alembic_reader.objects(alembic_reader.read(path)), {}
     for name, one in objects.items():
@@ -79,13 +79,13 @@ def alembic_curves(path, metres, axes):
                 matrix = above.children[".vals"].samples[0].reshape(4, 4).T @ matrix
         shape = one.properties[".geom"].children
         matrix[:3] = axes @ matrix[:3]
-        found[name] = in_world(shape["P"].only.reshape(-1, 3), shape["width"].only, matrix, metres)
+        found[name] = in_world(shape["P"].only.reshape(-1, 3), shape["width"].only, matrix, meters)
     return found
 
 
-def in_world(points, widths, matrix, metres):
+def in_world(points, widths, matrix, meters):
     factor = abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0)
-    return metres * (points @ matrix[:3, :3].T + matrix[:3, 3]), metres * factor * widths
+    return meters * (points @ matrix[:3, :3].T + matrix[:3, 3]), meters * factor * widths
 
 
 def array_curves(path):
@@ -105,7 +105,7 @@ def write_groom(path):
     groom_files.write(path, data("Guides"), data("Hair"), np.eye(3))
 
 
-UNREAL = partial(alembic_curves, metres=0.01, axes=np.eye(3))
+UNREAL = partial(alembic_curves, meters=0.01, axes=np.eye(3))
 OF_EXPORTS = {"/Hair/strands": "Hair", "/Hair/guides": "Guides", "/Kept/strands": "Kept", "/Kept/guides": "Guides.001"}
 OF_UNREAL = {
     "/groom/Hair/HairShape": "Hair",
@@ -119,7 +119,7 @@ FILES = {
     "export.usdc": (export, usd_curves, OF_EXPORTS),
     "export.abc": (export, UNREAL, OF_UNREAL),
     "groom.usdc": (write_groom, usd_curves, OF_GROOMS),
-    "groom.abc": (write_groom, partial(alembic_curves, metres=1.0, axes=FROM_Y_UP), OF_GROOMS),
+    "groom.abc": (write_groom, partial(alembic_curves, meters=1.0, axes=FROM_Y_UP), OF_GROOMS),
     "groom.npz": (write_groom, array_curves, OF_GROOMS),
 }
 
@@ -127,8 +127,8 @@ FILES = {
 @pytest.mark.parametrize("place", share_of(PLACES, 3))
 def test_files_have_hair_where_it_is_shown(placed_files, tmp_path, place):
     opened(placed_files(place))
-    before, metres = seen(), bpy.context.scene.unit_settings.scale_length
-    tolerance = metres * (1e-6 * before.size + 5e-7 * abs(before.vertices).max())
+    before, meters = seen(), bpy.context.scene.unit_settings.scale_length
+    tolerance = meters * (1e-6 * before.size + 5e-7 * abs(before.vertices).max())
     for name, (write, read, objects) in FILES.items():
         write(tmp_path / name)
         found = read(tmp_path / name)
@@ -136,8 +136,8 @@ def test_files_have_hair_where_it_is_shown(placed_files, tmp_path, place):
         for path, (points, widths) in found.items():
             (shown,) = (one for end, one in objects.items() if path.endswith(end))
             its_points, its_radii, _lengths = before.strands[shown]
-            np.testing.assert_allclose(points, metres * its_points, rtol=0.0, atol=tolerance, err_msg=f"{name} {path}")
-            np.testing.assert_allclose(widths, metres * 2.0 * its_radii, rtol=1e-5, err_msg=f"widths of {name} {path}")
+            np.testing.assert_allclose(points, meters * its_points, rtol=0.0, atol=tolerance, err_msg=f"{name} {path}")
+            np.testing.assert_allclose(widths, meters * 2.0 * its_radii, rtol=1e-5, err_msg=f"widths of {name} {path}")
 
 
 # ------------------------------------------------------------------------------------------ cards and tubes
@@ -204,7 +204,7 @@ COPIES = {
 
 @pytest.mark.parametrize(
     "place",
-    share_of(["turned", "small", "large", "uneven", "mirrored", "on a sheared rig", "in a scene of centimetres"]),
+    share_of(["turned", "small", "large", "uneven", "mirrored", "on a sheared rig", "in a scene of centimeters"]),
 )
 def test_copies_on_a_mesh_elsewhere_are_the_same_in_the_world(placed_files, tmp_path, place):
     """The same mesh, whose object has another transform."""
@@ -284,7 +284,7 @@ def test_guides_move_as_where_the_transform_was_applied(placed_files, tmp_path, 
     require_carried(found[1][LAST], found[0][LAST], points=5e-4, names=["Hair", "Guides"])
 
 
-def in_centimetres(body):
+def in_centimeters(body):
     bpy.context.scene.unit_settings.scale_length = 0.01
     body.scale = (100.0, 100.0, 100.0)
     data("Hair").vellus.hair.radius *= 100.0
@@ -296,7 +296,7 @@ ALIKE = {
     "moved": placed_hair.placed((3.0, 1.0, -2.0)),
     "turned about Z": placed_hair.placed((0.0, 0.0, 0.0), (0.0, 0.0, 1.2)),
     "mirrored": placed_hair.placed((1.0, 0.0, 0.0), (0.0, 0.0, 0.7), (1.0, -1.0, 1.0)),
-    "in centimetres": in_centimetres,
+    "in centimeters": in_centimeters,
 }
 
 

@@ -82,7 +82,7 @@ def mirrored():
     yield from compared("mirrored", bpy.ops.vellus.apply_scale)
 
 
-def rig_in_centimetres():
+def rig_in_centimeters():
     """The head on a rig whose unit is a centimeter, to which all transforms are applied with the rig."""
     rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.scene.collection.objects.link(rig)
@@ -102,4 +102,4 @@ def rig_in_centimetres():
 
 
 if __name__ == "__main__":
-    take((head_with_hair, all_transforms, set_origin, mirrored, rig_in_centimetres))
+    take((head_with_hair, all_transforms, set_origin, mirrored, rig_in_centimeters))

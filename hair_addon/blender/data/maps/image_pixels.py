@@ -20,7 +20,7 @@ pixel_cache = Cache(capacity=16)
 
 @dataclass(frozen=True, eq=False)
 class _Converted:
-    """Pixels of an image as Blender has them (H, W, C), and what they were converted to, in a way."""
+    """Pixels of an image (H, W, C) in Blender, and the converted pixels; way: arguments of the conversion."""
 
     raw: np.ndarray
     way: dict
@@ -79,7 +79,7 @@ def _read(image, is_color):
 
 
 def _tiles(image, numbers, is_color):
-    """Pixels of several tiles: Blender gives access to the first alone, so tiles are read from their files."""
+    """Pixels of several tiles, which are read from their files: Blender gives access only to the first tile."""
     with tempfile.TemporaryDirectory() as folder:
         path = bpy.path.abspath(image.filepath_raw, library=image.library)
         if image.is_dirty or not all(Path(_named(path, number)).is_file() for number in numbers):
@@ -107,7 +107,7 @@ def _named(path, number):
 
 
 def _pixels_of(image, named, is_color, is_painted=False):
-    """Converted pixels (H, W, C); of an image that is painted only rows that have changed are converted again."""
+    """Converted pixels (H, W, C). Of a painted image only changed rows are converted again."""
     width, height = image.size
     if not (width and height and image.channels):
         raise _without_pixels(named)
@@ -122,13 +122,13 @@ def _pixels_of(image, named, is_color, is_painted=False):
     rows = pixels.changed_rows(known.raw, raw)
     if rows is None:
         return known.pixels
-    found = known.pixels.copy()  # others compare theirs with it
+    found = known.pixels.copy()  # other users of the image compare their pixels with it
     found[rows] = convert(raw[rows], **way)
     return converted_cache.keep(key, _Converted(raw, way, found)).pixels
 
 
 def _way_of(image):
-    """How pixels of an image are converted: arguments of `pixels.colors`."""
+    """Return the arguments of `pixels.colors` for an image."""
     return {
         # Blender converts floating-point images while it loads them.
         "is_srgb": not image.is_float and image.colorspace_settings.name == "sRGB",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ramps: courses of a setting from root to tip, which Blender's curve widget edits.
+"""Ramps: curves of a setting from root to tip, edited in Blender's curve widget.
 
 Scripts cannot declare a curve, but a hidden node group can hold a *Float Curve* node.
 """
@@ -14,7 +14,7 @@ _NODE = "Course"
 
 
 def new_ramp(name, end):
-    """A new node group whose course falls from 1 at the root to `end` at the tip, in a straight line."""
+    """A new node group whose curve decreases linearly from 1 at the root to `end` at the tip."""
     tree = bpy.data.node_groups.new(f".{name}", "ShaderNodeTree")  # the dot hides it in lists
     node = tree.nodes.new("ShaderNodeFloatCurve")
     node.name = _NODE
@@ -27,13 +27,13 @@ def new_ramp(name, end):
 
 
 def node_of(tree):
-    """The node with the course of a node group; None in a group that has lost it."""
+    """The node with the curve of a node group; None if it was removed."""
     node = None if tree is None else tree.nodes.get(_NODE)
     return node if node is not None and node.bl_idname == "ShaderNodeFloatCurve" else None
 
 
 def samples(tree) -> np.ndarray | None:
-    """(`SAMPLES`,) float32 of the course from root to tip, within [0, 1]; None without a course."""
+    """(`SAMPLES`,) float32 values of the curve from root to tip, in [0, 1]; None without a curve."""
     node = node_of(tree)
     if node is None:
         return None
@@ -45,7 +45,7 @@ def samples(tree) -> np.ndarray | None:
 
 
 def digest(tree):
-    """What a course depends on, as text; empty without a course."""
+    """Everything that the curve depends on, as text; empty without a curve."""
     node = node_of(tree)
     if node is None:
         return ""

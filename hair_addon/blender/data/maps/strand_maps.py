@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Looks of strands by maps: one function makes the arrays, which the hair's Curves store for all who show the hair."""
+"""Looks of strands by maps, as arrays.
+
+One function computes the arrays, which the hair's Curves store for viewports and renders.
+"""
 
 import numpy as np
 

@@ -73,7 +73,10 @@ class ShaderInput:
 
 
 def shown_shader(tree, kinds):
-    """The `ShaderNode` that is linked to a tree's output if of `kinds`; else the first of the first kind, or None."""
+    """The `ShaderNode` linked to a tree's output, if its type is in `kinds`.
+
+    Else the first node of the first type, or None.
+    """
     if tree is None:
         return None
     output = tree.get_output_node("ALL")

@@ -104,7 +104,9 @@ class ViewportShading:
 
     @property
     def strands(self):
-        """A key of all but lights: of what strands are shaded by, and of whether surfaces cast shadows."""
+        """A key of all settings that affect the shading of strands, except lights, and of whether surfaces cast
+        shadows.
+        """
         light = self.light
         matcap = (light.matcap, light.has_highlights) if light.matcap else None
         return light.kind == SCENE, matcap, self.color, self.is_wire
@@ -177,11 +179,11 @@ def _solid_light(shading, world_to_view):
     )
 
 
-_NEAR = np.cos(np.radians(5.0))  # a turn of lights that is hardly visible while the view turns too
+_NEAR = np.cos(np.radians(5.0))  # rotation of lights that is hardly visible while the view rotates too
 
 
 def is_near(light, other):
-    """Whether two `ViewportLight`s differ in a small turn of lights that follow the view only."""
+    """Whether two `ViewportLight`s differ only by a small rotation of lights that follow the view."""
     if _turnless(light) != _turnless(other) or len(light.lights) != len(other.lights):
         return False
     if light.hdri is not None and light.hdri != other.hdri:

@@ -43,7 +43,7 @@ def _of_node(node, above):
 
 
 def _of_value(value, above, depth):
-    """A setting as numbers and text, with everything in it."""
+    """Return a setting and its nested values as numbers and text."""
     if value is None or isinstance(value, (bool, int, float, str, bytes)):
         return value
     if isinstance(value, (set, frozenset)):

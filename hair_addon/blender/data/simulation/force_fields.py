@@ -11,10 +11,10 @@ from ...host.notices import name_of
 _OF_OTHERS = {"NONE", "BOID", "GUIDE", "FLUID_FLOW"}
 
 
-def read(depsgraph, metres):
+def read(depsgraph, meters):
     """(`ForceField`s of the objects in a depsgraph, errors of unsupported force fields).
 
-    metres: per unit of the world.
+    meters: per unit of the world.
     """
     fields, errors = [], []
     for evaluated in depsgraph.objects:
@@ -25,7 +25,7 @@ def read(depsgraph, metres):
             sentence = 'The force field "{name}" does not act on hair: its type or shape is not supported.'
             errors.append(HairError(sentence, name=name_of(evaluated)))
             continue
-        field = _field_of(evaluated, settings, metres)
+        field = _field_of(evaluated, settings, meters)
         problem = field.problem()
         if problem is None:
             fields.append(field)
@@ -35,12 +35,12 @@ def read(depsgraph, metres):
     return tuple(fields), errors
 
 
-def _field_of(evaluated, settings, metres):
+def _field_of(evaluated, settings, meters):
     matrix = np.array(evaluated.matrix_world, np.float64)
-    x, y, z = metres * matrix[:3, 3]
+    x, y, z = meters * matrix[:3, 3]
     axis = matrix[:3, 2]
     is_drag, is_cone = settings.type == "DRAG", settings.falloff_type == "CONE"
-    beside = 1.0 if is_cone else metres  # an angle, or a distance
+    beside = 1.0 if is_cone else meters  # an angle, or a distance
 
     def limit(is_used, value, unit):
         return unit * value if is_used else None
@@ -55,13 +55,13 @@ def _field_of(evaluated, settings, metres):
         settings.falloff_type,
         settings.z_direction,
         settings.falloff_power,
-        limit(settings.use_min_distance, settings.distance_min, metres),
-        limit(settings.use_max_distance, settings.distance_max, metres),
+        limit(settings.use_min_distance, settings.distance_min, meters),
+        limit(settings.use_max_distance, settings.distance_max, meters),
         settings.radial_falloff,
         limit(settings.use_radial_min, settings.radial_min, beside),
         limit(settings.use_radial_max, settings.radial_max, beside),
         settings.use_gravity_falloff,
-        metres * settings.size,
+        meters * settings.size,
         settings.use_global_coords,
         settings.seed,
     )

@@ -30,18 +30,18 @@ def digest_of(guides, blender_scene, depsgraph, settings):
     The first half covers the surface's size and its points at the roots, the second half colliders, force fields,
     gravity and keyed settings. Raises `HairError` if the surface cannot be read.
     """
-    metres = simulated_world.metres_of(blender_scene, settings)
+    meters = simulated_world.meters_of(blender_scene, settings)
     surface = guides.surface
     if surface is None or surface.type != "MESH":
         raise HairError('"{name}" has no surface: attach the guides to a mesh.', name=name_of(guides))
-    vertices = _vertices(surface, depsgraph, metres)
+    vertices = _vertices(surface, depsgraph, meters)
     places = stored_roots.places(guides, len(vertices))
     if places is None or not len(vertices):
         sentence = 'The guides "{name}" are not rooted on their current surface: comb or regenerate them.'
         raise HairError(sentence, name=name_of(guides))
     roots = np.einsum("nc,ncx->nx", places[1].astype(np.float64), vertices[places[0]])
     carrying = np.float32(np.concatenate([roots, *_bounds(vertices), _matrix(surface, depsgraph)[:3, :3]]))
-    acting = _acting(guides, blender_scene, depsgraph, settings, metres)
+    acting = _acting(guides, blender_scene, depsgraph, settings, meters)
     of_surface = frame_manifest.digest([len(vertices)])[:_LEVEL] + frame_manifest.digest(carrying)
     return of_surface[:_HALF] + frame_manifest.digest(acting)[:_HALF]
 
@@ -58,15 +58,15 @@ def change(baked, now, is_carried=False):
     return SURROUNDINGS if is_other or baked[:_HALF] == now[:_HALF] else SURFACE
 
 
-def _acting(guides, blender_scene, depsgraph, settings, metres):
+def _acting(guides, blender_scene, depsgraph, settings, meters):
     """Everything but the surface that acts on guides, as JSON values in single precision."""
     gravity = blender_scene.gravity if blender_scene.use_gravity else simulated_world.NO_GRAVITY
     colliders = [
-        _collider(collider, depsgraph, settings, metres)
+        _collider(collider, depsgraph, settings, meters)
         for collider in simulated_world.colliders(settings.colliders)
         if not (settings.collides_with_surface and collider == guides.surface)
     ]
-    fields, _refused = force_fields.read(depsgraph, metres)
+    fields, _refused = force_fields.read(depsgraph, meters)
     keyed = [getattr(settings, name) for name in sorted(properties.keyed_dynamics_of(guides.vellus))]
     if shared_wetness.is_keyed(guides.vellus):
         keyed += [style.is_on * mean_amount(style) for style in shared_wetness.masked_styles(guides.vellus)]
@@ -74,9 +74,9 @@ def _acting(guides, blender_scene, depsgraph, settings, metres):
     return [_rounded(gravity), colliders, acting_fields, [_rounded(value) for value in keyed]]
 
 
-def _collider(collider, depsgraph, settings, metres):
+def _collider(collider, depsgraph, settings, meters):
     own = setting_properties.to_settings(collider.vellus, ColliderSettings)
-    vertices = _vertices(collider, depsgraph, metres)
+    vertices = _vertices(collider, depsgraph, meters)
     bounds = np.concatenate(_bounds(vertices)).ravel() if len(vertices) else ()
     contact = (*contact_of(own, settings), own.is_double_sided)
     return [name_of(collider), len(vertices), _rounded(contact), _rounded(bounds)]
@@ -89,10 +89,10 @@ def _rounded(value):
     return np.float32(value).tolist()
 
 
-def _vertices(mesh_object, depsgraph, metres):
+def _vertices(mesh_object, depsgraph, meters):
     """(V, 3) float64 [m] in the world, of an evaluated mesh object."""
     local = scene.evaluated_positions(mesh_object, depsgraph)
-    matrix = metres * _matrix(mesh_object, depsgraph)
+    matrix = meters * _matrix(mesh_object, depsgraph)
     return local @ matrix[:, :3].T + matrix[:, 3]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses of guides on their surface in a frame, in metres and world axes, for simulation; and the way back to rest.
+"""Poses of guides on their surface in a frame, in meters and world axes, for simulation; and the way back to rest.
 
 A guide moves rigidly with the surface at its root, like hair (posed_strands.py), and then with the object. The mean
 scale of an unevenly scaled object is used.
@@ -47,7 +47,7 @@ class GuidePose:
 
     @property
     def scale(self) -> float:
-        """Metres per unit of local coordinates, averaged over the axes."""
+        """Meters per unit of local coordinates, averaged over the axes."""
         return float(abs(np.linalg.det(self.matrix[:, :3]))) ** (1.0 / 3.0)
 
     @cached_property
@@ -117,8 +117,8 @@ def _rounded(factor):
     return math.ldexp(round(math.ldexp(mantissa, 20)), exponent - 20)
 
 
-def read(guides, depsgraph, metres):
-    """The `GuidePose` of guide Curves in a depsgraph; metres: per unit of the world.
+def read(guides, depsgraph, meters):
+    """The `GuidePose` of guide Curves in a depsgraph; meters: per unit of the world.
 
     Raises `HairError` if there is no surface or guides are not rooted on it.
     """
@@ -137,7 +137,7 @@ def read(guides, depsgraph, metres):
     matrix = np.array(surface_object.evaluated_get(depsgraph).matrix_world, np.float64)[:3]
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:, :3])) < 1e-30:
         raise HairError('"{name}" has a scale of zero: change its scale.', name=surface_object.name)
-    return GuidePose(pose, places, metres * matrix, stored_roots.slides(guides))
+    return GuidePose(pose, places, meters * matrix, stored_roots.slides(guides))
 
 
 def _polar(matrix):

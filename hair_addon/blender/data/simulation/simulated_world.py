@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world of simulated guides in metres: gravity, colliders and force fields."""
+"""The world of simulated guides in meters: gravity, colliders and force fields."""
 
 import bpy
 import numpy as np
@@ -20,8 +20,8 @@ NO_GRAVITY = (0.0, 0.0, 0.0)
 parts_cache = Cache(capacity=16)
 
 
-def metres_of(blender_scene, settings):
-    """Metres per unit of the scene's world, for guides with these `DynamicsSettings`."""
+def meters_of(blender_scene, settings):
+    """Meters per unit of the scene's world, for guides with these `DynamicsSettings`."""
     return blender_scene.unit_settings.scale_length * settings.size
 
 
@@ -32,21 +32,21 @@ def read(blender_scene, depsgraph, settings, guide_pose, surface_object, ways):
     points at rest, in local coordinates.
     """
     gravity = tuple(blender_scene.gravity) if blender_scene.use_gravity else NO_GRAVITY
-    metres = metres_of(blender_scene, settings)
+    meters = meters_of(blender_scene, settings)
     obstacles, errors = [], []
     if settings.collides_with_surface:
         triangles = _facing_hair(guide_pose.pose.surface, guide_pose.places[0], ways)
-        obstacles.append(_obstacle(surface_object, guide_pose.vertices, triangles, settings, metres))
+        obstacles.append(_obstacle(surface_object, guide_pose.vertices, triangles, settings, meters))
     for collider in colliders(settings.colliders):
         if settings.collides_with_surface and collider == surface_object:
             continue
         try:
-            vertices, triangles = _read_mesh(collider, depsgraph, metres)
+            vertices, triangles = _read_mesh(collider, depsgraph, meters)
         except HairError as error:
             errors.append(error)
             continue
-        obstacles.append(_obstacle(collider, vertices, triangles, settings, metres))
-    fields, refused = force_fields.read(depsgraph, metres)
+        obstacles.append(_obstacle(collider, vertices, triangles, settings, meters))
+    fields, refused = force_fields.read(depsgraph, meters)
     time = scene_time.time_of(blender_scene) / scene_time.animation_rate(blender_scene)
     return dynamics.simulation.World(gravity, tuple(obstacles), fields, time), errors + refused
 
@@ -58,11 +58,11 @@ def _facing_hair(surface, corners, ways):
     return dynamics.collision.closed_parts.facing_hair(surface.mesh, parts, corners, surface.from_local(ways))
 
 
-def _obstacle(mesh_object, vertices, triangles, settings, metres):
+def _obstacle(mesh_object, vertices, triangles, settings, meters):
     own = setting_properties.to_settings(mesh_object.vellus, ColliderSettings)
     friction, distance = contact_of(own, settings)
     name = f"{name_of(mesh_object)} {mesh_object.session_uid}"
-    return dynamics.simulation.Obstacle(name, vertices, triangles, friction, metres * distance, own.is_double_sided)
+    return dynamics.simulation.Obstacle(name, vertices, triangles, friction, meters * distance, own.is_double_sided)
 
 
 def require_colliders(settings, depsgraph):
@@ -97,8 +97,8 @@ def colliders(collection_name):
     return [] if collection is None else [o for o in collection.all_objects if o.type == "MESH"]
 
 
-def _read_mesh(mesh_object, depsgraph, metres):
+def _read_mesh(mesh_object, depsgraph, meters):
     """((V, 3) float64 [m] in the world, (F, 3) int32) of an evaluated mesh object. Raises `HairError`."""
     surface = scene.read_surface(mesh_object, depsgraph)
-    matrix = metres * np.array(mesh_object.evaluated_get(depsgraph).matrix_world, np.float64)[:3]
+    matrix = meters * np.array(mesh_object.evaluated_get(depsgraph).matrix_world, np.float64)[:3]
     return surface.posed @ matrix[:, :3].T + matrix[:, 3], surface.mesh.triangles

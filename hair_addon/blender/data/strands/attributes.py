@@ -50,7 +50,7 @@ def write_positions(curves, points, name="position"):
     """
     data, points = curves.attributes[name].data, np.asarray(points, np.float32)
     if not has(curves, name, "FLOAT_VECTOR", "POINT") or points.size != 3 * len(data):
-        raise ValueError("points are not as many as those of the curves, or are no vectors")
+        raise ValueError("the curves have another number of points, or the attribute has no vectors")
     if not len(data):
         return geometry.fingerprint.fingerprint(points)
     # Points are written into Blender's memory: `foreach_set` uses one thread, and silently does nothing where data is

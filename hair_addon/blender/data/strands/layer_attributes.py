@@ -15,7 +15,7 @@ _BASE, _NORMAL, _TANGENT = "layer_base", "layer_normal", "layer_tangent"
 
 
 def has_base(datablock):
-    """Whether guides store what layers need besides turns."""
+    """Whether guides store the base and the frames of layers."""
     return attributes.has(datablock, _BASE, "FLOAT_VECTOR", "POINT")
 
 

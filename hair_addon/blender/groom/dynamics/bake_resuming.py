@@ -78,7 +78,10 @@ def resuming(tasks: list[Task], its_scene: Remembered) -> Work[None]:
 
 
 def _may_stay(task, frame, scene):
-    """Whether a frame exists and matches the present settings and animation; stores its state in the task, if any."""
+    """Whether a frame exists and matches the present settings and animation.
+
+    The task gets the frame's state, if it is stored.
+    """
     found = task.there.read_frame(frame)
     if found is None or found.key != task.writer.manifest.key:
         return False

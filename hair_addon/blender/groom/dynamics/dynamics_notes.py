@@ -86,10 +86,10 @@ def _length(guides, blender_scene):
     """Return the length of grown guides, or the median length of combed guides [m]."""
     state = guide_states.of(guides)
     length = state.length if state.is_combed else guides.vellus.guides.length
-    return length * simulated_world.metres_of(blender_scene, guides.vellus.dynamics)
+    return length * simulated_world.meters_of(blender_scene, guides.vellus.dynamics)
 
 
-def _in_words(metres, blender_scene):
+def _in_words(meters, blender_scene):
     """Format a length with two digits, in scene units."""
     system = blender_scene.unit_settings.system
-    return bpy.utils.units.to_string("METRIC" if system == "NONE" else system, "LENGTH", metres, precision=2)
+    return bpy.utils.units.to_string("METRIC" if system == "NONE" else system, "LENGTH", meters, precision=2)

@@ -35,11 +35,11 @@ def draping(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) ->
     dynamics_settings = _softened(datablock, settings)
     blender_scene = depsgraph.scene
     gravity = tuple(blender_scene.gravity) if blender_scene.use_gravity else simulated_world.NO_GRAVITY
-    metres = simulated_world.metres_of(blender_scene, dynamics_settings)
-    dynamics_settings = guide_simulation.in_metres(dynamics_settings, metres)
+    meters = simulated_world.meters_of(blender_scene, dynamics_settings)
+    dynamics_settings = guide_simulation.in_meters(dynamics_settings, meters)
     posed, surface = guides.posed(), guides.surface
     wetness = wet_guides.of_guides(datablock, surface, depsgraph, {}, guides.roots)
-    mesh = TriMesh(surface.posed_mesh.vertices * np.float32(metres), surface.posed_mesh.triangles)
+    mesh = TriMesh(surface.posed_mesh.vertices * np.float32(meters), surface.posed_mesh.triangles)
     device, remembered, falling = preferences.device(), Remembered(datablock), guide_tools.to_shape(guides)
 
     def compute(progress):
@@ -51,7 +51,7 @@ def draping(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) ->
             def tell(part, own=own):
                 own("Draping guides", part)
 
-            points = metres * posed[places].astype(np.float64)
+            points = meters * posed[places].astype(np.float64)
             given = points, mesh, dynamics_settings, gravity, settings.seconds, device, tell
             settled.append(dynamics.draping.draped(*given, wetness=None if wetness is None else wetness[chosen]))
         return settled
@@ -59,7 +59,7 @@ def draping(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) ->
     settled = yield compute
     after = guides.points.copy()
     for (chosen, places), points in zip(falling, settled, strict=True):
-        at_rest = guides.carried_back((points / metres).astype(np.float32), chosen)
+        at_rest = guides.carried_back((points / meters).astype(np.float32), chosen)
         after[places] = grooming.guide_shapes.blended(guides.points[places], at_rest, guides.weights[chosen])
     return guide_tools.write_shapes(replace(guides, datablock=remembered.find()), after)
 

@@ -66,7 +66,7 @@ class GuideSimulation:
     space: Affine
     roots: np.ndarray  # (G, 3) float32 at rest, local
     simulation: "dynamics.simulation.Simulation"
-    metres: float  # per world unit
+    meters: float  # per world unit
     obstacles: dict[str, "dynamics.simulation.Obstacle"] = field(default_factory=dict)
     parted_by: tuple[str, ...] = ()  # `guide_regions.parting_keys` when regions were read
     masks: dict[tuple[str, str, bool], np.ndarray] = field(default_factory=dict)
@@ -101,7 +101,7 @@ class GuideSimulation:
     def _change(self, frame):
         """Use the settings and the wetness of a frame."""
         if frame.settings != self.settings or not _are_same(frame.wetness, self.wetness):
-            self.simulation.change(in_metres(frame.settings, self.metres), wetness=frame.wetness)
+            self.simulation.change(in_meters(frame.settings, self.meters), wetness=frame.wetness)
             self.settings, self.wetness = frame.settings, frame.wetness
 
     def follow_parting(self, guides: Curves, depsgraph: Depsgraph) -> bool:
@@ -175,11 +175,11 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     simulated_world.require_colliders(settings, depsgraph)
     masks: dict[tuple[str, str, bool], np.ndarray] = {}
     frame = read(guides, scene, depsgraph, settings, masks)
-    pose, metres = frame.pose, simulated_world.metres_of(scene, settings)
+    pose, meters = frame.pose, simulated_world.meters_of(scene, settings)
     local = combed_points(guides)
     simulation = dynamics.simulation.Simulation(
         pose.groom(local),
-        in_metres(settings, metres),
+        in_meters(settings, meters),
         pose.root_pose(pose),
         frame.world,
         preferences.device(),
@@ -191,7 +191,7 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     digest, topology = staleness.guides_digest(guides), guides.vellus.topology
     _keep_stiffness(guides, frame, local)
     ids, space = _identity_of(guides), surface_space.applied(guides)
-    begun = GuideSimulation(digest, topology, ids, settings, pose, space, space, local[:, 0].copy(), simulation, metres)
+    begun = GuideSimulation(digest, topology, ids, settings, pose, space, space, local[:, 0].copy(), simulation, meters)
     begun.parted_by = guide_regions.parting_keys(guides)
     begun.masks, begun.wetness = masks, frame.wetness
     begun.see(frame)
@@ -209,7 +209,7 @@ def read(
 
     masks: as in `GuideSimulation`; missing ones are read and added.
     """
-    pose = guide_poses.read(guides, depsgraph, simulated_world.metres_of(scene, settings))
+    pose = guide_poses.read(guides, depsgraph, simulated_world.meters_of(scene, settings))
     local = combed_points(guides)
     ways = local[:, 1] - local[:, 0]
     world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface, ways)
@@ -265,10 +265,10 @@ def _load(settings):
     return dynamics.rod.stiffness_advice.weight_ratio(one, 1.0, abs(settings.gravity)) or 1.0
 
 
-def in_metres(settings: DynamicsSettings, metres: float) -> DynamicsSettings:
-    """Convert settings with lengths in world units to metres."""
+def in_meters(settings: DynamicsSettings, meters: float) -> DynamicsSettings:
+    """Convert settings with lengths in world units to meters."""
     return replace(
-        settings, cell_size=metres * settings.cell_size, collision_distance=metres * settings.collision_distance
+        settings, cell_size=meters * settings.cell_size, collision_distance=meters * settings.collision_distance
     )
 
 

@@ -10,7 +10,7 @@ from ...host.notices import name_of
 
 
 def freeze_selected(guides: Curves) -> int:
-    """Freeze the selected points of guides too; returns how many are frozen. Raises `HairError`."""
+    """Freeze the selected points of guides too; returns the number of frozen points. Raises `HairError`."""
     _require_editable(guides)
     selected = frozen_points.selected(guides)
     if selected is None:
@@ -27,7 +27,10 @@ def unfreeze_all(guides: Curves) -> int:
 
 
 def invert(guides: Curves) -> int:
-    """Freeze all points that are not frozen, and no others; returns how many are. Raises `HairError`."""
+    """Freeze all points that are not frozen, and unfreeze the others.
+
+    Returns the number of frozen points. Raises `HairError`.
+    """
     _require_editable(guides)
     return _write(guides, ~_frozen(guides))
 

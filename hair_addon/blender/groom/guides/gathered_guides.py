@@ -16,7 +16,7 @@ def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) ->
     """Gather guides at the ties of a curve object; returns the number changed. Raises `HairError`."""
     guides = guide_tools.read(datablock, settings, depsgraph)
     if not settings.line:
-        raise HairError("Pick the curve to gather at: each of its curves begins at a tie and leads the tail.")
+        raise HairError("Pick a curve object: each of its curves begins at a tie and leads the tail.")
     segments = drawn_lines.read(datablock.surface, guides.surface, settings.line, depsgraph)
     lines = [] if segments is None else _lines(segments)
     mesh, after = guides.surface.posed_mesh, guides.points.copy()
@@ -33,11 +33,11 @@ def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) ->
         at_rest[:, 0] = guides.points[places[:, 0]]
         after[places[is_gathered]] = at_rest[is_gathered]
     if not changed:
-        raise HairError("No guide can be gathered there: the ties are on another part of the surface.")
+        raise HairError("No guides were gathered, because the ties are on another part of the surface: move the curve.")
     return guide_tools.write_shapes(guides, after)
 
 
 def _lines(segments):
-    """Return lines (K, 3) from segments (L, 2, 3), of which one begins where the previous one ends."""
+    """Return the lines, each (K, 3), that consecutive segments (L, 2, 3) form."""
     begins = np.flatnonzero((segments[1:, 0] != segments[:-1, 1]).any(axis=1)) + 1
     return [np.concatenate([part[:1, 0], part[:, 1]]) for part in np.split(segments, begins)]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guides kept outside of their surface as it is posed: after each event of a stroke, and by Push Outside.
 
-Points are pushed out from root to tip; roots and the lengths of segments stay. All surfaces are scaled to the size of a
-head, so that tolerances do not depend on the units of a scene.
+Points are pushed out from root to tip; roots and segment lengths do not change. All surfaces are scaled to the size of
+a head, so that tolerances do not depend on the units of a scene.
 """
 
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ class _Barrier:
     key: tuple
     surface: Surface
     barrier: "dynamics.outside.Barrier"
-    factor: float  # from metres to a surface of the extent of a head
+    factor: float  # from meters to a surface of the extent of a head
 
 
 def push(datablock: Curves, settings: OutsideSettings, depsgraph: Depsgraph) -> int:
@@ -53,9 +53,9 @@ def push(datablock: Curves, settings: OutsideSettings, depsgraph: Depsgraph) -> 
 
 
 def pushed_out(datablock: Curves, former: np.ndarray, points: np.ndarray, depsgraph: Depsgraph) -> np.ndarray:
-    """Return local points (N, 3) of guides, with guides outside that have changed since they had `former` points.
+    """Return local points (N, 3) of guides, of which those that differ from `former` points are pushed outside.
 
-    `points` itself if no guide is pushed. Guides without a surface, and broken ones, stay.
+    `points` itself if no guide is pushed. Guides without a surface, or with invalid points, are unchanged.
     """
     try:
         barrier = _known(datablock, former, depsgraph)

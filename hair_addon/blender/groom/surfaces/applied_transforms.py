@@ -65,7 +65,7 @@ def _fitted(strands, surface, rest_before):
 def shift_of(rest_before: np.ndarray, surface: Surface) -> Affine | None:
     """Return the common shift of all (V, 3) vertices of a surface, as by *Geometry to Origin*; None if there is none.
 
-    Noise that neighboring strands share, and all else that depends on places on the surface, is shifted along.
+    Noise shared by neighboring strands, and everything else that depends on places on the surface, is shifted too.
     """
     shift = Affine.shift((surface.rest.astype(np.float64) - rest_before).mean(axis=0))
     return shift if _is_close(shift.points(rest_before), surface.rest, surface) else None

@@ -120,7 +120,7 @@ def transferring(
         new_hair = _copy(hair, target, is_rendered=True)
         new_hair.vellus.guide_curves = new_guides
         cleared += transferred_names.clear(new_guides, new_hair, target)
-    new_guides.vellus.is_stale = False  # settings changed with what they describe
+    new_guides.vellus.is_stale = False  # settings are changed together with their data
     if new_hair is not None:
         yield from _growing(new_guides, new_hair, surface, places)
     looks.evaluate_guides(new_guides)

@@ -13,14 +13,14 @@ from ...host import scene_time
 SIZE = 1024, 512  # pixels of a third of a degree: the sun's disk is half a degree wide
 SAMPLES = 16  # of a pixel
 
-# What the Light Path node says of light that hair scatters.
+# Values of the Light Path node for light that hair scatters.
 _LIGHT_PATH = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0}
 
 
 def render(path, frame, out):
     """Render the only world of a .blend at a frame into an .exr. Raises `HairError`.
 
-    The picture is what light from all directions is, in the projection of the Environment Texture node.
+    The picture is the radiance from all directions, in the projection of the Environment Texture node.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -49,7 +49,7 @@ def _set_up(scene):
     cycles, render = scene.cycles, scene.render
     cycles.device, cycles.samples = "CPU", SAMPLES
     cycles.use_adaptive_sampling = cycles.use_denoising = False
-    cycles.pixel_filter_type = "BOX"  # so that pixels keep the whole light of the sun
+    cycles.pixel_filter_type = "BOX"  # so that pixels receive all light of the sun
     (render.resolution_x, render.resolution_y), render.resolution_percentage = SIZE, 100
     render.film_transparent = render.use_motion_blur = render.use_compositing = render.use_sequencer = False
     picture = render.image_settings

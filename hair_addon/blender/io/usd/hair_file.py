@@ -73,7 +73,7 @@ class HairFile:
     full.
     """
 
-    def __init__(self, path: Path, final_path: Path, frame_rate: float, metres_per_unit: float) -> None:
+    def __init__(self, path: Path, final_path: Path, frame_rate: float, meters_per_unit: float) -> None:
         require_usd()
         from pxr import Tf, Usd, UsdGeom
 
@@ -84,7 +84,7 @@ class HairFile:
             raise failed(final_path, error) from error
         self._stage.GetRootLayer().customLayerData = {_CREATOR: _PROGRAM, "version": paths.addon_version()}
         UsdGeom.SetStageUpAxis(self._stage, UsdGeom.Tokens.z)
-        UsdGeom.SetStageMetersPerUnit(self._stage, metres_per_unit)
+        UsdGeom.SetStageMetersPerUnit(self._stage, meters_per_unit)
         self._stage.SetTimeCodesPerSecond(frame_rate)
         self._stage.SetFramesPerSecond(frame_rate)
         self._stage.SetDefaultPrim(UsdGeom.Xform.Define(self._stage, f"/{ROOT}").GetPrim())

@@ -46,11 +46,11 @@ def read(path: Path) -> CurveFile:
         sets = []
         for prim, name in zip(found.prims, _names(found.prims), strict=True):
             sets += _sets_of(path, prim, name, timing, notes)
-        metres = UsdGeom.GetStageMetersPerUnit(stage) if UsdGeom.StageHasAuthoredMetersPerUnit(stage) else None
+        meters = UsdGeom.GetStageMetersPerUnit(stage) if UsdGeom.StageHasAuthoredMetersPerUnit(stage) else None
         up = UsdGeom.GetStageUpAxis(stage) if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis) else None
-    if metres is not None and not 0.0 < metres < np.inf:
-        raise HairError(f"{path}: its metersPerUnit is {metres:g}, but must be positive.")
-    return CurveFile(sets, Convention(metres, up), _USUAL, notes)
+    if meters is not None and not 0.0 < meters < np.inf:
+        raise HairError(f"{path}: its metersPerUnit is {meters:g}, but must be positive.")
+    return CurveFile(sets, Convention(meters, up), _USUAL, notes)
 
 
 def _names(prims):
@@ -71,10 +71,10 @@ def _sets_of(path, prim, name, timing, notes) -> Iterator[CurveSet]:
     if drawn.was_smooth:
         notes.append(HairError(curve_file.SPLINES_MOVE, path=f'"{name}" in {path}'))
     if drawn.has_odd_widths:
-        sentence = "has widths neither for each point nor for each curve: they are left out."
+        sentence = "has widths that are neither per point nor per curve: they are left out."
         notes.append(HairError(f'"{name}" in {path} {sentence}'))
     if usd_stage.is_skinned(prim):
-        sentence = "is bound to a skeleton: it is read as it was bound, without a pose."
+        sentence = "is bound to a skeleton: it is read in its bind pose."
         notes.append(HairError(f'"{name}" in {path} {sentence}'))
     if not len(drawn.counts):
         return
@@ -114,7 +114,9 @@ def _moved(path, prim, name, time, first):
     with usd_stage.errors_named(path):
         drawn = usd_shapes.drawn(prim, time, first.lines, keeps_splines=False)
         if not np.array_equal(drawn.counts, first.counts):
-            sentence = f"has another number of points at the time {time.GetValue():g}: export as many at all times."
+            sentence = (
+                f"has another number of points at the time {time.GetValue():g}: export the same number at all times."
+            )
             raise HairError(f'"{name}" in {path} {sentence}')
         return _placed(drawn.points, usd_stage.matrix_of(prim, time))
 

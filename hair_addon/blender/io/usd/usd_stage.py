@@ -64,7 +64,7 @@ def opened(path: Path):
         missing = _missing(stage)
     if missing:
         named = ", ".join(missing[:_MOST_NAMED]) + ("…" if len(missing) > _MOST_NAMED else "")
-        raise HairError(f"{path} needs {named}, which cannot be found: put it there.")
+        raise HairError(f"{path} refers to {named}, which cannot be found: restore it or correct the reference.")
     return stage
 
 

@@ -2,9 +2,9 @@
 """Light Grid in viewports: paths are followed in the background while nothing moves, one share after the other.
 
 A share runs in a thread and starts with a redraw, so nothing is followed for a region that is not shown. The picture
-goes over from dual scattering to paths in steps. While something moves, the light that is known stays in its voxels:
-its part of the picture falls with changes of hair, lights and looks, its weight beside new paths also with the angle
-that the view has turned.
+changes from dual scattering to paths in steps. While something moves, the measured light stays in its voxels. Its part
+of the picture decreases with changes of hair, lights and looks; its weight relative to new paths also decreases with
+the angle by which the view has turned.
 """
 
 import os
@@ -32,17 +32,17 @@ from .. import light_paths, seen_strands
 
 _REST = 0.3  # [s] without a change after which paths are followed
 _INTERVAL = 0.1  # [s] between checks whether a share is done
-_MOST_ASKED = 20  # redraws that a region is asked for before it counts as hidden
-_SHARES = 16  # of the paths of a picture, each followed between two redraws
+_MOST_ASKED = 20  # requested redraws after which a region that was not drawn counts as hidden
+_SHARES = 16  # number of shares of a picture's paths, each followed between two redraws
 _RAMP = 6  # shares after which paths have replaced dual scattering, at the earliest
 _LEAST_SHARE, _MOST_SHARE = 1024, 16_384  # paths
-_PATHS_AT_ONCE = 1024  # of a share on the processor, after which it can be stopped
+_PATHS_AT_ONCE = 1024  # paths between two checks whether a share on the processor must stop
 _HALF_TURN = np.radians(20.0)  # angle of the view at which former paths have half their weight
 _NICE = 10  # priority of the thread, if the system has priorities of threads
-_STILL = 0.01  # part of the hair's radius by which strands may move and count as still
+_STILL = 0.01  # fraction of the hair's radius by which strands may move and still count as still
 _SAMPLED = 500  # strands that are compared
-_LEAST_PART = 0.02  # of what was known: less is forgotten
-_OTHER = 0.5  # weight of what is known of other strands, surfaces or looks
+_LEAST_PART = 0.02  # least part of measured light that is kept
+_OTHER = 0.5  # weight of light that was measured with other strands, surfaces or looks
 
 _OFF = "Viewports show Dual Scattering: Light Grid in Viewports is off in the preferences."
 
@@ -52,7 +52,7 @@ _jobs = []  # of all regions: at most one that is not done
 
 
 def unregister():
-    """Stop following paths, wait for the share that is under way, and remove the timer."""
+    """Stop following paths, wait for the share that is running, and remove the timer."""
     if bpy.app.timers.is_registered(_wake):
         bpy.app.timers.unregister(_wake)
     end()
@@ -95,7 +95,7 @@ def drop(key):
 
 
 def obstacles(blender_scene):
-    """Why viewports show dual scattering although a scene's setting is Light Grid: sentences."""
+    """Return the reasons, as sentences, why viewports show dual scattering although a scene's setting is Light Grid."""
     if not light_paths.path_count(blender_scene, (1, 1)):
         return []
     if not preferences.has_live_light():
@@ -120,7 +120,7 @@ def _wake():
 
 @dataclass(frozen=True, eq=False)
 class _Content:
-    """What the light of paths depends on, beside the view."""
+    """All that the light of paths depends on, except the view."""
 
     hair: tuple  # (StrandsOnGPU, Shading, (4, 4) to world)
     lights: np.ndarray  # vector irradiance around the hair by lamp and channel, then the world's sides
@@ -129,7 +129,7 @@ class _Content:
     radius: float
 
     def part_since(self, before):
-        """How much of what was known of another `_Content` holds, from 0 to 1."""
+        """The part of the light measured with another `_Content` that is still valid, from 0 to 1."""
         if len(self.hair) != len(before.hair):
             return 0.0
         known = _unchanged(self.lights, before.lights)
@@ -201,7 +201,7 @@ def _content_of(drawn):
 
 
 def _unchanged(values, before):
-    """The part of light that is the same, from 0 to 1, if numbers of any count were others before."""
+    """The part of light that stays valid, from 0 to 1, after numbers have changed."""
     size = max(np.size(values), np.size(before))
     now, then = (np.pad(np.ravel(one).astype(float), (0, size - np.size(one))) for one in (values, before))
     change = np.abs(now - then).sum() / max(np.abs(now).sum(), np.abs(then).sum(), 1e-12)
@@ -247,7 +247,7 @@ class LiveLight:
         self.obstacle, self.asked = "", 0
         self._job = self._drawn = self._content = self._camera = None
         self._paths = None  # `PathSums`; the thread's while a job runs
-        self._former = None  # (`PathSums` of other hair or light, weight, shift), which count until paths replace them
+        self._former = None  # (`PathSums` of other hair or light, weight, shift), used until paths replace them
         self._followed = None  # (`_Content`, camera) of the sums, likewise the thread's
         self._known = None  # (`_Content`, part) of the textures
         self._grid, self._textures, self._scene = None, (), (None, None)
@@ -256,12 +256,12 @@ class LiveLight:
 
     @property
     def is_busy(self):
-        """Whether a share is under way."""
+        """Whether a share is running."""
         return self._job is not None and not self._job.is_done
 
     @property
     def is_waiting(self):
-        """Whether a redraw would be of use, now or later."""
+        """Whether a redraw would show new paths, now or later."""
         return (self._job is not None or not self._is_done) and self.asked < _MOST_ASKED
 
     @property
@@ -270,16 +270,16 @@ class LiveLight:
         return self._is_done and self._job is None
 
     def is_due(self, now):
-        """Whether a redraw would be of use now."""
+        """Whether a redraw would show new paths now."""
         return not self.is_busy and (self._job is not None or now - self._acted >= _REST)
 
     def stop(self):
-        """Ask the share that is under way to end."""
+        """Ask the running share to end."""
         if self._job is not None:
             self._job.stop()
 
     def wait(self):
-        """Wait until no share is under way."""
+        """Wait until no share is running."""
         if self._job is not None:
             self._job.wait()
 
@@ -363,7 +363,7 @@ class LiveLight:
             if former is None:
                 return found.taken - taken, found.shares()
             sums, weight, shift = former
-            # What was measured in other light has no part in the last picture.
+            # Light measured under other lights takes no part in the final picture.
             left = max(1.0 - found.taken / self._goal, 0.0)
             return found.taken - taken, found.shares(sums, left * weight, shift)
 
@@ -393,14 +393,14 @@ class LiveLight:
         self._is_done = part == 1.0 and (is_known or self._tried >= light_paths.MOST_TIMES * self._goal)
 
     def _part(self):
-        """How much of the known light is shown."""
+        """The part of the picture's light that is measured light, from 0 to 1."""
         if self._known is None:
             return 0.0
         content, part = self._known
         return part if content is self._content else part * self._content.part_since(content)
 
     def _shown(self, drawn):
-        """The scene in the known light: the same object if nothing has changed."""
+        """The scene lit by the measured light: the same object if nothing has changed."""
         if self._scene[0] is drawn:
             return self._scene[1]
         found, part = drawn, 0.0 if self.obstacle else self._part()

@@ -284,7 +284,7 @@ class VELLUS_OT_convert_particles(HairOperator, bpy.types.Operator):
     __annotations__ = {
         "use": properties.choice(
             "Convert To",
-            "What the hairs become",
+            "Type of curves to create from the hairs",
             {"HAIR": "Hair", "GUIDES": "Guides"},
             {
                 "HAIR": "Keep the hairs as strands, and derive guides from them",

@@ -122,7 +122,7 @@ class VELLUS_OT_free_dynamics(HairOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_deliver_dynamics(LongOperator, bpy.types.Operator):
-    """Write the baked hair to a file beside the .blend, and let Blender play that: linked files, render farms and \
+    """Write the baked hair to a file beside the .blend, and let Blender play it: linked files, render farms and \
 Blender without Vellus show the same hair"""
 
     bl_idname = "vellus.deliver_dynamics"

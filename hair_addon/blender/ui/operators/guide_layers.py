@@ -52,7 +52,7 @@ class VELLUS_OT_duplicate_layer(_LayerOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_move_layer(_LayerOperator, bpy.types.Operator):
-    """Move the active layer up or down; each layer bends the guides that the layers below it give"""
+    """Move the active layer up or down; each layer deforms the result of the layers below it"""
 
     bl_idname = "vellus.move_layer"
     bl_label = "Move Layer"

@@ -297,7 +297,7 @@ class VELLUS_OT_attract_guides(GuideTool, bpy.types.Operator):
 
 
 class VELLUS_OT_drape_guides(LongOperator, GuideTool, bpy.types.Operator):
-    """Let guides fall under gravity until they rest on the surface, and keep that as their shape"""
+    """Let guides fall under gravity until they rest on the surface, and keep the resulting shape"""
 
     bl_idname = "vellus.drape_guides"
     bl_label = "Drape Guides"

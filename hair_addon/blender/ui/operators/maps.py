@@ -52,7 +52,8 @@ class VELLUS_OT_edit_map(HairOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_paint_map(HairOperator, bpy.types.Operator):
-    """Paint the map on the surface with Blender's brushes, while the hair follows. A map without a source gets one"""
+    """Paint the map on the surface with Blender's brushes, while the hair follows. If the map has no source, create \
+one"""
 
     bl_idname = "vellus.paint_map"
     bl_label = "Paint Map"

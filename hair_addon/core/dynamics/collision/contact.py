@@ -103,7 +103,7 @@ class Contacts:
     def look(
         self, surface: Surface, asking: QueryOptions, positions: Any, last_positions: Any, moved: Any = None
     ) -> Any:
-        """Launch the kernels of `find` for validated arrays, a surface and an `QueryOptions`."""
+        """Launch the kernels of `find` for validated arrays, a surface and `QueryOptions`."""
         is_final = asking.is_final != 0
         *either, middle_planes = self.planes
         planes = either[int(is_final)]

@@ -48,7 +48,7 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
     const lanes next_moment = j + 1 < segment_count ? size_of_bend(j + 1) : lanes(0.0f);
     const lanes geometric = carried * (exact_sqrt_of(dot(tension, tension)) + 0.5f * (moment + next_moment));
     moment = next_moment;
-    // A lighter frame would be so stiff that single precision could not resolve its motion relative to its neighbours.
+    // A lighter frame would be so stiff that single precision could not resolve its motion relative to its neighbors.
     const lanes least_inertia = LEAST_INERTIA * h * h * (1.0f + damping) / compliance;
     const lanes turning = 1.0f / (higher_of(get(inertia, j), least_inertia) + geometric);
     put(kept(j, TURNING), 0, turning);

@@ -20,7 +20,7 @@ _MOST_ORDER = 16
 _MOST_POINTS = 2**26  # limit of points after subdivision of curves other than polylines
 
 _NOT_DRAWN = '"{name}" in {path}: {count} curves have too few points, or points that belong to no segment.'
-_ODD_WIDTHS = '"{name}" in {path} has widths neither for each point nor for each curve: they are left out.'
+_ODD_WIDTHS = '"{name}" in {path} has widths that are neither per point nor per curve: they are left out.'
 _POWERS = '"{name}" in {path} has {count} curves in the power basis, which is not supported.'
 
 

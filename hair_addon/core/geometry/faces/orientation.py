@@ -17,7 +17,7 @@ def signed_volume(vertices: np.ndarray, faces: Faces) -> float:
     """Return the volume of a closed mesh, negative if its faces point inward; vertices: (V, 3) of any unit."""
     if len(faces.starts) < 2:
         return 0.0
-    # Centred, as rounding grows with the distance from the origin. By columns: np.cross takes five times as long.
+    # Centered, as rounding grows with the distance from the origin. By columns: np.cross takes five times as long.
     x, y, z = np.ascontiguousarray((vertices.astype(np.float64) - vertices.mean(axis=0, dtype=np.float64)).T)
     here, firsts = faces.corner_vertices, faces.starts[:-1]
     following = np.append(here[1:], here[:1])

@@ -69,7 +69,7 @@ def _boxes(features, count):
 
 
 def _nearest(features, centres, progress):
-    """Return the label (N,) of the closest of the centres (K, D), and squared distances (N,)."""
+    """Return the label (N,) of the closest of the centers (K, D), and squared distances (N,)."""
     centres = centres.astype(np.float32)
     labels, squares = np.empty(len(features), np.int32), np.empty(len(features), np.float32)
     halves, step = 0.5 * (centres**2).sum(axis=1), max(_AT_ONCE // len(centres), 1)
@@ -83,7 +83,7 @@ def _nearest(features, centres, progress):
 
 
 def _without_empty(labels, squares, count):
-    """Fill empty clusters with the rows farthest from their centres, taken from clusters of several rows."""
+    """Fill empty clusters with the rows farthest from their centers, taken from clusters of several rows."""
     sizes = np.bincount(labels, minlength=count)
     missing = list(np.flatnonzero(sizes == 0))
     for row in np.argsort(-squares, kind="stable"):

@@ -3,7 +3,7 @@
 // Nearest points of each query of a cell, for QUERIES_AT_ONCE queries at once in Clang's vectors: the shared candidates
 // of the cell are sorted by their distance to each query.
 //
-// The body of `_rank` in hash_grid.py. Parameters, for Q queries and `limit` slots of neighbours each:
+// The body of `_rank` in hash_grid.py. Parameters, for Q queries and `limit` slots of neighbors each:
 //
 //   array_t<vec3> queries                   (Q,) positions [m]
 //   array_t<int> order                      (Q,) indices of queries, sorted by cell

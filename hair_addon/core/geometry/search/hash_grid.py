@@ -24,7 +24,7 @@ CELLS_ALONG = 1024  # maximum number of these cells along each axis
 CANDIDATE_LIMIT = 128  # candidate points of the queries of one cell
 candidate_indices = wp.types.vector(length=CANDIDATE_LIMIT, dtype=int)
 candidate_values = wp.types.vector(length=CANDIDATE_LIMIT, dtype=float)
-LIMIT = 64  # maximum number of neighbours of a query
+LIMIT = 64  # maximum number of neighbors of a query
 key_list = wp.types.vector(length=LIMIT, dtype=wp.uint64)
 NO_KEY = wp.constant(wp.uint64(2**64 - 1))
 QUERIES_AT_ONCE = 8  # of a cell, in vector registers

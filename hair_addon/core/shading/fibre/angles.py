@@ -2,8 +2,8 @@
 """Marschner's angles about a fiber [Marschner03], from directions and back.
 
 The tangent points from root to tip, `to_light` and `to_view` away from the fiber; all three are unit vectors (..., 3).
-An inclination theta is measured from the normal plane, positive towards the tip. The azimuth phi is turned about the
-tangent from the light to the viewer: 0 looks back at the light, pi looks straight through. Radians everywhere.
+An inclination theta is measured from the normal plane, positive towards the tip. The azimuth phi is the rotation about
+the tangent from the light to the viewer: 0 on the side of the light, pi straight behind the fiber. Radians everywhere.
 """
 
 from typing import NamedTuple
@@ -27,7 +27,7 @@ class FibreAngles(NamedTuple):
 
     @property
     def theta_d(self) -> np.ndarray:
-        """Difference angle: the inclination inside which the azimuthal scattering happens."""
+        """Difference angle: the inclination at which azimuthal scattering is computed."""
         return 0.5 * (self.theta_o - self.theta_i)
 
 
@@ -41,7 +41,7 @@ def fibre_angles(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray)
 def relative_azimuth(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray) -> np.ndarray:
     """phi (...) in (-pi, pi]. A direction along the tangent has no azimuth: phi is then 0.
 
-    Scattering is even in phi, so the shader's twin gives |phi|.
+    Scattering is even in phi, so the shader computes |phi|.
     """
     light = to_light - np.sum(tangent * to_light, axis=-1)[..., None] * tangent
     view = to_view - np.sum(tangent * to_view, axis=-1)[..., None] * tangent
@@ -50,7 +50,7 @@ def relative_azimuth(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndar
 
 
 def inclination(sin_theta: Values) -> np.ndarray:
-    """Dot product with the tangent (...) → theta (...); rounding may have carried it past ±1."""
+    """Dot product with the tangent (...) → theta (...); values beyond ±1 by rounding are clamped."""
     return np.arcsin(np.clip(sin_theta, -1.0, 1.0))
 
 

@@ -12,7 +12,7 @@ from .angles import Values
 
 def trimmed_logistic(phi: Values, scale: Values) -> np.ndarray:
     """Density D_s (...) [1/rad] of the deflection phi in [-pi, pi]; scale s [rad]."""
-    # The logistic density is 1 / (4 s cosh²(x / 2s)); this form has nothing that overflows.
+    # The logistic density is 1 / (4 s cosh²(x / 2s)); this form does not overflow.
     decay = np.exp(-np.abs(phi) / scale)
     return decay / (scale * np.square(1.0 + decay) * np.tanh(0.5 * np.pi / scale))
 
@@ -28,9 +28,9 @@ def roughening(edges: np.ndarray, scale: Values) -> np.ndarray:
 def forward_mean(edges: np.ndarray) -> np.ndarray:
     """(W, W) matrix that averages N over light from around each phi that strands have scattered forward.
 
-    The weight at a distance x is cos²(x) up to pi / 2. Its mean cosine, 8 / 3 pi or 0.85, is about that of light that a
-    fiber scatters into the half circle ahead, 0.80 to 0.83 for brown to white hair; N^G of [Zinke08] weights the half
-    circle evenly (0.64), which such light comes to after three fibers.
+    The weight at a distance x is cos²(x) up to pi / 2. Its mean cosine, 8 / 3 pi or 0.85, is close to that of light
+    scattered forward by one fiber, 0.80 to 0.83 for brown to white hair. N^G of [Zinke08] weights the half circle
+    uniformly (0.64), which light reaches after three fibers.
     """
 
     def second_antiderivative(x):
@@ -44,7 +44,7 @@ def _spreading(edges, second_antiderivative):
     """The matrix of a convolution over the circle with an even density D on [-pi, pi], for means over cells.
 
     N is even in phi, so light comes from both sides. Each element is the exact mean of D over two cells, and each
-    column spreads exactly what it was given. second_antiderivative: G on [0, pi] with G'' = D, G(0) = G'(0) = 0.
+    column sums to one, which conserves energy. second_antiderivative: G on [0, pi] with G'' = D, G(0) = G'(0) = 0.
     """
     # D(x - y) over the cell of y is D(x + y) over its mirror image.
     spread = sum(_cell_integrals(edges, image, second_antiderivative) for image in (-edges, edges))
@@ -57,7 +57,7 @@ def _cell_integrals(x_edges, y_edges, second_antiderivative):
     """Integrals (W, W) of D(x + y) over pairs of cells: second differences of G, continued around the circle."""
     x = np.abs(x_edges[:, None] + y_edges[None, :])  # up to 2 pi
     beyond = np.maximum(x - np.pi, 0.0)
-    # From pi on D is its mirror image, so G is the area under 1 - C where C, the integral of D, was.
+    # Beyond pi, D is mirrored, so the integral C of D is replaced by 1 - C in the integrand of G.
     values = beyond + second_antiderivative(np.where(x > np.pi, np.pi - beyond, x))
     return np.abs(np.diff(np.diff(values, axis=0), axis=1))
 

@@ -10,26 +10,27 @@ import numpy as np
 
 from .angles import Values
 
-LAYER_COUNT = 4  # indices that are baked, from eta*_1 to eta*_2
+LAYER_COUNT = 4  # number of baked indices, from eta*_1 to eta*_2
 
 
 def layer_etas(eta: float, eccentricity: float) -> np.ndarray:
-    """eta* of each layer, (4,); eccentricity: the minor axis, of the major."""
+    """Return eta* of each layer, (4,); eccentricity: ratio of the minor to the major axis."""
     squared = eccentricity**2
     low, high = (2.0 * (eta - 1.0) * ratio - eta + 2.0 for ratio in (squared, 1.0 / squared))
     return np.linspace(low, high, LAYER_COUNT)
 
 
 def layer_weights(cosine: np.ndarray) -> np.ndarray:
-    """How much of each layer, (..., 4), a fiber shows at cos(2 phi_h) (...)."""
+    """Return the weight of each layer, (..., 4), at cos(2 phi_h) (...)."""
     place = 0.5 * (LAYER_COUNT - 1) * (1.0 - np.asarray(cosine)[..., None])
     return np.maximum(0.0, 1.0 - np.abs(place - np.arange(LAYER_COUNT)))
 
 
 def major_axis(tangent: np.ndarray, random: Values) -> np.ndarray:
-    """Unit vector (..., 3) of the section's major axis: a direction of the strand's own, across its tangent (..., 3).
+    """Return the unit vector (..., 3) of the section's major axis: a random direction per strand, perpendicular to its
+    tangent (..., 3).
 
-    It turns with the fiber, and has a seam only where a strand runs along that one direction.
+    The axis rotates with the fiber, with a seam only where a strand runs along the random direction.
     """
     z, turn = 2.0 * random - 1.0, 2.0 * np.pi * ((random * 1021.0) % 1.0)
     radius = np.sqrt(1.0 - z * z)

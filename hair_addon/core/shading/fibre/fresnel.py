@@ -7,7 +7,7 @@ from .angles import Values
 
 
 def dielectric_reflectance(cos_incident: Values, eta: Values) -> np.ndarray:
-    """Unpolarised Fresnel reflectance for light that arrives from outside; 1 under total reflection.
+    """Unpolarized Fresnel reflectance for light from outside; 1 for total reflection.
 
     cos_incident (...): cosine between ray and surface normal, [0, 1]; eta: index inside over index outside.
     """
@@ -20,10 +20,10 @@ def dielectric_reflectance(cos_incident: Values, eta: Values) -> np.ndarray:
 
 
 def bravais_indices(cos_theta_d: Values, eta: Values) -> tuple[np.ndarray, np.ndarray]:
-    """(eta', eta''): indices of the flat problem that a ray inclined by theta_d meets [Marschner03].
+    """Return (eta', eta''): effective indices in the normal plane for a ray inclined by theta_d [Marschner03].
 
-    eta' bends the ray in the normal plane and reflects the perpendicular polarisation; eta'' = eta^2 / eta' reflects
-    the parallel one. cos_theta_d (...) in (0, 1].
+    eta' determines refraction and the reflectance of perpendicular polarization; eta'' = eta^2 / eta' that of parallel
+    polarization. cos_theta_d (...) in (0, 1].
     """
     root = np.sqrt(np.square(eta) - 1.0 + np.square(cos_theta_d))  # sqrt(eta^2 - sin^2 theta_d)
     return root / cos_theta_d, np.square(eta) * cos_theta_d / root
@@ -34,8 +34,8 @@ def bravais_reflectance(
 ) -> np.ndarray:
     """F(eta', eta'', gamma_i) of Eq. 17: equals `dielectric_reflectance(cos_theta_d * cos_gamma_i, eta)`.
 
-    gamma_t comes from eta' for both polarisations. Bending a second ray with eta'', as public code does, reflects
-    totally once eta'' < 1 (theta_d > 57 degrees for hair), which a ray entering a denser medium never does.
+    gamma_t follows from eta' for both polarizations. Public code refracts a second ray by eta'', which is totally
+    reflected if eta'' < 1 (theta_d > 57 degrees for hair), although a ray that enters a denser medium never is.
     """
     perpendicular = (cos_gamma_i - eta_prime * cos_gamma_t) / (cos_gamma_i + eta_prime * cos_gamma_t)
     parallel = (eta_double_prime * cos_gamma_i - cos_gamma_t) / (eta_double_prime * cos_gamma_i + cos_gamma_t)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The opaque cylinder of [Kajiya89], Eq. 11-13 of [Report12].
 
-Convention: light that falls on the fiber with irradiance E on a plane facing the light leaves it with the radiance
-`kajiya_kay(...) * E`. The cosine of the light's inclination is therefore already in it.
+Convention: light with irradiance E on a plane facing the light results in the radiance `kajiya_kay(...) * E`, which
+includes the cosine of the light's inclination.
 """
 
 from dataclasses import dataclass
@@ -70,7 +70,7 @@ def kajiya_kay_of_strands(
 def kajiya_kay_diffuse(tangent: np.ndarray, to_light: np.ndarray) -> np.ndarray:
     """sin(T, L), the cosine of the light's inclination, (...). Eq. 11.
 
-    Greatest for light across the fiber and zero along it: the report's text says the opposite.
+    It is one for light perpendicular to the fiber and zero for light along it: the report's text states the opposite.
     """
     return sin_from_cos(np.sum(tangent * to_light, axis=-1))
 
@@ -88,7 +88,7 @@ def kajiya_kay_specular(tangent: np.ndarray, to_light: np.ndarray, to_view: np.n
 
 
 def kajiya_kay(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray, settings: Settings) -> np.ndarray:
-    """Radiance per irradiance towards the viewer, RGB (..., 3). Eq. 13, with K taken into the colors."""
+    """Radiance per irradiance towards the viewer, RGB (..., 3). Eq. 13; its K is part of the colors."""
     diffuse = kajiya_kay_diffuse(tangent, to_light)[..., None]
     specular = kajiya_kay_specular(tangent, to_light, to_view, settings.exponent)[..., None]
     # The integral of sin(T, L) over the sphere is pi^2: divided by it, the diffuse color is an albedo.
@@ -99,7 +99,7 @@ def kajiya_kay_specular_albedo(exponent: Values) -> np.ndarray:
     """Directional albedo of a highlight of peak one under uniform light, the mean over all directions of view.
 
     The exact value is pi / 2 times the integral of cos^n(s) ((pi - |s|) cos(s) + sin(|s|)) over s = theta_i + theta_o;
-    this is within 0.5 % of it from the exponent 10 on, 4 % at 1.
+    the approximation is within 0.5 % for exponents of 10 and more, 4 % for 1.
     """
     return 0.5 * np.pi**2 * np.sqrt(2.0 * np.pi / (exponent + 1.5))
 

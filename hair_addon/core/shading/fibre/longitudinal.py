@@ -2,7 +2,7 @@
 """Energy-conserving longitudinal scattering function of [DEon11].
 
 It is a density over solid angle in a slice of azimuth: its integral times cos(theta_i) over theta_i is 1 for every
-theta_o and every variance, where Marschner's Gaussian loses what falls beyond the poles.
+theta_o and variance. Marschner's Gaussian loses the part beyond the poles.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ BESSEL_FAR = (
 
 
 def i0e(x: Values) -> np.ndarray:
-    """exp(-x) I0(x), x >= 0 (...): the modified Bessel function without its overflow; within 5e-7 of it."""
+    """Return exp(-x) I0(x), x >= 0 (...): the scaled modified Bessel function, with an error below 5e-7."""
     t = np.asarray(x) / 3.75
     near = np.exp(-np.minimum(x, 3.75)) * np.polynomial.polynomial.polyval(np.square(np.minimum(t, 1.0)), BESSEL_NEAR)
     far_t = np.maximum(t, 1.0)
@@ -30,7 +30,8 @@ def d_eon_lobe(sin_i: Values, cos_i: Values, sin_o: Values, cos_o: Values, v: Va
     """M_v (...) of [DEon11] from sines and cosines of the inclinations, v the variance in theta_i + theta_o.
 
     The printed exp(-sin sin / v) I0(cos cos / v) / (2 v sinh(1 / v)) overflows below v = 0.01; here the exponents are
-    taken together first. cos(theta_i + theta_o) - 1 is half a squared distance, which single precision keeps.
+    combined first. cos(theta_i + theta_o) - 1 is computed as half a squared distance, which is accurate in single
+    precision.
     """
     beside_cone = -0.5 * (np.square(sin_i + sin_o) + np.square(cos_i - cos_o))
     normalization = v * -np.expm1(-2.0 / v)

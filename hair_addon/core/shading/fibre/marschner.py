@@ -2,10 +2,10 @@
 """Light scattered by a translucent fiber in three paths: R, TT and TRT [Marschner03], Eq. 14-17 of [Report12].
 
 S = sum over the paths p of M_p(theta_h) N_p(theta_d, phi) / cos^2(theta_d). Lengths are in fiber radii, so sigma_a is
-per radius. Each function evaluates one point exactly and is vectorised over it; `lookup_tables` averages over texels.
+per radius. Functions are exact and vectorized over points; `lookup_tables` averages over texels.
 
-Convention: irradiance E on a plane facing the light leaves the fiber with the radiance
-`scattering(...) * cos(theta_i) * E`, averaged over the fiber's width.
+Convention: light with irradiance E on a plane facing the light results in the radiance `scattering(...) * cos(theta_i)
+* E`, averaged over the fiber's width.
 """
 
 import math
@@ -23,11 +23,11 @@ from .pigment import sigma_a_from_melanin
 from .principled import beta_r_from_roughness
 
 # Shift of each lobe's center in theta_h per cuticle tilt. A traced tilted wedge gives -1, eta - 1, 2 eta - 1
-# (-1, +0.55, +2.10 for hair), which Cycles' set approaches more closely than the published one.
+# (-1, +0.55, +2.10 for hair), to which the values of Cycles are closer than the published values.
 _SHIFTS = {"CYCLES": (-1.0, 0.5, 2.0), "PUBLISHED": (-1.0, 0.5, 1.5)}
 _WIDTHS = (1.0, 0.5, 2.0)  # of each lobe, relative to R's [Marschner03]
 
-# Keeps 1 / cos^2(theta_d) finite where light and view run along the fiber, and cos(theta_i) takes it to nothing.
+# Keeps 1 / cos^2(theta_d) finite for light and view along the fiber, where cos(theta_i) is zero anyway.
 LEAST_COS_THETA_D = 1e-3
 
 LEAST_BETA_R, GREATEST_BETA_R = math.radians(1.0), math.radians(45.0)
@@ -39,7 +39,8 @@ _BROWN = tuple(round(float(channel), 3) for channel in sigma_a_from_melanin(0.65
 class Settings(_Settings):
     """The optics of a fiber with a circular section.
 
-    Both modes share index, absorption and tilt; what follows is of the energy-conserving mode, then of the classic one.
+    Both modes use index, absorption and tilt; the settings of the energy-conserving mode follow, then those of the
+    classic mode.
     """
 
     mode: str = param(
@@ -148,7 +149,7 @@ class Settings(_Settings):
 
     @property
     def is_elliptic(self) -> bool:
-        """Whether the section is no circle, which only the classic mode knows."""
+        """Whether the section is an ellipse, which only the classic mode supports."""
         return self.mode == "classic" and self.eccentricity < 1.0
 
 
@@ -158,14 +159,14 @@ def gaussian(x: Values, sigma: Values) -> np.ndarray:
 
 
 def beta_r_of(roughness: Values) -> np.ndarray:
-    """beta_R (...) [rad] of a longitudinal roughness (...) in [0, 1], held to what `Settings` allow."""
+    """Return beta_R (...) [rad] of a longitudinal roughness (...) in [0, 1], clamped to the range of `Settings`."""
     return np.clip(beta_r_from_roughness(roughness), LEAST_BETA_R, GREATEST_BETA_R)
 
 
 def longitudinal_lobes(settings: Settings, beta_r: Values | None = None) -> list[tuple[float, Values]]:
     """[(alpha, beta)] of R, TT and TRT: center and standard deviation in theta_h.
 
-    beta_r: R's deviation (...) on strands that differ in it; None: the settings' own.
+    beta_r: deviation (...) of R on varied strands; None: that of the settings.
     """
     beta_r = settings.beta_r if beta_r is None else beta_r
     return [(s * settings.tilt, width * beta_r) for s, width in zip(_SHIFTS[settings.shifts], _WIDTHS, strict=True)]
@@ -178,12 +179,12 @@ def gaussian_lobes(theta_h: Values, settings: Settings, beta_r: Values | None = 
 
 
 def m_lobe(theta_h: Values, alpha: float, beta: Values) -> np.ndarray:
-    """M (...): of unit area in theta_o. Eq. 15 with the factor ½ that it lacks, d(theta_o) being 2 d(theta_h)."""
+    """Return M (...), of unit area in theta_o. Eq. 15 with the missing factor ½, because d(theta_o) = 2 d(theta_h)."""
     return 0.5 * gaussian(theta_h - alpha, beta)
 
 
 def _root_term(p, gamma, cos_theta_d, eta, sigma_a):
-    """One root's share (..., C) of N_p: ½ A dh / d(phi), Eq. 16 with the exponent -1 in place of 2."""
+    """Return one root's contribution (..., C) to N_p: ½ A dh / d(phi), Eq. 16 with the exponent -1 instead of 2."""
     eta_prime, _ = bravais_indices(cos_theta_d, eta)
     slope = np.maximum(np.abs(paths.exit_angle_slope(p, gamma, eta_prime)), 1e-6)  # zero at the caustic
     return paths.path_attenuation(p, gamma, cos_theta_d, eta, sigma_a) * (0.5 * np.cos(gamma) / slope)[..., None]
@@ -204,7 +205,7 @@ def n_tt(phi: Values, cos_theta_d: Values, eta: Values, sigma_a: ArrayLike) -> n
 
 
 def n_trt(phi: Values, cos_theta_d: Values, eta: Values, sigma_a: ArrayLike) -> np.ndarray:
-    """N_TRT (..., C) of a smooth cylinder, exact: up to three roots, without bound at the caustic."""
+    """Return N_TRT (..., C) of a smooth cylinder, exact: up to three roots, infinite at the caustic."""
     phi, cos_theta_d = np.broadcast_arrays(np.abs(phi), cos_theta_d)
     eta_prime, _ = bravais_indices(cos_theta_d, eta)
     total = np.zeros(phi.shape + np.shape(sigma_a))
@@ -219,7 +220,7 @@ def n_trt(phi: Values, cos_theta_d: Values, eta: Values, sigma_a: ArrayLike) -> 
 
 
 def n_trt_caustic(phi: Values, cos_theta_d: Values, settings: Settings) -> np.ndarray:
-    """N_TRT (..., C) with the caustic taken out and a glint of finite width put in its place [Marschner03]."""
+    """Return N_TRT (..., C) with a glint of finite width in place of the caustic [Marschner03]."""
     phi, cos_theta_d = np.broadcast_arrays(np.abs(phi), cos_theta_d)
     caustic = Caustic.at(cos_theta_d, settings, settings.sigma_a)
     smooth = n_trt(phi, cos_theta_d, settings.eta, settings.sigma_a) * caustic.kept(phi)[..., None]
@@ -242,7 +243,8 @@ class Caustic:
         gamma_c = np.where(exists, paths.caustic_gamma(eta_prime), 0.0)
         h_c = np.sin(gamma_c)
         curvature = 4.0 * h_c / (np.square(eta_prime) - h_c**2) ** 1.5 - 2.0 * h_c / (1.0 - h_c**2) ** 1.5
-        # The interval of h that leaves within w_c of the caustic; at eta' = 2 the exit angle is flat and it is all.
+        # The interval of h whose rays leave within w_c of the caustic; at eta' = 2 all rays do, as the exit angle is
+        # flat.
         interval = 2.0 * np.sqrt(2.0 * settings.glint_width / np.maximum(np.abs(curvature), 1e-12))
         interval = np.minimum(interval, settings.glint_limit)
         # 1 - smoothstep: the printed smoothstep would jump from 1 to 0 at eta' = 2.
@@ -259,13 +261,13 @@ class Caustic:
         return Caustic(self.phi_c[index], self.fade[index], self.area[index], self.width)
 
     def kept(self, phi: Values) -> np.ndarray:
-        """The factor (...) that takes the caustic out of N_TRT at phi (...)."""
+        """Return the factor (...) that removes the caustic from N_TRT at phi (...)."""
         peak = gaussian(0.0, self.width)
         left = 1.0 - self.fade * gaussian(phi - self.phi_c, self.width) / peak
         return left * (1.0 - self.fade * gaussian(phi + self.phi_c, self.width) / peak)
 
     def glint(self, phi: Values) -> np.ndarray:
-        """The glint that replaces it, (..., C)."""
+        """Return the glint that replaces the caustic, (..., C)."""
         both = gaussian(phi - self.phi_c, self.width) + gaussian(phi + self.phi_c, self.width)
         return self.area * both[..., None]
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rays through a smooth cylinder, flattened into its normal plane by the Bravais indices [Marschner03].
 
-A path p crosses the inside p times: R, TT, TRT; RESIDUAL stands for all the longer ones together. A ray is named by
-gamma, its angle of incidence in the normal plane; h = sin(gamma) is its offset from the axis. Lengths are in fiber
-radii. cos_theta_d (...) in (0, 1].
+A path p crosses the inside p times: R, TT, TRT; RESIDUAL represents all longer paths. A ray is identified by gamma, its
+angle of incidence in the normal plane; h = sin(gamma) is its offset from the axis. Lengths are in fiber radii.
+cos_theta_d (...) in (0, 1].
 """
 
 import numpy as np
@@ -27,16 +27,16 @@ def exit_angle_slope(p: int, gamma: Values, eta_prime: Values) -> np.ndarray:
 
 
 def tt_gamma(phi: Values, eta_prime: Values) -> np.ndarray:
-    """The one gamma in [0, pi/2] of a TT path that leaves at phi in [0, pi]; pi/2 where no path does.
+    """Return the unique gamma in [0, pi/2] of a TT path that leaves at phi in [0, pi]; pi/2 if there is none.
 
-    From sin(gamma) = eta' sin(gamma - delta), where delta = gamma - gamma_t turns the ray at each of two crossings.
+    From sin(gamma) = eta' sin(gamma - delta), where the ray turns by delta = gamma - gamma_t at each of two crossings.
     """
     delta = 0.5 * (np.pi - phi)
     return np.minimum(np.arctan2(eta_prime * np.sin(delta), eta_prime * np.cos(delta) - 1.0), 0.5 * np.pi)
 
 
 def caustic_gamma(eta_prime: Values) -> np.ndarray:
-    """gamma_c (...), where TRT's exit angle turns back; pi/2 from eta' = 2 on, where it never does."""
+    """Return gamma_c (...), where TRT's exit angle has its extremum; pi/2 for eta' of 2 and more, where it has none."""
     sin_squared = (4.0 - np.square(eta_prime)) / 3.0
     return np.where(sin_squared > 0.0, np.arcsin(np.sqrt(np.maximum(sin_squared, 0.0))), 0.5 * np.pi)
 
@@ -44,7 +44,7 @@ def caustic_gamma(eta_prime: Values) -> np.ndarray:
 def trt_segments(eta_prime: Values) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """[(low, high, slope sign)], each (...): the intervals of gamma in which TRT's exit angle is monotone.
 
-    From eta' = 2 on it is monotone throughout: the middle interval is all and the others are empty.
+    For eta' of 2 and more it is monotone everywhere: the middle interval is the whole range, the others are empty.
     """
     gamma_c = caustic_gamma(eta_prime)
     rim = np.full_like(gamma_c, 0.5 * np.pi)
@@ -65,10 +65,12 @@ def trt_gamma(
     bisections: int = 16,
     newton_steps: int = 2,
 ) -> np.ndarray:
-    """gamma (...) in one monotone segment at which TRT leaves at phi; the nearer end where none does.
+    """Return gamma (...) in one monotone segment at which TRT leaves at phi.
 
-    Newton's steps square the error that bisection has left, and stay between its ends, as beside the caustic the slope
-    is nothing to divide by.
+    The nearer end of the segment if there is none.
+
+    Newton's steps square the remaining error of the bisection, and are limited to its interval, as the slope is nearly
+    zero beside the caustic.
     """
     for _ in range(bisections):
         middle = 0.5 * (low + high)
@@ -83,9 +85,9 @@ def trt_gamma(
 
 
 def attenuation(fresnel: np.ndarray, transmittance: Values) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(A_R, A_TT, A_TRT) from the reflectance and the transmittance of one crossing, broadcast. Eq. 17.
+    """Return (A_R, A_TT, A_TRT) from the reflectance and the transmittance of one crossing, broadcast.
 
-    The reflectance inside, F(1/eta', 1/eta'', gamma_t), is that outside.
+    Eq. 17. The reflectance is the same inside, F(1/eta', 1/eta'', gamma_t), and outside.
     """
     through = np.square(1.0 - fresnel) * transmittance
     return fresnel, through, through * fresnel * transmittance
@@ -100,7 +102,8 @@ def residual_attenuation(fresnel: Values, transmittance: Values) -> np.ndarray:
 def crossing_transmittance(gamma: Values, cos_theta_d: Values, eta: Values, sigma_a: ArrayLike) -> np.ndarray:
     """T (..., C): transmittance of one internal crossing; sigma_a (C,) per radius.
 
-    The report's exponent, 1 + cos(2 gamma_t), is half the square of the chord; this is the chord.
+    The exponent is the length of the chord; the report's exponent, 1 + cos(2 gamma_t), is half the square of that
+    length.
     """
     eta_prime, _ = bravais_indices(cos_theta_d, eta)
     cos_gamma_t = np.sqrt(1.0 - np.square(np.sin(gamma) / eta_prime))
@@ -110,7 +113,7 @@ def crossing_transmittance(gamma: Values, cos_theta_d: Values, eta: Values, sigm
 
 
 def path_attenuation(p: int, gamma: Values, cos_theta_d: Values, eta: Values, sigma_a: ArrayLike) -> np.ndarray:
-    """A_p (..., C), or (..., 1) for R: the part of a ray's light that is left at its exit."""
+    """Return A_p (..., C), or (..., 1) for R: the fraction of a ray's light that remains at its exit."""
     eta_prime, eta_double_prime = bravais_indices(cos_theta_d, eta)
     cos_gamma_t = np.sqrt(1.0 - np.square(np.sin(gamma) / eta_prime))
     fresnel = bravais_reflectance(np.cos(gamma), cos_gamma_t, eta_prime, eta_double_prime)[..., None]

@@ -13,7 +13,7 @@ from .angles import Values
 _EUMELANIN = np.array([0.506, 0.841, 1.653])
 _PHEOMELANIN = np.array([0.343, 0.733, 1.924])
 
-FITTED_IOR = 1.55  # of the fibers that [Chiang16] fitted colors to
+FITTED_IOR = 1.55  # of the fibers to which [Chiang16] fitted colors
 
 # Transmittance of full melanin, as its absorption is finite.
 LEAST_LIGHT = 1e-4
@@ -37,18 +37,18 @@ def sigma_a_from_color(color: ArrayLike, azimuthal_roughness: Values = 0.3) -> n
 
 
 def color_from_sigma_a(sigma_a: ArrayLike, azimuthal_roughness: Values = 0.3) -> np.ndarray:
-    """The color, linear RGB (..., 3), that light takes on among many fibers of sigma_a (..., 3) [Chiang16]."""
+    """Return the color, linear RGB (..., 3), of a groom whose fibers have sigma_a (..., 3) [Chiang16]."""
     return color_from_falloff(sigma_a, color_falloff(azimuthal_roughness))
 
 
 def color_of_scattering(color: ArrayLike, scattering: Values) -> np.ndarray:
-    """The color (..., 3) of hair whose fibers send back more light, or less; color (..., 3): where scattering is 1.
+    """Return the color (..., 3) of hair whose fibers scatter more or less light; color (..., 3): for scattering 1.
 
-    Kubelka and Munk's deep layer: where a part K of the light is absorbed and a part S sent back, the reflectance R
-    follows from K / S = (1 - R)² / (2 R). Here K stays, and S is multiplied by `scattering`, positive.
+    In a deep layer that absorbs a fraction K of the light and scatters a fraction S back, the reflectance R follows
+    from K / S = (1 - R)² / (2 R) [Kubelka31]. K is constant, and S is multiplied by `scattering`, which is positive.
     """
     color = np.asarray(color, float)
-    k, s = np.square(1.0 - color), 2.0 * color * scattering  # K and S by a common factor
+    k, s = np.square(1.0 - color), 2.0 * color * scattering  # K and S up to a common factor
     return s / (s + k + np.sqrt(k * (k + 2.0 * s)))
 
 
@@ -58,5 +58,5 @@ def color_from_falloff(sigma_a: ArrayLike, falloff: Values) -> np.ndarray:
 
 
 def color_falloff(roughness: Values) -> np.ndarray:
-    """Fit of [Chiang16] to path traced grooms: how fast ln(color) falls with sqrt(sigma_a)."""
+    """Fit of [Chiang16] to path-traced grooms: decrease of ln(color) with sqrt(sigma_a)."""
     return np.polynomial.polynomial.polyval(roughness, [5.969, -0.215, 2.532, -10.73, 5.574, 0.245])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's Principled Hair in our terms: its roughness sockets ↔ the widths of lobes [Chiang16]."""
+"""Roughness sockets of Blender's Principled Hair ↔ widths of lobes [Chiang16]."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from .angles import Values
 # Standard deviation of the R lobe in theta_i + theta_o = a b + c b² + d b^20 for the roughness b.
 LINEAR, QUADRATIC, STEEP = 0.726, 0.812, 3.7
 
-# A narrower lobe (0.6 degrees) is about as narrow as the sun's disk, and beyond single precision.
+# Least roughness: its lobe (0.6 degrees) is about as wide as the sun's disk; narrower lobes exceed single precision.
 LEAST_VARIANCE = 1e-4
 # The azimuthal scale of roughness 0: a third of a degree, half a texel of a table of 256.
 LEAST_SCALE = 0.006
@@ -31,7 +31,10 @@ def scale_from_radial_roughness(roughness: Values) -> np.ndarray:
 
 
 def varied_roughness(roughness: Values, amount: float, random: Values) -> np.ndarray:
-    """Roughness (...) of strands with random numbers (...) in [0, 1], as Cycles varies it: up to `amount` of it."""
+    """Return the roughness (...) of strands with random numbers (...) in [0, 1], as in Cycles.
+
+    amount: maximum relative change.
+    """
     return np.clip(roughness * (1.0 + 2.0 * (np.asarray(random) - 0.5) * amount), 0.0, 1.0)
 
 
@@ -41,6 +44,6 @@ def beta_r_from_roughness(roughness: Values) -> Values:
 
 
 def roughness_from_beta_r(beta_r: float) -> float:
-    """beta_R [rad] → longitudinal roughness, held to [0, 1]; the inverse of `beta_r_from_roughness`."""
+    """beta_R [rad] → longitudinal roughness, clamped to [0, 1]; the inverse of `beta_r_from_roughness`."""
     roughness = np.linspace(0.0, 1.0, 4097)
     return float(np.interp(beta_r, beta_r_from_roughness(roughness), roughness))

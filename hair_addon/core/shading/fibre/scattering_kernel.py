@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scattering by one fibre as Warp functions in any precision: tables are baked in double precision, paths take floats.
+"""Scattering by one fiber as Warp functions in any precision: tables are baked in double precision, paths take floats.
 
 Shaders that evaluate lobes include the same text, in single precision (`core/kernels/glsl_text.py`). The reference is
-NumPy: `principled`, `longitudinal`, `fresnel` and `paths`. Here a ray is named by h, its offset from the axis in
-radii, and by sine and cosine of the fibre's inclination to it, theta_o. With theta_d in place of theta_o the equations
-are those of the classic mode: Bravais' indices follow from both alike.
+NumPy: `principled`, `longitudinal`, `fresnel` and `paths`. A ray is given by h, its offset from the axis in radii, and
+by sine and cosine of its inclination theta_o to the fiber's normal plane. With theta_d in place of theta_o the
+equations are those of the classic mode, as Bravais' indices depend on either angle in the same way.
 """
 
 from typing import Any
@@ -106,7 +106,7 @@ def reflectance(cosine: Any, eta: Any):
 
 @wp.func
 def crossing_length(h: Any, sin_o: Any, cos_o: Any, eta: Any):
-    """Length of one crossing of the fibre, in radii: the exponent of `paths.crossing_transmittance`."""
+    """Length of one crossing of the fiber, in radii: the exponent of `paths.crossing_transmittance`."""
     root = wp.sqrt(eta * eta - sin_o * sin_o)
     offset = h * cos_o / root
     return type(h)(2.0) * wp.sqrt(wp.max(type(h)(0.0), type(h)(1.0) - offset * offset)) * eta / root

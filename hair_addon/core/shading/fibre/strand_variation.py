@@ -3,7 +3,7 @@
 
     sigma_a = (pigment k(random) + dye) (1 + (tip_absorption - 1) g) + tip_dye g
 
-where g rises smoothly from 0 to 1 along the strand, and k is the strand's part of the pigment.
+where g rises smoothly from 0 to 1 along the strand, and k is the strand's factor of the pigment.
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class Settings(_Settings):
 
     @property
     def is_even(self) -> bool:
-        """Whether all strands are alike from root to tip: the tables of one sigma_a do."""
+        """Whether all strands are equal from root to tip, so that tables of one sigma_a suffice."""
         return self.random_color == 0.0 and self.random_roughness == 0.0 and not self.has_gradient
 
     @property
@@ -53,7 +53,7 @@ def strand_sigma_a(settings: Settings, random: Values, position: Values) -> np.n
 
 
 def sigma_a_along(settings: Settings, random: Values, gradient: Values) -> np.ndarray:
-    """sigma_a (..., 3) where the root's color has turned into the tip's by a part (...)."""
+    """Return sigma_a (..., 3) at a fraction `gradient` (...) of the tip's color."""
     pigment = pigment_factor(settings.melanin, settings.random_color, random)[..., None] * settings.pigment
     gradient = np.asarray(gradient, float)[..., None]
     at_root = pigment + np.asarray(settings.dye)
@@ -61,27 +61,27 @@ def sigma_a_along(settings: Settings, random: Values, gradient: Values) -> np.nd
 
 
 def sample_sigma_a(settings: Settings, count: int = 16) -> np.ndarray:
-    """sigma_a (count, count, 3) of strands with evenly chosen random numbers, at places evenly chosen along them."""
+    """Return sigma_a (count, count, 3) of strands with evenly spaced random numbers, at evenly spaced positions."""
     middles = (np.arange(count) + 0.5) / count
     return strand_sigma_a(settings, middles[:, None], middles)
 
 
 def pigment_factor(melanin: float, random_color: float, random: Values) -> np.ndarray:
-    """k (...): how the amount of pigment changes with a strand's random number (...), as Cycles changes melanin."""
+    """Return k (...): the factor of pigment by a strand's random number (...), as Cycles varies melanin."""
     factor = 1.0 + 2.0 * (np.asarray(random, float) - 0.5) * random_color
-    if melanin < 1e-4:  # where concentration is proportional to melanin, and its logarithm has lost its digits
+    if melanin < 1e-4:  # here concentration is proportional to melanin, and its logarithm is inaccurate
         return factor
     concentrations = [np.log(np.maximum(1.0 - amount, LEAST_LIGHT)) for amount in (melanin * factor, melanin)]
     return concentrations[0] / concentrations[1]
 
 
 def tip_gradient(start: float, end: float, position: Values) -> np.ndarray:
-    """g (...): a smooth step between two parts of the length; a sharp one where they are the same."""
+    """Return g (...): a smooth step between two positions along the strand; a sharp step if they are equal."""
     x = np.clip((np.asarray(position, float) - start) / np.maximum(end - start, 1e-4), 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)
 
 
 def absorption_range(settings: Settings) -> tuple[float, float]:
-    """(least, greatest) sigma_a of any channel anywhere on any strand."""
+    """Return (least, greatest) sigma_a of all channels, strands and positions."""
     extremes = strand_sigma_a(settings, *np.meshgrid([0.0, 1.0], [0.0, 1.0]))
     return float(extremes.min()), float(extremes.max())

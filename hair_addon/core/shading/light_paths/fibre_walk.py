@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path's turn at a fibre: the energy-conserving model of `energy_conserving` [DEon11] [Chiang16], its value and its
-sampling, for one offset h of the ray in the fibre's width. The mean over h is the fibre's.
+"""Scattering of a path at a fiber: value and sampling of `energy_conserving` [DEon11] [Chiang16] for one offset h of
+the ray within the fiber's width. The mean over h is the scattering of the fiber.
 """
 
 import warp as wp
@@ -18,12 +18,12 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 PI = wp.constant(wp.pi)
 _STEEPEST = wp.constant(0.99999)  # sine of an inclination
-_RESIDUAL = wp.constant(3)  # the path of all longer ones
+_RESIDUAL = wp.constant(3)  # index that stands for all longer paths
 
 
 @wp.struct
 class Fibre:
-    """A fibre's settings where a path meets it."""
+    """The settings of a fiber where a path hits it."""
 
     tangent: wp.vec3
     sigma_a: wp.vec3
@@ -37,14 +37,14 @@ class Fibre:
 
 @wp.func
 def transmittance(h: float, sin_o: float, cos_o: float, eta: float, sigma_a: wp.vec3):
-    """Light left after one crossing of the fibre."""
+    """Light left after one crossing of the fiber."""
     length = crossing_length(h, sin_o, cos_o, eta)
     return wp.vec3(wp.exp(-sigma_a[0] * length), wp.exp(-sigma_a[1] * length), wp.exp(-sigma_a[2] * length))
 
 
 @wp.func
 def attenuation(path: int, fresnel: float, crossing: wp.vec3):
-    """Light of R, TT, TRT or all longer paths."""
+    """Attenuation of R, TT, TRT, or all longer paths."""
     return wp.vec3(
         attenuation_of(path, fresnel, crossing[0]),
         attenuation_of(path, fresnel, crossing[1]),
@@ -69,14 +69,14 @@ def longitudinal(sin_i: float, sin_o: float, shift: float, v: float):
 
 @wp.func
 def logistic_part(scale: float):
-    """Part of a logistic beyond pi, on either side."""
+    """Fraction of a logistic distribution beyond pi, on each side."""
     return 1.0 / (1.0 + wp.exp(PI / scale))
 
 
 @wp.func
 def value(fibre: Fibre, viewer: wp.vec3, light: wp.vec3, h: float, weight: wp.vec3):
-    """(radiance towards the viewer for unit irradiance from the light, density [1/sr] with which `turn` takes the
-    light's direction for a path of this weight); both are unit vectors from the fibre.
+    """Return (radiance towards the viewer for unit irradiance from the light, density [1/sr] with which `turn` samples
+    the light's direction for a path of this weight); viewer, light: unit vectors from the fiber.
     """
     sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
     sin_i = wp.clamp(wp.dot(fibre.tangent, light), -_STEEPEST, _STEEPEST)
@@ -105,13 +105,13 @@ def value(fibre: Fibre, viewer: wp.vec3, light: wp.vec3, h: float, weight: wp.ve
 
 @wp.func
 def even_return(fibre: Fibre, viewer: wp.vec3):
-    """Radiance towards the viewer in even light of radiance one, the mean over the width."""
+    """Return the radiance towards the viewer in uniform light of radiance one, the mean over the width."""
     sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
     cos_o = wp.sqrt(1.0 - sin_o * sin_o)
     total = wp.vec3(0.0, 0.0, 0.0)
     in_all = float(0.0)
     for step in range(8):
-        gamma = (float(step) + 0.5) * (PI / 16.0)  # in which reflection at the edges is smooth
+        gamma = (float(step) + 0.5) * (PI / 16.0)  # a variable in which reflection at the edges is smooth
         weight = wp.cos(gamma)
         fresnel = reflectance(cos_o * weight, fibre.eta)
         crossing = transmittance(wp.sin(gamma), sin_o, cos_o, fibre.eta, fibre.sigma_a)
@@ -123,7 +123,10 @@ def even_return(fibre: Fibre, viewer: wp.vec3):
 
 @wp.func
 def turn(fibre: Fibre, viewer: wp.vec3, weight: wp.vec3, h: float, random: wp.uint32):
-    """(direction of light that goes to the viewer, the path's weight then, random state), at an offset h."""
+    """Sample the direction of light that is scattered to the viewer at an offset h.
+
+    Returns (direction, new weight of the path, random state).
+    """
     state = random
     sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
     cos_o = wp.sqrt(1.0 - sin_o * sin_o)

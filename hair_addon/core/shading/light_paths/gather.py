@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among strands: paths from seen strands through a grid of all, gathered by voxel.
+"""Light among strands: paths from visible strands through a grid of all strands, summed by voxel.
 
-Each path finds all light that its strand sends to the viewer, after any number of events. Beside it is what the same
-strands would send back of even light, and what is drawn of them without paths: dual scattering, with sharp shadows. Of
-these three `voxel_means` tells how each strand of a voxel is shaded, so that their mean is that of
-the paths.
+Each path measures the light that its strand scatters to the viewer, after any number of events. Two other sums are
+gathered: the light that the same strands would scatter in uniform light, and their light as drawn without paths: dual
+scattering, with sharp shadows. From these three sums `voxel_means` computes how each strand of a voxel is shaded, so
+that the mean light of the voxel is that of the paths.
 """
 
 import numpy as np
@@ -23,19 +23,19 @@ from .start_places import start
 from .strand_grid import StrandGrid
 from .surface_walk import surface_of, surface_turn
 
-FOLLOWING = "Following light"  # the step that progress is told of
+FOLLOWING = "Following light"  # name of the step for progress
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 _MOST_EVENTS = wp.constant(1000)
-_DIM = wp.constant(0.1)  # weight below which paths are left out at random
+_DIM = wp.constant(0.1)  # weight below which paths end at random
 _FAR = wp.constant(grid_walk.FAR)
-_KNOWN = 0.015  # standard error of the mean light, as a part of it, below which no more paths are taken
-_FAINT = 0.3  # of the mean light that is drawn: light below it is worth no shadow each time
-_SHARES, _LEAST_SHARE = 8, 8_192  # paths after which processors tell progress: shares of all, of so many at least
+_KNOWN = 0.015  # relative standard error of the mean light below which no more paths are traced
+_FAINT = 0.3  # fraction of the mean drawn light below which shadows are traced only at random
+_SHARES, _LEAST_SHARE = 8, 8_192  # paths between progress reports on a CPU: a fraction of all paths, and the minimum
 _MOST_TURNS = 64  # of paths on the same hair
-_SPARE = 1.1  # by which more are taken: the error is an estimate, and each turn has a cost of its own
-_LEAST_TURN = 0.125  # paths of a further turn, as a part of all before
+_SPARE = 1.1  # factor of additional paths: the error is an estimate, and each further pass has overhead
+_LEAST_TURN = 0.125  # minimum paths of a further pass, as a fraction of the previous paths
 
 
 @wp.kernel
@@ -63,7 +63,7 @@ def _gather(
             here.position = met.position
             here.own = -1
             here.weight = weight
-            # Numbers of their own: with other lamps a path goes the same way.
+            # A separate random sequence: with other lamps a path takes the same directions.
             lamp_state = wp.rand_init(1 + event, keys[path])
             if met.kind == STRAND:
                 here.fibre = fibre_of(medium, met.index)
@@ -123,13 +123,13 @@ def gather(
     most_paths: int = 0,
     progress: Progress = no_progress,
 ) -> tuple[list[wp.array4d[wp.float64]], int]:
-    """(Z, Y, X, 12) of each system by voxel, sums of RGB: over paths their light, and what even light would give; over
-    samples, which are others, what is drawn without paths, and what even light would give there; and how many paths.
-    All on the device of the grid.
+    """Return ((Z, Y, X, 12) sums for each hair system, number of paths), on the device of the grid. The sums of a voxel
+    are RGB: over paths, their light and the light in uniform light; over the picture's samples, the light drawn without
+    paths and the light in uniform light.
 
-    About `path_count` start on hair that is in sight. Then follow as many as the standard error of their mean light
-    seems to need to fall to 1.5 % of it, at most as many again, until it has fallen so far or there would be more than
-    `most_paths`: few paths of dark hair find a lamp.
+    About `path_count` paths start on visible hair. Further passes add the number of paths that reduces the relative
+    standard error of the mean light to 1.5 % by estimate, at most as many as before, up to `most_paths` in total: in
+    dark hair few paths reach a lamp.
     """
     light = PathSums(grid, surroundings)
     light.see(seen)
@@ -146,9 +146,9 @@ def gather(
 
 
 class PathSums:
-    """Sums of `gather` over the paths of any number of views, one turn of paths after the other.
+    """Sums of `gather` over the paths of any number of views, pass by pass.
 
-    taken: number of paths, less where sums have faded.
+    taken: number of paths, reduced where sums have faded.
     """
 
     def __init__(self, grid: StrandGrid, surroundings: Surroundings) -> None:
@@ -164,7 +164,7 @@ class PathSums:
             self._in_sight, self._hiding = _sight_of(grid, surroundings) or (self._medium, self._mesh)
 
     def see(self, seen: Seen) -> None:
-        """Start paths in another view from now on, and add what is drawn there to the sums."""
+        """Start further paths in another view, and add the light drawn there to the sums."""
         count = len(seen.segments)
         require_indices("segments", seen.segments.numpy(), len(self.grid.points) - 1)
         for name in ("places", "drawn"):
@@ -180,9 +180,10 @@ class PathSums:
             self._voxels = start_places.voxels_of(self._medium, places)
 
     def follow(self, count: int, seed: int, progress: Progress = no_progress, share: int = 0) -> None:
-        """Add about `count` paths that start on hair in sight; share: paths after which progress is told, 0: many.
+        """Trace about `count` paths from visible hair, and add them to the sums.
 
-        Sums change at the end only: an exception of `progress` leaves them as they are.
+        share: paths between progress reports, 0 for the default. The sums change only at the end, so an exception
+        raised by `progress` leaves them unchanged.
         """
         if self._seen is None or not len(self._seen.segments):
             return
@@ -196,11 +197,11 @@ class PathSums:
 
     @property
     def wanted(self) -> float:
-        """How many times as many paths the standard error of the mean light seems to need to fall to 1.5 % of it."""
+        """Return the estimated factor of paths that reduces the relative standard error of the mean light to 1.5 %."""
         return (_standard_error(self._total, self._squares, self.taken) / _KNOWN) ** 2
 
     def fade(self, weight: float) -> None:
-        """Multiply all sums with a weight."""
+        """Multiply all sums by a weight."""
         self._sums.scale(weight)
         self._total, self._squares, self.taken = weight * self._total, weight * self._squares, weight * self.taken
 
@@ -211,9 +212,10 @@ class PathSums:
     def shares(
         self, former: "PathSums | None" = None, weight: float = 0.0, shift: np.ndarray | float = 0.0
     ) -> list[np.ndarray]:
-        """`voxel_means.shares` of each system of hair.
+        """Return `voxel_means.shares` of each hair system.
 
-        former: other sums on this device of as many systems, which count with a weight; shift: (3,) since then [m].
+        former: earlier sums on this device with the same number of systems, which are added with a weight; shift: (3,)
+        motion of the hair since then [m].
         """
         sums, taken = self._sums, self.taken
         if former is not None and weight > 0.0:
@@ -225,28 +227,31 @@ class PathSums:
 
 
 def _sight_of(grid, surroundings):
-    """(`Medium` of what is seen, the mesh in it) where some surfaces are not; None where all are."""
+    """Return (`Medium` with the visible surfaces, their mesh) if some surfaces are invisible.
+
+    None if all are visible.
+    """
     if surroundings.is_seen is None or surroundings.is_seen.all():
         return None
-    require_count("surfaces that are seen", len(surroundings.is_seen), len(surroundings.corners) // 3)
+    require_count("visibilities of surfaces", len(surroundings.is_seen), len(surroundings.corners) // 3)
     mesh = mesh_of(surroundings.corners.reshape(-1, 3, 3)[surroundings.is_seen])
     return unlit_medium_of(grid, mesh), mesh
 
 
 def _even_there(medium, seen_in, segments, places):
-    """(N,) RGB that even light would give at samples."""
+    """Return the light (N,) RGB of samples in uniform light."""
     found, device = wp.zeros(len(segments), dtype=wp.vec3), medium.points.device
     launch(_even, len(found), [medium, view.on_device(seen_in), segments, places, found], device)
     return found
 
 
 def _traced(medium, sources, seen_in, starts, progress, share=0):
-    """Of paths: where they start, light from there, and what even light would give, (N,) each."""
+    """Trace paths; returns their starts, their light, and the light in uniform light, (N,) each."""
     count, seen_here, device = len(starts.segments), view.on_device(seen_in), medium.points.device
     found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
-    # A GPU takes about as long for a share as for all.
+    # On a GPU a share takes about as long as all paths.
     share = share or (max(count // _SHARES, _LEAST_SHARE) if device.is_cpu else max(count, 1))
-    for first in range(0, count, share):  # none if no place is in sight: Warp has no empty slices
+    for first in range(0, count, share):  # none if no place is visible: Warp has no empty slices
         some = slice(first, min(first + share, count))
         rows = [array[some] for array in (starts.segments, starts.keys, *found)]
         launch(_gather, len(rows[0]), [medium, sources, seen_here, *rows], device)
@@ -255,5 +260,5 @@ def _traced(medium, sources, seen_in, starts, progress, share=0):
 
 
 def _standard_error(total, squares, count):
-    """Of the mean of values with a sum and a sum of squares, as a part of it."""
+    """Return the relative standard error of the mean of values with this sum and sum of squares."""
     return np.sqrt(max(squares - total * total / count, 0.0)) / total if total > 0.0 else np.inf

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path's way to the next strand or surface: through voxels, and in those that hold hair through the cells of segments
-that they are divided into [Amanatides87].
+"""Tracing of a ray to the next strand or surface: through voxels, and through the cells of voxels that contain hair
+[Amanatides87].
 
-Strands are round, as Cycles takes hair of straight segments: a segment is a cylinder around its axis, and the wedge
-that two of them leave open on the outside of a bend is of a sphere around the point between them. A path meets the side
-of a strand that faces it, so not a strand that it begins inside of, as strands that overlap are [Embree26]; and it goes
-on from where it has met the strand, on that side. The strand that it leaves it does not meet next, even in bends.
+Strands are round, as linear hair in Cycles: a segment is a cylinder around its axis, and a sphere around the point
+between two segments fills the gap on the outside of a bend. A ray hits only the side of a strand that faces it, and
+thus no strand that contains its origin, where strands overlap [Embree26]; the path continues from the hit, on that
+side. A ray does not hit the strand that it leaves, even in bends.
 """
 
 import warp as wp
@@ -16,8 +16,8 @@ from .strand_cells import LINE_ERROR, line_from
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 FAR = wp.constant(1e9)
-_LEAST = wp.constant(1e-9)  # component of a direction
-PASSED, STRAND, SURFACE = (wp.constant(kind) for kind in range(3))  # what ends a path's way
+_LEAST = wp.constant(1e-9)  # least component of a direction
+PASSED, STRAND, SURFACE = (wp.constant(kind) for kind in range(3))  # kinds of hits
 
 
 @wp.struct
@@ -50,9 +50,10 @@ class Medium:
 
 @wp.struct
 class Met:
-    """What a path meets: a segment, by its first point, or a triangle; where; the triangle's normal against the path.
+    """The hit of a ray: a segment, identified by its first point, or a triangle; its place.
 
-    offset: from the segment's axis, a part of the radius, positive along cross(path, tangent).
+    The triangle's normal on the side of the ray. offset: from the segment's axis, as a fraction of the radius, positive
+    along cross(ray, tangent).
     """
 
     kind: int
@@ -81,7 +82,7 @@ def fibre_of(medium: Medium, segment: int):
 
 @wp.func
 def is_in_bend(medium: Medium, segment: int, place: wp.vec3):
-    """Whether a place, from the segment's end, is beyond that end and before the strand's next segment."""
+    """Whether a place, relative to the segment's end, is beyond that end and before the strand's next segment."""
     if segment + 2 >= medium.points.shape[0]:
         return False
     if medium.strands[segment + 2] != medium.strands[segment]:
@@ -94,7 +95,10 @@ def is_in_bend(medium: Medium, segment: int, place: wp.vec3):
 
 @wp.func
 def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3):
-    """(distance along a ray of unit direction, offset from the axis) where it enters a segment; `FAR` without."""
+    """Return (distance along a ray of unit direction, offset from the axis) where the ray enters a segment.
+
+    `FAR` without a hit.
+    """
     start = medium.points[segment] - position
     along = medium.points[segment + 1] - medium.points[segment]
     normal = wp.cross(direction, along)
@@ -132,7 +136,10 @@ def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3
 
 @wp.func
 def _shading_normal(medium: Medium, face: int, u: float, v: float, flat: wp.vec3):
-    """The normal between those of a triangle's corners, on the side of its own; its own where they have none."""
+    """Return the interpolated normal of a triangle's corners, on the side of its face normal.
+
+    The face normal if corners have none.
+    """
     between = u * medium.normals[3 * face] + v * medium.normals[3 * face + 1]
     between += (1.0 - u - v) * medium.normals[3 * face + 2]
     normal = flat
@@ -155,7 +162,7 @@ def _inverse_of(direction: wp.vec3):
 
 @wp.func
 def _first_cell(inside: wp.vec3, shape: wp.vec3i):
-    """The cell of a grid that a place, in cells from its corner, is in."""
+    """Return the cell of a grid that contains a place; inside: in cells from the grid's corner."""
     cell = wp.vec3i(0, 0, 0)
     for axis in range(3):
         cell[axis] = wp.clamp(int(wp.floor(inside[axis])), 0, shape[axis] - 1)
@@ -164,7 +171,7 @@ def _first_cell(inside: wp.vec3, shape: wp.vec3i):
 
 @wp.func
 def _leaves(corner: wp.vec3, cell: wp.vec3i, side: float, position: wp.vec3, direction: wp.vec3, inverse: wp.vec3):
-    """Where a ray leaves a cell along each axis [m]."""
+    """Return the distances at which a ray leaves a cell along each axis [m]."""
     leave = wp.vec3(FAR, FAR, FAR)
     for axis in range(3):
         if wp.abs(direction[axis]) >= _LEAST:
@@ -177,9 +184,10 @@ def _leaves(corner: wp.vec3, cell: wp.vec3i, side: float, position: wp.vec3, dir
 
 @wp.func
 def _comes_near(medium: Medium, turn: int, from_centre: wp.vec3, side: float, direction: wp.vec3):
-    """Whether a ray, from a place away from a cell's centre, may come into one of the cell's segments within the cell.
+    """Whether a ray may hit one of the cell's segments within the cell; from_centre: its origin relative to the cell's
+    center.
 
-    It does if the line that is kept of the segment is as near as the radius, or beyond that by what it is off.
+    It may if the distance to the segment's stored line is at most the radius plus the line's rounding error.
     """
     point, along, halvings = line_from(medium.lines[2 * turn], medium.lines[2 * turn + 1], side)
     normal = wp.cross(direction, along)
@@ -190,7 +198,10 @@ def _comes_near(medium: Medium, turn: int, from_centre: wp.vec3, side: float, di
 
 @wp.func
 def _part_in_grid(medium: Medium, position: wp.vec3, direction: wp.vec3, inverse: wp.vec3, most: float):
-    """The distances [m] at which a ray enters and leaves the grid, up to `most`; the second is less without a part."""
+    """Return the distances [m] at which a ray enters and leaves the grid, up to `most`.
+
+    The second is smaller if the ray misses the grid.
+    """
     here = float(0.0)
     last = float(most)
     for axis in range(3):
@@ -218,7 +229,7 @@ def _trace_cell(
     end: float,
     met: Met,
 ):
-    """(distance, `Met`) of the nearest segment of a cell in front of `end`; both as given without one."""
+    """Return (distance, `Met`) of the nearest segment of a cell before `end`; the arguments if there is none."""
     for turn in range(medium.starts[index], medium.starts[index + 1]):
         if _comes_near(medium, turn, position - centre, side, direction):
             segment = medium.segments[turn]
@@ -246,7 +257,10 @@ def _trace_brick(
     end: float,
     met: Met,
 ):
-    """The same for the cells of a voxel that a ray enters at `here` and leaves at `to` [m]; corner: of the voxel."""
+    """Return `_trace_cell` of all cells of a voxel that a ray enters at `here` and leaves at `to` [m].
+
+    corner: of the voxel.
+    """
     along = medium.along_voxel
     side = medium.voxel / float(along)
     cell = _first_cell((position + direction * here - corner) / side, wp.vec3i(along, along, along))
@@ -271,13 +285,13 @@ def _trace_brick(
 
 @wp.func
 def _trace_strands(medium: Medium, position: wp.vec3, direction: wp.vec3, own: int, most: float, met: Met):
-    """The same for the whole grid."""
+    """Return `_trace_cell` of all cells of the grid."""
     end = float(most)
     inverse = _inverse_of(direction)
     here, last = _part_in_grid(medium, position, direction, inverse, most)
     voxel = _first_cell((position + direction * here - medium.corner) / medium.voxel, medium.shape)
     leave = _leaves(medium.corner, voxel, medium.voxel, position, direction, inverse)
-    going = medium.shape[0] + medium.shape[1] + medium.shape[2]  # no ray crosses more voxels, whatever its numbers are
+    going = medium.shape[0] + medium.shape[1] + medium.shape[2]  # no ray crosses more voxels, even with invalid numbers
     if here >= last:
         going = 0
     while going > 0:
@@ -302,11 +316,11 @@ def _trace_strands(medium: Medium, position: wp.vec3, direction: wp.vec3, own: i
 
 @wp.func
 def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int):
-    """`Met` within a distance [m] of a ray; own: the strand that it leaves, -1: none."""
+    """Return the `Met` of a ray within a distance [m]; own: the strand that the ray leaves, -1: none."""
     met = Met()
     met.kind = PASSED
     end, met = _trace_strands(medium, position, direction, own, most, met)
-    # Surfaces are looked for in front of the strand only.
+    # Surfaces behind the strand do not matter.
     if medium.has_mesh > 0:
         found = wp.mesh_query_ray(medium.mesh, position, direction, end)
         if found.result:
@@ -322,8 +336,8 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
 
 @wp.func
 def place_on(medium: Medium, segment: int, part: float, offset: float, direction: wp.vec3):
-    """`Met` of a ray of a direction with a segment, at a part of it and an offset from its axis, on the side that faces
-    the ray: as `walk` finds it.
+    """Return the `Met` of a ray with a segment, at a fraction of its length and an offset from its axis, on the side
+    that faces the ray, as `walk` returns it.
     """
     start = medium.points[segment]
     along = medium.points[segment + 1] - start

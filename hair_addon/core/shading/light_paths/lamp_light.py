@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light at the events of a path: of random points of lamps and the world, and of those that the path meets [Veach95].
+"""Light at the events of a path.
 
-Both find the same light: each counts by its share of both densities (the balance heuristic), so that neither lamps near
-a strand nor narrow lobes give few paths much light.
+Light comes from random points of lamps and of the world, and from lamps and the world that the path hits [Veach95].
+Both methods sample the same light: each is weighted by its share of both densities (the balance heuristic), so that
+neither lamps near a strand nor narrow lobes give few paths much light.
 """
 
 import warp as wp
@@ -15,16 +16,16 @@ from .world_light import world_density, world_radiance
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-_LAMPS_AT_ONCE = wp.constant(8)  # that light an event
-_WORLD_AT_ONCE = wp.constant(4)  # directions of the world that light a seen place
-_OFFSETS_AT_ONCE = wp.constant(4)  # over the part of a strand's width around the one that is met
-_AROUND = wp.constant(0.25)  # half that part, of the radius
-_LEAST = wp.constant(0.25)  # of a voxel: distance below which no lamp's light grows
+_LAMPS_AT_ONCE = wp.constant(8)  # lamps traced at each event
+_WORLD_AT_ONCE = wp.constant(4)  # directions of the world traced at a visible place
+_OFFSETS_AT_ONCE = wp.constant(4)  # offsets averaged around the hit
+_AROUND = wp.constant(0.25)  # half the averaged range, relative to the radius
+_LEAST = wp.constant(0.25)  # relative to a voxel: distance below which the light of a lamp no longer increases
 
 
 @wp.struct
 class Event:
-    """A place on strand `own`, or where that is below zero on a surface.
+    """A place on strand `own`, or on a surface if `own` is negative.
 
     facing: unit vector towards the path's last place; offset: in the strand's width, from -1 to 1; weight: of light
     from there to the viewer.
@@ -41,7 +42,7 @@ class Event:
 
 @wp.func
 def turn_density(here: Event, direction: wp.vec3):
-    """The density [1/sr] with which a path leaves an event in a direction."""
+    """Return the density [1/sr] with which a path leaves an event in a direction."""
     density = float(0.0)
     if here.own >= 0:
         _found, density = value(here.fibre, here.facing, direction, here.offset, here.weight)
@@ -52,7 +53,7 @@ def turn_density(here: Event, direction: wp.vec3):
 
 @wp.func
 def _is_shadowed(medium: Medium, lit: Lit, here: Event):
-    """Whether a lamp's light does not arrive at an event."""
+    """Whether an event is in the shadow of a lamp."""
     if lit.casts_shadow == 0:
         return False
     met = walk(medium, here.position, lit.direction, lit.distance, here.own)
@@ -61,7 +62,10 @@ def _is_shadowed(medium: Medium, lit: Lit, here: Event):
 
 @wp.func
 def _one_of(sources: Sources, index: int, random: wp.uint32):
-    """(a lamp by its index, or any one where there are more than `_LAMPS_AT_ONCE`; its share; random state)."""
+    """Return (the lamp of an index, or a random lamp if there are more than `_LAMPS_AT_ONCE`.
+
+    One over its probability; random state).
+    """
     state = random
     if sources.count <= _LAMPS_AT_ONCE:
         return index, 1.0, state
@@ -71,7 +75,10 @@ def _one_of(sources: Sources, index: int, random: wp.uint32):
 
 @wp.func
 def _lamp_at(medium: Medium, sources: Sources, index: int, here: Event, random: wp.uint32):
-    """(`Lit` of `_one_of` the lamps with its share, or of the world after them; that share; random state)."""
+    """Return (`Lit` by the lamp of `_one_of`, or by the world for an index after the lamps.
+
+    Its share; random state).
+    """
     state = random
     lit = Lit()
     share = float(1.0)
@@ -86,9 +93,9 @@ def _lamp_at(medium: Medium, sources: Sources, index: int, here: Event, random: 
 
 @wp.func
 def _offset_at(here: Event, step: int, shift: float):
-    """An offset around that of an event."""
+    """Return an offset near that of an event."""
     h = here.offset + _AROUND * (2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0)
-    # Back from beyond the edge: the mean over all offsets stays that over the width.
+    # Reflected at the edge: the mean over all offsets remains the mean over the width.
     if wp.abs(h) > 1.0:
         h = wp.sign(h) * 2.0 - h
     return h
@@ -96,7 +103,10 @@ def _offset_at(here: Event, step: int, shift: float):
 
 @wp.func
 def _scattered(here: Event, lit: Lit, shift: float):
-    """Light of a point of a lamp that goes to the viewer, by its share of densities: the mean around an offset."""
+    """Return the light of a point of a lamp that is scattered to the viewer, weighted by its share of densities.
+
+    It is the mean around an offset.
+    """
     light = wp.vec3(0.0, 0.0, 0.0)
     if here.own < 0:
         light, density = surface_value(here.surface, lit.direction, here.weight)
@@ -112,12 +122,12 @@ def _scattered(here: Event, lit: Lit, shift: float):
 
 @wp.func
 def _by_lot(light: wp.vec3, faint: float, random: wp.uint32):
-    """(light, random state): of light whose sum of RGB is below `faint`, as much as that or none, the same in the mean
-    [Arvo90]. What is none needs no shadow.
+    """Return (light, random state). Light whose sum of RGB is below `faint` becomes `faint` or zero at random, with the
+    same mean [Arvo90]: zero light needs no shadow ray.
     """
     state = random
     amount = light[0] + light[1] + light[2]
-    lot = wp.randf(state) * faint  # always, that all numbers after it are the same
+    lot = wp.randf(state) * faint  # always drawn, so that all later numbers are the same
     kept = light
     if amount < faint:
         kept = wp.vec3(0.0, 0.0, 0.0)
@@ -128,7 +138,9 @@ def _by_lot(light: wp.vec3, faint: float, random: wp.uint32):
 
 @wp.func
 def light_at_once(medium: Medium, sources: Sources, here: Event, random: wp.uint32):
-    """(radiance of light that an event sends to the viewer, random state): all lamps are traced that are not faint."""
+    """Return (radiance that an event scatters to the viewer, random state), with a shadow ray to each lamp that is not
+    faint.
+    """
     state = random
     light = wp.vec3(0.0, 0.0, 0.0)
     lamp_count = wp.min(sources.count, _LAMPS_AT_ONCE)
@@ -148,8 +160,8 @@ def light_at_once(medium: Medium, sources: Sources, here: Event, random: wp.uint
 
 @wp.func
 def light_by_share(medium: Medium, sources: Sources, here: Event, random: wp.uint32):
-    """(the same light, random state): of what all lamps would send without shadows one is drawn by its share, and
-    traced [Talbot05].
+    """Return `light_at_once` with a single shadow ray, to a lamp chosen by its share of the unshadowed light
+    [Talbot05].
     """
     state = random
     total = float(0.0)
@@ -176,9 +188,8 @@ def light_by_share(medium: Medium, sources: Sources, here: Event, random: wp.uin
 
 @wp.func
 def light_met(medium: Medium, sources: Sources, here: Event, direction: wp.vec3, met: Met, random: wp.uint32):
-    """(radiance from the direction in which a path leaves an event, by its share of densities, random state).
-
-    met: what the path meets there.
+    """Return (radiance from the direction in which a path leaves an event, weighted by its share of densities, random
+    state). met: the hit in that direction.
     """
     state = random
     light = wp.vec3(0.0, 0.0, 0.0)

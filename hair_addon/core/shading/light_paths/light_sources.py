@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps as paths see them: shaders/light/lights.glsl, at a point of each lamp; and the world beside them."""
+"""Light sources of paths: the lamps of shaders/light/lights.glsl, sampled at points, and the world."""
 
 import warp as wp
 
@@ -9,7 +9,7 @@ from .world_light import World, world_direction
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-_NO_AREA = wp.constant(1e-20)  # of a lamp [m²]: no direction meets it
+_NO_AREA = wp.constant(1e-20)  # area of a lamp [m²] too small to be hit
 SUN, POINT, SPOT, AREA = (wp.constant(kind) for kind in range(4))  # as `core.imaging.lamps`
 
 
@@ -23,16 +23,16 @@ class Sources:
     axis: wp.array[wp.vec3]
     power: wp.array[wp.vec3]
     shape: wp.array[wp.vec4]  # radius, cos_cone, blend, whether it casts shadows
-    chance: wp.array[float]  # of being chosen
+    chance: wp.array[float]  # probability of being chosen
     world: World
-    faint: float  # sum of RGB, as the viewer sees it, below which light is looked for at random
+    faint: float  # sum of RGB at the viewer below which shadow rays are traced at random
 
 
 @wp.struct
 class Lit:
     """Light of a lamp at a place: unit vector towards a point of it, distance [m], irradiance.
 
-    density: of random points of the lamp in this direction [1/sr]; the lamp's radiance is it times the irradiance.
+    density: of random points of the lamp in this direction [1/sr]; the lamp's radiance is density × irradiance.
     """
 
     direction: wp.vec3
@@ -44,7 +44,7 @@ class Lit:
 
 @wp.func
 def across(direction: wp.vec3):
-    """A unit vector at a right angle."""
+    """Return a perpendicular unit vector."""
     helper = wp.vec3(1.0, 0.0, 0.0)
     if wp.abs(direction[0]) > 0.7:
         helper = wp.vec3(0.0, 1.0, 0.0)
@@ -80,7 +80,7 @@ def area_falloff(cosine: float, cos_cone: float):
     tan_cone = wp.sqrt((1.0 - cos_cone) * (1.0 + cos_cone)) / cos_cone
     tan_angle = wp.sqrt(wp.max(0.0, (1.0 - cosine) * (1.0 + cosine))) / wp.max(cosine, 1e-6)
     excess = tan_cone - wp.atan(tan_cone)
-    if tan_cone < 0.2:  # where the difference is little more than rounding
+    if tan_cone < 0.2:  # here the difference is mostly rounding error
         squared = tan_cone * tan_cone
         excess = tan_cone * squared * (1.0 / 3.0 - squared * (1.0 / 5.0 - squared / 7.0))
     return wp.max(0.0, tan_cone - tan_angle) / wp.max(excess, 1e-12)
@@ -88,7 +88,7 @@ def area_falloff(cosine: float, cos_cone: float):
 
 @wp.func
 def choose(sources: Sources, random: wp.uint32):
-    """(index of one of the lamps, one over its chance, random state)."""
+    """Return (index of a random lamp, one over its probability, random state)."""
     state = random
     chosen = int(0)
     before = wp.randf(state)
@@ -100,7 +100,10 @@ def choose(sources: Sources, random: wp.uint32):
 
 @wp.func
 def _sent(sources: Sources, chosen: int, offset: wp.vec3, lit: Lit, least: float):
-    """`Lit` with its irradiance and density, of a direction and a distance; offset: to the lamp's middle [m]."""
+    """Return a `Lit` completed by irradiance and density.
+
+    lit: with direction and distance; offset: to the lamp's center [m].
+    """
     shape = sources.shape[chosen]
     kind = sources.kind[chosen]
     area = wp.max(PI * shape[0] * shape[0], _NO_AREA)
@@ -126,7 +129,7 @@ def _sent(sources: Sources, chosen: int, offset: wp.vec3, lit: Lit, least: float
 
 @wp.func
 def _disk_normal(sources: Sources, chosen: int, offset: wp.vec3):
-    """The side of a lamp's disk that gives light: all around it turns to what it lights."""
+    """Return the normal of the emitting side of a lamp's disk; the disk of a point light faces the lit place."""
     normal = sources.axis[chosen]
     if sources.kind[chosen] != AREA:
         normal = -wp.normalize(offset)
@@ -135,9 +138,10 @@ def _disk_normal(sources: Sources, chosen: int, offset: wp.vec3):
 
 @wp.func
 def lit_by(sources: Sources, chosen: int, position: wp.vec3, least: float, random: wp.uint32):
-    """(`Lit` by a random point of a lamp, random state); least: distance [m] below which no light grows.
+    """Return (`Lit` by a random point of a lamp, random state).
 
-    Only lamps smaller than that have so few paths with so much light.
+    least: distance [m] below which irradiance no longer increases. Without this limit few paths near small lamps would
+    carry very much light.
     """
     state = random
     lit = Lit()
@@ -159,7 +163,7 @@ def lit_by(sources: Sources, chosen: int, position: wp.vec3, least: float, rando
 
 @wp.func
 def lit_by_world(sources: Sources, random: wp.uint32):
-    """(`Lit` by a direction of the world, random state)."""
+    """Return (`Lit` by a random direction of the world, random state)."""
     state = random
     lit = Lit()
     direction, radiance, density, after = world_direction(sources.world, state)
@@ -173,7 +177,7 @@ def lit_by_world(sources: Sources, random: wp.uint32):
 
 @wp.func
 def lit_from(sources: Sources, chosen: int, position: wp.vec3, direction: wp.vec3, least: float):
-    """`Lit` by the point of a lamp in a direction; without irradiance where the lamp is not there."""
+    """Return the `Lit` by the point of a lamp in a direction; zero irradiance if the direction misses the lamp."""
     lit = Lit()
     lit.casts_shadow = int(sources.shape[chosen][3])
     lit.direction = direction

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands, surfaces and lamps on a device, as kernels of paths take them."""
+"""Strands, surfaces and lamps on a device, for the kernels that trace paths."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -20,14 +20,13 @@ _LEAST_PATHS = 1024  # fewer are not worth a thread
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What lights hair beside itself: surfaces, lamps and the world.
+    """Everything that lights hair, except hair: surfaces, lamps and the world.
 
     corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own;
     albedo: (F, 3) base colors of them; lamps: (N,) records with the fields of `Light` in shaders/light/lights.glsl;
-    importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance, a picture of longitude
-    and latitude as core/imaging/environment.py takes it apart; gloss: (F, 3) of triangles, roughness, metallic, and
-    reflectance at normal incidence, without it all are matt; is_seen: (F,) bool of triangles, whether they hide hair
-    from the viewer, without it all do.
+    importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance, an equirectangular picture as in
+    core/imaging/environment.py; gloss: (F, 3) roughness, metallic, and reflectance at normal incidence of triangles,
+    None: all are matte; is_seen: (F,) bool, whether triangles hide hair from the viewer, None: all do.
     """
 
     corners: np.ndarray
@@ -48,7 +47,7 @@ def launch(kernel: wp.Kernel, count: int, inputs: list[Any], device: wp.DeviceLi
 
 
 def mesh_of(corners: np.ndarray) -> wp.Mesh | None:
-    """A `wp.Mesh` of triangles, None without."""
+    """Return a `wp.Mesh` of triangles, None without triangles."""
     corners = np.ascontiguousarray(corners, np.float32).reshape(-1, 3)
     if not len(corners):
         return None
@@ -58,7 +57,10 @@ def mesh_of(corners: np.ndarray) -> wp.Mesh | None:
 def medium_of(
     grid: StrandGrid, mesh: wp.Mesh | None, normals: np.ndarray, albedo: np.ndarray, gloss: np.ndarray | None = None
 ) -> Medium:
-    """A grid and the triangles of a mesh on its device, the current one, as `Surroundings` has their values."""
+    """Return the `Medium` of a grid and the triangles of a mesh, on the current device, which must be the grid's.
+
+    The other arguments are those of `Surroundings`.
+    """
     corner_count = 0 if mesh is None else len(mesh.indices)
     gloss = np.zeros((corner_count // 3, 3)) if gloss is None else gloss
     require_count("surface gloss", len(gloss), corner_count // 3)
@@ -85,13 +87,13 @@ def medium_of(
 
 
 def unlit_medium_of(grid: StrandGrid, mesh: wp.Mesh | None) -> Medium:
-    """Return the `Medium` of strands and a mesh whose triangles only hide what is behind them."""
+    """Return the `Medium` of strands and a mesh whose triangles only occlude strands."""
     corner_count = 0 if mesh is None else len(mesh.indices)
     return medium_of(grid, mesh, np.zeros((corner_count, 3)), np.zeros((corner_count // 3, 3)))
 
 
 def sources_of(surroundings: Surroundings, faint: float) -> Sources:
-    """Lamps and world on the current device; faint: as of `Sources`."""
+    """Return the lamps and the world on the current device; faint: as in `Sources`."""
     lamps = surroundings.lamps
     require_count("lamps", len(surroundings.importance), len(lamps))
     sources = Sources()
@@ -102,7 +104,7 @@ def sources_of(surroundings: Surroundings, faint: float) -> Sources:
     )
     shape = np.stack([lamps[name] for name in ("radius", "cos_cone", "blend", "casts_shadow")], axis=-1)
     sources.shape = wp.array(shape.astype(np.float32).reshape(-1, 4), dtype=wp.vec4)
-    # None without a chance: the irradiance elsewhere may be another.
+    # Give every lamp a non-zero probability: the irradiance may differ elsewhere.
     importance = np.asarray(surroundings.importance, float)
     chance = importance + 0.1 * importance.mean() + 1e-12 if len(lamps) else importance
     sources.chance = wp.array((chance / max(chance.sum(), 1e-30)).astype(np.float32), dtype=float)
@@ -111,5 +113,5 @@ def sources_of(surroundings: Surroundings, faint: float) -> Sources:
 
 
 def vectors(values: np.ndarray) -> wp.array:
-    """Numbers (..., 3) as an array of vectors."""
+    """Return numbers (..., 3) as an array of vectors."""
     return wp.array(np.ascontiguousarray(values, np.float32).reshape(-1, 3), dtype=wp.vec3)

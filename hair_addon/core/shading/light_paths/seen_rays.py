@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that rays of a picture meet: without drawing any, or at samples that were drawn."""
+"""Visible strands in a picture, found by tracing rays or from drawn samples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Hair that is seen in a picture, at N samples of it; arrays are on the device of the grid."""
+    """Visible hair at N samples of a picture; arrays are on the device of the grid."""
 
     view: View
-    segments: wp.array[int]  # (N,) of a grid, which samples show
+    segments: wp.array[int]  # (N,) of the grid, visible in the samples
     places: wp.array[wp.vec3]  # (N,) [m] there
-    drawn: wp.array[wp.vec3]  # (N,) radiance that is drawn there without paths
-    area: float  # of the picture that each sample stands for
+    drawn: wp.array[wp.vec3]  # (N,) radiance drawn without paths
+    area: float  # area of the picture represented by each sample
 
 
 @wp.kernel
@@ -53,9 +53,10 @@ def _find(
 def met_by(
     grid: StrandGrid, corners: np.ndarray, view: View, ray_count: int, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(segments (N,), places (N, 3)) where rays meet strands before a surface, triangles of corners (3 F, 3).
+    """Return (segments (N,), places (N, 3)) of strands that rays hit before a surface.
 
-    ray_count: of rays over the picture, rounded to a square; those that meet no strand are left out.
+    corners: (3 F, 3) of the surfaces' triangles; ray_count: over the whole picture, rounded to a square. Rays that hit
+    no strand are left out.
     """
     side = max(1, round(ray_count**0.5))
     device = grid.device
@@ -106,7 +107,7 @@ def _number(
     out_is_hair: wp.array[int],
     first: int,
 ):
-    """Which segment of a grid each sample shows; drawn_ranges: by system as `shown_in` fills them."""
+    """Find the segment of the grid that each sample shows; drawn_ranges: of each system, from `shown_in`."""
     sample = first + wp.tid()
     shown = picture[sample]
     for system in range(drawn_ranges.shape[0]):
@@ -115,7 +116,7 @@ def _number(
             segment = int(shown - begin)
             of_strand = drawn_ranges[system, 2]
             kept = drawn_ranges[system, 4]
-            # The middle of the drawn segment, as a part of the strand, in segments that are kept.
+            # The middle of the drawn segment, converted from the drawn to the grid's number of segments.
             along = (2 * (segment % of_strand) + 1) * (kept - 1) / (2 * of_strand)
             strand = segment / of_strand / drawn_ranges[system, 3]
             out_segments[sample] = drawn_ranges[system, 5] + strand * kept + along
@@ -147,10 +148,10 @@ def _list(
 def shown_in(
     grid: StrandGrid, view: View, picture: np.ndarray, color: np.ndarray, ranges: Sequence[tuple[int, int, int]]
 ) -> Seen:
-    """`Seen` of a picture of numbers of drawn segments (H, W) uint32, and their radiance (H, W, 4) float32.
+    """Return the `Seen` of a picture of indices of drawn segments (H, W) uint32 and their radiance (H, W, 4) float32.
 
-    ranges: of each system (number of its first segment, how many there are, how many a strand has); other numbers are
-    not hair. Places are those of segments that are nearest to the rays through the samples' centers.
+    ranges: for each system (index of its first segment, number of segments, segments per strand); other indices are not
+    hair. Places are the points of segments nearest to the rays through the samples' centers.
     """
     height, width = picture.shape
     require_count("colors", color.size, 4 * picture.size)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Start places of paths, which stay on their strands from frame to frame, and random numbers of paths from there.
+"""Start places of paths, which stay on their strands from frame to frame, and the random numbers of these paths.
 
-Each segment is taken as often as it is large in the picture, in sight or not; of its places those count that rays from
-the viewer meet first. A path is known by its segment and by its number there. All its random numbers follow from these,
-and its directions are taken in the frame of what it meets. So while a camera or hair moves a little, the same paths
-begin at the same places, and their light changes by as little.
+The number of tried places on a segment is proportional to its area in the picture; visible places become starts. A path
+is identified by its segment and its index there, which determine all its random numbers, and its directions are sampled
+in the frame of what it hits. While a camera or hair moves a little, the same paths therefore begin at the same places,
+and their light changes little.
 """
 
 from dataclasses import dataclass
@@ -20,23 +20,23 @@ from .view import ViewOnDevice, depth_at, direction_at, on_device, seen_at
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-_LEAST_SHARE = 0.005  # of all paths that a segment may have, where there are too many tries
-_MOST_TRIES = 32  # places for each path: in deep hair few are in sight
-_MOST_PLACES = wp.constant(64)  # along a segment, where its cells are looked up
-_MOST_PARTS = 4096  # of all segments, whose tries are added up
+_LEAST_SHARE = 0.005  # fraction of all paths that a segment may always have, even if there are too many tries
+_MOST_TRIES = 32  # tried places per path: in deep hair few are visible
+_MOST_PLACES = wp.constant(64)  # points along a segment at which voxels are looked up
+_MOST_PARTS = 4096  # maximum number of parts of a sum of tries
 
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """N places in sight where paths begin, on segments."""
+    """N visible places on segments where paths begin."""
 
     segments: wp.array[int]  # (N,) of a grid
-    keys: wp.array[int]  # (N,) of random numbers
+    keys: wp.array[int]  # (N,) random states
 
 
 @wp.func
 def start(medium: Medium, view: ViewOnDevice, segment: int, key: int):
-    """(`Met` where a path starts, in sight or not; direction there; random state)."""
+    """Return (`Met` where a path starts, visible or not; direction of the ray there; random state)."""
     state = wp.rand_init(0, key)
     part = wp.randf(state)
     x, y, _area = seen_at(view, (1.0 - part) * medium.points[segment] + part * medium.points[segment + 1])
@@ -47,19 +47,19 @@ def start(medium: Medium, view: ViewOnDevice, segment: int, key: int):
 
 @wp.func
 def _is_in_sight(medium: Medium, view: ViewOnDevice, place: Met, direction: wp.vec3):
-    """Whether the ray through a place on a strand meets that first."""
+    """Whether the ray through a place on a strand hits that place first."""
     x, y, area = seen_at(view, place.position)
     if area <= 0.0 or wp.abs(x) >= 1.0 or wp.abs(y) >= 1.0:
         return False
     reach = depth_at(view, place.position, direction)
     if reach <= 0.0:
         return False
-    # What is hidden is mostly so by the next strand, which is found soon from here.
+    # Places are mostly hidden by the next strand, which a short ray from here hits.
     own = medium.strands[place.index]
     before = walk(medium, place.position, -direction, reach, own)
     if before.kind != PASSED:
         return False
-    # A place inside another strand is hidden by that strand's side, which rays from inside do not meet.
+    # A place inside another strand is hidden by that strand's side, which rays from inside do not hit.
     radius = medium.radii[place.index]
     met = walk(medium, place.position - reach * direction, direction, reach + radius, -1)
     if met.kind != STRAND:
@@ -93,7 +93,7 @@ def _count(
     out_count: wp.array[int],
     first: int,
 ):
-    """How many places are tried on each segment: `density` for the picture's unit of area, no more than `most`."""
+    """Count the places to try on each segment: `density` per unit of area in the picture, at most `most`."""
     segment = first + wp.tid()
     start = medium.points[segment]
     end = medium.points[segment + 1]
@@ -103,7 +103,7 @@ def _count(
         x, y, area = seen_at(view, middle)
         direction = direction_at(view, x, y)
         if depth_at(view, middle, direction) <= 0.0:
-            area = 0.0  # before the near plane it has no bound
+            area = 0.0  # unbounded in front of the near plane
         width = medium.radii[segment] + medium.radii[segment + 1]
         wanted = wp.length(wp.cross(end - start, direction)) * width * area * density
         if wanted < float(most):
@@ -116,7 +116,10 @@ def _count(
 
 @wp.func
 def voxel_at(place: wp.vec3, corner: wp.vec3, voxel: float, shape: wp.vec3i):
-    """Numbers along X, Y, Z of the voxel of a grid that holds a place, the nearest beside the grid."""
+    """Return indices along X, Y, Z of the voxel that contains a place.
+
+    The nearest voxel for places outside the grid.
+    """
     at = (place - corner) * (1.0 / voxel)
     found = wp.vec3i(0, 0, 0)
     for axis in range(3):
@@ -142,9 +145,9 @@ def _spread(holds: wp.array3d[wp.uint8], out_touches: wp.array3d[wp.uint8]):
 
 
 def voxels_of(medium: Medium, places: wp.array[wp.vec3]) -> wp.array3d[wp.uint8]:
-    """(Z, Y, X): one in voxels in which places (N,) are, and in all that touch these.
+    """Return (Z, Y, X): one in voxels that contain places (N,), and in their neighbors.
 
-    Thin hair is missed by samples, and may be in sight beside them.
+    Samples miss thin hair, which may be visible beside them.
     """
     x, y, z = (int(count) for count in medium.shape)
     holds, touches = (wp.zeros((z, y, x), dtype=wp.uint8, device=places.device) for _ in range(2))
@@ -178,7 +181,7 @@ def _add_counts(counts: wp.array[int], part_size: int, out_totals: wp.array[wp.i
 
 
 def _total(counts):
-    """The sum of (N,) numbers, which may be above what one of them can be."""
+    """Return the sum of (N,) integers, which may exceed their type."""
     size = max(-(-len(counts) // _MOST_PARTS), 1)
     totals = wp.empty(-(-len(counts) // size), dtype=wp.int64)
     kernel_cache.launch(_add_counts, len(totals), [counts, size], [totals], counts.device)
@@ -186,7 +189,7 @@ def _total(counts):
 
 
 def _tries(medium, view, is_seen, density, count, seed, device):
-    """(segments,) how often each is tried, less often where there would be too many for `count` paths."""
+    """Return (segments,) the number of tried places of each, reduced if there would be too many for `count` paths."""
     counts, most = wp.zeros(max(len(medium.points) - 1, 0), dtype=int), count
     while True:
         launch(_count, len(counts), [medium, view, is_seen, density, most, seed, counts], device)
@@ -194,14 +197,14 @@ def _tries(medium, view, is_seen, density, count, seed, device):
         if tries <= _MOST_TRIES * count:
             return counts
         if most > _LEAST_SHARE * count:
-            most //= 4  # of strands next the camera, nearly all of which are beside the picture
+            most //= 4  # of strands near the camera, most of which are outside the picture
         else:
             density *= 0.9 * _MOST_TRIES * count / tries
 
 
 @wp.func
 def _hashed(value: wp.uint64, number: wp.uint64, seed: wp.uint64):
-    """A hash of two numbers and the product of a seed: the finalizer of [Steele14]."""
+    """Return a hash of two integers and the `_product` of a seed: the finalizer of [Steele14]."""
     bits = value * wp.uint64(0x9E3779B97F4A7C15) + number * wp.uint64(0xD1B54A32D192ED03) + seed
     bits = (bits ^ (bits >> wp.uint64(30))) * wp.uint64(0xBF58476D1CE4E5B9)
     bits = (bits ^ (bits >> wp.uint64(27))) * wp.uint64(0x94D049BB133111EB)
@@ -240,7 +243,7 @@ def _keep(
 
 
 def of_seen(medium: Medium, seen: Seen, voxels: wp.array3d[wp.uint8], count: int, seed: int) -> Starts:
-    """About `count` `Starts`, on the device of a medium; voxels: of what is seen, by `voxels_of`."""
+    """Return about `count` `Starts`, on the device of a medium; voxels: with visible hair, from `voxels_of`."""
     device, seen_in = medium.points.device, on_device(seen.view)
     for side, wanted in zip(voxels.shape[::-1], medium.shape, strict=True):
         require_count("voxels", side, int(wanted))

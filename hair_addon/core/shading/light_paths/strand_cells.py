@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The segments of strands in each cell: voxels with hair are divided into cells, other voxels are empty.
 
-A path waits for memory longer than for arithmetic. So each cell has the lines that its segments lie on next to each
-other, of eight bytes each: most segments are told from them not to be near a ray, without being read.
+Paths wait longer for memory than for arithmetic. Each cell therefore stores the lines of its segments consecutively, in
+eight bytes each, by which most segments are rejected without reading their points.
 """
 
 from dataclasses import dataclass
@@ -17,12 +17,12 @@ from ...kernels.checks import require_count
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 _LEAST_SEGMENTS = 20_000  # fewer are not worth a thread
-_WIDER = wp.constant(1e-4)  # part of a cell by which segments are taken as wider, for rounding
-_REACH = wp.constant(1.7321)  # cells from a cell's centre to the nearest point of a line, at most
+_WIDER = wp.constant(1e-4)  # enlargement of segments for rounding, relative to a cell
+_REACH = wp.constant(1.7321)  # cells from a cell's center to the nearest point of a line, at most
 _STEPS = wp.constant(1023.0)  # of that point, along each axis
 _TURNS = wp.constant(65535.0)  # steps of a line's direction, along both axes
-LINE_ERROR = wp.constant(0.004)  # cells between a line and what is kept of it, at most
-_WIDTHS = wp.constant(4)  # that segments are taken to have, each half the one before
+LINE_ERROR = wp.constant(0.004)  # maximum distance in cells between a line and its stored form
+_WIDTHS = wp.constant(4)  # number of stored radii, each half the previous one
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class StrandCells:
 
     @property
     def widths(self) -> np.ndarray:
-        """(4,) radii that segments are taken to have [m]: the largest, and each half the one before."""
+        """(4,) radii to which those of segments are rounded up [m]: the largest, and each half the previous one."""
         return self.radius * 0.5 ** np.arange(_WIDTHS)
 
 
@@ -58,23 +58,26 @@ class _Strands:
 
 @wp.struct
 class _Axis:
-    """A segment's axis: from `origin` + first × `way` to `origin` + last × `way` where only a part of it is meant."""
+    """A segment's axis, from `origin` to `origin` + `way`.
+
+    Parts of it are given as fractions (first, last) of `way`.
+    """
 
     origin: wp.vec3
     way: wp.vec3
-    inverse: wp.vec3  # one over `way`
+    inverse: wp.vec3  # component-wise reciprocal of `way`
     radius: float
 
 
 @wp.func
 def _axis_of(hair: _Strands, segment: int, side: float):
-    """The axis of a whole segment; side: of the cells that it is looked for in [m]."""
+    """Return the axis of a segment; side: of the cells [m]."""
     axis = _Axis()
     axis.origin = hair.points[segment]
     axis.way = hair.points[segment + 1] - axis.origin
     axis.radius = wp.max(hair.radii[segment], hair.radii[segment + 1]) + _WIDER * side
     for along in range(3):
-        # What is as long as nothing is inside of a cell or outside, wherever it begins.
+        # A zero-length component is wholly inside or wholly outside of a cell.
         length = axis.way[along]
         if wp.abs(length) < 1e-20:
             length = 1e-20
@@ -84,7 +87,7 @@ def _axis_of(hair: _Strands, segment: int, side: float):
 
 @wp.func
 def _cells_along(hair: _Strands, axis: _Axis, along: int, first: float, last: float, per_side: float):
-    """(first, last) cells along X, Y or Z that a part of a segment is in with its width."""
+    """Return the (first, last) cells along X, Y or Z that a part of a segment touches with its width."""
     a = axis.origin[along] + first * axis.way[along] - hair.corner[along]
     b = axis.origin[along] + last * axis.way[along] - hair.corner[along]
     most = float(hair.shape[along] * hair.along_voxel - 1)
@@ -95,7 +98,10 @@ def _cells_along(hair: _Strands, axis: _Axis, along: int, first: float, last: fl
 
 @wp.func
 def _part_in_layer(hair: _Strands, axis: _Axis, along: int, cell: int, first: float, last: float, side: float):
-    """(first, last) of a part of a segment as far as it is in one layer of cells; first is above last without."""
+    """Return the fractions (first, last) of a segment within one layer of cells.
+
+    First > last if it misses the layer.
+    """
     low = hair.corner[along] + side * float(cell) - axis.origin[along]
     one = (low - axis.radius) * axis.inverse[along]
     other = (low + side + axis.radius) * axis.inverse[along]
@@ -126,16 +132,15 @@ def _direction_word(way: wp.vec3):
 
 @wp.func
 def line_of(origin: wp.vec3, way: wp.vec3, centre: wp.vec3, side: float, halvings: int):
-    """(two words) of a line along a way: its point that is nearest to a cell's centre, of ten bits along each axis;
-    halvings: of the widest radius, to that of the segment; and its direction on an octahedron [Meyer10], of 16 bits
-    along both axes.
+    """Return two words that store a line: its point nearest to a cell's center, ten bits per axis; `halvings` of the
+    largest radius to the segment's; and its direction on an octahedron [Meyer10], 16 bits per axis.
     """
     return _place_word(origin, way, centre, side, halvings), _direction_word(way)
 
 
 @wp.func
 def line_from(where: wp.uint32, turned: wp.uint32, side: float):
-    """(point from the cell's centre, along the line: of any length, halvings) of the words of `line_of`."""
+    """Return (point relative to the cell's center, direction of any length, halvings) from the words of `line_of`."""
     mask = wp.uint32(1023)
     scale = 2.0 * _REACH * side / _STEPS
     point = wp.vec3(float(where & mask), float((where >> wp.uint32(10)) & mask), float((where >> wp.uint32(20)) & mask))
@@ -151,7 +156,7 @@ def line_from(where: wp.uint32, turned: wp.uint32, side: float):
 
 @wp.func
 def _halvings_of(hair: _Strands, axis: _Axis):
-    """How often the largest radius can be halved and is still a segment's or above it."""
+    """Return how often the largest radius can be halved without becoming smaller than a segment's radius."""
     halvings = int(0)
     width = 0.5 * hair.radius
     while halvings < _WIDTHS - 1 and axis.radius < width:
@@ -174,8 +179,8 @@ def _find(
 ):
     """Count the cells of each segment and mark their voxels, or write them before the segment's end.
 
-    Layer by layer, row by row: of a segment as much as is in a layer has its rows, and of that as much as is in a row
-    its cells. None is looked at in vain.
+    The cells of a segment are found layer by layer, and within a layer row by row, so that only touched cells are
+    visited.
     """
     segment = first + wp.tid()
     if hair.strands[segment] != hair.strands[segment + 1]:
@@ -254,7 +259,10 @@ def _add_shares(counts: wp.array2d[int], out_total: wp.array[int]):
 
 @wp.kernel
 def _begin_shares(starts: wp.array[int], counts: wp.array2d[int]):
-    """Of each share of the segments where its own begin in each cell: those of earlier shares come first."""
+    """Compute for each share of the segments where its entries begin in each cell.
+
+    Entries of earlier shares come first.
+    """
     cell = wp.tid()
     at = starts[cell]
     for share in range(counts.shape[0]):
@@ -273,7 +281,7 @@ def _put(
     out_segments: wp.array[int],
     out_lines: wp.array[wp.uint32],
 ):
-    """Put each into the next place of its cell, on one core of the processor: they stay in order."""
+    """Write each entry to the next place of its cell, on one CPU core, so that entries stay in order."""
     entry = first + wp.tid()
     cell = cells[entry]
     at = ends[cell]
@@ -311,10 +319,10 @@ def build(
     voxels: tuple[np.ndarray, float, tuple[int, int, int]],
     along_voxel: int,
 ) -> StrandCells:
-    """The cells, on their device, of strands of points (N,) with radii (N,) [m], of which (N,) tells whose point it is.
+    """Return the `StrandCells` of points (N,) with radii (N,) [m], on their device.
 
-    radius: the largest [m]; voxels: corner (3,) and side [m], and numbers along X, Y, Z, of voxels that hold all
-    strands, each at least as wide as `along_voxel` strands.
+    strands: (N,) strand index of each point; radius: the largest [m]; voxels: (corner (3,), side [m], numbers along X,
+    Y, Z) of voxels that contain all strands, each at least as wide as `along_voxel` strands.
     """
     require_count("radii", len(radii), len(points))
     require_count("strands of points", len(strands), len(points))
@@ -345,7 +353,7 @@ def build(
 
 
 def _by_segments(hair, given):
-    """`_find` for all segments."""
+    """Launch Launch `_find` for all segments."""
     count, device = max(len(hair.points) - 1, 0), hair.points.device
     if count:
         parts = parallel.part_count(count, device, _LEAST_SEGMENTS)
@@ -353,7 +361,10 @@ def _by_segments(hair, given):
 
 
 def _sorted(cells, cell_count, segments, lines):
-    """((cells + 1,) starts, segments and lines by cell) of M that are in any order in (2 M,) cells: by a radix sort."""
+    """Return ((cells + 1,) starts, segments and lines by cell) of M unordered entries, by a radix sort.
+
+    cells: (2 M,), of which the first half is used.
+    """
     device, count = cells.device, len(segments)
     counts, starts = (wp.zeros(cell_count + 1, dtype=int, device=device) for _ in range(2))
     order = wp.empty(2 * count, dtype=int, device=device)
@@ -367,7 +378,7 @@ def _sorted(cells, cell_count, segments, lines):
 
 
 def _sorted_by_cores(cells, cell_count, segments, lines):
-    """What `_sorted` returns: each core of the processor puts a share of the segments into their cells."""
+    """Return the same as `_sorted` on a CPU: each core writes a share of the segments into their cells."""
     device, count = cells.device, len(segments)
     counts = wp.zeros((parallel.share_count(count, device, _LEAST_SEGMENTS), cell_count + 1), dtype=int, device=device)
     total, starts = (wp.zeros(cell_count + 1, dtype=int, device=device) for _ in range(2))

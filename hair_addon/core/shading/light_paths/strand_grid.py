@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands as segments in the cells of a grid, for paths of light that meet them.
+"""Strands as segments in the cells of a grid, for tracing paths of light.
 
-Every segment is in each cell that it touches with its width, so a path that walks from cell to cell finds the nearest
-one by few tests. Very many strands are thinned out: the rest is wider, and stops as much light.
+Each cell lists all segments that touch it with their width, so a ray finds the nearest segment by few tests. Very many
+strands are thinned out: the remaining strands are wider and block as much light.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,21 +23,21 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 SEGMENT_COUNT = 3_000_000  # at most, of all strands
 VOXEL_COUNT = 375_000
 MOST_VOXELS = 200  # along a side
-CELLS_ALONG_VOXEL = 3  # at most: cells are wider than strands
+CELLS_ALONG_VOXEL = 3  # maximum per voxel side: cells are wider than strands
 _SIZES_AN_OCTAVE = 4  # of voxels
-_LEAST_SEGMENTS = 8  # of a strand, that it can bend
-_AT_ONCE = 1000  # strands that are looked at for any area
-_MOST_ROUNDING = 100.0  # of places, in radii: that of ten kilometers for hair of a head
-_MOST_PARTS, _LEAST_PART = 4096, 256  # of all points that are measured, and points of a part
+_LEAST_SEGMENTS = 8  # minimum segments per strand, so that strands can bend
+_AT_ONCE = 1000  # strands tested for a positive area
+_MOST_ROUNDING = 100.0  # resolution of positions in radii: for hair of a head, ten kilometers from the origin
+_MOST_PARTS, _LEAST_PART = 4096, 256  # maximum number of parts of a measurement, and minimum points of a part
 
 
 @dataclass(frozen=True, eq=False)
 class Strands:
     """One system of hair: S strands of P points.
 
-    absorption: function of indices of strands (N,) → sigma_a (N, 2, 3), or (1, 2, 3) where all have the same, at roots
-    and at tips; gradient: (P,) part of the way between both; fibre: (S,) index of each strand's settings among those
-    given to `build`.
+    absorption: function of indices of strands (N,) → sigma_a (N, 2, 3), or (1, 2, 3) if all strands are equal, at root
+    and tip; gradient: (P,) fraction of the tip's absorption at each point; fibre: (S,) index of each strand's settings
+    among those given to `build`.
     """
 
     points: np.ndarray  # (S, P, 3)
@@ -62,7 +62,7 @@ class Kept:
 class StrandGrid:
     """S strands of N points in all, and their segments in the cells of voxels (Z, Y, X); (0, 0, 0) is at `corner`.
 
-    Voxels are cubes, which light is averaged in.
+    Light is averaged by voxel; voxels are cubes.
     """
 
     corner: np.ndarray  # (3,) [m]
@@ -81,21 +81,21 @@ class StrandGrid:
 
     @property
     def origin(self) -> tuple[int, int, int]:
-        """Numbers along X, Y, Z of the first voxel, of all that fill the world."""
+        """Return indices along X, Y, Z of the first voxel, among voxels that fill the world."""
         return tuple(np.rint(self.corner / self.voxel).astype(int).tolist())
 
     @property
     def is_resolved(self) -> bool:
-        """Whether places in single precision are exact to some radii of the widest strand.
+        """Whether single precision resolves positions to some radii of the widest strand.
 
-        Elsewhere paths meet the strands that they leave again and again, a thousand times in minutes.
+        Otherwise paths hit the strand that they leave again and again, and take minutes.
         """
         rounding = max(self.shape) * self.voxel * float(np.finfo(np.float32).eps)
         return bool(rounding <= _MOST_ROUNDING * self.cells.widths[0])
 
     @property
     def device(self) -> wp.Device:
-        """The device that its arrays are on."""
+        """The device of the arrays."""
         return self.points.device
 
 
@@ -106,9 +106,9 @@ def build(
     voxel_count: int = VOXEL_COUNT,
     device: wp.DeviceLike = "cpu",
 ) -> StrandGrid:
-    """The grid of all `Strands`; fibres: settings that their `fibre` counts.
+    """Return the `StrandGrid` of all hair systems; fibres: settings to which `Strands.fibre` refers.
 
-    Raises `HairError` for hair without size, and where counts do not match.
+    Raises `HairError` for hair without size, and if counts do not match.
     """
     for strands in systems:
         require_count("radii", strands.radii.size, strands.points.shape[0] * strands.points.shape[1])
@@ -155,7 +155,7 @@ def build(
 
 
 def has_area(systems: Sequence[Strands]) -> bool:
-    """Whether any strand has a length and a width, which light could meet."""
+    """Whether any strand has a length and a width, so that rays can hit it."""
     for strands in systems:
         turn = strands.to_world[:3, :3].T
         for first in range(0, len(strands.points), _AT_ONCE):
@@ -167,7 +167,7 @@ def has_area(systems: Sequence[Strands]) -> bool:
 
 
 def _chosen(strands, share):
-    """(stride of strands, indices of points along each) that keep about a share of the segments."""
+    """Return (stride of strands, indices of points along each) that keep about a fraction of the segments."""
     point_count = strands.points.shape[1]
     most = max(point_count - 1, 1)
     wanted = most  # segments of a strand
@@ -241,7 +241,7 @@ def _measure(
     out_widest: wp.array[float],
     out_area: wp.array[float],
 ):
-    """The bounds of a part of all points, their largest radius, and length × width of segments."""
+    """Compute the bounds of a part of all points, their largest radius, and the sum of length × width of segments."""
     part = wp.tid()
     start = part * part_size
     low = points[start]
@@ -275,10 +275,10 @@ def _measured(points, radii, strands):
 
 
 def _voxels(low, high, radius, voxel_count):
-    """(corner, side, numbers along X, Y, Z) of voxels around all strands, whose points are between (3,) and (3,).
+    """Return (corner, side, numbers along X, Y, Z) of voxels around all strands.
 
-    They stay where they are in the world while hair moves, and their size is one of a few: what is averaged by voxel
-    changes no more than the hair does.
+    low, high: (3,) bounds of their points. Voxels have fixed places in the world while hair moves, and one of a few
+    sizes, so that averages by voxel change no more than the hair.
     """
     low, high = low.astype(np.float64) - radius, high.astype(np.float64) + radius
     least = 1e-6 * max(float((high - low).max()), 1e-6)

@@ -2,8 +2,8 @@
 """Scattering of a path at a surface: value and sampling of a diffuse surface below a rough dielectric, or of metal, as
 in surface_light.glsl.
 
-Microfacets have the GGX distribution [Walter07]. Directions are of the microfacets that the viewer sees [Heitz18] or of
-the diffuse part, by what both send back; the density is that of either.
+Microfacets have the GGX distribution [Walter07]. Directions are sampled from visible microfacets [Heitz18] or from the
+diffuse part, in proportion to their albedos; the density is that of the mixture.
 """
 
 import warp as wp
@@ -13,16 +13,16 @@ from .fibre_walk import PI, reflectance
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 _LEAST_COSINE = wp.constant(1e-3)
-_SMOOTHEST = wp.constant(0.03)  # roughness, as shaders/surfaces/surface_material.glsl has it
+_SMOOTHEST = wp.constant(0.03)  # least roughness, as in shaders/surfaces/surface_material.glsl
 _GRAZING = wp.constant(50.0)  # one over the reflectance below which less is reflected at any angle
 
 
 @wp.struct
 class Surface:
-    """A surface's material where a path meets it; of Principled BSDF, as `SurfaceMaterial` has it.
+    """A surface's material where a path hits it: a Principled BSDF, as in `SurfaceMaterial`.
 
-    alpha: the square of the roughness; diffuse, reflected: parts of even light that it sends to the viewer in each way,
-    RGB; gain: of one reflection, for those after it.
+    alpha: the square of the roughness; diffuse, reflected: fractions of uniform light that both parts scatter to the
+    viewer, RGB; gain: factor of one reflection that includes further reflections.
     """
 
     normal: wp.vec3
@@ -38,7 +38,7 @@ class Surface:
 
 @wp.func
 def _table_at(table: wp.array2d[wp.vec4], n_dot_v: float, roughness: float):
-    """A texel of `surface_albedo.table` between its four neighbours, the first and last at 0 and 1."""
+    """Interpolate `surface_albedo.table`; the centers of the first and the last texel are at 0 and 1."""
     last = table.shape[0] - 1
     x = wp.clamp(n_dot_v, 0.0, 1.0) * float(last)
     y = wp.clamp(roughness, 0.0, 1.0) * float(last)
@@ -53,8 +53,8 @@ def _table_at(table: wp.array2d[wp.vec4], n_dot_v: float, roughness: float):
 
 @wp.func
 def surface_of(normal: wp.vec3, viewer: wp.vec3, color: wp.vec3, gloss: wp.vec3, table: wp.array2d[wp.vec4]):
-    """The `Surface` towards a viewer, both unit vectors; gloss: roughness, metallic, reflectance at normal incidence;
-    table: `surface_albedo.table`.
+    """Return the `Surface` for a viewer; normal, viewer: unit vectors; gloss: roughness, metallic, reflectance at
+    normal incidence; table: `surface_albedo.table`.
     """
     surface = Surface()
     surface.normal = normal
@@ -83,7 +83,7 @@ def surface_of(normal: wp.vec3, viewer: wp.vec3, color: wp.vec3, gloss: wp.vec3,
 
 @wp.func
 def _fresnel(surface: Surface, cosine: float):
-    """Part that a microfacet reflects, of a dielectric and of a metal."""
+    """Return the Fresnel reflectance of a microfacet, a mix of dielectric and metal."""
     root = wp.sqrt(wp.min(surface.normal_reflectance, 0.99))
     dielectric = reflectance(cosine, (1.0 + root) / (1.0 - root))
     rest = wp.pow(1.0 - wp.clamp(cosine, 0.0, 1.0), 5.0)
@@ -94,15 +94,15 @@ def _fresnel(surface: Surface, cosine: float):
 
 @wp.func
 def _part_reflected(surface: Surface, weight: wp.vec3):
-    """The chance of a microfacet's reflection, for a path of a weight."""
+    """Return the probability of sampling the microfacets, for a path of a weight."""
     of_reflected = wp.dot(weight, surface.reflected)
     return of_reflected / wp.max(of_reflected + wp.dot(weight, surface.diffuse), 1e-30)
 
 
 @wp.func
 def surface_value(surface: Surface, light: wp.vec3, weight: wp.vec3):
-    """(radiance towards the viewer for unit irradiance across the light's direction, density [1/sr] with which
-    `surface_turn` takes that direction for a path of this weight).
+    """Return (radiance towards the viewer for unit irradiance perpendicular to the light's direction, density [1/sr]
+    with which `surface_turn` samples that direction for a path of this weight).
     """
     n_dot_l = wp.dot(surface.normal, light)
     value = wp.vec3(0.0, 0.0, 0.0)
@@ -130,9 +130,10 @@ def surface_value(surface: Surface, light: wp.vec3, weight: wp.vec3):
 
 @wp.func
 def surface_turn(surface: Surface, x: wp.vec3, weight: wp.vec3, random: wp.uint32):
-    """(direction of light that goes to the viewer, the path's weight then, random state); x: unit, along the surface.
+    """Sample the direction of light that is reflected to the viewer.
 
-    Without weight where that direction is below the surface.
+    Returns (direction, new weight of the path, random state). x: unit, tangent to the surface. The weight is zero for
+    directions below the surface.
     """
     state = random
     y = wp.cross(surface.normal, x)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A part of a picture as paths see it: rays through it, and where in it places are."""
+"""A part of a picture: rays through it, and projection of places to it."""
 
 from dataclasses import dataclass
 
@@ -13,12 +13,12 @@ AREA = 4.0  # of a picture, whose coordinates are from -1 to 1
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What a camera sees in a picture, or in a part of one."""
+    """A camera's view, for a whole picture or a part of it."""
 
     world_to_clip: np.ndarray  # (4, 4), of the part
 
     def near(self, x: float, y: float) -> np.ndarray:
-        """The point (3,) of the near plane that is seen at x and y, from -1 to 1."""
+        """Return the point (3,) of the near plane at x and y, from -1 to 1."""
         found = np.linalg.inv(self.world_to_clip) @ [x, y, -1.0, 1.0]
         return found[:3] / found[3]
 
@@ -51,7 +51,7 @@ def on_device(view: View) -> ViewOnDevice:
 
 @wp.func
 def _across(view: ViewOnDevice, x: float, y: float):
-    """Along the ray at a place of the picture: the line of all points that are seen there."""
+    """Return the unnormalized direction of the ray at a place of the picture."""
     of_w = wp.vec3(view.row_w[0], view.row_w[1], view.row_w[2])
     of_x = wp.vec3(view.row_x[0], view.row_x[1], view.row_x[2]) - x * of_w
     of_y = wp.vec3(view.row_y[0], view.row_y[1], view.row_y[2]) - y * of_w
@@ -82,7 +82,10 @@ def depth_at(view: ViewOnDevice, place: wp.vec3, direction: wp.vec3):
 
 @wp.func
 def seen_at(view: ViewOnDevice, place: wp.vec3):
-    """(x, y of a place in the picture, picture's area for each m² across the ray there); no area behind the camera."""
+    """Return (x, y of a place in the picture, area in the picture per m² perpendicular to the ray).
+
+    Zero area behind the camera.
+    """
     point = wp.vec4(place[0], place[1], place[2], 1.0)
     w = wp.dot(view.row_w, point)
     x = float(0.0)

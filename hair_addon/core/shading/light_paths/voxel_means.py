@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums over paths by voxel → ratios without holes: where there are few paths, those of larger voxels count as well.
+"""Sums over paths by voxel → ratios without holes: voxels with few paths are blended with larger voxels.
 
-All of it happens on the device of the sums. A thread adds up in the order of its voxels or of its part, so the same
-sums give the same bits.
+All computations run on the device of the sums. Each thread adds in a fixed order, so the same sums give the same bits.
 """
 
 import numpy as np
@@ -13,10 +12,12 @@ from ...kernels.checks import require_count
 
 wp.set_module_options({"enable_backward": False})
 
-CHANNELS = 12  # RGB of four sums: light of paths, even light there, what is drawn, and even light there
-_PRIOR = 512.0  # paths that the ratio of the voxels around stands for
+# RGB of four sums: light of paths, and the same in uniform light; drawn light, and the same in uniform light.
+CHANNELS = 12
+_PRIOR = 512.0  # weight in paths of the ratio of larger voxels
 _LEAST_VOXELS = 4096  # fewer are not worth a thread
-_MOST_PARTS = 512  # of all voxels, whose sums are added up
+_MOST_PARTS = 512  # maximum number of parts of a sum
+
 rgb = wp.types.vector(length=3, dtype=wp.float64)
 
 
@@ -33,7 +34,7 @@ def _mark(
     out_columns: wp.array[wp.uint8],
     first: int,
 ):
-    """Which layers, rows and columns have any paths or samples."""
+    """Mark the layers, rows and columns with any paths or samples."""
     voxel = first + wp.tid()
     x = voxel % sums.shape[2]
     y = voxel / sums.shape[2] % sums.shape[1]
@@ -46,7 +47,7 @@ def _mark(
 
 @wp.kernel
 def _halve(sums: wp.array4d[wp.float64], shift: wp.vec3i, out_sums: wp.array4d[wp.float64], first: int):
-    """Sums over blocks of 2 × 2 × 2 voxels, the first of them without its lower half along axes whose shift is 1."""
+    """Sum blocks of 2 × 2 × 2 voxels; the first block lacks its lower half along axes whose shift is 1."""
     voxel = first + wp.tid()
     x = voxel % out_sums.shape[2]
     y = voxel / out_sums.shape[2] % out_sums.shape[1]
@@ -65,7 +66,9 @@ def _halve(sums: wp.array4d[wp.float64], shift: wp.vec3i, out_sums: wp.array4d[w
 
 @wp.func
 def _place(at: int, shift: int, count: int):
-    """(voxel below, voxel above, part of the way) of the centre of a voxel between `count` ones of twice the size."""
+    """Return (voxel below, voxel above, fraction between them) of a voxel's center among `count` voxels of twice the
+    size.
+    """
     place = wp.float64(0.5) * (wp.float64(at + shift) + wp.float64(0.5)) - wp.float64(0.5)
     below = wp.clamp(int(wp.floor(place)), 0, count - 1)
     part = wp.clamp(place - wp.float64(below), wp.float64(0.0), wp.float64(1.0))
@@ -95,7 +98,7 @@ def _refine(
     out_ratios: wp.array4d[wp.float64],
     first: int,
 ):
-    """Ratios of voxels from those of the voxels of twice the size, linear between these."""
+    """Compute the ratios of voxels from the ratios of voxels of twice the size, interpolated linearly."""
     voxel = first + wp.tid()
     x = voxel % sums.shape[2]
     y = voxel / sums.shape[2] % sums.shape[1]
@@ -125,7 +128,10 @@ def _divide(total: wp.array4d[wp.float64], out_ratios: wp.array4d[wp.float64]):
 
 @wp.func
 def _known_at(sums: wp.array4d[wp.float64], voxel: int):
-    """(light, even light, what is drawn as if of that even light) where all are known; no even light without."""
+    """Return (light, uniform light, drawn light scaled to that uniform light) of a voxel in which all are known.
+
+    Else zero uniform light.
+    """
     x = voxel % sums.shape[2]
     y = voxel / sums.shape[2] % sums.shape[1]
     z = voxel / (sums.shape[2] * sums.shape[1])
@@ -144,7 +150,7 @@ def _known_at(sums: wp.array4d[wp.float64], voxel: int):
 
 @wp.kernel
 def _add_known(sums: wp.array4d[wp.float64], part_size: int, out_parts: wp.array2d[wp.float64]):
-    """(3 × RGB) light, even and drawn light of a part of all voxels."""
+    """Sum light, uniform light and drawn light (3 × RGB) of a part of all voxels."""
     part = wp.tid()
     lights = rgb()
     evens = rgb()
@@ -174,7 +180,7 @@ def _add_parts(parts: wp.array2d[wp.float64], out_totals: wp.array[wp.float64]):
 def _add_products(
     sums: wp.array4d[wp.float64], totals: wp.array[wp.float64], part_size: int, out_parts: wp.array2d[wp.float64]
 ):
-    """(light × drawn, drawn²) of what differs from even light, over even light, in a part of all voxels."""
+    """Sum (light × drawn, drawn²) / uniform light of a part of all voxels, of the deviations from uniform light."""
     part = wp.tid()
     product = wp.float64(0.0)
     square = wp.float64(0.0)
@@ -186,7 +192,7 @@ def _add_products(
                 total = wp.max(totals[3 + channel], wp.float64(1e-12))
                 light_there = light[channel] - totals[channel] / total * even[channel]
                 drawn_there = drawn[channel] - totals[6 + channel] / total * even[channel]
-                # A voxel counts by its paths, not by their square.
+                # A voxel's weight is proportional to its paths, not to their square.
                 share = wp.float64(1.0) / wp.max(even[channel], wp.float64(1e-12))
                 product += share * light_there * drawn_there
                 square += share * drawn_there * drawn_there
@@ -202,7 +208,10 @@ def _keep(
     out_shares: wp.array3d[wp.vec4],
     first: int,
 ):
-    """Shares of a voxel, or of the nearest one that has ratios; origin: the first of these, along Z, Y, X."""
+    """Write the shares of a voxel, or of the nearest voxel with ratios.
+
+    origin: the first voxel with ratios, along Z, Y, X.
+    """
     voxel = first + wp.tid()
     column = voxel % out_shares.shape[2]
     row = voxel / out_shares.shape[2] % out_shares.shape[1]
@@ -222,16 +231,16 @@ def _keep(
 
 
 def shares(sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int, int] = (0, 0, 0)) -> np.ndarray:
-    """(Z, Y, X, 12) sums of `gather` over some paths → (Z, Y, X, 4) float32: RGB in parts of what even light gives, and
-    how much of what is drawn is kept.
+    """(Z, Y, X, 12) sums of `gather` over some paths → (Z, Y, X, 4) float32 shares of light.
 
-    Both together are the paths' light. What is drawn tells apart strands and places that the paths' mean is too coarse
-    for; as much is kept as explains the paths best, but where that is more than they find in any channel.
+    The shares are RGB relative to the light in uniform light, and the fraction of the drawn light to keep; both
+    together are the light of the paths. Drawn light distinguishes strands and places within a voxel. The fraction is
+    the one that explains the light of the paths best, limited so that it exceeds their light in no channel.
     """
     require_count("sums", sums.shape[3], CHANNELS)
     with wp.ScopedDevice(sums.device):
         found = wp.empty(sums.shape[:3], dtype=wp.vec4)
-        # One hair may take a small part of the grid of all.
+        # One hair system may occupy a small part of the grid.
         box = _box_of(sums)
         low = tuple(part.start for part in box)
         inner = sums[box]
@@ -241,8 +250,8 @@ def shares(sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int
 
 
 def explained_part(sums: wp.array4d[wp.float64]) -> float:
-    """The part of what is drawn, from 0 to 1, with the least squared difference from the paths' light over all voxels
-    of (Z, Y, X, 12) sums, beside any part of even light in each channel.
+    """Return the fraction of drawn light, from 0 to 1, that fits the light of the paths best (least squares over all
+    voxels of (Z, Y, X, 12) sums), together with any amount of uniform light in each channel.
     """
     with wp.ScopedDevice(sums.device):
         product, square = _explained(sums).numpy().tolist()
@@ -252,21 +261,21 @@ def explained_part(sums: wp.array4d[wp.float64]) -> float:
 def smooth_ratios(
     sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int, int] = (0, 0, 0)
 ) -> np.ndarray:
-    """(Z, Y, X, 6 N) sums of light RGB and of even light RGB over some paths, N times → (Z, Y, X, 3 N) ratios of both.
+    """(Z, Y, X, 6 N) sums of light RGB and of uniform light RGB over some paths, N times → (Z, Y, X, 3 N) their ratios.
 
-    From large voxels to small ones each ratio is drawn to that of the voxel around it, by as many average paths as the
-    prior. origin: number of the first voxel along X, Y, Z: those of even numbers share a larger one with the next.
-    Black where there is no light at all.
+    From large to small voxels, each ratio is blended with that of the enclosing larger voxel, which has the weight of
+    `prior` average paths. origin: index of the first voxel along X, Y, Z: voxels with an even index share a larger
+    voxel with the next. Black without any light.
     """
     with wp.ScopedDevice(sums.device):
         return _smooth(sums, path_count, origin).numpy()
 
 
 def _smooth(sums, path_count, origin):
-    """`smooth_ratios` as an array on the device."""
+    """Return Return `smooth_ratios` as an array on the device."""
     levels, shifts, first = [sums], [], np.array(origin[::-1])
     while max(levels[-1].shape[:3]) > 1:
-        # Two on both sides of the world's origin would never become one.
+        # Two voxels on both sides of the world's origin would never merge.
         sides = np.array(levels[-1].shape[:3])
         shift = np.where(sides > 2, first % 2, 0)
         first = first // 2
@@ -286,7 +295,7 @@ def _smooth(sums, path_count, origin):
 
 
 def _explained(sums):
-    """(2,) on the device: their quotient is `explained_part`."""
+    """Return (2,) numbers on the device whose quotient is `explained_part`."""
     count = sums.shape[0] * sums.shape[1] * sums.shape[2]
     size = -(-count // _MOST_PARTS)
     parts = -(-count // size)
@@ -307,7 +316,10 @@ def _by_voxels(kernel, voxels, inputs):
 
 
 def _box_of(sums):
-    """Slices along Z, Y, X around all that is used of (Z, Y, X, 12) sums; of all, where none is."""
+    """Return slices along Z, Y, X around all voxels of (Z, Y, X, 12) sums with data.
+
+    The whole range if there is none.
+    """
     used = [wp.zeros(side, dtype=wp.uint8) for side in sums.shape[:3]]
     _by_voxels(_mark, sums, [sums, *used])
     box = []

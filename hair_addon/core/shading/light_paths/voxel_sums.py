@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums by voxel and by system of hair of what paths and samples find, on the device of a grid.
+"""Sums over paths and samples by voxel and hair system, on the device of a grid.
 
-The same paths give the same bits, in whatever order a GPU takes them: there whole numbers are added up, with 62 bits
-for the sum of as many values as there are of the largest.
+The same paths give the same bits in any order: on a GPU integers are added, scaled so that the sum of all values fits
+62 bits even if all equal the largest.
 """
 
 import numpy as np
@@ -17,12 +17,12 @@ from .voxel_means import CHANNELS
 wp.set_module_options({"enable_backward": False})
 
 _MOST_PARTS = 4096  # of all values
-_LARGEST_SUM = 4.0e18  # of whole numbers, below 2^62
+_LARGEST_SUM = 4.0e18  # limit of integers, below 2^62
 
 
 @wp.struct
 class _Places:
-    """Which sum each of N values is added to: that of its place's voxel and of its segment's hair."""
+    """The sum that each of N values is added to: the voxel of its place and the hair system of its segment."""
 
     places: wp.array[wp.vec3]
     segments: wp.array[int]
@@ -48,7 +48,7 @@ def _add_in_order(
     first_channel: int,
     out_sums: wp.array2d[wp.float64],
 ):
-    """On one core of the processor, where one value comes after the other."""
+    """Add values one after the other, on one CPU core."""
     index = wp.tid()
     row = _row_of(at, index)
     for channel in range(3):
@@ -71,7 +71,7 @@ def _find_largest(
 
 @wp.func
 def _scale(largest: wp.array[float], count: int):
-    """Whole numbers in one, of `count` values up to the largest."""
+    """Return the integer that represents one, for `count` values up to the largest."""
     return wp.float64(_LARGEST_SUM) / (wp.max(wp.float64(largest[0]), wp.float64(1e-30)) * wp.float64(count))
 
 
@@ -154,13 +154,13 @@ class VoxelSums:
         return [self._sums[first : first + count].reshape((*self._voxels, CHANNELS)) for first in firsts]
 
     def scale(self, weight: float) -> None:
-        """Multiply all sums with a weight."""
+        """Multiply all sums by a weight."""
         kernel_cache.launch(_scale_sums, self._sums.shape, [wp.float64(weight)], [self._sums], self._sums.device)
 
     def carry(self, before: "VoxelSums", weight: float, shift: np.ndarray | float) -> None:
-        """Add the sums of another grid on this device with as many systems, with a weight.
+        """Add the sums of another grid on this device with the same number of systems, multiplied by a weight.
 
-        shift: (3,) of the other grid's voxels [m]. Voxels beside the other grid get nothing.
+        shift: (3,) offset of the other grid's voxels [m]. Voxels outside the other grid do not change.
         """
         own, other = self.grid, before.grid
         require_count("systems of hair", len(other.kept), len(own.kept))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world as paths see it: a picture of longitude and latitude, whose texels are taken by their light.
+"""The world as a light source of paths: an equirectangular picture whose texels are sampled by their light.
 
-Paths that meet the sky find it too; each counts by its share of both densities [Veach95], so that small bright places,
-as windows and suns, are no noise. A picture that is even anyway is only met.
+Paths that hit the sky sample it too; both are weighted by their share of the densities [Veach95], so that small bright
+places, such as windows and suns, cause no noise. A nearly uniform picture is not sampled by its light.
 """
 
 import numpy as np
@@ -12,15 +12,15 @@ from .fibre_walk import PI
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-_UNEVEN = 4.0  # how much more light than the mean direction the brightest has where directions are taken by it
+_UNEVEN = 4.0  # ratio of the brightest to the mean radiance from which directions are sampled by light
 
 
 @wp.struct
 class World:
     """A picture's texels (H, W): rows of latitude from the lowest, columns from pi to -pi.
 
-    density: [1/sr] with which directions in a texel are taken; rows: (H,), and columns: (H, W), sums of chances of rows
-    and of texels in a row, up to each; is_uneven: whether any are taken.
+    density: [1/sr] with which directions in a texel are sampled; rows: (H,) and columns: (H, W), cumulative
+    probabilities of rows and of texels in a row; is_uneven: whether directions are sampled by light.
     """
 
     radiance: wp.array2d[wp.vec3]
@@ -70,14 +70,14 @@ def world_radiance(world: World, direction: wp.vec3):
 
 @wp.func
 def world_density(world: World, direction: wp.vec3):
-    """The density [1/sr] with which `world_direction` takes a direction."""
+    """Return the density [1/sr] with which `world_direction` samples a direction."""
     row, column = _texel(world, direction)
     return world.density[row, column]
 
 
 @wp.func
 def _row_by(world: World, chance: float):
-    """The first row up to which the sum of chances is above one."""
+    """Return the first row whose cumulative probability exceeds a random number."""
     low = int(0)
     high = world.rows.shape[0] - 1
     while low < high:
@@ -91,7 +91,7 @@ def _row_by(world: World, chance: float):
 
 @wp.func
 def _column_by(world: World, row: int, chance: float):
-    """The first texel of a row up to which the sum of chances is above one."""
+    """Return the first texel of a row whose cumulative probability exceeds a random number."""
     low = int(0)
     high = world.columns.shape[1] - 1
     while low < high:
@@ -105,7 +105,7 @@ def _column_by(world: World, row: int, chance: float):
 
 @wp.func
 def world_direction(world: World, random: wp.uint32):
-    """(a direction by the light of the picture, radiance from there, its density [1/sr], random state)."""
+    """Sample a direction by the light of the picture; returns (direction, radiance, density [1/sr], random state)."""
     state = random
     row = _row_by(world, wp.randf(state))
     column = _column_by(world, row, wp.randf(state))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Means of a smooth fiber's N_p over cells of phi: the texels of its tables.
 
-The caustic of N_TRT is infinite in its middle and finite in the mean. Means are found by sending the light A dh of the
-rays that leave through a cell into that cell.
+The caustic of N_TRT is infinite, but its means are finite. The light A dh of each ray is added to the cell through
+which the ray leaves.
 """
 
 from collections.abc import Sequence
@@ -14,14 +14,14 @@ from ..fibre import paths
 from ..fibre.fresnel import bravais_indices
 from ..fibre.marschner import Caustic, Settings
 
-# Gauss-Legendre within a cell: attenuation is smooth in gamma, and four nodes leave less than half floats can hold.
+# Gauss-Legendre within a cell: attenuation is smooth in gamma, so the error of four nodes is below half floats.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 BAKING = "Baking tables"  # the progress step
 
 Absorptions = Sequence[float] | np.ndarray  # sigma_a (C,)
 
 _ROWS_AT_ONCE = 32  # keeps a block's rays in the processor's cache
-# Gauss-Legendre over half the fiber, for what leaves evenly.
+# Gauss-Legendre over half the fiber, for light that leaves uniformly.
 _WIDE_NODES, _WIDE_WEIGHTS = np.polynomial.legendre.leggauss(64)
 
 
@@ -30,8 +30,8 @@ def smooth_means(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """N_R (H, W, 1), N_TT and N_TRT (H, W, C) as means over the cells between `edges`, float32.
 
-    edges: W + 1 monotone values of phi from 0 to pi or back; cosines (H,): of theta_d; sigma_a (C,). The caustic is
-    treated as `settings` have it in the classic mode; in the other it stays. progress(step, part): told how far it is.
+    edges: W + 1 monotone values of phi from 0 to pi or back; cosines (H,): of theta_d; sigma_a (C,). In the classic
+    mode the caustic is treated as in `settings`, else it is kept. progress(step, part): progress callback.
     """
     shape = (len(cosines), len(edges) - 1)
     n_r, n_tt, n_trt = (np.empty((*shape, count), np.float32) for count in (1, len(sigma_a), len(sigma_a)))
@@ -45,7 +45,7 @@ def smooth_means(
 
 
 def smooth_trt_means(edges: np.ndarray, cosines: np.ndarray, settings: Settings, sigma_a: Absorptions) -> np.ndarray:
-    """N_TRT (H, W, C) alone, as `smooth_means` has it."""
+    """Return only N_TRT (H, W, C) of `smooth_means`."""
     starts = range(0, len(cosines), _ROWS_AT_ONCE)
     blocks = [_trt_cell_means(edges, cosines[start : start + _ROWS_AT_ONCE], settings, sigma_a) for start in starts]
     return np.concatenate(blocks).astype(np.float32)
@@ -54,7 +54,7 @@ def smooth_trt_means(edges: np.ndarray, cosines: np.ndarray, settings: Settings,
 def residual(cosines: np.ndarray, eta: float, sigma_a: Absorptions) -> np.ndarray:
     """N of all paths beyond TRT together, which leave evenly around the fibre: (H, C) for cosines (H,)."""
     gamma = 0.25 * np.pi * (1.0 + _WIDE_NODES)
-    dh = 0.25 * np.pi * _WIDE_WEIGHTS * np.cos(gamma)  # ½ of both halves
+    dh = 0.25 * np.pi * _WIDE_WEIGHTS * np.cos(gamma)  # half of the sum over both halves
     attenuated = paths.path_attenuation(paths.RESIDUAL, gamma, cosines[:, None], eta, sigma_a)
     return np.einsum("hnc,n->hc", attenuated, dh) * (0.5 / np.pi)
 
@@ -69,9 +69,8 @@ def _trt_cell_means(edges, cos_theta_d, settings, sigma_a):
 
 
 def _cell_means(p, edges, cos_theta_d, eta, sigma_a, caustic=None):
-    """Means of N_p over cells of phi, (H, W, C): ½ int A dh over the rays that leave through a cell, by its width.
-
-    With a `Caustic` (H, 1), each ray counts as much as the caustic treatment keeps of N_TRT where the ray leaves.
+    """Return means of N_p over cells of phi, (H, W, C): ½ ∫ A dh over the rays that leave through a cell, divided by
+    its width. With a `Caustic` (H, 1), each ray is weighted by `Caustic.kept` at its exit angle.
     """
     eta_prime, _ = bravais_indices(cos_theta_d[:, None], eta)
     light = np.zeros((len(cos_theta_d), len(edges) - 1, 1 if p == paths.R else len(sigma_a)))
@@ -89,7 +88,9 @@ def _cell_means(p, edges, cos_theta_d, eta, sigma_a, caustic=None):
 
 
 def _gamma_edges(p, edges, eta_prime):
-    """For each monotone segment, (H, W + 1): gamma of the ray that leaves at each edge, else the segment's nearer end.
+    """Return for each monotone segment (H, W + 1): gamma of the ray that leaves at each edge.
+
+    The nearer end of the segment if there is none.
 
     Only phi >= 0 is covered; N is even. eta_prime (H, 1).
     """

@@ -44,7 +44,7 @@ def _microfacets(roughness, n_dot_v):
 
 
 def _fresnel(cosine, refractive_index):
-    """Return the reflectance of a dielectric for unpolarised light."""
+    """Return the reflectance of a dielectric for unpolarized light."""
     g = np.sqrt(refractive_index**2 - 1.0 + cosine**2)
     along = (cosine * (g + cosine) - 1.0) / (cosine * (g - cosine) + 1.0)
     return 0.5 * ((g - cosine) / (g + cosine)) ** 2 * (1.0 + along**2)

@@ -111,7 +111,7 @@ def test_hair_stands_outwards_under_any_scale(sphere, scale):
     assert (outwards.sum(axis=1) > 0.0).all()
 
 
-def test_a_radius_means_metres_whatever_the_scale(sphere):
+def test_a_radius_means_meters_whatever_the_scale(sphere):
     sphere.scale = (2.0, 2.0, 2.0)
     bpy.context.view_layer.update()
     bpy.ops.vellus.distribute_guides(guide_count=20)

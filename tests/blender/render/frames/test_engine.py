@@ -121,7 +121,7 @@ def test_over_black_and_over_white_it_is_what_is_rendered_there(lit, tmp_path, l
 
 @pytest.mark.parametrize("backdrop", [0.0, 1.0])
 def test_a_png_composites_as_the_exr_does(lit, tmp_path, backdrop):
-    """PNG holds straight colours of 8 bits: over a backdrop within 1/255 of the picture it was written of."""
+    """PNG holds straight colors of 8 bits: over a backdrop within 1/255 of the picture it was written of."""
     scene = bpy.context.scene
     light_up()
     exr = rendered(tmp_path, film_transparent=True, sample_count=16)["Combined"]
@@ -277,7 +277,7 @@ def test_blender_s_panels_are_shown_for_it_while_it_is_there(scene):
 
 
 def test_a_scene_without_anything_is_its_background(scene, tmp_path):
-    """No hair, no surface, no light: the world's colour, or nothing at all."""
+    """No hair, no surface, no light: the world's color, or nothing at all."""
     bpy.ops.object.camera_add()
     scene.camera = bpy.context.object
     light_up((0.25, 0.5, 0.75))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scattering of a path at a fibre, compared with `energy_conserving`."""
+"""Scattering of a path at a fiber, compared with `energy_conserving`."""
 
 import numpy as np
 import pytest
