@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lights: Blender's lights and world → arrays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -40,9 +40,16 @@ def read_lights(depsgraph, for_render):
             with np.errstate(all="ignore"):  # values are checked below
                 light = _read_light(instance.object.data, np.array(instance.matrix_world))
             if can_be_drawn(instance.object, *(light[name] for name in light.dtype.names)):
+                light["group"] = group_of(instance.object, depsgraph.view_layer)
                 lights.append(light)
                 links.append(light_linking.read_links(instance.object.original))
     return np.array(lights, uniforms.LIGHT.dtype), links
+
+
+def group_of(owner, view_layer):
+    """Number of the light group of a light object or a world in a view layer, counted from one; 0 without one."""
+    names = [group.name for group in view_layer.lightgroups] if owner.lightgroup else []
+    return names.index(owner.lightgroup) + 1 if owner.lightgroup in names else 0
 
 
 def _shines(instance, for_render):
@@ -113,7 +120,7 @@ class World:
     """Environment lighting: (3,) radiance, multiplied by the image if there is one.
 
     to_image: (4, 4), from world directions to directions of the image; is_mirror_ball: the projection of the image,
-    else equirectangular; frame: of a sequence or movie.
+    else equirectangular; frame: of a sequence or movie; group: of lights, by `group_of`.
     """
 
     color: np.ndarray
@@ -121,6 +128,7 @@ class World:
     to_image: np.ndarray | None = None
     is_mirror_ball: bool = False
     frame: int = 0
+    group: int = 0
 
     @property
     def key(self):
@@ -154,7 +162,8 @@ def read_world(scene, view_layer=None, waits=True):
     if found is None:
         found = _panorama_of(world, scene_time.time_of(scene), waits)
     is_finite = can_be_drawn(world, found.color, () if found.to_image is None else found.to_image)
-    return found if is_finite else World(np.zeros(3))
+    group = 0 if view_layer is None else group_of(world, view_layer)
+    return replace(found, group=group) if is_finite else World(np.zeros(3))
 
 
 def _read_world(world, scene_frame):
@@ -189,7 +198,7 @@ def _is_shown(shader, tree):
 
 
 def _panorama_of(world, time, waits):
-    """The `World` of a panorama that Cycles renders of a world at a time [frames]."""
+    """The `World` of a panorama that Cycles renders of a world at a time [frames]; the last panorama meanwhile."""
     try:
         path = world_panoramas.file_of(world, time, waits)
     except HairError as error:
@@ -197,6 +206,8 @@ def _panorama_of(world, time, waits):
             raise
         say(str(error))
         path = None
+    else:
+        path = path or world_panoramas.last_of(world)
     if path is None:
         return World(np.array(world.color))
     return World(np.ones(3), image_of(str(path)), np.eye(4))

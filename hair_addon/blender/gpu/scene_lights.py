@@ -85,6 +85,7 @@ def gather(found, links, world, receivers):
     for sun, lobe in zip(suns, lobes, strict=True):
         sun["kind"], sun["casts_shadow"] = lamps.SUN, True
         sun["axis"][:3], sun["power"][:3] = -lobe.direction, lobe.irradiance
+        sun["group"] = world.group
         sun["radius"] = 2.0 * np.sqrt(lobe.variance)  # a disk's variance along an axis is a quarter of its radius²
     found, links = np.concatenate([found, suns]), [*links, *([(ALL, ALL)] * len(suns))]
     importance = _importance(found, links, receivers)

@@ -89,6 +89,7 @@ OTHERS = (
     surface_textures.surface_cache,
     notices.printed_cache,
     world_panoramas.process_cache,
+    world_panoramas.last_cache,
 )
 
 # If a bound program is freed and a new one gets its address, the GPU module takes the new one for bound, so programs

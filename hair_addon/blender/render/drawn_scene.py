@@ -220,10 +220,19 @@ def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
     maps.draw(lamps.record, placed, solid, steps, casters, is_steady=is_draft or are_made)
     if maps.is_wide and (sphere := _sphere_around_hair(drawn)) is not None:
         maps.draw_wide(lamps.record, solid, sphere, casters)
+    return _with_lamps(replace(drawn, shadow_maps=maps), lamps, hair_receivers)
+
+
+def with_lamps(drawn, lamps):
+    """A `DrawnScene` of a render with other `SceneLights` that have its shadow maps."""
+    return _with_lamps(drawn, lamps, _hair_receivers(drawn.hair, [owner[1::-1] for owner in drawn.owners]))
+
+
+def _with_lamps(drawn, lamps, hair_receivers):
     own = {}
     if not lamps.are_alike:
         own = {"hair_lights": lamps.lit(hair_receivers), "surface_lights": lamps.lit(drawn.receivers)}
-    return replace(drawn, lights=lamps.record, lamps=lamps, shadow_maps=maps, **own)
+    return replace(drawn, lights=lamps.record, lamps=lamps, **own)
 
 
 def _sphere_around_hair(drawn):

@@ -8,7 +8,7 @@ from ...core.imaging import pixel_sampling
 from ..gpu import drawing
 from ..gpu.programs import picture_programs, surface_programs
 from ..gpu.visibility_buffer import VisibilityBuffer
-from . import data_passes, mattes, motion_vectors, scene_drawing
+from . import data_passes, light_groups, mattes, motion_vectors, scene_drawing
 
 _MOST_SAMPLES = 4096  # along a tile's side: textures take 340 MB, 870 MB with all passes
 
@@ -59,9 +59,9 @@ class Film:
     """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
 
     border: extra samples around the tile; passes: names out of "Combined", "Depth", "Hair Mask", "Hair Shadow",
-    "Shadow", "Vector", `LOBES` and `data_passes`; is_transparent: leave the background empty; filter_width: of
-    `pixel_sampling.filter_weights` [pixels]; labels: `mattes.Labels` if mattes are wanted. The attribute
-    `motion` is the `Motion` for the pass "Vector".
+    "Shadow", "Vector", `LOBES`, `data_passes` and `light_groups`; is_transparent: leave the background empty;
+    filter_width: of `pixel_sampling.filter_weights` [pixels]; labels: `mattes.Labels` if mattes are wanted. The
+    attribute `motion` is the `Motion` for the pass "Vector", `groups` is from `light_groups.lit`.
     """
 
     def __init__(self, size, per_side, passes, is_transparent, filter_width=0.0, border=BORDER, labels=None):
@@ -70,11 +70,13 @@ class Film:
         self._border = border
         sides = (length * per_side + 2 * (self._margin + border) for length in size)
         self.samples = VisibilityBuffer(*sides, is_coarse=per_side > 1)
-        self._sums = {name: self._texture() for name in passes if name not in _OWN_PROGRAMS}
+        has_groups = any(map(light_groups.is_of_group, passes))
+        names = [*passes, light_groups.REST] if has_groups else passes
+        self._sums = {name: self._texture() for name in names if name not in _OWN_PROGRAMS}
         self._positions = self._texture() if "Position" in passes else None
         self._depth = self._texture() if {"Depth", "Hair Mask", "Vector"} & set(passes) else None
         self._mattes = None if labels is None else mattes.MatteFilm(size, labels)
-        self._passes, self.motion = passes, None
+        self._passes, self.motion, self.groups = passes, None, {}
         self.clear()
 
     def _texture(self):
@@ -112,6 +114,8 @@ class Film:
         ]
         weighting = _weights_texture(weights)
         for name, texture in self._sums.items():
+            if light_groups.is_of_group(name) and name not in self.groups:
+                continue  # no light
             samplers = {"picture": self._picture(name, drawn, view, central), "filter_weights": weighting}
             self._add(picture_programs.film_program(), samplers, texture)
         if self._depth is not None:
@@ -135,6 +139,8 @@ class Film:
         """The samples of a pass, as a texture; world_to_view: of the camera without its lens."""
         if name == "Combined":
             return self.samples.color
+        if name in self.groups:
+            return scene_drawing.relight(self.groups[name], view, self.samples, self.is_transparent)
         if name in data_passes.KINDS:
             return data_passes.draw(drawn, name, world_to_view, view, self.samples)
         if name == "Vector":
@@ -188,6 +194,9 @@ class Film:
             found |= {"Hair Mask": mask / self._weight_sum, "Depth": depth}
             if "Vector" in found:  # of objects, not of the background
                 found["Vector"] *= self._weight_sum / np.maximum(covered, 1e-6)
+        if light_groups.REST in found:
+            groups = {name: found.pop(name)[..., :3] for name in list(found) if light_groups.is_of_group(name)}
+            found |= light_groups.fitted(groups, found["Combined"][..., :3])
         if self._positions is not None:
             found["Position"] = self._read(self._positions)
         if "Mist" in found:

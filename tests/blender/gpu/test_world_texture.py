@@ -214,6 +214,27 @@ def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, monkeypat
         lights.read_world(scene)
 
 
+def test_a_view_has_the_last_panorama_while_the_next_is_rendered(scene, monkeypatch):
+    """Panels say so with the name of the world, until it is ready."""
+    rotation, _part = mixed_world(scene)
+    rotation.default_value = (0.21, 0.0, 0.0)
+    former = world_panoramas._folder() / f"{world_digest.digest_of(scene.world)}.exr"
+    former.write_bytes(b"")
+    assert lights.read_world(scene, waits=False).image.path == str(former)
+    assert not world_panoramas.sentences()
+    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "import time; time.sleep(60)"])
+    rotation.default_value = (0.22, 0.0, 0.0)
+    assert lights.read_world(scene, waits=False).image.path == str(former)
+    (sentence,) = world_panoramas.sentences()
+    assert '"World"' in sentence
+    (rendering,) = world_panoramas.process_cache.values()
+    rendering._process.wait(0.0)
+    world_panoramas.look()
+    assert not world_panoramas.sentences()
+    former.unlink()
+    assert lights.read_world(scene, waits=False).image is None
+
+
 def test_the_picture_is_seen_behind_the_scene(scene, rng, tmp_path):
     environment_node(scene, picture(rng))
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))

@@ -14,6 +14,7 @@ from ...host.caches import Cache
 from ...host.notices import name_of
 from ...host.other_process import OtherProcess
 from ...settings import preferences
+from ...settings.translations import interface_text
 from . import world_digest
 
 _PATIENCE = 300.0  # [s] for a panorama
@@ -21,6 +22,7 @@ _LOOK = 0.25  # [s] between checks of processes
 _MOST_KEPT = 64  # files
 
 process_cache = Cache()  # digest → _Rendering: running, or failed
+last_cache = Cache()  # session_uid of a world → the last panorama of any of its nodes
 
 
 class _Rendering:
@@ -65,10 +67,10 @@ def file_of(world, frame, waits):
     waits: return only once it is there. Raises `HairError` if it cannot be rendered.
     """
     digest = world_digest.digest_of(world)
-    path = _folder() / f"{digest}.exr"
+    path, uid = _folder() / f"{digest}.exr", world.original.session_uid
     if path.is_file():
         process_cache.invalidate(digest)
-        return path
+        return last_cache.keep(uid, path)
     rendering = process_cache.get(digest)
     if rendering is None and (waits or not _running()):  # a view has one process, as dragged or played nodes change
         rendering = process_cache.keep(digest, _Rendering(world, path, frame))
@@ -81,7 +83,25 @@ def file_of(world, frame, waits):
         raise HairError(sentence, world=rendering.world, reason=rendering.reason)
     _remove_oldest(path)
     process_cache.invalidate(digest)
-    return path
+    return last_cache.keep(uid, path)
+
+
+def last_of(world):
+    """The last panorama of a world, with other nodes, for views while its next one is rendered; None without one."""
+    path = last_cache.get(world.original.session_uid)
+    return path if path is not None and path.is_file() else None
+
+
+def sentences():
+    """Translated sentences about panoramas that are rendered now, for panels."""
+    return [
+        interface_text(
+            'Cycles renders the nodes of the world "{world}" as a panorama. '
+            "Until it is ready, views have the last one, or the viewport color.",
+            world=name,
+        )
+        for name in sorted({one.world for one in _running()})
+    ]
 
 
 def look():
@@ -90,7 +110,15 @@ def look():
     if any(ended):
         for world in bpy.data.worlds:
             world.update_tag()
+        _redraw_panels()
     return _LOOK if _running() else None
+
+
+def _redraw_panels():
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"PROPERTIES", "VIEW_3D"}:
+                area.tag_redraw()
 
 
 def _running():

@@ -119,6 +119,7 @@ LIGHT = Block(
         "wide_extent": "float",  # `extent` and `near` of that map
         "wide_near": "float",
         "highlight_excess": "float",  # of R relative to its other light, less one
+        "group": "int",  # light group, by `lights.group_of`
         "dimmed_behind": "float",  # fraction of its light that is left out where it shines towards the viewer
     },
 )

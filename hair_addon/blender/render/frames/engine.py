@@ -16,7 +16,7 @@ from ...groom.dynamics import frame_folders
 from ...host import scene_time
 from ...settings import setting_properties
 from ...settings.translations import error_text, interface_text
-from .. import data_passes, drawn_scene, film, light_paths, mattes, motion_vectors
+from .. import data_passes, drawn_scene, film, light_groups, light_paths, mattes, motion_vectors
 from ..viewport import rendered_view, viewport
 from . import composite, frame_progress
 from .frame_progress import FrameProgress
@@ -237,7 +237,7 @@ def _passes(view_layer, is_blurred):
         names += film.LOBES
     if wanted.has_hair_shadow:
         names.append("Hair Shadow")
-    return names + mattes.pass_names(view_layer)
+    return names + light_groups.pass_names(view_layer) + mattes.pass_names(view_layer)
 
 
 def _offsets(render, count):

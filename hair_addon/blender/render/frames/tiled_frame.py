@@ -6,7 +6,7 @@ import numpy as np
 from ....core.imaging import cryptomatte, pixel_sampling
 from ....core.long_work import no_progress, part_of
 from ...gpu import drawing
-from .. import film, light_paths
+from .. import film, light_groups, light_paths
 
 _LIGHT = 0.3  # share of tracing light among strands in the progress of a motion step
 _PASS = "Pass {number} of {count}"
@@ -34,7 +34,7 @@ class Frame:
         path_count=0,
         labels=None,
     ):
-        self._size, self._window, self._path_count = size, window, path_count
+        self._size, self._window, self._path_count, self._passes = size, window, path_count, passes
         self._per_side = pixel_sampling.samples_per_side(sample_count, lens_passes)
         self._turns = sample_count // self._per_side**2
         self._tiles = pixel_sampling.tiles(window, film.largest_tile(self._per_side, filter_width))
@@ -57,15 +57,19 @@ class Frame:
         """
         lit = _LIGHT if self._path_count and drawn.hair else 0.0
         following, drawing_passes = part_of(progress, 0.0, lit), part_of(progress, lit, 1.0)
-        drawn = light_paths.with_grid(
-            drawn, world_to_view, view_to_clip, self._path_count, self._moment_count, following
-        )
+        groups = light_groups.lit(drawn, self._passes)
+        traced = []
+        for number, one in enumerate((drawn, *groups.values())):
+            tracing = part_of(following, number / (1 + len(groups)), (number + 1) / (1 + len(groups)))
+            arguments = world_to_view, view_to_clip, self._path_count, self._moment_count, tracing
+            traced.append(light_paths.with_grid(one, *arguments))
+        drawn, groups = traced[0], dict(zip(groups, traced[1:], strict=True))
         done = 0
         for tile in self._tiles:
             if self._film is None or self._film.size != tile[2:]:
                 self._film = self._new_film(tile)
             self._film.clear()
-            self._film.motion = motion
+            self._film.motion, self._film.groups = motion, groups
             for turn in range(self._turns):
                 with drawing.ALONE:
                     turns_before = self._moment_count * self._turns

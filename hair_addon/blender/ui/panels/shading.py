@@ -6,6 +6,7 @@ import bpy
 from ....core.shading import appearance
 from ....core.shading.appearance import Appearance
 from ....core.shading.presets import PRESETS
+from ...data.pictures import world_panoramas
 from ...groom.selection import active_of_kind, hair_of, object_of
 from ...groom.systems.diagnostics import modifier_notes
 from ...settings import saved_looks
@@ -58,7 +59,7 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
         state = hair_of(context.object).vellus
         write_status(layout, context, state, "shading_status")
         row(layout, state, "is_drawn")
-        for note in modifier_notes(_hair_object(context)):
+        for note in (*modifier_notes(_hair_object(context)), *world_panoramas.sentences()):
             write(layout, context, note, "INFO")
         for name in ("viewport_percentage", "model"):
             row(layout, state, name)
