@@ -188,10 +188,17 @@ def made_of(path, file, wanted, surface_object):
         notes.append(_note_on_motion(path, moving[0]))
     if guides:
         joined_guides = curve_file.join(its_guides)
-        made_guides = curve_objects.new_object("Guides", joined_guides, surface_object)
+        made_guides = curve_objects.new_object("Guides", joined_guides, surface_object, groups=_groups(guides))
         guide_ids = joined_guides.ids
-    made = curve_objects.new_object(_name(path, chosen), joined, surface_object, guide_ids)
+    made = curve_objects.new_object(_name(path, chosen), joined, surface_object, guide_ids, _groups(chosen))
     return Found(made, made_guides, notes, motion, curve_offsets(joined.counts))
+
+
+def _groups(sets):
+    """Return (C,) int32 IDs of the groups of curves, or None if they are of no groom."""
+    if all(one.is_guide is None and not one.group_id for one in sets):
+        return None
+    return np.repeat([one.group_id for one in sets], [len(one) for one in sets]).astype(np.int32)
 
 
 def _name(path, chosen):

@@ -11,10 +11,11 @@ from ..groom.foreign import foreign_curves
 from . import strand_arrays
 
 
-def new_object(name, placed, surface_object, guide_ids=None):
+def new_object(name, placed, surface_object, guide_ids=None, groups=None):
     """Add an object for a `CurveSet` in meters with Z up to the scene, with the transform of a surface but its shear.
 
-    guide_ids: (G,) IDs of the guides that the curves follow; their indices are stored with the weights.
+    guide_ids: (G,) IDs of the guides that the curves follow; their indices are stored with the weights; groups: (C,)
+    IDs of groups, None for none.
     """
     matrix = _without_shear(surface_object.matrix_world)
     to_world = np.array(matrix, np.float64) * strand_arrays.meters_per_unit(bpy.context.scene)
@@ -32,6 +33,13 @@ def new_object(name, placed, surface_object, guide_ids=None):
         attributes.write(datablock, "radius", "FLOAT", "POINT", placed.radii / np.float32(scale))
     if placed.ids is not None:
         attributes.write(datablock, "id", "INT", "CURVE", placed.ids)
+    if placed.root_uvs is not None:
+        attributes.write(datablock, "groom_root_uv", "FLOAT2", "CURVE", placed.root_uvs)
+    if placed.colors is not None:
+        colors = np.concatenate([placed.colors, np.ones((len(placed.colors), 1), np.float32)], axis=1)
+        attributes.write(datablock, "groom_color", "FLOAT_COLOR", "POINT", colors)
+    if groups is not None:
+        attributes.write(datablock, "groom_group_id", "INT", "CURVE", groups)
     if guide_ids is not None and placed.guide_ids is not None:
         curves.write_guide_map(datablock, _guide_map(guide_ids, placed.guide_ids, placed.guide_weights))
     made = bpy.data.objects.new(name, datablock)

@@ -78,7 +78,7 @@ class CurveSet:
     is_smooth: (C,) bool, Catmull-Rom splines whose end points count twice, as Blender draws them; radii: (N,), None if
     the file has no widths; is_guide: None if the file does not specify it. Attributes of Vellus and Unreal, None if
     missing: ids (C,) int32; root_uvs (C, 2); guide_ids (C, 3) int32, IDs of guides of the same file, and guide_weights
-    (C, 3). motion: of animated points.
+    (C, 3); colors (N, 3), linear RGB. motion: of animated points.
     """
 
     name: str
@@ -93,6 +93,7 @@ class CurveSet:
     root_uvs: np.ndarray | None = None
     guide_ids: np.ndarray | None = None
     guide_weights: np.ndarray | None = None
+    colors: np.ndarray | None = None
     motion: Motion | None = None
 
     def __len__(self) -> int:
@@ -131,6 +132,7 @@ class CurveSet:
             counts=self.counts[is_chosen],
             is_smooth=self.is_smooth[is_chosen],
             radii=None if self.radii is None else self.radii[rows],
+            colors=None if self.colors is None else self.colors[rows],
             ids=of_curves(self.ids),
             root_uvs=of_curves(self.root_uvs),
             guide_ids=of_curves(self.guide_ids),
@@ -142,8 +144,8 @@ class CurveSet:
 def as_polylines(curves: CurveSet) -> CurveSet:
     """Return the curves with Catmull-Rom splines evaluated to polylines, with the same counts at all times."""
     counts, is_smooth, motion = curves.counts, curves.is_smooth, curves.motion
-    values = curves.points if curves.radii is None else np.column_stack([curves.points, curves.radii])
-    values, new_counts, lines = bezier_segments.smooth_lines(values, counts, is_smooth)
+    columns = [values for values in (curves.points, curves.colors, curves.radii) if values is not None]
+    values, new_counts, lines = bezier_segments.smooth_lines(np.column_stack(columns), counts, is_smooth)
     if motion is not None:
         points_at = motion.points_at
         motion = Motion(
@@ -154,7 +156,8 @@ def as_polylines(curves: CurveSet) -> CurveSet:
         points=values[:, :3],
         counts=new_counts,
         is_smooth=np.zeros(len(counts), bool),
-        radii=None if curves.radii is None else values[:, 3],
+        radii=None if curves.radii is None else values[:, -1],
+        colors=None if curves.colors is None else values[:, 3:6],
         motion=motion,
     )
 
@@ -194,6 +197,7 @@ def join(sets: Sequence[CurveSet]) -> CurveSet:
         root_uvs=_joined([one.root_uvs for one in sets]),
         guide_ids=_joined([one.guide_ids for one in sets]),
         guide_weights=_joined([one.guide_weights for one in sets]),
+        colors=_joined([one.colors for one in sets]),
         motion=_joined_motion(sets),
     )
 

@@ -132,6 +132,35 @@ def test_curves_of_one_object_are_told_apart_by_kind_and_group(path, rng):
     np.testing.assert_array_equal(sets[1].guide_ids, np.full((2, 3), 3))
 
 
+def test_groups_have_names_and_curves_have_colors(path, rng):
+    """Of each curve, of each point, or of all; colors of another number are reported, and left out."""
+    file, points, rgb = File(), rng.normal(size=(7, 3)), rng.random((7, 3)).astype(np.float32)
+    write, counts = file.writer, [3, 2, 2]
+
+    def colors(values):
+        return write.array("groom_color", "float32", np.float32(values))
+
+    named = [
+        write.array("groom_group_id", "int32", [5, 9, 5]),
+        write.strings("groom_group_name", ["Beard", "Brows", "Beard"]),
+    ]
+    found = read(
+        file,
+        path,
+        file.curves("curves", points, counts, parameters=[*named, colors(rgb[:3])]),
+        file.curves("points", points, counts, parameters=[colors(rgb)]),
+        file.curves("all", points, counts, parameters=[colors(rgb[:1])]),
+        file.curves("odd", points, counts, parameters=[colors(rgb[:4])]),
+    )
+    beard, brows, of_points, of_all, odd = found.sets
+    assert [(one.group_id, one.group_name) for one in (beard, brows)] == [(5, "Beard"), (9, "Brows")]
+    np.testing.assert_array_equal(beard.colors, rgb[[0, 0, 0, 2, 2]])
+    np.testing.assert_array_equal(brows.colors, rgb[[1, 1]])
+    np.testing.assert_array_equal(of_points.colors, rgb)
+    np.testing.assert_array_equal(of_all.colors, rgb[[0] * 7])
+    assert odd.colors is None and ["colors" in str(note) for note in found.notes] == [True]
+
+
 def test_instances_show_curves_again(path):
     file, line = File(), [[0, 0, 0], [1, 0, 0]]
     source = file.transform("hair", [file.curves("hairShape", line, [2])], [1], [0, 0, 1])

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.files import groom_curves
+from hair_addon.core.files import alembic, groom_curves
 from hair_addon.core.files.alembic import unreal_groom
+from hair_addon.core.files.curve_file import Convention
 from hair_addon.core.files.groom_curves import GroomCurves
 from tests.support.exchange import alembic_reader
 
@@ -148,6 +149,27 @@ def test_every_array_comes_back(written):
     root = {name: p.only[0] for (path, name), p in parameters(archive).items() if path == "/groom"}
     assert (root["groom_version_major"], root["groom_version_minor"]) == (1, 5)
     assert root["groom_tool"] == "Vellus 1.0" and root["groom_properties"] == '{"length": 0.3}'
+
+
+def test_our_reader_returns_what_was_written(written, tmp_path):
+    """Guides and strands with their group, IDs, weights, widths, UV coordinates and colors, bit by bit."""
+    _archive, arrays, guides, strands = written
+    found = alembic.grooms.read(tmp_path / "groom.abc")
+    read = {one.is_guide: one for one in found.sets}
+    assert found.stated == Convention(0.01, "Z") and not found.notes and len(read) == 2
+    for one, points in ((guides, arrays["guides"]), (strands, arrays["strands"])):
+        its = read[one.is_guide]
+        assert (its.group_id, its.group_name) == (3, "Long")
+        np.testing.assert_array_equal(its.points.astype(np.float32), points.reshape(-1, 3))
+        np.testing.assert_array_equal(its.counts, one.counts)
+        np.testing.assert_array_equal(its.ids, one.ids)
+        np.testing.assert_array_equal(its.root_uvs, one.root_uvs)
+    its = read[False]
+    np.testing.assert_array_equal(its.radii, np.float32(0.5) * arrays["widths"].ravel())
+    np.testing.assert_array_equal(its.colors, arrays["colors"].reshape(-1, 3))
+    np.testing.assert_array_equal(its.guide_ids, strands.guide_ids)
+    np.testing.assert_array_equal(its.guide_weights, strands.guide_weights)
+    assert read[True].colors is None
 
 
 def test_guides_that_strands_name_are_there(written):

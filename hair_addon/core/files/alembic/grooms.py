@@ -147,7 +147,24 @@ def _sets_of(archive, node, name, application, notes) -> Iterator[CurveSet]:
         radii,
         motion=motion,
     )
-    yield from _split_by_group(curves, _Parameters(archive, node, stack), drawn.kept)
+    parameters = _Parameters(archive, node, stack)
+    colors = _colors(parameters, drawn)
+    if colors is None and parameters.values("groom_color", "f", 3) is not None:
+        sentence = '"{name}" in {path} has colors neither for each point nor for each curve: they are left out.'
+        notes.append(HairError(sentence, name=name, path=archive.path))
+    yield from _split_by_group(replace(curves, colors=colors), parameters, drawn.kept)
+
+
+def _colors(parameters, drawn):
+    """Return linear RGB (N, 3) of the points of `Drawn`, from one for each, for each curve or for all; or None."""
+    colors, count = parameters.values("groom_color", "f", 3), len(drawn.kept)
+    if colors is None:
+        return None
+    if len(colors) in (1, count):
+        colors = np.repeat(np.broadcast_to(colors, (count, 3))[drawn.kept], drawn.counts, axis=0)
+    elif len(colors) != len(drawn.points) or drawn.lines is not None or not drawn.kept.all():
+        return None
+    return colors.astype(np.float32)
 
 
 def _placed(points, matrix):
@@ -197,6 +214,7 @@ def _split_by_group(curves, parameters, kept) -> Iterator[CurveSet]:
         return np.broadcast_to(values.astype(np.int64), file_count)[kept]
 
     is_guide, groups, names = of_all("groom_guide"), of_all("groom_group_id"), parameters.values("groom_group_name", "")
+    of_each = np.array(names, object)[kept] if names and len(names) == file_count else None
     ids, uvs = of_curves("groom_id", "iu"), of_curves("groom_root_uv", "f", 2)
     guide_ids, weights = (
         of_curves("groom_closest_guides", "iu", GUIDE_SLOTS),
@@ -214,6 +232,7 @@ def _split_by_group(curves, parameters, kept) -> Iterator[CurveSet]:
         root_uvs=None if uvs is None else uvs.astype(np.float32),
         guide_ids=guide_ids.astype(np.int32) if has_map else None,
         guide_weights=weights.astype(np.float32) if has_map else None,
+        colors=curves.colors,
         motion=curves.motion,
     )
     if is_guide is None and groups is None:
@@ -222,5 +241,7 @@ def _split_by_group(curves, parameters, kept) -> Iterator[CurveSet]:
     guides = np.full(len(whole), -1) if is_guide is None else is_guide
     groups = np.zeros(len(whole), np.int64) if groups is None else groups
     for guide, group in sorted(set(zip(guides.tolist(), groups.tolist(), strict=True))):
-        part = whole.some((guides == guide) & (groups == group))
-        yield replace(part, is_guide=None if is_guide is None else guide != 0, group_id=group)
+        chosen = (guides == guide) & (groups == group)
+        name = whole.group_name if of_each is None else of_each[chosen][0]
+        is_of_guides = None if is_guide is None else guide != 0
+        yield replace(whole.some(chosen), is_guide=is_of_guides, group_id=group, group_name=name)

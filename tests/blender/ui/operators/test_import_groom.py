@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from hair_addon import api
+from hair_addon.blender.data.strands import attributes, exported_curves
+from hair_addon.blender.io import curve_files
 from hair_addon.blender.ui import menus, panels
 from tests.support.dynamics.following import update
 from tests.support.exchange.alembic_files import of_maya
@@ -83,6 +85,28 @@ def test_our_own_grooms_come_back(hair, tmp_path, ending):
     its_guides, read = run(path, kind="GUIDES")
     np.testing.assert_allclose(in_world(its_guides), expected[0], atol=2e-6)
     assert read.data.vellus.guide_curves == its_guides.data and len(read.data.curves) > 100
+
+
+def test_attributes_of_a_groom_are_attributes_of_curves(hair, tmp_path):
+    """IDs, groups, weights, radii, UV coordinates of roots and colors of an .abc file are those that were exported."""
+    path = tmp_path / "groom.abc"
+    api.export_groom(path, [hair], has_color=True)
+    sets = {one.is_guide: one for one in curve_files.read(path).sets}
+    _guides, read = run(path)
+
+    def values(name, kind, domain):
+        return attributes.read(read.data, name, kind, domain)
+
+    np.testing.assert_array_equal(values("id", "INT", "CURVE"), sets[False].ids)
+    np.testing.assert_array_equal(values("groom_group_id", "INT", "CURVE"), sets[False].group_id)
+    np.testing.assert_array_equal(values("groom_root_uv", "FLOAT2", "CURVE"), sets[False].root_uvs)
+    np.testing.assert_array_equal(values("groom_color", "FLOAT_COLOR", "POINT")[:, :3], sets[False].colors)
+    np.testing.assert_allclose(values("radius", "FLOAT", "POINT"), 0.01 * sets[False].radii, rtol=1e-6)
+    indices, weights = exported_curves.read_guide_map(read.data, len(sets[True]))
+    is_used = weights > 0.0
+    np.testing.assert_array_equal(sets[True].ids[indices][is_used], sets[False].guide_ids[is_used])
+    np.testing.assert_array_equal(weights[is_used], sets[False].guide_weights[is_used])
+    assert len(np.unique(sets[False].colors, axis=0)) >= 1 and is_used.any()
 
 
 @pytest.mark.parametrize("is_saved", [True, False])
