@@ -119,6 +119,10 @@ def _group():
     for group in bpy.data.node_groups:
         if _is_ours(group) and group["vellus_version"] == _VERSION and group.library is None and _carries(group):
             return group
+    return _new_group()
+
+
+def _new_group():
     group = bpy.data.node_groups.new(_NAME, "GeometryNodeTree")
     group["vellus_version"] = _VERSION
     group.is_modifier = True
