@@ -108,19 +108,21 @@ def run_python(program, folder):
     return done.stdout
 
 
-def test_the_example_of_plain_arrays_runs_without_blender(tmp_path):
+def test_examples_of_plain_arrays_run_without_blender(tmp_path):
+    """That of the module, and that of docs/scripts.md."""
     program = "import doctest, warp\nfrom hair_addon import api\nwarp.config.log_level = warp.LOG_WARNING\n"
     program += "test = doctest.DocTestFinder(recurse=False).find(api, 'api')[0]\n"
     program += "assert doctest.DocTestRunner().run(test).failed == 0 and test.examples\n"
-    run_python(WITHOUT_BLENDER + program, tmp_path)
+    *_in_blender, plain = shown_code()
+    assert "bpy" not in plain
+    run_python(WITHOUT_BLENDER + program + plain, tmp_path)
 
 
 def test_examples_of_the_documentation_run(tmp_path):
     """Examples run unchanged: the add-on registers itself in a checkout."""
-    in_blender, keyframes, plain = shown_code()
-    assert "import bpy" in in_blender and "bpy" not in plain
+    in_blender, keyframes, _plain = shown_code()
+    assert "import bpy" in in_blender
     run_python(in_blender + keyframes, tmp_path)
-    run_python(WITHOUT_BLENDER + plain, tmp_path)
 
 
 def test_without_blender_functions_and_commands_say_so(tmp_path):

@@ -395,7 +395,7 @@ def test_json_output_contains_only_results(mesh, tmp_path):
     (result,) = ended.results
     assert (result["guides"], result["strands"], result["points"]) == (20, 100, 4100)
     assert result["bytes"] == (tmp_path / "a.usdc").stat().st_size
-    told = run(*groom, "--verbose")
+    told = run("info", mesh, "--json", "--verbose")
     assert len(told.results) == 1 and "OBJ import" in told.errors
 
 

@@ -15,7 +15,7 @@ from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.files import settings_file
 from hair_addon.core.files.settings_file import GroomSettings
 from tests.command_line.test_command_line import SMALL, grown, mesh  # noqa: F401 (a fixture)
-from tests.support.commands import run, run_here
+from tests.support.commands import run_here
 
 
 def dynamics_of(*options):
@@ -62,10 +62,11 @@ def test_what_is_wrong_is_one_sentence(text, reported):
         dynamics_options.dynamics(text)
 
 
-def test_a_command_ends_with_the_sentence(tmp_path):
-    ended = run("groom", "missing.obj", "--out", tmp_path / "a.npz", "--dynamics-preset", "CURLY")
-    assert ended.status == 2 and "argument --dynamics-preset: invalid choice: 'CURLY'" in ended.errors
-    assert len(ended.errors.splitlines()) == 1
+def test_a_command_ends_with_the_sentence(tmp_path, capfd):
+    words = ("groom", "missing.obj", "--out", tmp_path / "a.npz", "--dynamics-preset", "CURLY")
+    assert run_here(*words).status == 2
+    errors = capfd.readouterr().err
+    assert "argument --dynamics-preset: invalid choice: 'CURLY'" in errors and len(errors.splitlines()) == 1
 
 
 def test_guides_of_a_file_have_the_dynamics_that_are_given(scene, mesh, tmp_path):  # noqa: F811

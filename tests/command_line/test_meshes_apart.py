@@ -44,7 +44,8 @@ def seen():
     return meshes, bpy.data.filepath, bpy.context.scene.unit_settings.scale_length
 
 
-@pytest.mark.parametrize("ending", [".usdc", ".ply", ".gltf"])  # .abc is handled like these
+# All are handled alike, .abc too.
+@pytest.mark.parametrize("ending", [".usdc", ".ply", pytest.param(".gltf", marks=pytest.mark.long)])
 def test_another_process_gives_the_same_scene(files, tmp_path, ending):
     up = "Y" if ending == ".ply" else "Z"
     file_axes = mesh_files.open_file(files[ending], up=up)

@@ -37,7 +37,7 @@ def shot(lit, tmp_path):
 
 
 def test_frames_are_baked_and_rendered(shot, tmp_path):
-    first = run("simulate", shot, "--json", "--last-frame", "3")
+    first = run_here("simulate", shot, "--json", "--last-frame", "3")
     assert [line["frame"] for line in first.results] == [2, 3, 4]  # one more for motion blur
     assert [line["frame"] for line in run_here("simulate", shot, "--json").results] == [5, 6, 7]
     size = ("--width", "64", "--height", "64", "--samples", "4")
@@ -189,11 +189,11 @@ def test_files_without_simulated_guides_are_refused(shot):
     bpy.data.objects["Guides"].data.vellus.simulates = False
     bpy.ops.wm.save_mainfile()
     ended = run_here("simulate", shot)
-    assert ended.status == 1 and "no guides that simulate" in ended.errors
+    assert ended.status == 1 and "no guides with Dynamics on" in ended.errors
     needless = run_here("simulate", shot, "--if-needed", "--json")
     assert (needless.status, needless.results) == (0, [])
     delivered = run_here("simulate", shot, "--if-needed", "--deliver", shot.with_name("delivered.blend"))
-    assert delivered.status == 1 and "no guides that simulate" in delivered.errors
+    assert delivered.status == 1 and "no guides with Dynamics on" in delivered.errors
 
 
 def test_only_what_is_rendered_is_simulated_if_needed(shot):

@@ -17,7 +17,7 @@ from hair_addon.core.params import declared
 from hair_addon.core.styling import clump, curl, frizz, lean, trim, wet
 from hair_addon.core.styling.kinds import OFFERS
 from tests.command_line.test_command_line import SMALL, grown, mesh  # noqa: F401 (a fixture)
-from tests.support.commands import HEAD, load, run, run_here
+from tests.support.commands import HEAD, load, run_here
 
 
 def words(identifier, settings, names):
@@ -62,16 +62,17 @@ def test_what_is_wrong_is_one_sentence(text, reported):
         (("--style-preset", "PERM"), "argument --style-preset: invalid choice: 'PERM'"),
     ],
 )
-def test_a_command_ends_with_the_sentence(options, reported, tmp_path):
-    ended = run("groom", "missing.obj", "--out", tmp_path / "a.npz", *options)
-    assert ended.status == 2 and reported in ended.errors and len(ended.errors.splitlines()) == 1
+def test_a_command_ends_with_the_sentence(options, reported, tmp_path, capfd):
+    assert run_here("groom", "missing.obj", "--out", tmp_path / "a.npz", *options).status == 2
+    errors = capfd.readouterr().err
+    assert reported in errors and len(errors.splitlines()) == 1
 
 
 def test_a_preset_that_is_not_given_cannot_be_fitted(tmp_path):
-    ended = run("settings", "--style-preset", "CURLY", "--out", tmp_path / "a.json")
+    ended = run_here("settings", "--style-preset", "CURLY", "--out", tmp_path / "a.json")
     assert ended.status == 0
     too_many = [word for _ in range(65) for word in ("--style", "curl")]
-    ended = run("settings", *too_many)
+    ended = run_here("settings", *too_many)
     assert ended.status == 1 and "at most 64 styles" in ended.errors
 
 

@@ -188,6 +188,20 @@ def use(folder):
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "saved.blend"))
 
 
+def rename_layer(path):
+    """Check that a layer's name is made readable when the file is opened, as Blender would crash, and renamed."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+    api.add_layer(api.distribute_guides(bpy.context.object, guide_count=10), "QQQQ")
+    damage(path)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    guides = bpy.data.hair_curves[0]
+    (name,) = api.layers(guides)
+    assert name
+    guides.vellus.layers[0].name = "Fringe"
+    assert list(api.layers(guides)) == ["Fringe"]
+
+
 if __name__ == "__main__":
     hair_addon.register()
     shrink_shadows(pytest.MonkeyPatch())
@@ -195,4 +209,5 @@ if __name__ == "__main__":
     use(Path(sys.argv[1]))
     make_styled(Path(sys.argv[1]) / "styled.blend")
     use_styled(Path(sys.argv[1]) / "styled.blend")
+    rename_layer(Path(sys.argv[1]) / "layers.blend")
     print("all was used")
