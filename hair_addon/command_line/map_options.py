@@ -21,7 +21,7 @@ def add_maps(parser):
         "--map",
         dest="maps",
         metavar="SETTING=SOURCE",
-        type=one_map,
+        type=parsed_map,
         action="append",
         default=[],
         help="vary a setting by image:FILE or image:NAME, group:NAME, attribute:NAME, curves:NAME, strand or clump, "
@@ -29,7 +29,7 @@ def add_maps(parser):
     )
 
 
-def one_map(text):
+def parsed_map(text):
     """Parse SETTING=SOURCE,name=value as `MapSettings`."""
     setting, is_given, rest = text.partition("=")
     source, _, fields = rest.partition(",")

@@ -19,7 +19,7 @@ def open_file(given, console, has_curves=False):
     if blender.io.mesh_files.may_crash_blender(given.input):
         return import_mesh.open_apart(given.input, up, console, has_curves)
     file_axes = blender.io.mesh_files.open_file(given.input, up=up, runs_scripts=given.enable_scripts)
-    blocked = blender.io.mesh_files.scripts_kept_from_running()
+    blocked = blender.io.mesh_files.blocked_scripts()
     if blocked:
         console.warn(f"{given.input} has scripts or drivers that were not run ({blocked}): --enable-scripts runs them.")
     return file_axes

@@ -77,7 +77,7 @@ def run(given, console):
     baking = blender.groom.dynamics.guide_baking.baking(guides, last, scene, given.overwrite, report)
     for one, made in zip(guides, run_now(baking, console.progress), strict=True):
         if made.worst.count:
-            console.warn(str(made.worst.said_of(one)))
+            console.warn(str(made.worst.message_of(one)))
     if given.deliver is not None:
         _deliver(given, guides, scene, console)
 

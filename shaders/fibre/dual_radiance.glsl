@@ -61,7 +61,7 @@ vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float front, float behind, float blur
          drawn_lobes.w * ((onward - direct) * through + backward * returning);
 }
 
-// Uniform light that strands behind reflect through a strand: `albedo.returned_from_behind`.
+// Uniform light that the strands behind reflect through a strand.
 vec3 returned_from_behind(float sin_theta_o, float behind)
 {
   float theta_o = atan(sin_theta_o, sin_from_cos(sin_theta_o));

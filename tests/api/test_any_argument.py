@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Any value for any argument of the functions for scripts, and for any property, works or raises `HairError`.
 
-Afterwards the file has nothing that was half made; it is saved, drawn, and an undo works. VELLUS_TEST_STEPS sets the
-number of calls.
+Afterwards the file contains no incomplete hair, it can be saved and drawn, and an undo works. VELLUS_TEST_STEPS sets
+the number of calls.
 """
 
 import math
@@ -77,7 +77,7 @@ COSTLY = {
 
 
 def extremes(default, details):
-    """The ends of a setting's range, now and then just beyond."""
+    """Return an end of a setting's range, sometimes a value just beyond."""
     if isinstance(default, bool | str):
         return [not default] if isinstance(default, bool) else [choice[0] for choice in details.choices] or [default]
     ends = [v for v in (details.low, details.high, details.soft_high) if math.isfinite(v)] or [default]
@@ -109,7 +109,7 @@ def target(dice, kind):
 
 
 def settings(dice):
-    """Mostly a groom's settings, made of anything."""
+    """Return random settings of a groom, mostly valid."""
     if dice.random() < 0.1:
         return dice.choice(OTHERS)
     parts = {}
@@ -167,7 +167,7 @@ def hair_of_arrays(dice):
 
 
 def bake(dice):
-    """Few frames: a million are no error."""
+    """Replace the frame range by a few frames, as a million frames are valid but slow."""
     guides = target(dice, "GUIDES")
     if isinstance(guides, bpy.types.Object) and guides.type == "CURVES" and guides.data.vellus.dynamics.start_frame < 0:
         guides.data.vellus.dynamics.start_frame = 1
@@ -176,7 +176,7 @@ def bake(dice):
 
 
 def require_foreign_curves():
-    """Curves of another hand, for `use_as_guides`, which makes them guides."""
+    """Create curves that are not guides, unless there are some: `use_as_guides` converts them."""
     shown = bpy.data.objects.get(FOREIGN)
     if shown is not None and shown.data.vellus.kind == "NONE":
         return
@@ -190,7 +190,7 @@ def require_foreign_curves():
 
 
 def use_as_guides(dice):
-    """Curves of another hand, in Blender or as arrays."""
+    """Use curves as guides, in Blender or as arrays."""
     if dice.random() < 0.5:
         lines = [[(0.2, 0.2, 0.0), (0.2, 0.2, 0.1)], anything(dice, [(0.1, 0.1, 0.0), (0.1, 0.3, 0.1)])]
         return api.use_as_guides(anything(dice, lines), (np.eye(3), [[0, 1, 2]]), every=anything(dice, 1, 2))
@@ -295,7 +295,7 @@ MADE = ("objects", "hair_curves", "materials", "node_groups")
 
 
 def assert_whole():
-    """No curves are half made, and each hair has what it needs."""
+    """Assert that all guides and hair are complete."""
     for shown in bpy.data.objects:
         if shown.type == "CURVES" and not shown.name.startswith(FOREIGN):
             assert shown.data.vellus.kind != "NONE" and len(shown.data.curves) > 0

@@ -243,7 +243,7 @@ def test_a_look_keeps_how_it_is_drawn(hair):
 
 
 def test_a_color_of_a_script_is_seen(hair):
-    """A script's color takes effect whichever way the color was given before."""
+    """A script's color takes effect in every parametrization of the previous color."""
     api.shade(hair, color=(0.5, 0.1, 0.02))
     look = api.settings_of(hair).appearance
     assert appearance.mean_color(look) == pytest.approx((0.5, 0.1, 0.02), rel=0.01)
@@ -291,7 +291,7 @@ def test_each_kind_of_style_has_its_class_under_its_label():
 
 
 def _giving_locks(hair):
-    """{what: function of (progress) that gives hair locks}."""
+    """Return {name: function of (progress) that adds locks to hair}."""
     other = api.Clump(size=0.3, seed=5)
     return {
         "add": lambda progress: api.add_style(hair, "CLUMP", progress=progress),
@@ -357,7 +357,7 @@ def test_a_style_that_is_not_to_be_fitted_keeps_its_lengths(hair, style):
 
 @pytest.mark.parametrize("style", ["CLUMP", "BRAID", "WET"])
 def test_styles_of_the_menu_have_few_locks_on_any_surface(hair, style, monkeypatch):
-    """Locks for a head would be a hundred thousand on a sphere of two meters."""
+    """Locks are scaled to the surface: with their size on a head, a sphere of two meters would have 100,000."""
     placed, place = [], cvt.place
     monkeypatch.setattr(
         cvt, "place", lambda mesh, count, *rest, **named: placed.append(count) or place(mesh, count, *rest, **named)

@@ -56,7 +56,7 @@ def test_a_handler_of_a_render_that_draws_hears_that_blender_has_the_graphics(ha
 
 @pytest.mark.parametrize("digits", [4299, 4301, 5000])
 def test_a_key_with_an_index_of_any_length_is_of_no_style(digits):
-    """Python refuses to read a number of so many digits."""
+    """A key with an index of any number of digits is no key of a style; Python refuses to parse very long numbers."""
     moved = Rearrangement(["Clump", "Curl"], [1, 0], ["Curl", "Clump"])
     path = f"vellus.styles[{'9' * digits}].curl.radius"
     assert moved.path(path) == moved.path_of_target(path) == path

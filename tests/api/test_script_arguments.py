@@ -24,7 +24,7 @@ def data(name):
 
 
 def removed():
-    """An object that a script holds on to after it was removed."""
+    """Return a reference to an object that was removed."""
     gone = bpy.data.objects.new("Gone", bpy.data.meshes["Icosphere"])
     bpy.data.objects.remove(gone)
     return gone
@@ -38,7 +38,7 @@ def elsewhere():
 
 
 def foreign():
-    """Curves that no one has made guides of."""
+    """Curves that are not guides."""
     curves = bpy.data.hair_curves.new("Lines")
     curves.add_curves([3])
     curves.surface = bpy.data.objects["Sphere"]
@@ -70,7 +70,7 @@ def simulate(poses, guides=None, triangles=TRIANGLE, **changes):
 
 
 class Tensor:
-    """What PyTorch's tensors with gradients are to NumPy."""
+    """Behaves like a PyTorch tensor with gradients when NumPy converts it."""
 
     def __array__(self, dtype=None, copy=None):
         raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead.")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whole bodies by code, for measurements on surfaces with thin parts: a person, a hand, an animal, a folded cloth.
 
-Limbs and balls are joined, remeshed by voxels, smoothed and decimated, as a scan is. Nothing here is made for what
-places guides.
+Limbs and balls are joined, remeshed by voxels, smoothed and decimated like a scan. The shapes are not adapted to guide
+placement.
 """
 
 import bmesh
@@ -146,7 +146,7 @@ def _ball(parts, place, radii, turn=(0, 0, 0)):
 
 
 def _solid(parts, voxel_size, face_count):
-    """An object of one closed surface around all parts, of so many triangles."""
+    """An object of one closed surface around all parts, with `face_count` triangles."""
     mesh = bpy.data.meshes.new("Body")
     parts.to_mesh(mesh)
     parts.free()

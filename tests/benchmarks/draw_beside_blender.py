@@ -56,7 +56,7 @@ class View:
         self.picture = gpu.types.GPUOffScreen(*self.size, format="RGBA16F")
 
     def turn(self):
-        """Look from a little further to the side: what is at rest Blender does not draw again."""
+        """Turn the view a little, as Blender does not redraw a view at rest."""
         step = np.eye(4)
         step[:2, :2] = [[np.cos(0.003), -np.sin(0.003)], [np.sin(0.003), np.cos(0.003)]]
         self.world_to_view = self.world_to_view @ step
@@ -104,7 +104,7 @@ def by_vellus(view):
 
 
 def main():
-    """Print milliseconds, and how many times longer Blender takes."""
+    """Print milliseconds, and the ratio of Blender's time to ours."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--strands", type=int, nargs="+", default=[10_000, 100_000])
     parser.add_argument("--size", type=int, nargs=2, default=[1920, 1080], metavar=("WIDTH", "HEIGHT"))

@@ -32,7 +32,7 @@ REPETITIONS = 15
 
 
 def median_milliseconds(work, repetitions=REPETITIONS):
-    """Median time of one call [ms], after two that compile and warm up."""
+    """Median time of one call [ms], after two calls that compile and warm up."""
     times = []
     for _ in range(repetitions + 2):
         started = time.perf_counter()
@@ -54,14 +54,14 @@ class Frame:
         self._end = gpu.types.GPUFrameBuffer(color_slots=self._pixel)
 
     def draw(self, drawn):
-        """Draw a `DrawnScene` as a viewport does, whose surfaces Blender shades, and wait until that is done."""
+        """Draw a `DrawnScene` like a viewport whose surfaces Blender shades, and wait until it is drawn."""
         with self._buffer.hiding():
             scene_drawing.draw_hiding(drawn, self.view)
         scene_drawing.draw_hair(drawn, self.view, self._buffer)
         self.wait()
 
     def wait(self):
-        """Wait until all that was drawn before is done: what is read has to be there."""
+        """Wait for all previous drawing, by reading a pixel."""
         with self._end.bind():
             drawing.resolve(self._buffer.color, 1)
             self._end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
@@ -83,7 +83,7 @@ def strands_between(guides, strand_count, device):
 
 
 def measure(drawn, frame, points, radii):
-    """{what: milliseconds} of these strands in place of the scene's hair."""
+    """Return {stage: milliseconds} for these strands in place of the scene's hair."""
     _strands, _shading, to_world, *growing_on = drawn.hair[0]
     uploaded = [strand_textures.upload_strands(points, radii)]
 

@@ -49,7 +49,7 @@ def measured(name, way, device, frames):
 
 
 class Free:
-    """Level strands whose roots are shaken; nothing else acts on them."""
+    """Level strands whose roots are shaken, without other forces."""
 
     def __init__(self, count, device):
         roots = np.random.default_rng(0).normal(scale=0.05, size=(count, 1, 3))

@@ -86,7 +86,7 @@ class Editing:
         live_hair.follow_guides(self.hair, depsgraph, self.points.reshape(-1, 3))
 
     def slider(self):
-        """Let strands be as long as their guides, or less; those with styles take more of the last one, or less."""
+        """Change a slider: the preserved length of plain hair, or the amount of the last style of styled hair."""
         self.turn += 1
         if len(self.hair.vellus.styles):
             style_items.group_of(self.hair.vellus.styles[-1]).amount = 0.9 if self.turn % 2 else 0.8
@@ -111,7 +111,7 @@ class Editing:
         work()
 
     def playback(self):
-        """Show guides where they were simulated in the next frame."""
+        """Show guides at their simulated points of the next frame."""
         self._combed()
         live_hair.show_guides(self.guides, self.points, bpy.context.evaluated_depsgraph_get())
 
@@ -122,7 +122,7 @@ class Editing:
         self.points[self.combed] += along * np.float32([0.0, 1e-3, 0.0]) * (1 if self.turn % 2 else -1)
 
     def once(self, action):
-        """One change to the finished picture."""
+        """Make a change and draw the finished picture."""
         getattr(self, action)()
         is_played, is_hair_only = action in {*_OF_SURFACE, "playback"}, action not in _OF_SURFACE
         self.drawn = self.read(
@@ -134,7 +134,7 @@ class Editing:
         hair_cache.choose_makers()
 
     def parts(self, action):
-        """{part: milliseconds} of one change, each waited for."""
+        """Return {part: milliseconds} of one change; each part is timed until it has ended."""
         found, real = dict.fromkeys(PARTS, 0.0), {part: getattr(*where) for part, where in PARTS.items()}
         running_parts = []
 
@@ -185,7 +185,7 @@ def bend(surface, frames):
 
 
 def measure(editing, action, repetitions):
-    """(median of one change [ms], quartiles, {part: median}, bytes uploaded by one)."""
+    """Return (median time of a change [ms], quartiles, {part: median}, bytes uploaded by a change)."""
     totals = []
     for _ in range(repetitions + 3):
         started = time.perf_counter()
@@ -270,7 +270,7 @@ def _measure_way(options, strand_count, device, action, share, way):
 
 
 def _print_profile(editing, action, line_count):
-    """The functions of this side that take most, of twenty changes."""
+    """Print the Python functions that take the most time in twenty changes."""
     profile = cProfile.Profile()
     profile.enable()
     for _ in range(20):
@@ -282,7 +282,7 @@ def _print_profile(editing, action, line_count):
 
 
 def _print_error(hair):
-    """The greatest difference of what is drawn from what is written afterwards, in parts of a strand's length."""
+    """Print the largest difference between drawn and later written points, relative to a strand's length."""
     on_gpu = hair_cache.strands_on_gpu(hair.data)
     if on_gpu.strand_count > 200_000:
         live_hair.write_all()

@@ -3,7 +3,7 @@
 
     .venv/bin/python tests/benchmarks/exchange.py [STRANDS]
 
-Files are read by others than wrote them: Alembic by the tests' own reader, USD by Blender's library. Seconds are
+Independent code reads the files: Alembic by the tests' own reader, USD by Blender's library. Seconds are
 processor time of all cores.
 """
 
@@ -29,7 +29,7 @@ _IMPORTERS = {".abc": {"as_background_job": False, "scale": 0.01}, ".usdc": {}}
 
 
 def main(strand_count):
-    """Print the rows: file, megabytes, seconds, what came back."""
+    """Print the rows: file, megabytes, seconds, errors of reading."""
     hair_addon.register()
     head, guides = head_with_guides()
     hair = api.interpolate_hair(guides, strand_count=strand_count)
@@ -69,7 +69,7 @@ def _megabytes(path):
 
 
 def _errors(path, hair):
-    """Largest differences of what a file has from what the hair has."""
+    """Return the largest differences between a file and the hair."""
     if path.suffix == ".abc":
         found = shape(alembic_reader.read(path), hair.name)
         arrays, per_meter = {name: one.only for name, one in found.items() if one.samples}, 100.0
@@ -113,7 +113,10 @@ def _far(found, expected):
 
 
 def _used_as_hair(path, options, head, strand_count):
-    """Import strands and use them as hair: seconds of both, how far points moved, and what guides reproduce."""
+    """Import strands and use them as hair.
+
+    Returns the times of both [s], the largest movement of points, and the errors of the guides.
+    """
     before = set(bpy.data.objects)
     reader = bpy.ops.wm.alembic_import if path.suffix == ".abc" else bpy.ops.wm.usd_import
     imported, _done = _worked(lambda: reader(filepath=str(path), **options))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bytes that growing hair one way adds to this process at its peak: `hair_memory.py WAY STRANDS`, printed last."""
+"""Peak memory of growing hair by one of the methods [bytes], printed last: `hair_memory.py WAY STRANDS`."""
 
 import sys
 from pathlib import Path
@@ -11,13 +11,13 @@ from tests.benchmarks.hair_peers import Asset, LeanGraph, Ours, head_with_guides
 
 
 def resident(kind):
-    """Bytes of VmRSS or of VmHWM, the most that was since the peak was forgotten."""
+    """Return the bytes of VmRSS, or of VmHWM, the peak since its last reset."""
     lines = Path("/proc/self/status").read_text().splitlines()
     return 1024 * next(int(line.split()[1]) for line in lines if line.startswith(f"{kind}:"))
 
 
 def grow(way, head, guides, strand_count):
-    """Hair of one of the ways, and its `Way`."""
+    """Return hair grown by one of the methods, and its `Way`."""
     if way == "ours":
         return Ours.grown(guides, strand_count)
     if way == "lean":

@@ -38,7 +38,7 @@ def head_with_guides():
 
 @dataclass
 class Way:
-    """How hair is made: its object, and that of the guides that `edit` moves."""
+    """A method of making hair: its object, and the object of the guides that `edit` moves."""
 
     guides: bpy.types.Object
     hair: bpy.types.Object
@@ -59,7 +59,7 @@ class Way:
 
     @property
     def is_poly(self):
-        """Whether that is poly lines; Catmull-Rom curves say nothing of their type."""
+        """Whether the evaluated hair consists of poly lines; Catmull-Rom curves have no type attribute."""
         kind = self._evaluated().attributes.get("curve_type")
         return kind is not None and {item.value for item in kind.data} == {1}
 
@@ -77,7 +77,7 @@ def move(guides, chosen):
 
 
 class Ours(Way):
-    """Vellus, registered: what its operators, sliders and handlers do in a Blender without a window."""
+    """The registered add-on: its operators, sliders and handlers without a window."""
 
     @classmethod
     def grown(cls, guides, strand_count):
@@ -99,7 +99,7 @@ class Ours(Way):
         self._interpolate(self.hair.data)
 
     def edit(self):
-        """The handler follows the guides and writes the hair, of which Blender then takes note."""
+        """Move the guides: the handler follows them and writes the hair, and Blender evaluates it."""
         super().edit()
         bpy.context.view_layer.update()
 
@@ -108,7 +108,7 @@ class Ours(Way):
         bpy.context.view_layer.update()
 
     def write(self):
-        """No strand is made: points that are there are written, and Blender takes note."""
+        """Write existing points without computing strands, and let Blender evaluate them."""
         writing.write_hair(self.hair.data)
         bpy.context.view_layer.update()
 
@@ -151,7 +151,7 @@ class Asset(Way):
 
     @property
     def modifier_time(self):
-        """Seconds [s] that the modifier alone took in the last update."""
+        """Return the time of the modifier in the last update [s]."""
         return self.hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).modifiers[0].execution_time
 
 
@@ -178,7 +178,7 @@ def area(surface_object):
 
 
 def _bare_copy(guides, head, name):
-    """Guides as Blender's own tools make them: positions and UV coordinates, on their surface."""
+    """Return guides like those of Blender's tools: with positions and UV coordinates, on their surface."""
     data = guides.data.copy()
     data.vellus.kind = "NONE"
     for attribute in [a.name for a in data.attributes]:

@@ -15,10 +15,9 @@ CANDIDATES = 12
 
 @dataclass(frozen=True)
 class Evenness:
-    """energy: by that of as many hexagons; variation of the cells' areas; closest: two sites, by a honeycomb's spacing.
-
-    Straight: cells are of the nearest site through space, however thin the part; else of the nearest site of the same
-    island that faces the same way.
+    """energy: relative to that of as many hexagons; variation: of the cells' areas; closest: least distance of two
+    sites, relative to a honeycomb's. Straight cells belong to the nearest site in space; other cells to the nearest
+    site of the same island that faces the same way.
     """
 
     energy: float
@@ -61,7 +60,7 @@ def _moments(distances, sites, weights, count):
 
 
 def _samples(mesh, count):
-    """Middles (Q, 3) of equal parts of each triangle, their areas (Q,) and triangles (Q,)."""
+    """Return the centers (Q, 3) of equal parts of each triangle, their areas (Q,) and triangles (Q,)."""
     sides = np.maximum(np.ceil(np.sqrt(mesh.areas * count / mesh.areas.sum())), 1).astype(int)
     sides[mesh.areas == 0.0] = 0
     points, areas, triangles = [], [], []

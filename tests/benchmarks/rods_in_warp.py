@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One Newton step of free rods in Warp's own vectors and matrices, a strand a thread: what the solver's lanes are timed
-beside. The algebra is that of rod_newton.h and rod_back.h, without damping and contact.
+"""One Newton step of free rods in Warp's own vectors and matrices, with a strand per thread, as a reference for the
+times of the solver's lanes. The algebra is that of rod_newton.h and rod_back.h, without damping and contact.
 """
 
 import numpy as np
@@ -168,7 +168,7 @@ def _newton_step(
 
 
 class NewtonStep:
-    """A Newton step of the strands of some `Rods`, from where PREDICT has left them, with still roots."""
+    """A Newton step of the strands of some `Rods`, from their state after PREDICT, with fixed roots."""
 
     def __init__(self, rods, step):
         count, segments = rods.strand_count, rods.segment_count

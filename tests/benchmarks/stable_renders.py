@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Flicker of rendered hair while the scene rotates under fixed lights, by dual scattering and by Light Grid.
 
-Scenes of `random_scene` turn by a quarter of a degree with each frame. Printed are display levels of 255, where hair
-is: how far pixels change from one frame to the next, at the 99th percentile; how far means of 12 × 12 pixels do, in
-which flicker is seen that single pixels hide, in the mean and at the 99th percentile; the same with `--converged` times
-as many paths; and how far frames are from those, the root mean square of blocks.
+Scenes of `random_scene` turn by a quarter of a degree with each frame. The script prints differences of hair pixels in
+display levels of 255: the 99th percentile of the change of pixels between frames; the mean and the 99th percentile of
+the change of means over 12 × 12 pixels, which show flicker that single pixels hide; the same with `--converged` times
+as many paths; and the root mean square difference of these blocks between both.
 
 .venv/bin/python tests/benchmarks/stable_renders.py --seeds 36 45 41 --converged 16
 """

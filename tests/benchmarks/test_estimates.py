@@ -40,7 +40,7 @@ def seconds(work, repetitions=2):
 
 
 def place(mesh, settings):
-    """Guides on a mesh of which nothing is known from the last run."""
+    """Place guides on a mesh without cached results of the last run."""
     return groom.distribute_guides(TriMesh(mesh.vertices, mesh.triangles), settings)
 
 

@@ -16,7 +16,7 @@ def devices():
 
 
 def median_time(work, device, repetitions=9):
-    """Median time [s] of one call, the device's part included, after a first call, which compiles."""
+    """Median time [s] of one call, including the device's work, after a first call that compiles."""
     times = []
     for _ in range(repetitions + 1):
         wp.synchronize_device(device)

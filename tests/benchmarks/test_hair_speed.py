@@ -43,7 +43,7 @@ MODIFIER = "asset, its modifier alone"
 
 @pytest.fixture(scope="module", autouse=True)
 def told():
-    """Return the lines before the tables: what was measured, and on which machine."""
+    """Return the lines before the tables, which name the measurement and the machine."""
     print("\n" + json.dumps(machine()))
 
 

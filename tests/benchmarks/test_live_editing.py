@@ -86,7 +86,7 @@ class View:
         return drawn_scene.read(context.scene, context.view_layer, depsgraph, before=before, is_draft=is_draft)
 
     def redraw(self):
-        """Hair has changed, and nothing else."""
+        """Redraw after a change of only the hair."""
         self.drawn = self._read(self.drawn)
         self.picture.restart()
         self.picture.add_pass(self.drawn, *self.matrices)
@@ -123,7 +123,7 @@ def test_live_editing(head, strand_count, monkeypatch):
     monkeypatch.undo()
     monkeypatch.setattr(running, "has_window", lambda: True)
     write = median_ms(lambda: (comb(guides), live_hair.write_all())) - edit
-    whole = median_ms(lambda: (events.strands_made(hair), on_gpu(hair)))
+    whole = median_ms(lambda: (events.strands_computed(hair), on_gpu(hair)))
 
     basis = head.shape_key_add(name="Basis")
     key = head.shape_key_add(name="Key")

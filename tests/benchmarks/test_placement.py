@@ -141,7 +141,7 @@ def poisson(mesh, count):
 
 
 def ways(mesh, count):
-    """{name: call} of what is compared and installed."""
+    """Return {name: function} of the compared methods that are installed."""
     found = {"ours": lambda: ours(mesh, count), "ours, thorough": lambda: ours_thorough(mesh, count)}
     if importlib.util.find_spec("point_cloud_utils"):
         found["geogram"] = lambda: geogram(mesh, count)
@@ -154,7 +154,7 @@ def ways(mesh, count):
 
 
 def versions():
-    """Of all that is compared, and the machine."""
+    """Return the versions of the compared programs and the machine."""
     packages = ("warp-lang", "numpy", "point-cloud-utils", "pyacvd", "bpy")
     found = {}
     for package in packages:
@@ -205,9 +205,9 @@ def test_sites_are_more_even_than_those_of_peers(name):
 @pytest.mark.skipif(REPETITIONS == 1, reason="geogram is not installed")
 @pytest.mark.parametrize("name", BODIES)
 def test_sites_on_whole_bodies_beside_geogram(name):
-    """Energy, variation of cells, each on its own side of thin parts, and processor time: all below geogram's.
+    """Energy, variation of cells (on each side of thin parts) and processor time are below geogram's.
 
-    geogram's sites lie beside the surface, and are put back onto it, which is not timed.
+    Geogram's sites are projected onto the surface, which is not timed.
     """
     mesh, count = surface(name), 4000
     query, times, found = SurfaceQuery(mesh), {"ours": [], "geogram": []}, {"ours": [], "geogram": []}

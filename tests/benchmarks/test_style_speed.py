@@ -30,7 +30,7 @@ def hair():
 
 
 def styling_calls(hair, stacks):
-    """{name: call} that styles points which are there; "copy" copies them."""
+    """Return {name: function} that styles existing points; "copy" copies them."""
     plain = following.follow_guides(hair.binding, hair.guides).points
     points = wp.clone(plain)
     calls = {"copy": lambda: wp.copy(points, plain)}
@@ -44,7 +44,7 @@ def styling_calls(hair, stacks):
 
 @pytest.mark.long
 def test_each_style_beside_copying(hair):
-    """The least that a style can cost is a read and a write: a style that trims nothing."""
+    """The reference is a read and a write of all points: a style that trims nothing."""
     stacks = {kind: (kinds.KINDS[kind](),) for kind in ON_STRANDS} | {"CLUMP": THREE[:1], "Clump, Curl, Frizz": THREE}
     stacks |= {"two levels of Clump": (clump.Settings(levels=2),)}
     times = best_times(styling_calls(hair, stacks), 7)
@@ -55,7 +55,7 @@ def test_each_style_beside_copying(hair):
 
 @pytest.mark.long
 def test_styles_beside_blender(hair):
-    """Blender's assets on poly lines; what the update takes without them is subtracted."""
+    """Blender's assets on poly lines; the time of an update without them is subtracted."""
     hair_addon.register()
     _surface, guides = hair_peers.head_with_guides()
     strands = hair_peers.Ours.grown(guides, STRAND_COUNT).hair

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair with three styles while guides are combed and sliders are moved, beside the same hair without: printed.
 
-All in a Blender without a window whose handlers believe in one, up to the arrays that the picture reads. Nothing is
-uploaded or drawn, as Vellus has the same to upload with styles and without.
+Blender runs without a window, but handlers act as if it had one. Times end with the arrays that the picture reads.
+Nothing is uploaded or drawn, as Vellus has the same to upload with styles and without.
 """
 
 from itertools import count
@@ -40,19 +40,19 @@ def hair(monkeypatch):
 
 
 def slide(hair, place, name, values):
-    """Another value of a style's slider, and Blender's update."""
+    """Set another value of a style's setting, and let Blender update."""
     setattr(style_items.group_of(hair.vellus.styles[place]), name, next(values))
     bpy.context.view_layer.update()
 
 
 def made(hair, change):
-    """A change, until the strands of a hair are there: they are made in other threads."""
+    """Make a change and wait for the strands, which are computed in other threads."""
     change()
     return bindings.of(hair).points
 
 
 def near(value):
-    """Values close to one, no two of them the same."""
+    """Return distinct values close to one."""
     return (value * (1.0 + 0.001 * step) for step in count(1))
 
 
@@ -93,7 +93,7 @@ def test_styled_editing(hair, monkeypatch):
 
 
 def style_bytes(hair):
-    """What the styles of bound hair keep, without what strands have anyhow: normals and identities."""
+    """Return the memory of the styles of bound hair, except the normals and identities that strands have anyway."""
     styling = bindings.of(hair).styles.styling
     kept = [styling.data.masks, styling.data.members, styling.data.centre_points, styling.data.centre_normals]
     kept += [array for level in styling.levels for array in (level.data.masks, level.data.members)]

@@ -120,7 +120,7 @@ def drawn_points_are_current():
     present = {o.data for o in bpy.context.view_layer.objects if o.type == "CURVES"}
     # All points are read first, as hair on one surface is regenerated together.
     for datablock, kept in [(datablock, _drawn_points(datablock)) for datablock in ours() if datablock in present]:
-        events.strands_made(datablock)
+        events.strands_computed(datablock)
         if datablock.surface is not None:
             events.surface_moved(datablock.surface)
         fresh = _drawn_points(datablock)

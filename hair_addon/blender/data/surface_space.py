@@ -12,7 +12,7 @@ from ...core.geometry.affine import Affine
 from ..host.notices import name_of
 
 # Properties of Curves. They are groups, because Blender's USD exporter warns about bare arrays.
-_STOOD_ON = "vellus_stood_on"  # the surface, when strands were rooted on it
+_STORED_SURFACE = "vellus_stood_on"  # the surface, when strands were rooted on it
 _APPLIED = "vellus_applied"
 _KNOWN_AS = "vellus_known_as"
 
@@ -34,12 +34,12 @@ def keep_surface(curves, surface):
     values = {"rest": surface.rest.ravel(), "to_world": matrix.ravel(), "name": surface.name}
     if curves.surface is not None:
         values["surface"] = curves.surface
-    _store(curves, _STOOD_ON, values)
+    _store(curves, _STORED_SURFACE, values)
 
 
 def remember_place(curves):
     """Store the surface's transform before a file is saved, as transforms may be applied without the add-on."""
-    stored = curves.get(_STOOD_ON)
+    stored = curves.get(_STORED_SURFACE)
     if stored is not None and curves.surface is not None and curves.library is None and not has_other_surface(curves):
         stored["to_world"], stored["name"] = np.array(curves.surface.matrix_world).ravel(), name_of(curves.surface)
         stored["surface"] = curves.surface
@@ -47,10 +47,10 @@ def remember_place(curves):
 
 def has_other_surface(curves):
     """Whether another surface was picked for Curves to which their objects are not attached yet as children."""
-    stored = curves.get(_STOOD_ON)
+    stored = curves.get(_STORED_SURFACE)
     if curves.surface is None or stored is None:
         return False
-    known, name = _stood_on(stored), stored.get("name")
+    known, name = _stored_surface(stored), stored.get("name")
     # Files of older versions only store the name: a renamed surface counts as another surface.
     is_same = known == curves.surface if known is not None else name == name_of(curves.surface)
     if is_same or (known is None and not isinstance(name, str)):
@@ -62,11 +62,11 @@ def surface_before(curves):
     """The object that Curves stand on, even if another was picked since; None if deleted or unknown."""
     if not has_other_surface(curves):
         return curves.surface
-    stored = curves[_STOOD_ON]
-    return _stood_on(stored) or bpy.data.objects.get(stored.get("name", ""))
+    stored = curves[_STORED_SURFACE]
+    return _stored_surface(stored) or bpy.data.objects.get(stored.get("name", ""))
 
 
-def _stood_on(stored):
+def _stored_surface(stored):
     """The object stored by `keep_surface`, a reference that follows renaming; None if deleted, or in older files."""
     found = stored.get("surface")
     return found if isinstance(found, bpy.types.Object) else None
@@ -74,19 +74,19 @@ def _stood_on(stored):
 
 def rest_before(curves):
     """(V, 3) float32 vertices of the surface that `keep_surface` stored, or None."""
-    stored = curves.get(_STOOD_ON)
+    stored = curves.get(_STORED_SURFACE)
     return None if stored is None else np.array(stored["rest"], np.float32).reshape(-1, 3)
 
 
 def vertex_count_before(curves):
     """The number of vertices of the surface that `keep_surface` stored, or None."""
-    stored = curves.get(_STOOD_ON)
+    stored = curves.get(_STORED_SURFACE)
     return None if stored is None else len(stored["rest"]) // 3
 
 
 def to_world_before(curves):
     """The `Affine` that was stored with the surface; None in files of older versions."""
-    stored = curves.get(_STOOD_ON)
+    stored = curves.get(_STORED_SURFACE)
     if stored is None or len(stored.get("to_world", ())) != 16:
         return None
     return Affine.of(stored["to_world"])

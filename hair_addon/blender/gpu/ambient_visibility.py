@@ -193,7 +193,7 @@ def _is_surface(place):
 
 
 def _texture(size, kind):
-    texture = driver_textures.made(size, kind)
+    texture = driver_textures.new_texture(size, kind)
     texture.filter_mode(True)
     texture.extend_mode("EXTEND")
     return texture

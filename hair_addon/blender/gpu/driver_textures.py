@@ -9,7 +9,7 @@ from ...core.errors import HairError
 _TEXEL_BYTES = {"RGBA32F": 16, "RG32F": 8, "RGBA16F": 8, "R32F": 4, "R16": 2}
 
 
-def made(size: tuple[int, ...], texture_format: str, texels: np.ndarray | None = None) -> gpu.types.GPUTexture:
+def new_texture(size: tuple[int, ...], texture_format: str, texels: np.ndarray | None = None) -> gpu.types.GPUTexture:
     """Return a texture of `size` texels without filtering; texels: float32 values, None: undefined.
 
     Raises `HairError` if the texture exceeds the driver's limits or memory.

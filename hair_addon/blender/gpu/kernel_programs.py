@@ -134,14 +134,14 @@ def _texture(parts, texture_format, channels):
     texels = np.concatenate([np.zeros((0, channels), np.float32), *parts])
     height = max(-(-len(texels) // TEXTURE_WIDTH), 1)
     texels = np.pad(texels, ((0, height * TEXTURE_WIDTH - len(texels)), (0, 0)))
-    return driver_textures.made((TEXTURE_WIDTH, height), texture_format, texels)
+    return driver_textures.new_texture((TEXTURE_WIDTH, height), texture_format, texels)
 
 
 def _empty(count, kind):
     """Return an image of zeros for the values that threads write."""
     texture_format, channels = _FORMATS[_TEXTURE_OF[kind]]
     size = TEXTURE_WIDTH, max(-(-count // TEXTURE_WIDTH), 1)
-    return driver_textures.made(size, texture_format, np.zeros(size[0] * size[1] * channels, np.float32))
+    return driver_textures.new_texture(size, texture_format, np.zeros(size[0] * size[1] * channels, np.float32))
 
 
 def _read(image, count, kind):

@@ -159,7 +159,7 @@ def with_looks(strands, looks):
         np.minimum(sigma_a, _MOST_HALF, out=texels[:count, place, :3])
     np.minimum(looks.roughness, _MOST_HALF, out=texels[:count, 0, 3])
     texels[:count, 1, 3] = 0.5 if strands.randoms_here is None else strands.randoms_here
-    texture = driver_textures.made((2 * row_strands, len(texels) // row_strands), "RGBA16F", texels)
+    texture = driver_textures.new_texture((2 * row_strands, len(texels) // row_strands), "RGBA16F", texels)
     return replace(strands, looks=texture, looks_here=looks)
 
 
@@ -181,14 +181,14 @@ def numbers_texture(values, row_strands):
     """A texture with one number per strand, `row_strands` per row; values: (S,)."""
     numbers = np.zeros((-(-len(values) // row_strands), row_strands), np.float32)
     numbers.ravel()[: len(values)] = values
-    return driver_textures.made(numbers.shape[::-1], "R32F", numbers)
+    return driver_textures.new_texture(numbers.shape[::-1], "R32F", numbers)
 
 
 def pairs_texture(values, row_strands):
     """A texture with two numbers per strand, `row_strands` per row; values: (S, 2)."""
     pairs = np.zeros((-(-len(values) // row_strands), row_strands, 2), np.float32)
     pairs.reshape(-1, 2)[: len(values)] = values
-    return driver_textures.made(pairs.shape[1::-1], "RG32F", pairs)
+    return driver_textures.new_texture(pairs.shape[1::-1], "RG32F", pairs)
 
 
 def row_strands_of(point_count, others=0):
@@ -267,12 +267,12 @@ def _to_steps(numbers):
 
 def _texture(texture_format, width, texels):
     channels = 2 if texture_format == "RG32F" else 1
-    return driver_textures.made((width, texels.size // (channels * width)), texture_format, texels)
+    return driver_textures.new_texture((width, texels.size // (channels * width)), texture_format, texels)
 
 
 def like(texture):
     """An undefined texture of the same size for other strands."""
-    return driver_textures.made((texture.width, texture.height), "RG32F")
+    return driver_textures.new_texture((texture.width, texture.height), "RG32F")
 
 
 def seen_points(point_count):

@@ -34,7 +34,7 @@ def note(surfaces: Collection[Object], depsgraph: Depsgraph) -> None:
             count_cache.keep(_key(datablock), counts)
 
 
-def came_with_the_frame(datablock: Curves, surface: Surface) -> bool:
+def differs_by_frame(datablock: Curves, surface: Surface) -> bool:
     """Whether a surface differs from the one that Curves are rooted on because of the frame, not because of an edit."""
     return count_cache.get(_key(datablock)) == (len(surface.rest), len(surface.mesh.triangles))
 

@@ -143,15 +143,15 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     roots = reused_roots.of(target, surface, key, settings.strand_count) if known is None else None
     device, guide_uid = preferences.device(), guide_curves.session_uid
 
-    ground = _ground(surface, scene.shown_surface(guide_curves.surface, surface), mask, parting, device)
+    inputs = _placement_inputs(surface, scene.shown_surface(guide_curves.surface, surface), mask, parting, device)
     if target is not None:
         made_on = surface_space.made_on(target, surface.rest)
-        ground["shape"] = surface.former_shape(made_on, surface_space.applied(target))
+        inputs["shape"] = surface.former_shape(made_on, surface_space.applied(target))
 
     def compute(progress):
         if known is None:
-            binding = _bind(surface, guides, settings, ground, roots, progress)
-            make_trees = _trees_on(surface, guides, settings, ground)
+            binding = _bind(surface, guides, settings, inputs, roots, progress)
+            make_trees = _trees_on(surface, guides, settings, inputs)
         else:
             binding = hair_binding.reweighed(known.binding, settings)
             make_trees = styled_hair.reweighed_trees(known.styles, settings)
@@ -224,13 +224,13 @@ def adding_hair(
 
     def compute(progress):
         groom.load_kernels(device, progress)
-        ground = _ground(surface, shown, hair_mask, parting, device)
+        inputs = _placement_inputs(surface, shown, hair_mask, parting, device)
         laid_flow = drawn_lines.at_rest(flow, shown, surface, device)
         grown = grown_guides.grow(surface, guide_settings, mask, laid_flow, part_of(progress, 0.0, 0.5))
         guides = _as_written(grown.strands, surface, device)
         progress = part_of(progress, 0.5, 1.0)
-        binding = _bind(surface, guides, hair_settings, ground, None, progress)
-        styled = _styled(styling, binding, guides, hair_settings, surface, ground, part_of(progress, 0.5, 0.8))
+        binding = _bind(surface, guides, hair_settings, inputs, None, progress)
+        styled = _styled(styling, binding, guides, hair_settings, surface, inputs, part_of(progress, 0.5, 0.8))
         known = binding, hair_settings, of_hair.root_key, parting.key, guides, None, surface, styled
         bound = BoundHair(*known, fits=of_hair.fits)
         return grown, _growing(bound, progress)
@@ -259,12 +259,12 @@ def hair_between(
         density = painted if density is None else shown.of_cage(density)
         mask = density, texture
         sized = size_fitting.of_hair(settings, surface, mask, len(guides))
-        completed, ground = sized.settings, _ground(surface, shown, mask, parting, device)
+        completed, inputs = sized.settings, _placement_inputs(surface, shown, mask, parting, device)
         if surface is not shown:
             roots = curves.nearest_roots(surface, guides.numpy()[:, 0])
             guides = strands.from_numpy(guides.numpy(), roots, device)
-        binding = _bind(surface, guides, completed, ground, None, progress)
-        styles = _styled(ReadStyles(), binding, guides, completed, surface, ground)
+        binding = _bind(surface, guides, completed, inputs, None, progress)
+        styles = _styled(ReadStyles(), binding, guides, completed, surface, inputs)
         known = binding, completed, sized.root_key, parting.key, guides, None, surface, styles
         return _growing(BoundHair(*known, fits=sized.fits), progress)
 
@@ -283,7 +283,7 @@ def _as_written(guides, surface, device):
     return strands.from_numpy(surface.from_local(points), guides.roots, device)
 
 
-class _Ground(TypedDict):
+class _PlacementInputs(TypedDict):
     """The surface on which strands and clump sites are placed: arguments of `groom.bind_hair`, described there."""
 
     density: np.ndarray | None
@@ -296,10 +296,13 @@ class _Ground(TypedDict):
     device: str
 
 
-def _ground(surface, shown, mask, parting, device) -> _Ground:
-    """Return the `_Ground` of a surface. mask: (density, texture); shown: the subdivided surface with drawn lines."""
+def _placement_inputs(surface, shown, mask, parting, device) -> _PlacementInputs:
+    """Return the `_PlacementInputs` of a surface.
+
+    mask: (density, texture); shown: the subdivided surface with drawn lines.
+    """
     density, texture = mask
-    return _Ground(
+    return _PlacementInputs(
         density=density,
         texture=texture,
         regions=parting.regions,
@@ -311,18 +314,18 @@ def _ground(surface, shown, mask, parting, device) -> _Ground:
     )
 
 
-def _bind(surface, guides, settings, ground, roots, progress):
-    return groom.bind_hair(surface.mesh, guides, settings, roots=roots, progress=part_of(progress, 0.0, 0.5), **ground)
+def _bind(surface, guides, settings, inputs, roots, progress):
+    return groom.bind_hair(surface.mesh, guides, settings, roots=roots, progress=part_of(progress, 0.0, 0.5), **inputs)
 
 
-def _trees_on(surface, guides, settings, ground):
+def _trees_on(surface, guides, settings, inputs):
     """Return a function that builds the `ClumpTrees` of hair."""
-    return lambda: hair_styles.clump_trees(surface.mesh, guides.roots, settings, **ground)
+    return lambda: hair_styles.clump_trees(surface.mesh, guides.roots, settings, **inputs)
 
 
-def _styled(read, binding, guides, settings, surface, ground, progress=no_progress):
+def _styled(read, binding, guides, settings, surface, inputs, progress=no_progress):
     """Return the `StyledHair` of new hair."""
-    make_trees = _trees_on(surface, guides, settings, ground)
+    make_trees = _trees_on(surface, guides, settings, inputs)
     return styled_hair.bind(read, binding, guides, settings, surface, make_trees, progress)
 
 

@@ -67,7 +67,7 @@ def exporting(path, chosen, settings, blender_scene):
         stack.callback(_go_to, blender_scene, None if frames == [None] else scene_time.time_of(blender_scene))
         _go_to(blender_scene, frames[0])
         yield Stage("Exporting", 0.0)
-        strand_arrays.bring_up_to_date()
+        strand_arrays.update_strands()
         chosen = [one.find() for one in remembered]
         sources = groom_sources.sources_of(chosen, settings, per_meter)
         notes, instances = list(groom_sources.notes_of(chosen, sources, settings)), groom_sources.instances_of(chosen)

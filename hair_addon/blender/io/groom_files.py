@@ -66,7 +66,7 @@ def arrays(guides, hair, file_axes):
     for name, curves in (("guide", guides), ("strand", hair)):
         counts = strand_arrays.counts_of(curves)
         points = strand_arrays.world_rows(curves)(slice(0, len(counts))) @ file_axes.T.astype(np.float32)
-        widths = exported_curves.radii_kept(curves) * np.float32(2.0 * strand_arrays.world_scale(curves))
+        widths = exported_curves.radii_per_curve(curves) * np.float32(2.0 * strand_arrays.world_scale(curves))
         roots = points[curve_offsets(counts)[:-1]]
         if (counts == counts[0]).all():
             points, widths = points.reshape(len(counts), -1, 3), widths.reshape(len(counts), -1)

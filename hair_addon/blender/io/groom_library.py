@@ -157,9 +157,9 @@ def _asset(groom, picture, catalog):
     attributes.write(datablock, "root_barycentric", "FLOAT_VECTOR", "CURVE", groom.roots.barycentric)
     for name, values in groom.regions.items():
         attributes.write(datablock, name, "FLOAT" if values.dtype.kind == "f" else "INT", "CURVE", values)
-    ground = groom.ground
+    source = groom.source
     datablock.surface = groom_assets.surface_object(
-        f"{groom.name} Surface", ground.mesh, ground.corner_uvs, groom.masks
+        f"{groom.name} Surface", source.mesh, source.corner_uvs, groom.masks
     )
     asset = bpy.data.objects.new(groom.name, datablock)
     asset.parent = datablock.surface
@@ -250,8 +250,8 @@ def _groom(asset, name, path):
         raise HairError('"{name}" in {path} is not a groom saved by Vellus.', name=name, path=path)
     surface_object = asset.data.surface
     try:
-        ground = grooming.groom_transfer.TransferSurface(*groom_assets.read_surface(surface_object))
-        check_mesh(ground.mesh)
+        source = grooming.groom_transfer.TransferSurface(*groom_assets.read_surface(surface_object))
+        check_mesh(source.mesh)
         points, counts = curves.read_points(asset.data), np.diff(curves.curve_offsets(asset.data))
         settings = settings_file.from_object(settings_file.object_of_text(text, path), path)
         left = json.loads(asset.get(_LEFT, "[]"))
@@ -268,8 +268,8 @@ def _groom(asset, name, path):
     masks = {
         group.name: scene.weights_in_group(surface_object.data, group.index) for group in surface_object.vertex_groups
     }
-    roots = _roots(asset.data, ground.mesh, first)
-    return LibraryGroom(name, ground, roots, points, counts, settings, masks, regions, tuple(map(str, left)))
+    roots = _roots(asset.data, source.mesh, first)
+    return LibraryGroom(name, source, roots, points, counts, settings, masks, regions, tuple(map(str, left)))
 
 
 def _roots(datablock, mesh, first_points):

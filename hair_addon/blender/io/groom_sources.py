@@ -122,8 +122,8 @@ def _strand_curves(hair, shown, group, name, first_id, per_meter, settings):
 
 def _widths(datablock, shown, counts, per_meter):
     """Return a function of a slice of curves that gives diameters in the file's units; shown: Curves with radii."""
-    if np.array_equal(counts, exported_curves.counts_kept(shown)):
-        radii = exported_curves.radii_kept(shown)
+    if np.array_equal(counts, exported_curves.counts_per_curve(shown)):
+        radii = exported_curves.radii_per_curve(shown)
     else:  # simulated guides, which are resampled to equal point counts
         radii = exported_curves.read_radii(shown, int(counts[0]))(slice(None)).ravel()
     factor = np.float32(2.0 * strand_arrays.world_scale(datablock) * per_meter)
@@ -151,7 +151,7 @@ def _shading_of(look, randoms, varied, counts, shown):
             lambda some: strand_colors.colors(look, randoms[some], count, looks(some)).reshape(-1, 3),
             lambda some: strand_colors.roughness(look, randoms[some], count, looks(some)).ravel(),
         )
-    along = strands.places_along(exported_curves.points_kept(shown), strands.curve_offsets(counts))
+    along = strands.places_along(exported_curves.points_per_curve(shown), strands.curve_offsets(counts))
 
     def colors(some):
         of_points = np.repeat(np.arange(len(counts))[some], counts[some])

@@ -162,7 +162,7 @@ def _is_y_up(path, ending):
     return UsdGeom.GetStageUpAxis(Usd.Stage.Open(str(path), Usd.Stage.LoadNone)) == UsdGeom.Tokens.y
 
 
-def scripts_kept_from_running():
+def blocked_scripts():
     """Blender's message about scripts or drivers of the open .blend that did not run; empty if there are none."""
     return bpy.app.autoexec_fail_message if bpy.app.autoexec_fail else ""
 

@@ -30,7 +30,7 @@ def world_points(datablock):
     The artist's modifiers are not applied. Curves are resampled to the largest point count, and Catmull-Rom splines to
     at least `POINT_COUNT` points on the curve.
     """
-    bring_up_to_date()
+    update_strands()
     return _whole(world_rows(datablock, local=_at_rest(datablock)), shape_of(datablock))
 
 
@@ -53,7 +53,7 @@ def _whole(rows, shape):
 def counts_of(datablock):
     """Return (S,) int32 point counts of the curves of `world_rows` and `shown_rows`. Raises `HairError`."""
     shape_of(datablock)
-    return exported_curves.counts_kept(datablock)
+    return exported_curves.counts_per_curve(datablock)
 
 
 def shown_rows(datablock, per_meter=1.0) -> Rows:
@@ -61,7 +61,8 @@ def shown_rows(datablock, per_meter=1.0) -> Rows:
     shown = _shown(datablock)
     if shown is None:
         return world_rows(datablock, per_meter)
-    points, starts = exported_curves.points_kept(shown), strands.curve_offsets(exported_curves.counts_kept(shown))
+    points = exported_curves.points_per_curve(shown)
+    starts = strands.curve_offsets(exported_curves.counts_per_curve(shown))
     return _placed(lambda some: points[starts[some.start] : starts[some.stop]], _to_world(datablock) * per_meter)
 
 
@@ -71,9 +72,9 @@ def world_rows(datablock, per_meter=1.0, local=None) -> Rows:
     Like `world_points`, but without resampling: point counts are those of `counts_of`. local: (S, P, 3) float32 points
     at rest, None for those of the datablock.
     """
-    bring_up_to_date()
+    update_strands()
     if local is None:
-        points, counts = exported_curves.points_kept(datablock), exported_curves.counts_kept(datablock)
+        points, counts = exported_curves.points_per_curve(datablock), exported_curves.counts_per_curve(datablock)
     else:
         points, counts = local.reshape(-1, 3), np.full(*local.shape[:2])
     pose = posed_strands.read_pose(datablock.surface, scene.present_depsgraph())
@@ -100,7 +101,7 @@ def _placed(local, to_world) -> Rows:
 
 def _shown(datablock):
     """Return the evaluated Curves of a datablock with artist's modifiers; None without any, or if unusable."""
-    bring_up_to_date()
+    update_strands()
     shown = modified_strands.curves_of(datablock)
     return None if shown == datablock else shown
 
@@ -124,7 +125,7 @@ def other_places(datablock):
     return [*matrices]
 
 
-def bring_up_to_date():
+def update_strands():
     """Update strands after changes and evaluate new objects."""
     live_hair.write_all()
     with scene_time.outside_drivers():

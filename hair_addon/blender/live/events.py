@@ -34,7 +34,7 @@ def hair_evaluated(hair_object):
     modified_hair.invalidate(hair_object)
 
 
-def strands_made(datablock):
+def strands_computed(datablock):
     """Guides or hair were computed again: invalidate the strands of the datablock."""
     hair_cache.strand_cache.invalidate(datablock.session_uid)
     guide_states.state_cache.invalidate(datablock.session_uid)

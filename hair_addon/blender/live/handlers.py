@@ -221,7 +221,7 @@ def _evaluate_guides(guides, depsgraph, combed):
         looks.evaluate_guides(guides)
     if guides.vellus.is_stale and guides.vellus.is_live and _is_ready(guides, depsgraph):
         pipeline.evaluate(guides, depsgraph)
-        events.strands_made(guides)
+        events.strands_computed(guides)
         stale_marks.follow_mask(guides, depsgraph)
         combed[guides] = None  # to be read
 

@@ -44,7 +44,7 @@ def follow(hair, depsgraph, local=None):
         hair.vellus.is_stale = False
         return True
     if is_other:
-        events.strands_made(hair)
+        events.strands_computed(hair)
     return is_other
 
 
@@ -93,7 +93,7 @@ def follow_guides(hair, depsgraph, local=None):
 def show_guides(guides, points, depsgraph):
     """Show guides at (G, POINT_COUNT, 3) simulated points like `simulated_guides.show`, and let their hair follow."""
     simulated_guides.show(guides, points)
-    events.strands_made(guides)
+    events.strands_computed(guides)
     for hair in curves.followers(guides):
         if hair.vellus.is_live:
             follow_guides(hair, depsgraph)
@@ -111,7 +111,7 @@ def show_styles(depsgraph):
             bound = bindings.of(hair)
         if bound is not None and is_styled != (bound.straight is None):
             bound.show_styles(is_styled)
-            events.strands_made(hair)
+            events.strands_computed(hair)
 
 
 def _is_combed_straight(state):
@@ -133,7 +133,7 @@ def regenerate(hair, depsgraph):
         pipeline.evaluate(hair, depsgraph)
         if _follow_simulated(hair):
             _write(hair)
-        events.strands_made(hair)
+        events.strands_computed(hair)
         _guides_written(hair)
         return
     try:
@@ -155,7 +155,7 @@ def regenerate(hair, depsgraph):
         hair.vellus.is_stale = False
         hair.vellus.status = str(error)
         return
-    events.strands_made(hair)
+    events.strands_computed(hair)
     write_soon(hair)
 
 
@@ -184,7 +184,7 @@ def _follow_linked(hair, depsgraph):
     bound.is_written = bound.has_moved_only = bound.is_map_written = fits  # the library's file holds the rest
     bindings.keep(hair, bound)
     _follow_simulated(hair)
-    events.strands_made(hair)
+    events.strands_computed(hair)
     write_soon(hair)
 
 
@@ -217,7 +217,7 @@ def _restyle(hair, depsgraph):
         if bound.is_behind and bound.straight is None:
             hair_cache.follow_where_drawn(hair.session_uid, bound)
         else:
-            events.strands_made(hair)
+            events.strands_computed(hair)
         write_soon(hair)
     return True
 
@@ -258,7 +258,7 @@ def _write(hair):
         _guides_written(hair)
         bound = bindings.of(hair)
         if bound is not None and bound.free is not None:
-            events.strands_made(hair)  # some strands were moved out of colliders
+            events.strands_computed(hair)  # some strands were moved out of colliders
     except HairError as error:
         bindings.invalidate(hair)
         hair.vellus.status = str(error)

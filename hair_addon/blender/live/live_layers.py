@@ -100,5 +100,5 @@ def _update(guides, depsgraph):
         guides.vellus.status = str(error)
         return False
     if is_moved:
-        events.strands_made(guides)
+        events.strands_computed(guides)
     return is_moved

@@ -85,7 +85,7 @@ def follow_settings(blender_scene, depsgraph):
     """After an update, show guides whose simulation was disabled as combed, and note changes of settings."""
     for guides in bpy.data.hair_curves:
         state = guides.vellus
-        _stay_as_seen(guides, blender_scene)
+        _keep_shown_frame(guides, blender_scene)
         if simulated_guides.is_shown(guides) and not frame_folders.is_simulated(guides):
             played_cache.invalidate(guides.session_uid)
             _show(guides, None, depsgraph)
@@ -220,7 +220,7 @@ def _follow_applied(guides, played):
     return True
 
 
-def _stay_as_seen(guides, blender_scene):
+def _keep_shown_frame(guides, blender_scene):
     """If a transform was just applied to the surface, keep the shown frame in place."""
     played, shown = played_cache.get(guides.session_uid), simulated_guides.point_cache.get(guides.session_uid)
     if played is None or shown is None or not played.simulated.has_other_space(guides):
@@ -272,7 +272,7 @@ def notes_of(guides):
     played, worst = played_cache.get(guides.session_uid), broken_guides.baked(guides)
     if not worst.count and played is not None:
         worst = played.worst
-    broken = (worst.said_of(guides),) if worst.count else ()
+    broken = (worst.message_of(guides),) if worst.count else ()
     return broken if played is None else (*played.notes, *broken)
 
 

@@ -69,7 +69,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
 def _strands_carried(guides):
     """Draw guides and the hair between them as an edit has left them; Blender reports them only in its next update."""
     for datablock in (guides, *curves.followers(guides)):
-        events.strands_made(datablock)
+        events.strands_computed(datablock)
 
 
 def follow_applied():
@@ -226,7 +226,7 @@ def mark_followers(guide_curves, redrawn=()):
     """
     for hair in curves.followers(guide_curves):
         if hair in redrawn:
-            events.strands_made(hair)
+            events.strands_computed(hair)
         elif not (curves.is_hand_made(hair) and hair.vellus.followed == staleness.guides_digest(guide_curves)):
             _mark(hair)
 

@@ -98,7 +98,7 @@ class HairVolume:
         self.grid.low, self.grid.counts = wp.vec3i(*map(int, first)), wp.vec3i(*map(int, counts))
         self.grid.per_cell = 1.0 / self.cell_size
         self._rest = self._sums(groom, None)
-        self._alone = self._most_of_one(groom)
+        self._alone = self._single_strand_mass(groom)
         self._mean = wp.zeros(2, dtype=wp.int64, device=self.device)
         kernel_cache.launch(_average, len(self._rest), inputs=[self._rest], outputs=[self._mean], device=self.device)
 
@@ -139,7 +139,7 @@ class HairVolume:
             self._missing = wp.empty(cell_count, dtype=float, device=self.device)
         return self._missing
 
-    def _most_of_one(self, groom):
+    def _single_strand_mass(self, groom):
         """Return ρ¹, the most mass of a straight mean strand in a cell: a point, or all points in a cell's length."""
         if self._weights is None:
             masses = self._masses.numpy().astype(np.float64)

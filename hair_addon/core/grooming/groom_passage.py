@@ -97,29 +97,29 @@ def carried_weights(
     source, relative to the target's size; masks are 0 beyond it.
     """
     if warp is None:
-        wanted, ground = _uv_places(target), _layout(source)
-        reach = _OUTSIDE * float(np.ptp(ground.vertices[:, :2], axis=0).max())
+        wanted, mesh = _uv_places(target), _layout(source)
+        reach = _OUTSIDE * float(np.ptp(mesh.vertices[:, :2], axis=0).max())
         weights = weights[source.mesh.triangles.ravel()]
     else:
         wanted = target.mesh.vertices
-        ground = TriMesh(warp.places(source.mesh.vertices).astype(np.float32), source.mesh.triangles)
+        mesh = TriMesh(warp.places(source.mesh.vertices).astype(np.float32), source.mesh.triangles)
         reach *= float(np.ptp(target.mesh.vertices, axis=0).max())
-    nearest = geometry.closest_point.SurfaceQuery(ground).nearest(wanted)
-    is_near = np.linalg.norm(positions(ground, nearest) - wanted, axis=1) <= reach
-    sampled = interpolate(weights.astype(np.float32), ground, nearest)
+    nearest = geometry.closest_point.SurfaceQuery(mesh).nearest(wanted)
+    is_near = np.linalg.norm(positions(mesh, nearest) - wanted, axis=1) <= reach
+    sampled = interpolate(weights.astype(np.float32), mesh, nearest)
     return np.clip(np.where(is_near[:, None], sampled, 0.0), 0.0, 1.0).astype(np.float32)
 
 
-def _layout(ground):
+def _layout(source):
     """Return the UV map as a flat `TriMesh` with separate corners."""
-    flat = np.zeros((3 * len(ground.corner_uvs), 3), np.float32)
-    flat[:, :2] = ground.corner_uvs.reshape(-1, 2)
+    flat = np.zeros((3 * len(source.corner_uvs), 3), np.float32)
+    flat[:, :2] = source.corner_uvs.reshape(-1, 2)
     return TriMesh(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
 
 
-def _uv_places(ground):
+def _uv_places(source):
     """Return the UV coordinates (V, 3) float32 of a corner of each vertex, with z = 0; far away for loose vertices."""
-    places = np.full((len(ground.mesh.vertices), 3), 1e6, np.float32)
-    places[ground.mesh.triangles.ravel(), :2] = ground.corner_uvs.reshape(-1, 2)
-    places[ground.mesh.triangles.ravel(), 2] = 0.0
+    places = np.full((len(source.mesh.vertices), 3), 1e6, np.float32)
+    places[source.mesh.triangles.ravel(), :2] = source.corner_uvs.reshape(-1, 2)
+    places[source.mesh.triangles.ravel(), 2] = 0.0
     return places

@@ -66,7 +66,7 @@ def places_by_uv(source: TransferSurface, target: TransferSurface, roots: Surfac
     own, has_area = _uv_tangents(source, roots.triangle)
     its, has_its_area = _uv_tangents(target, found.triangle)
     derivatives = its @ np.linalg.inv(own)
-    return _kept(source.mesh, target.mesh, (roots, found), derivatives, is_near & has_area & has_its_area, scales)
+    return _placed(source.mesh, target.mesh, (roots, found), derivatives, is_near & has_area & has_its_area, scales)
 
 
 def places_by_warp(
@@ -85,7 +85,7 @@ def places_by_warp(
     found = geometry.closest_point.SurfaceQuery(target).nearest(wanted)
     apart = np.linalg.norm(positions(target, found) - wanted, axis=1)
     is_near = apart <= reach * float(np.ptp(target.vertices, axis=0).max())
-    return _kept(source, target, (roots, found), warp.derivatives(at_roots), is_near, scales)
+    return _placed(source, target, (roots, found), warp.derivatives(at_roots), is_near, scales)
 
 
 def carried(
@@ -124,16 +124,16 @@ def _layout(corner_uvs):
     return layout
 
 
-def _uv_tangents(ground, triangles):
+def _uv_tangents(surface, triangles):
     """Return ((N, 3, 3) columns dP/du, dP/dv and normal [m] of triangles (N,), (N,) bool: whether these span space).
 
     The normal has the geometric mean length of the tangents, so that it scales with lengths.
     """
-    corners, uvs = ground.mesh.corners[triangles], ground.corner_uvs[triangles].astype(np.float64)
+    corners, uvs = surface.mesh.corners[triangles], surface.corner_uvs[triangles].astype(np.float64)
     edges, uv_edges = (np.swapaxes(array[:, 1:] - array[:, :1], 1, 2) for array in (corners, uvs))
     areas = np.linalg.det(uv_edges)
     span = np.abs(uv_edges).max(axis=(1, 2))
-    scaled = ground.mesh.scaled_normals[triangles]
+    scaled = surface.mesh.scaled_normals[triangles]
     doubled = np.linalg.norm(scaled, axis=1)
     has_area = (np.abs(areas) > 1e-9 * span**2) & (doubled > 0.0)
     uv_edges[~has_area], areas[~has_area], doubled[~has_area] = np.eye(2), 1.0, 1.0
@@ -144,7 +144,7 @@ def _uv_tangents(ground, triangles):
     return frames, has_area
 
 
-def _kept(source, target, roots, derivatives, is_near, scales):
+def _placed(source, target, roots, derivatives, is_near, scales):
     """Return `Places` of the roots (own, found) that are near and face the same side as the mapped surface."""
     own, found = roots
     own_normals, found_normals = (normals(mesh, at).astype(np.float64) for mesh, at in ((source, own), (target, found)))

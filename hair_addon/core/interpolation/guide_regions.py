@@ -16,7 +16,7 @@ from ..geometry import closest_point, root_frames
 from ..geometry.mesh import SurfacePoints, TriMesh
 from . import part_lines
 from .part_lines import PartLines
-from .regions import Regions, kept_apart
+from .regions import Regions, region_labels
 
 _APART = 1.0 / 16.0  # distance of side points from a line, as a fraction of the distance between its points
 _NEAREST = 8  # nearest side points, on each side of a line, to which paths of a guide are measured
@@ -36,7 +36,7 @@ def guide_regions(
     Numbers are those of `combined`. mesh: checked, with the guides' roots on it; lines: laid on it, or None.
     """
     labels = [np.zeros(len(roots), np.int32)]
-    apart = kept_apart(regions, roots, roots)
+    apart = region_labels(regions, roots, roots)
     if apart is not None:
         labels.append(apart[1])
     if lines is not None:

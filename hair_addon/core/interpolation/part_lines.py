@@ -235,7 +235,7 @@ def _crosses(root: wp.vec3, guide: wp.vec3, up: wp.vec3, start: wp.vec3, end: wp
 
 
 @wp.func
-def _way_round(
+def _path_around(
     root: wp.vec3,
     guide: wp.vec3,
     up: wp.vec3,
@@ -331,7 +331,7 @@ def _go_round(
             for slot in range(count):
                 guide = candidates[slot]
                 up = wp.normalize(normals[strand] + guide_normals[guide])
-                around = _way_round(
+                around = _path_around(
                     root, guide_roots[guide], up, points, starts[line], starts[line + 1], ends[line], first, last
                 )
                 ways[slot] = wp.max(ways[slot], around)

@@ -36,7 +36,7 @@ def _labels(corners, points):
     return np.full(len(points), _NOWHERE) if corners is None else regions_at(corners, points).astype(np.int64)
 
 
-def kept_apart(
+def region_labels(
     regions: Sequence[Regions], roots: SurfacePoints, guide_roots: SurfacePoints
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Return (S,) and (G,) int32, equal where all `Regions` are equal; -1 for strands in a region without guides.

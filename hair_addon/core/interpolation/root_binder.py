@@ -44,7 +44,7 @@ class RootBinder:
             guide_positions,
             guide_normals,
             self.settings.neighbour_limit,
-            regions=interpolation.regions.kept_apart(self.regions, roots, self.guide_roots),
+            regions=interpolation.regions.region_labels(self.regions, roots, self.guide_roots),
             lines=self.lines,
         )
         at_roots, at_guides = (root_positions, root_normals), (positions(self.mesh, self.guide_roots), guide_normals)
@@ -75,10 +75,10 @@ class RootBinder:
 
     def _with_guide_regions(self, strands, centres):
         """Return the regions (S,) and (K,) of the first guides of strands and centers; None without regions."""
-        kept_apart = interpolation.regions.kept_apart(self.regions, self.guide_roots, self.guide_roots)
-        if kept_apart is None:
+        region_labels = interpolation.regions.region_labels(self.regions, self.guide_roots, self.guide_roots)
+        if region_labels is None:
             return None
-        of_guides = kept_apart[1]
+        of_guides = region_labels[1]
         first_guides = (binding.guide_weights.indices.numpy()[:, 0] for binding in (strands, centres))
         of_strands, of_centres = (of_guides[guides] for guides in first_guides)
         return of_strands, of_centres

@@ -87,7 +87,7 @@ def differences(picture, other):
 
 
 def rest(view):
-    """Rest until all light is known, and print times of frames; returns the lit scene."""
+    """Wait at rest until all light is measured, and print times of frames; returns the lit scene."""
     started, first = time.perf_counter(), None
     kinds = {"while a share is followed": [], "that show a share, begin one, or both": []}
     waiting, showing = kinds.values()
@@ -123,7 +123,7 @@ def pairs_of_frames(view, count):
 
 
 def measure(strand_count, size, device, per_side):
-    """Measure a head with so many strands, and print the figures."""
+    """Measure a head with a number of strands, and print the figures."""
     preferences.device = lambda: "cpu"  # hair is made on the processor
     _guides, hair = head.grow(head.build(), strand_count=strand_count)
     api.shade(hair.data, presets.PRESETS["BROWN"][1], model="MARSCHNER", mode="energy")

@@ -43,7 +43,10 @@ def test_an_attribute_of_vertices_is_a_vertex_group(sphere, data_type):
 
 @pytest.mark.parametrize("domain", ["EDGE", "FACE", "CORNER"])
 def test_values_of_other_domains_are_means_around_vertices(sphere, domain):
-    """One everywhere is one at each vertex; ones of one half of the sphere leave the other bare but for a ring."""
+    """Values of one on all elements are one at each vertex.
+
+    Ones on half of the sphere leave zeros on the other half, except for a ring.
+    """
     mesh = sphere.data
     heights = np.array([vertex.co.z for vertex in mesh.vertices])
     ends = {

@@ -149,7 +149,7 @@ def test_a_moved_surface_with_its_lines_grows_the_same_guides(plane):
 
 
 def test_lines_are_drawn_on_the_surface_as_modifiers_leave_it(plane):
-    """A plane that a modifier lifts by two meters, and a line up there."""
+    """A modifier lifts the plane by two meters, and guides follow a line drawn on the lifted plane."""
     drawn = spline("POLY")
     drawn.location.z = 2.0
     modifier = plane.modifiers.new("Up", "DISPLACE")

@@ -86,7 +86,7 @@ def made_of(render, at_levels=RENDERED):
 
 
 def require_same(found, wanted):
-    """Stored data to the bit; renders to the rounding of where the nearest points of the surface are found."""
+    """Assert that stored data are bit-identical, and renders equal up to the rounding of nearest points."""
     assert found[0] == wanted[0]
     for mine, its in zip(found[1], wanted[1], strict=True):
         np.testing.assert_array_equal(mine, its)
@@ -101,7 +101,9 @@ def render(scene):
 
 
 def test_hair_is_the_same_whatever_viewports_show(render, tmp_path):
-    """New hair; the same where its number or its surface has changed at another level, after its file was opened."""
+    """New hair is the same at all levels, and so is hair whose count or surface was changed at another level after
+    opening the file.
+    """
     path, first = str(tmp_path / "hair.blend"), {}
 
     def change(how):

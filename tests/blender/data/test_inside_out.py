@@ -47,7 +47,7 @@ def is_mesh_closed(mesh):
 @pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (-0.01, -0.02, -0.03)])
 @pytest.mark.parametrize("kind", MESHES)
 def test_only_closed_meshes_with_normals_inward_are_inside_out(blender_scene, kind, scale):
-    """Mirrored objects are what their mesh is, as hair grows out of them as it does unmirrored."""
+    """A mirrored object is inside out only if its mesh is, as hair grows out of it like out of an unmirrored object."""
     made = MESHES[kind]()
     made.scale = scale
     bpy.context.view_layer.update()

@@ -82,7 +82,7 @@ def test_hair_stays_outside_where_faces_are_copied_later(copying, half):
 
 
 def test_both_sides_follow_an_armature(half):
-    """A mirrored half ball that a bone moves and turns as a whole, across the mirror's plane: all strands go along."""
+    """All strands follow a mirrored half ball that a bone moves and turns across the mirror's plane."""
     mirror(half)
     bpy.ops.object.armature_add()
     rig = bpy.context.object

@@ -16,7 +16,7 @@ from tests.support.reading import evaluated_points, points, vertex_positions, wr
 
 @pytest.fixture
 def cube(scene):
-    """A cube of 2 m that a modifier subdivides twice: as bent as a cage is."""
+    """A cube of 2 m, subdivided twice by a modifier, as an example of a strongly bent cage."""
     bpy.ops.mesh.primitive_cube_add()
     subdivision = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
     subdivision.levels, subdivision.render_levels = 2, 3
@@ -25,7 +25,7 @@ def cube(scene):
 
 
 def grow_straight(surface):
-    """Guides and hair that all stand along one direction at rest."""
+    """Guides and hair that all have the same direction at rest."""
     guides, hair = grow(surface, guide_count=80, strand_count=400, gravity=0.0, tilt=0.0, length_variation=0.0)
     combed = points(guides)
     write_points(guides, combed[:, :1] + np.linspace(0.0, 0.3, combed.shape[1])[:, None] * np.float32([0.6, 0.0, 0.8]))

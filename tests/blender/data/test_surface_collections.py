@@ -52,7 +52,9 @@ def test_cards_are_made_beside_a_surface_that_the_view_layer_lacks(hair):
 
 
 def test_what_is_new_on_an_overridden_character_is_in_the_scene(hair, tmp_path):
-    """Blender links no object to an overridden collection; another one only lists the surface, and is hidden."""
+    """New objects are linked to the scene, as Blender links no object to an overridden collection, and the surface's
+    other collection is hidden.
+    """
     character = override(hair, tmp_path)
     present, overridden = set(bpy.data.objects), set(character.objects)
     sphere, _guides, _hair = parts()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shaders' functions equal their references in Python, and satisfy the laws that have no reference."""
+"""The shaders' functions equal their references in Python; functions without a reference satisfy their laws."""
 
 import numpy as np
 import pytest
@@ -110,7 +110,9 @@ def test_kajiya_kay_reflection(fibres):
 
 @pytest.mark.parametrize(("exponent", "tolerance"), [(1.0, 0.05), (10.0, 0.005), (60.0, 0.002), (400.0, 0.002)])
 def test_kajiya_kay_albedo_is_the_mean_answer_to_a_uniform_surrounding(exponent, tolerance):
-    """Radiance one from everywhere, over all directions of light and of view, against what the shader adds for it."""
+    """The mean radiance over all directions of light and view, in light of radiance one, equals the albedo that the
+    shader uses.
+    """
     settings = kajiya_kay.Settings(diffuse_color=(0.3, 0.0, 0.2), specular_color=(0.0, 0.3, 0.2), exponent=exponent)
     theta = np.pi * ((np.arange(180) + 0.5) / 180 - 0.5)
     theta_i, theta_o = (grid.ravel() for grid in np.meshgrid(theta, theta))
@@ -142,7 +144,7 @@ def shading_model(fragment, settings, expression, textures=None, more="", **inpu
 @pytest.mark.parametrize("model", ["fibre/kajiya_kay.comp", "fibre/energy_conserving.comp"])
 @pytest.mark.parametrize("width", [0.1, 0.5])
 def test_a_wide_light_is_as_many_narrow_ones(rng, model, width):
-    """Light from a stripe of inclinations [rad], one direction after the other and all at once."""
+    """The light of a wide stripe of inclinations [rad] equals the sum of its narrow parts."""
     if model == "fibre/kajiya_kay.comp":
         settings, textures = kajiya_kay.Settings(diffuse_color=(0.0, 0.0, 0.0), exponent=60.0), {}
     else:

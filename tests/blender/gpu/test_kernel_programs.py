@@ -28,7 +28,7 @@ _HALF = wp.constant(0.5)
 
 @wp.struct
 class _Pair:
-    """A struct of its own, and one that is given."""
+    """A struct with a member that is another struct."""
 
     first: wp.vec3
     second: float
@@ -190,8 +190,10 @@ GATHERED = dict.fromkeys(("out_position", "out_light", "out_even"), wp.vec3)
 
 
 def test_paths_of_light_are_those_of_the_processor(rng):
-    """The same places and random numbers. Each turn at a strand takes rounding a hundred times farther, so some paths
-    part; the rest carry the same light, and all together the same within statistics.
+    """Paths on the GPU have the same starts and random numbers as on the processor.
+
+    Each scattering event magnifies rounding a hundredfold, so some paths diverge. The others carry the same light, and
+    the mean is equal within its error.
     """
     grid, light = lit_scene(rng, (0.1, 0.3, 1.0))
     given, count, _mesh = paths_of(grid, light, 3000)

@@ -68,7 +68,7 @@ def drawn_strands(strand_count, steps):
 
 @pytest.mark.parametrize("count", [1, 2, 7, 1000, 32_768, 32_769, 100_003, 1_000_000])
 def test_any_turns_are_spread_over_all_strands(count):
-    """Strands lie in memory as they do on the surface: those that stand for all must not come from one side of it."""
+    """Neighbors in memory are neighbors on the surface, so a subset of strands must be spread over all of them."""
     drawn = max(count - 1, 1)
     first = count // 3
     found = drawn_strands(count, drawing.Steps(strand_count=drawn, first_strand=first))
@@ -95,9 +95,9 @@ def test_passes_take_all_strands_in_turn_but_those_that_the_artist_leaves_out(ma
 
 @pytest.mark.parametrize("distance", [8.0, 20.0])
 def test_hair_from_afar_is_as_bright_as_all_of_it(thin, monkeypatch, distance):
-    """Light that leaves it, and what it covers: a part of the strands, as much thicker, against all of them.
+    """Distant hair, drawn with fewer and thicker strands, has the light and coverage of all strands.
 
-    Ten placements of its guides gave from 0.9 to 5.4 per cent less light, in blue, at the larger distance.
+    In ten placements of the guides, blue light was lower by 0.9 to 5.4 percent at the larger distance.
     """
     thin.data.vellus.hair.strand_count = 25_000
     thin.data.vellus.hair.radius = 0.0013

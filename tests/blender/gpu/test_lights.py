@@ -146,7 +146,7 @@ def test_a_scene_without_lights_is_dark(wall):
 
 @pytest.mark.parametrize("radius", [0.02, 0.4, 1.5])
 def test_a_disk_lights_by_its_solid_angle(radius):
-    """Against the integral over the disk of the light that small balls above and beside it receive."""
+    """The irradiance of small balls above and beside a disk equals the integral over the disk."""
     height, beside = (grid.ravel() for grid in np.meshgrid([0.2, 0.5, 1.0, 3.0], [0.0, 0.3, 0.7, 1.2, 2.5]))
     part, turn = (np.arange(400) + 0.5) / 400, 2.0 * np.pi * (np.arange(200) + 0.5) / 200
     out = radius * np.sqrt(part)[:, None]
@@ -166,7 +166,9 @@ def test_a_disk_lights_by_its_solid_angle(radius):
 
 
 def test_python_has_the_irradiance_of_the_shaders(rng):
-    """Lamps of all kinds around places at random, cones and beams met by some of them."""
+    """Python and the shaders compute the same irradiance for lamps of all kinds around random places, inside and
+    outside their cones and beams.
+    """
     count = 400
     some = np.zeros(count, uniforms.LIGHT.dtype)
     some["kind"] = np.arange(count) % 4

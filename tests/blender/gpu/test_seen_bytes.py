@@ -64,7 +64,9 @@ def sums(rng):
 
 
 def test_bytes_keep_what_strands_see(fine_world, rng):
-    """Every sum to half a step of its root, ratios too, the direction of surfaces to a third of a degree."""
+    """Stored sums and ratios are exact to half a step of their square root, the direction of surfaces to a third of a
+    degree.
+    """
     given = sums(rng)
     names = dict(zip(("x_y", "z", "surface", "channels", "tint"), given, strict=True))
     text = shaders.expand("light/visibility_bytes.glsl")[0] + _ROUND_TRIP

@@ -60,7 +60,10 @@ def test_shadows_in_hair_do_not_flicker_while_the_sun_turns(scene, rng):
 )
 @pytest.mark.parametrize("radius", [4e-5, 8e-4])
 def test_triangles_and_the_computed_make_the_same_map(scene, rng, radius, steps):
-    """Strands behind each texel, layer by layer: the mean is the same, and texels differ by a strand here or there."""
+    """Maps by triangles and by compute programs have the same mean count in each layer.
+
+    Texels rarely differ, by a strand.
+    """
     points, radii = tuft(rng)
     hair = [(strand_textures.upload_strands(points, np.full_like(radii, radius)), np.eye(4))]
     found = []
@@ -83,7 +86,9 @@ def test_triangles_and_the_computed_make_the_same_map(scene, rng, radius, steps)
 @pytest.mark.parametrize("turn", [1.2, 0.2, 0.0])
 @pytest.mark.parametrize("radius", [0.0015, 0.012], ids=["thin", "thick"])
 def test_short_strands_shade_what_spheres_along_them_shade(scene, rng, radius, turn, in_compute):
-    """Strands that point at the sun, and beside: length times width, and half a disk at either end."""
+    """Strands that point toward the sun or beside it cast the shadow of their length times width and of half a disk at
+    each end.
+    """
     count, length = 2000, 0.006
     start = rng.uniform(-0.3, 0.3, (count, 1, 3))
     azimuth = rng.uniform(0.0, 2.0 * np.pi, (count, 1))
@@ -112,7 +117,7 @@ def test_turning_past_the_pole_keeps_the_shadow(scene, rng):
 
 @pytest.mark.parametrize("radius", [0.01, 0.1, 0.2])
 def test_the_shadow_of_an_edge_is_as_wide_as_the_light(scene, rng, radius):
-    """A half plane above the hair: the way from dark to lit is the sun's width times about the edge's distance."""
+    """The penumbra of a half plane above the hair is about as wide as the sun's width times the edge's distance."""
     points, radii = tuft(rng)
     hair = strand_textures.upload_strands(points, np.full_like(radii, 1e-9))
     height = 0.25
@@ -133,7 +138,7 @@ def test_the_shadow_of_an_edge_is_as_wide_as_the_light(scene, rng, radius):
 
 
 def test_curls_shade_as_much_where_few_of_their_points_are_drawn(scene, rng):
-    """Chords between every seventh point are shorter than a curl, whose strand is drawn wider instead."""
+    """Curls drawn with every seventh point are shorter, and are widened to cast the same shadow."""
     points, radii = tuft(rng)
     turn = np.linspace(0.0, 40.0, points.shape[1])
     curl = 0.004 * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=-1)
@@ -147,7 +152,7 @@ def test_curls_shade_as_much_where_few_of_their_points_are_drawn(scene, rng):
 
 
 def test_a_floor_lets_no_light_of_a_low_sun_through(scene, rng):
-    """Between texels a slope is no penumbra: from below, places right above a floor see nothing."""
+    """A slope between texels does not cast a penumbra: places right above a floor are dark for light from below."""
     points, radii = tuft(rng, 100)
     hair = strand_textures.upload_strands(points, np.full_like(radii, 1e-9))
     corners = 9.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
@@ -192,7 +197,10 @@ def test_the_sphere_around_hair_touches_it(scene, rng):
 
 
 def test_maps_at_rest_are_drawn_from_the_points_that_show_the_strands(scene, rng):
-    """Straight strands need two points and curls all of theirs; the map is that of all points, but for half a texel."""
+    """Straight strands are drawn with two points and curls with all.
+
+    The map differs from that of all points by at most half a texel.
+    """
     points, radii = tuft(rng)
     straight = points[:, :1] + np.linspace(0.0, 1.0, points.shape[1])[:, None] * (points[:, -1:] - points[:, :1])
     on_gpu = strand_textures.upload_strands(straight.astype(np.float32), radii)

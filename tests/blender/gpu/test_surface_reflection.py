@@ -9,7 +9,10 @@ from tests.support.pictures import glsl
 
 @pytest.mark.parametrize("half_radius, alpha", [(0.09, 0.002), (0.05, 0.01), (0.03, 0.03)])
 def test_a_disk_is_mirrored_with_the_light_that_it_sends(half_radius, alpha):
-    """Over all normals the integral is one, as of a small lamp; a smooth surface shows an even disk with a border."""
+    """The integral over all normals is one, as for a small lamp.
+
+    A smooth surface shows a uniform disk with a border.
+    """
     angle = np.linspace(0.0, 1.2, 40_001)
     text = glsl.source("surfaces/surface_reflection.glsl")
     values = glsl.evaluate(

@@ -113,7 +113,7 @@ EVEN, MIRRORED, UNEVEN = (0.8, 0.8, 0.8), (-0.8, 0.8, 0.8), (1.2, -0.5, 0.8)
     [(smooth, EVEN), (smooth, MIRRORED), (half_flat, EVEN), (half_flat, MIRRORED), (flat, UNEVEN)],
 )
 def test_an_object_is_drawn_as_the_mesh_that_its_matrix_makes_of_it(ball, shade, scale):
-    """Its normals too: those of vertices, of corners, and of faces, which follow any matrix."""
+    """Positions and normals of vertices, corners and faces follow any matrix."""
     shade(ball.data)
     ball.matrix_world = Matrix.LocRotScale((0.1, 0.2, -0.1), Euler((0.4, 0.3, 1.0)), scale)
     settings = PictureSettings(48, 48, 2)

@@ -51,7 +51,7 @@ def test_a_mirror_sees_light_that_varies_exponentially_as_it_is(rng):
 
 
 def test_light_from_behind_is_not_seen_by_what_sends_light_back(rng):
-    """Light is positive, and the more of it the more light there is where the fiber takes it from."""
+    """A fiber's light is positive, and increases with the light from the directions that the fiber scatters."""
     first, turned = rng.uniform(-1.0, 1.0, (2, COUNT))
     found = evaluate("azimuthal_part(vec3(first), vec3(turned))", first=first, turned=turned)
     assert (found >= 0.0).all()

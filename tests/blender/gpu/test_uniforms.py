@@ -61,7 +61,7 @@ def number(record, start=1):
 
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.type_name)
 def test_copies_of_a_record_have_its_bytes(block):
-    """NumPy copies members alone: bytes between them would be whatever was in memory."""
+    """Copies of a record have its bytes, including padding, which NumPy would not copy."""
     assert sum(form.itemsize for form, *_place in block.dtype.fields.values()) == block.dtype.itemsize
     assert block.dtype.itemsize % 16 == 0
 

@@ -82,7 +82,7 @@ def test_roughness_of_strands(rng):
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 3.0), (0.2, 0.7), (0.5, 0.5)])
 def test_place_among_slices(rng, low, high):
-    """The slice itself may differ by one where a value lies on it; what is between them may not."""
+    """The index of the slice may differ by one for values on a slice; the interpolated position may not."""
     sigma_a = np.concatenate([[0.0, 99.0], np.square(rng.uniform(0.0, 3.0, COUNT))]).astype(np.float32)
     text = glsl.source("fibre/absorption_slices.glsl")
     shader = glsl.evaluate(text, "vec2", f"slice_of(x, {low}, {high}, 16)", x=sigma_a).sum(axis=1)

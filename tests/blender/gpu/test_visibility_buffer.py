@@ -74,7 +74,7 @@ def tuft(rng, strand_count=60, point_count=33, thickness=0.004):
 
 @pytest.mark.parametrize("in_compute", [True, False])
 def test_a_sample_is_covered_if_its_centre_lies_in_the_strand(shading, in_compute):
-    """Straight strands across the picture in a parallel view: the distance of a center from the axis decides."""
+    """A sample of a parallel view is covered if the distance of its center from a strand's axis is below the radius."""
     height, width = np.indices(SIZE[::-1])
     centres = np.stack([(width + 0.5) / SIZE[0] * 2 - 1, (height + 0.5) / SIZE[1] * 2 - 1], axis=-1)
     centres *= [HALF_WIDTH, 0.2]
@@ -97,7 +97,9 @@ def test_a_sample_is_covered_if_its_centre_lies_in_the_strand(shading, in_comput
 
 @pytest.mark.parametrize("in_compute", [True, False])
 def test_a_wide_angle_sees_strands_as_thick_as_its_rays_do(shading, in_compute):
-    """Towards the corners of a picture, where a perspective stretches: the distance of a ray from the axis decides."""
+    """A sample near the corner of a wide perspective is covered if the distance of its ray from a strand's axis is
+    below the radius.
+    """
     wide = PERSPECTIVE.copy()
     wide[0, 0], wide[1, 1] = SIZE[1] / SIZE[0], 1.0
     height, width = np.indices(SIZE[::-1])
@@ -119,7 +121,9 @@ def test_a_wide_angle_sees_strands_as_thick_as_its_rays_do(shading, in_compute):
 @pytest.mark.parametrize("steps", [ALL, drawing.Steps(17, 45, 30)], ids=["all", "some"])
 @pytest.mark.parametrize("thickness", [0.004, 0.0003])
 def test_triangles_and_the_computed_show_the_same_strands(rng, shading, view_to_clip, thickness, steps):
-    """All but samples at a strand's very edge, and where a strip turns: it is mitred there."""
+    """Triangles and compute program show the same strands, except for samples at edges and at the mitered turns of
+    strips.
+    """
     stretched = np.diag([1.5, 1.5, 1.5, 1.0])
     placed = [(*tuft(rng, thickness=thickness), np.eye(4)), (*tuft(rng, 50, 25, thickness / 3), stretched)]
     (triangles, depths), (computed, same) = (
@@ -152,7 +156,9 @@ def test_a_strand_behind_a_surface_is_hidden(shading):
 
 @pytest.mark.parametrize("in_compute", [True, False])
 def test_thin_strands_in_one_line_cover_what_one_of_them_does(shading, in_compute):
-    """A fifth of a sample wide: neither widened nor counted one by one, in one picture of lines of many slopes."""
+    """Strands a fifth of a sample wide, in one picture of lines of many slopes: together they cover as much as one
+    strand.
+    """
     sample = 2.0 * HALF_WIDTH / SIZE[0]
     hits = columns = 0
     for slope in np.linspace(-0.4, 0.4, 35):
@@ -190,7 +196,7 @@ def test_wide_strands_end_with_disks(shading):
 @pytest.mark.parametrize("in_compute", [True, False])
 @pytest.mark.parametrize("turn", [1.2, 0.2, 0.0])
 def test_thin_strands_cover_what_spheres_along_them_cover(rng, shading, in_compute, turn):
-    """Strands that point at the viewer, and beside: length times width, and half a disk at either end."""
+    """Strands that point toward the viewer or beside it cover their length times width and half a disk at each end."""
     sample, length = 2.0 * HALF_WIDTH / SIZE[0], 0.006
     start = rng.uniform([-0.3, -0.18, -2.0], [0.3, 0.18, -2.0], (400, 1, 3))
     azimuth = rng.uniform(0.0, 2.0 * np.pi, (400, 1))
@@ -225,7 +231,9 @@ def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
 
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
 def test_leaving_out_what_tiles_hide_changes_no_sample(shading, rng, monkeypatch, view_to_clip):
-    """Much hair behind itself, some of it before the near plane, half of it behind a surface."""
+    """Culling by tiles changes no sample of dense hair, part of it in front of the near plane and half of it behind a
+    surface.
+    """
     placed = [(*tuft(rng, 1500, thickness=0.006), np.eye(4)), (*tuft(rng, 40, thickness=0.02), np.eye(4))]
     found = []
     for few in (1 << 30, 0):
@@ -237,7 +245,7 @@ def test_leaving_out_what_tiles_hide_changes_no_sample(shading, rng, monkeypatch
 
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
 def test_bends_and_ends_are_left_out_only_where_strands_are_too_thin_for_them(shading, rng, monkeypatch, view_to_clip):
-    """Tufts of all widths, by the program that leaves them out and by that which draws them."""
+    """Tufts of all widths look the same whether bends and ends are drawn or omitted for thin strands."""
     may_be_wide, chosen = windows.may_be_wide, []
     for x, thickness in ((0.0, 2e-3), (0.1, 6e-3), (0.0, 0.012), (0.1, 0.018), (0.0, 0.025), (0.1, 0.06)):
         points, radii = tuft(rng, strand_count=12, thickness=thickness)

@@ -59,7 +59,7 @@ def test_strands_color_light_and_surfaces_do_not(scene, rng):
 
 
 def test_a_floor_hides_half_of_the_world_of_every_channel(scene, rng):
-    """Single strands just above a floor without other hair, with any transmittance."""
+    """A floor hides half of the world, in every channel, from single strands just above it with any transmittance."""
     roots = np.append(rng.uniform(-1.0, 1.0, (50, 2)), np.zeros((50, 1)), axis=1)
     points = roots[:, None] + np.linspace(0.0, 0.3, 5)[:, None] * np.array([0.3, 0.0, 1.0])
     hair = strand_textures.upload_strands(points.astype(np.float32), np.full((50, 5), 1e-7, np.float32))

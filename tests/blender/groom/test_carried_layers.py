@@ -61,7 +61,9 @@ def layered(hair):
 
 
 def test_change_guide_count_carries_layers(layered):
-    """60, then 150, then 60 guides: those that stay are exact, and each layer combs new guides as it combs strands."""
+    """With 60, then 150, then 60 guides, remaining guides are exact, and each layer combs new guides as it combs
+    strands.
+    """
     state = layered.data.vellus
     for frame, weight in ((1, 1.0), (11, 0.5)):
         state.layers[0].weight = weight
@@ -95,7 +97,9 @@ def test_change_guide_count_carries_layers(layered):
 
 
 def test_first_layer_keeps_guides_that_were_added(hair):
-    """Settings that grow another number of guides grow no base: the guides count as combed, with all their points."""
+    """The first layer takes the guides with all their points, including added ones, and settings no longer grow its
+    base.
+    """
     guides = bpy.data.objects["Guides"]
     api.change_guides(guides, "COUNT", method="COUNT", guide_count=2 * len(guides.data.curves))
     update()
@@ -108,7 +112,7 @@ def test_first_layer_keeps_guides_that_were_added(hair):
 
 
 def test_another_guide_count_carries_each_layer(layered):
-    """The setting from 60 to 150 and back to 60: each layer is off by 2 % of the length in the median."""
+    """After changing the count from 60 to 150 and back, each layer differs by 2 % of the length in the median."""
     weights = (1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)
     before = [weigh(layered, *pair) for pair in weights]
     weigh(layered, 1.0, 1.0)

@@ -135,7 +135,7 @@ def test_strands_stay_whose_face_is_left_alone(hair, name):
 
 
 def test_strands_are_carried_with_what_is_moved_while_faces_come_and_go(hair):
-    """All in one visit of Edit Mode: faces are deleted, and others are moved."""
+    """Strands follow when faces are deleted and others are moved in a single visit to Edit Mode."""
     before, moved = points(hair), slice(20, 60)
     lost = faces_of(hair, 1)
     corners = np.array([attribute(hair, name) for name in stored_roots.VERTICES])
@@ -206,7 +206,9 @@ def test_a_quad_that_is_cut_otherwise_keeps_its_strands(scene):
 
 
 def test_strands_that_were_edited_by_hand_are_carried_too(hair):
-    """They do not grow again between their guides: one edit moves vertices, another makes faces as well."""
+    """Hand-edited strands are moved with the surface instead of being regenerated, when an edit moves vertices, and
+    when it adds faces.
+    """
     edited = points(hair)
     edited[:, :, 1] += np.linspace(0.0, 0.2, edited.shape[1]) ** 2
     write_points(hair, edited)
@@ -250,7 +252,7 @@ def step(name):
 
 
 def test_undo_across_frames_of_changing_faces_roots_nothing_again(changing, scene):
-    """Faces that came with the frame are no edit, by whatever the surface is reported."""
+    """Faces that differ because of the frame are not an edit, whatever reports the surface."""
     before = {name: points(bpy.data.objects[name]) for name in ("Hair", "Hair Guides")}
     topology = bpy.data.objects["Hair"].data.vellus.topology
     scene.frame_set(5)
@@ -280,7 +282,7 @@ def test_an_edit_in_such_a_frame_is_followed(changing, scene):
 
 
 def test_a_setting_that_is_changed_back_is_an_edit_too(hair, scene):
-    """Within a frame the topology follows a ratio that is changed, and one that is changed back."""
+    """Changing a ratio and changing it back within a frame both count as edits of the topology."""
     decimate = bpy.data.objects["Skin"].modifiers.new("Decimate", "DECIMATE")
     topologies = []
     for frame, ratio in ((1, 0.5), (2, 0.5), (2, 1.0), (2, 0.5)):

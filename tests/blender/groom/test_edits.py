@@ -212,7 +212,7 @@ def test_guides_without_object_and_surface_wait_for_a_surface(hair):
 
 
 def test_a_flat_surface_is_not_attached_to(hair):
-    """It was a traceback, as its coordinates have no inverse."""
+    """Attaching to a surface with a scale of zero raises an error, as its coordinates have no inverse."""
     before = points(hair)
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=1.0)
     other = bpy.context.object

@@ -39,7 +39,7 @@ def choose_mask(hair, group="top"):
 
 @pytest.fixture
 def mask_first(sphere):
-    """The sizes of hair that was made with its mask, and those without one."""
+    """Return the fitted sizes of hair with a mask, and without one."""
     masked = sizes_of(add(**MASKED))
     bpy.ops.vellus.delete_hair()
     bpy.context.view_layer.objects.active = sphere

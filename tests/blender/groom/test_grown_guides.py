@@ -38,7 +38,7 @@ def test_new_hair_on_a_dome_is_draped(dome):
 
 
 def test_fur_stands(sphere):
-    """A closed surface, and a plane, get short hair, which does not hang."""
+    """Closed surfaces and planes get short fur, which is not draped."""
     assert not new_guides().vellus.guides.drape
     bpy.ops.mesh.primitive_plane_add()
     assert not new_guides().vellus.guides.drape
@@ -46,7 +46,7 @@ def test_fur_stands(sphere):
 
 @pytest.mark.parametrize("given", [{"gravity": 0.75}, {"drape": False}, {"guide_count": 5000}])
 def test_who_says_how_guides_grow_is_obeyed(dome, given):
-    """Thousands of guides would take longer than a second."""
+    """A given *Gravity* or *Drape*, or more guides than can be draped in a second, prevent draping."""
     given = FEW | dome | given
     bpy.ops.vellus.distribute_guides(**{name: value for name, value in given.items() if name != "strand_count"})
     assert not bpy.data.objects["Guides"].data.vellus.guides.drape

@@ -230,7 +230,7 @@ def test_weights_are_animated(layered):
 
 
 def test_combing_survives_other_settings_and_another_number_of_guides(layered):
-    """60, then 120, then 60 guides: the same combing, and settings still apply to what it bends."""
+    """With 60, then 120, then 60 guides the combing is the same, and settings still apply to the base."""
     base, shape = points(layered), comb(layered)
     turn = shape[:, -1] - shape[:, 0] - (base[:, -1] - base[:, 0])
     group = layered.data.vellus.guides

@@ -45,7 +45,7 @@ def resident(name):
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="the system does not tell what was used at most")
 @pytest.mark.parametrize(("strands", "point_count"), [(60_000, 41), (10_000, 257)])
 def test_strands_take_what_is_estimated(guides, strands, point_count):
-    """While they are made, without what styles and viewports add: at least half of it, and never more."""
+    """Generating strands takes between half of the estimated memory and all of it, without styles and viewports."""
     api.interpolate_hair(guides.data, strand_count=100, point_count=point_count)  # loads what is to be loaded
     gc.collect()
     ctypes.CDLL(None).malloc_trim(0)  # what tests before have freed would be taken again, and not be seen

@@ -31,7 +31,7 @@ def systems(sphere):
 
 
 def listed():
-    """Names of the rows, and the name of the one that is edited, None if none is."""
+    """Return the names of the rows, and the name of the edited row or None."""
     view_layer = bpy.context.view_layer
     rows = [object_of(curves, view_layer) for curves in systems_of(surface_of(bpy.context.object), view_layer)]
     index = view_layer.vellus_system
@@ -119,7 +119,7 @@ def test_deleting_a_row_leaves_the_others_alone(systems):
 
 
 def test_a_row_is_deleted_without_its_mesh_in_the_view_layer(systems):
-    """Its mesh, which is selected else, is in a collection that the view layer excludes."""
+    """A row is deleted although its mesh is in a collection that the view layer excludes."""
     hidden = bpy.data.collections.new("Hidden")
     bpy.context.scene.collection.children.link(hidden)
     sphere = bpy.data.objects["Sphere"]

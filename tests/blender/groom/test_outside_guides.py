@@ -85,7 +85,7 @@ def test_only_guides_that_a_stroke_moves_are_pushed(guides):
 
 
 def test_frozen_points_stay(guides):
-    """Also those that are slightly inside, where the rest of their guide goes on from them."""
+    """Frozen points stay, also slightly inside the surface; the rest of the guide is moved outside."""
     state = guides.data.vellus
     state.keeps_outside = False
     inside = comb(guides, inward(points(guides)))

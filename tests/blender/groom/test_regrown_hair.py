@@ -56,7 +56,7 @@ def test_binding_hair_without_writing_it_leaves_its_points(hair):
 
 
 def test_hair_that_cannot_be_written_is_what_it_was(hair, monkeypatch):
-    """Its points are in its datablock, and it can be generated again."""
+    """Hair that cannot be written keeps the points in its datablock, and can be generated again."""
     regrown(hair, seed=2)
     before = points(hair)
 

@@ -16,7 +16,9 @@ SLASHES = ["".join(row) for count in range(1, 5) for row in itertools.product("/
 
 
 def leads_elsewhere(path):
-    """Whether Windows takes it for a share: as `bpy.path.abspath` puts it together, by Python's rules of Windows."""
+    """Whether Windows would treat the path as a network share: resolved by `bpy.path.abspath` with Python's Windows
+    rules.
+    """
     whole = ntpath.join("C:\\shot", path[2:]) if path.startswith("//") else path
     return ntpath.splitdrive(ntpath.normpath(whole))[0].startswith("\\\\")
 

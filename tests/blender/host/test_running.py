@@ -7,7 +7,7 @@ from hair_addon.blender.host import running
 
 
 def managers(*operators):
-    """One with two windows: the operators run in the second."""
+    """A window manager with two windows, with operators in the second."""
     return [SimpleNamespace(windows=[SimpleNamespace(modal_operators=[]), SimpleNamespace(modal_operators=operators)])]
 
 

@@ -15,7 +15,7 @@ STATUS = "<IIQQQQQQQ"
 
 
 class Windows:
-    """kernel32: 16 GB, of which `free` are free and `committed` may be promised yet."""
+    """Stands in for kernel32: 16 GB, of which `free` are free and `committed` may still be committed."""
 
     def __init__(self, free=6 * GB, committed=20 * GB, answer=1):
         self.free, self.committed, self.answer = free, committed, answer
@@ -50,7 +50,7 @@ class Mac:
 
 @pytest.fixture
 def system(monkeypatch, tmp_path):
-    """A function of (name, library): this computer is another; nothing limits the process."""
+    """A function of (name, library) that simulates another system without limits of the process."""
 
     def be(name, library):
         monkeypatch.setattr(sys, "platform", name)

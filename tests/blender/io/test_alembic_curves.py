@@ -46,7 +46,7 @@ def test_blenders_curves_are_read_as_they_are_seen_in_every_frame(scene, lines, 
 
 
 def test_one_object_a_curve_is_hair_of_all_of_them(scene, sphere, lines, tmp_path):
-    """Unit and axis are found, and told; wrong ones are refused, with those that fit."""
+    """Unit and axis are inferred and reported; wrong ones are refused with a sentence that names fitting ones."""
     of_maya(tmp_path / "curves.abc", lines)
     bpy.ops.wm.obj_export(filepath=str(tmp_path / "sphere.obj"), forward_axis="Y", up_axis="Z")
     words = ["groom", tmp_path / "sphere.obj", "--hair-from", tmp_path / "curves.abc", "--out", tmp_path / "out.npz"]

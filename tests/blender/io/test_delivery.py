@@ -182,7 +182,7 @@ def refuse(guides, sentence):
 
 
 def test_a_file_that_hair_of_other_guides_plays_is_not_replaced(shot):
-    """Some systems take capitals for small letters."""
+    """File names are compared without case, as some systems do."""
     made, other, third = deliver(shot), bpy.data.hair_curves.new("guides"), bpy.data.hair_curves.new("Grün (2)")
     names = [delivery.path_of(guides).name for guides in (shot, other, third)]
     assert names == ["shot_Guides.usdc", "shot_guides.001.usdc", "shot_Grün (2).usdc"] and names[0] == made.path.name
@@ -213,7 +213,7 @@ def test_what_cannot_be_delivered_is_refused(shot, tmp_path):
 
 
 def test_guides_that_begin_after_the_last_frame_need_none(shot):
-    """They are as combed in all frames, also where nothing was ever baked."""
+    """Guides that start after the last frame need no baked frames: they are as combed in all frames."""
     frame_cache.remove(frame_folders.folder_of(shot))
     frame_folders.have_changed(shot)
     shot.vellus.dynamics.start_frame = LAST + 10
@@ -249,7 +249,7 @@ def test_stopped_delivery_leaves_all_as_it_was(shot, tmp_path):
 
 
 def test_a_full_disk_is_reported(shot, tmp_path):
-    """A limit on the size of files stands for it."""
+    """A full disk, simulated by a limit on the size of files, is reported."""
     deliver(shot)
     path = delivery.path_of(shot)
     size, before = path.stat().st_size, state()
@@ -288,7 +288,7 @@ def test_all_hair_of_the_guides_is_delivered_whatever_its_name_and_the_frame_rat
 
 
 def test_in_a_window_hair_is_followed_although_an_operator_runs(window, shot, monkeypatch):
-    """Viewports go first there, and nothing else follows while long work runs."""
+    """In a window, hair follows for viewports even while a long operation runs."""
     before = live((4.0, 4.75))
     monkeypatch.setattr(running, "has_window", lambda: True)
     operator = Operator(delivery.delivering(shot, delivery.path_of(shot), bpy.context.scene))

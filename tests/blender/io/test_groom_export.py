@@ -36,7 +36,7 @@ def test_curves_are_in_centimeters_where_they_are_seen(twisted, tmp_path):
 
 
 def test_properties_are_as_blender_writes_them(hair, tmp_path):
-    """Blender writes with Alembic's own library: types and metadata of what both write are the same."""
+    """Properties have the same types and metadata as those written by Blender, which uses Alembic's library."""
     bpy.ops.wm.alembic_export(filepath=str(tmp_path / "blender.abc"), start=1, end=1, as_background_job=False)
     export(tmp_path / "groom.abc")
     theirs, ours = (alembic_reader.read(tmp_path / f"{name}.abc") for name in ("blender", "groom"))
@@ -55,7 +55,7 @@ def test_properties_are_as_blender_writes_them(hair, tmp_path):
 
 
 def test_blender_takes_the_curves_back(twisted, tmp_path):
-    """Blender takes Alembic as Y up and in meters: its axes turn, and its unit is the file's."""
+    """Blender imports the curves with rotated axes and in the file's unit, as it assumes Y up and meters."""
     wanted = {len(o.data.curves): (100.0 * world(o), 100.0 * widths(o)) for o in twisted}
     export(tmp_path / "groom.abc")
     before = set(bpy.data.objects)

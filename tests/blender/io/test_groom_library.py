@@ -142,7 +142,7 @@ def write_foreign(path):
 
 
 def write_damaged(path, change):
-    """The groom of a file with something else in it."""
+    """Save a groom and then replace some of the file's data."""
     with bpy.data.libraries.load(str(path), assets_only=True) as (_there, wanted):
         wanted.objects = ["Bob"]
     asset = wanted.objects[0]

@@ -72,7 +72,7 @@ def test_cards_are_where_the_strands_are(head, rng):
 
 
 def test_a_card_covers_as_much_as_its_strands_from_the_same_side(scene):
-    """A tuft on a plane, along the normal of its one card, by the distance of places from strands: within 3 percent."""
+    """A card of a tuft on a plane covers as much as its strands seen along the card's normal, within 3 percent."""
     bpy.ops.mesh.primitive_plane_add(size=0.1)
     bpy.ops.vellus.add_hair(
         guide_count=12, strand_count=60, length=0.2, length_variation=0.3, gravity=0.0, tilt=0.1, radius=4e-4

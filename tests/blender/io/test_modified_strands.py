@@ -19,7 +19,7 @@ from tests.support.reading import attribute
 
 
 def add_modifier(hair, *kinds):
-    """A modifier of nodes that take the strands one after the other."""
+    """Add a nodes modifier that processes strands one after the other."""
     group = bpy.data.node_groups.new("Artist", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")

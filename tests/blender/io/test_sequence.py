@@ -72,7 +72,7 @@ def words(turning, folder, *more, ending="png"):
 
 
 def start(turning, folder):
-    """The command in a process of its own, whose standard output may be read."""
+    """Start the command in a separate process, whose standard output can be read."""
     line = list(map(str, command(*words(turning, folder))))
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen(line, text=True, env=ENVIRONMENT, cwd=ROOT, **pipes)
@@ -104,7 +104,7 @@ ALL = [f"f_{number:03}.png" for number in range(1, COUNT + 1)]
 
 @pytest.fixture(scope="module")
 def whole(turning, tmp_path_factory):
-    """A folder with the sequence, made in one go by this process: others must give the same."""
+    """A folder with the sequence rendered by this process at once, as the reference."""
     folder = tmp_path_factory.mktemp("whole")
     ended = run_here(*words(turning, folder))
     assert ended.status == 0, ended.errors
@@ -210,7 +210,7 @@ def test_a_full_disk_keeps_complete_frames(turning, tmp_path):
 
 
 def test_a_folder_without_space_is_reported(turning, tmp_path, monkeypatch):
-    """A disk may have no space left even for a file's name."""
+    """A folder in which no file can be created is reported."""
 
     def refuse(_path):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -81,7 +81,10 @@ def test_strands_lie_where_the_file_has_them(scene, sphere, rng, tmp_path, place
 
 
 def test_unit_and_axis_are_found_by_the_surface(scene, sphere, rng, tmp_path):
-    """CT2Hair's millimeters and HairSalon's meters with Y up are the usual ones; others fit the surface."""
+    """The conventions of CT2Hair (millimeters) and HairSalon (meters, Y up) are preferred.
+
+    Else unit and axis fit the surface.
+    """
     sphere.location, sphere.scale = (0.1, 0.2, 1.6), (0.1, 0.1, 0.1)
     update()
     lines = [np.float32(line) for line in lines_on(sphere, rng, 8, 5, 5)]
@@ -142,7 +145,9 @@ def test_guides_alone_are_written_where_strands_are_left_out(hair, tmp_path):
 
 
 def test_the_command_line_reads_and_writes_them(scene, sphere, rng, tmp_path):
-    """--hair-from and --guides-from with --unit and --up, info, and export."""
+    """The command line reads files with --hair-from, --guides-from and info, in the given unit and axis, and export
+    writes them.
+    """
     lines = [np.float32(line) for line in lines_on(sphere, rng, 8, 5, 5)]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "sphere.blend"))
     (tmp_path / "a.bin").write_bytes(strand_files.bin_file([100.0 * line for line in lines]))

@@ -316,7 +316,7 @@ def test_what_moves_is_where_the_file_begins_and_has_all_its_times(rng, tmp_path
 
 
 def damaged(stage, what, rng):
-    """A file that says one thing and has another."""
+    """Return a file whose header contradicts its content."""
     from pxr import UsdGeom
 
     points = wandering(rng, 8)

@@ -144,7 +144,9 @@ def test_blender_takes_usd_back(hair, tmp_path):
 
 @pytest.mark.parametrize("ending", [".usda", ".usdc"])
 def test_a_text_file_is_written_once_whatever_its_number_of_frames(rng, tmp_path, ending):
-    """USD writes all of a text file at each save: by the frame it would take a time as their square."""
+    """A text file is saved only once, as USD rewrites it with each save, so the time would grow with the square of the
+    frames.
+    """
     path = tmp_path / f"groom{ending}"
     frames = rng.random((3, 10, 3), np.float32)
     made = GroomCurves(0, "Long", False, np.int32([4, 6]), 0, lambda _some: np.ones(10, np.float32))

@@ -35,7 +35,9 @@ def bend(surface_object, amount):
 
 
 def carried(hair, target=None):
-    """(S, P, 3): hair that grows between the guides as they are, where Warp carries it; target: whose styles it has."""
+    """Return (S, P, 3): hair interpolated between the present guides and deformed by Warp; target: the hair with the
+    styles.
+    """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     pose = posed_strands.read_pose(hair.data.surface, depsgraph)
     bound = pipeline.bind_hair(*pipeline.inputs_of(hair.data), depsgraph, target)
@@ -180,7 +182,9 @@ def parts_seen(texture):
 
 
 def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_shadows, monkeypatch):
-    """A direction with each frame, and after all of them what is measured at rest but for rounding."""
+    """Each frame adds one direction, and after all directions the light equals that measured at rest, except for
+    rounding.
+    """
     measured, real = [], ambient_visibility.measure
     monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
     bpy.ops.object.light_add(type="SUN")
@@ -248,5 +252,5 @@ def test_guides_are_drawn_at_the_roots_that_are_stored_with_their_hair(hair):
     hair.data.vellus.is_live, hair.data.vellus.hair.seed = True, 9
     bpy.context.view_layer.update()
     drawn_at_once = hair_cache.strands_on_gpu(guides.data).points
-    events.strands_made(guides.data)
+    events.strands_computed(guides.data)
     assert np.array_equal(drawn_at_once, hair_cache.strands_on_gpu(guides.data).points)

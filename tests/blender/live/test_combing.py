@@ -47,7 +47,7 @@ def stroke(guides, combed_guides, steps=4):
 
 
 def grown_from_nothing(hair):
-    """(S, P, 3) that interpolation makes of the guides as they are now."""
+    """Return the points (S, P, 3) interpolated from the present guides."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     return pipeline.bind_hair(*pipeline.inputs_of(hair.data), depsgraph).points
 
@@ -73,7 +73,7 @@ def test_a_stroke_searches_nothing_and_writes_once(hair, window, monkeypatch):
 
 
 def grown(hair):
-    """(S, P, 3) that the whole hair follows its binding to, for the guides as they are now."""
+    """Return the points (S, P, 3) of all strands by their binding, for the present guides."""
     bound = bindings.of(hair.data)
     return following.follow_guides(
         bound.binding, curves.read_guides(hair.data.vellus.guide_curves, bound.surface, "cpu")
@@ -239,7 +239,7 @@ def test_hair_from_a_file_follows_by_the_roots_that_it_stores(hair, tmp_path):
 
 @pytest.mark.parametrize("is_reported_first", [True, False])
 def test_own_writes_are_no_news(hair, monkeypatch, is_reported_first):
-    """What somebody else changes is, before Blender's report of our write and after it."""
+    """Our own writes are not reported as changes; changes by others are, before and after Blender reports our write."""
     calls = counts_of(monkeypatch)
     pipeline.interpolate_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get(), hair.data)
     if is_reported_first:

@@ -184,7 +184,7 @@ def test_nothing_is_measured_without_a_window(monkeypatch):
 
 @pytest.mark.usefixtures("made_anew")
 def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkeypatch):
-    """It is measured when hair is drawn first; every edit of bound hair is then made there."""
+    """The first drawing measures the GPU, and all later edits of bound hair use the choice."""
     viewport.view_cache.clear()
     calls, asked = counts_of(monkeypatch), []
     monkeypatch.setattr(device_choice, "times", lambda: asked.append(1) or (0.0, 1.0))

@@ -204,7 +204,7 @@ SCENARIOS = {
     "scene_changed": lambda _folder: move_sun(),
     "hair_evaluated": lambda _folder: play_modifiers(),
     "curves_reported": lambda _folder: sculpt(),
-    "strands_made": lambda _folder: regrow(),
+    "strands_computed": lambda _folder: regrow(),
     "looks_written": lambda _folder: dye(),
     "surface_moved": lambda _folder: bend(),
     "image_changed": lambda _folder: repaint(),

@@ -47,7 +47,7 @@ def test_a_changed_guide_setting_makes_guides_and_their_hair_again(hair):
 
 @pytest.mark.usefixtures("made_anew")
 def test_radii_are_written_where_they_are_others(hair, monkeypatch):
-    """Again where somebody has changed them, and not while they are what was written."""
+    """Radii are written again only if others have changed them."""
     written = []
     write = attributes.write
     monkeypatch.setattr(attributes, "write", lambda *args: (written.append(args[1]), write(*args)))
@@ -71,7 +71,7 @@ def test_radii_are_written_where_they_are_others(hair, monkeypatch):
 
 
 def test_strands_edited_before_blender_reports_our_write_are_drawn(hair):
-    """The handler's own write and the edit after it come as one report."""
+    """Blender reports the handler's write and a later edit as one change, and the edited strands are drawn."""
     hair_cache.strands_on_gpu(hair.data)
     hair.data.vellus.hair.seed = 9
     update()  # its handler writes the strands
@@ -222,7 +222,7 @@ def test_a_fresh_datablock_has_the_declared_defaults(scene, group, settings_clas
 )
 @pytest.mark.parametrize("end", ["low", "high"])
 def test_a_slider_at_its_end_is_within_the_range(scene, group, settings_class, skip, end):
-    """15 degrees in single precision are a little more than 15 degrees, which the range would forbid."""
+    """The end of a range is valid although single precision rounds 15 degrees up."""
     owner = getattr(bpy.data.hair_curves.new("Fresh").vellus, group)
     for name, default, details in declared(settings_class):
         limit = getattr(details, end)

@@ -56,7 +56,7 @@ def written(hair):
     "styles", [(lean.Settings(amount=0.3),), (clump.Settings(size=0.3, levels=1), curl.Settings())]
 )
 def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, styles):
-    """Guides that lean do so here; what is written afterwards is what was shown."""
+    """Only leaning guides are computed on the processor, and the written strands equal the shown ones."""
     add_styles(watched, *styles)
     with monkeypatch.context() as counted:
         calls = counts_of(counted)
@@ -170,7 +170,7 @@ def test_a_mask_that_is_painted_uploads_no_strands(watched, monkeypatch):
 
 
 def test_a_style_that_is_switched_off_and_on(watched):
-    """Steps take a program of their kinds, styles of guides alone take none, nor does hair without any effect."""
+    """Each set of kinds has a program; styles of guides alone and hair without effective styles need none."""
     add_styles(watched, bend.Settings(), lean.Settings(amount=0.5))
     for place, is_on in ((0, False), (1, False), (0, True), (1, True)):
         slide(watched, place, "is_on", is_on)

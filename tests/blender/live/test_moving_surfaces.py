@@ -321,7 +321,7 @@ def test_files_that_were_kept_hidden_are_shown_when_opened(playing, tmp_path, mo
 
 
 def test_an_undo_step_of_a_drag_hides_nothing_again(playing):
-    """Blender keeps one when a bone is let go, before the surface has come to rest."""
+    """Blender pushes an undo step when a bone is released, before the surface is at rest: undoing it hides no hair."""
     assert are_hidden()
     bpy.ops.ed.undo_push(message="Hidden")
     moving_surfaces.resume()

@@ -96,7 +96,7 @@ def test_the_present_frame_is_shown_as_it_is_baked_and_as_combed_when_freed(swun
 
 
 def test_a_file_that_was_never_saved_has_no_frames_to_free(swung):
-    """Its folder for frames, beside the .blend, is nowhere yet. Panels ask with every redraw."""
+    """An unsaved file has no cache folder, and panels that ask with every redraw do not fail."""
     guides, _hair = swung
     assert not bpy.data.filepath
     guides.data.vellus.cache_folder = "//haircache"
@@ -149,7 +149,7 @@ def test_a_setting_takes_effect_with_the_next_frame(swung):
 
 
 def test_a_part_line_takes_effect_with_the_next_frame(swung):
-    """Frames before it count as outdated; one that divides the guides as before changes nothing."""
+    """Frames before a new part line are outdated; a part line that divides the guides as before changes nothing."""
     guides, hair = swung
     guides.data.vellus.dynamics.hair_friction = 50.0
     draw_line((0.0, -0.9, 1.2), (0.0, 0.9, 1.2))
@@ -182,7 +182,7 @@ def test_switched_off_guides_are_as_combed(swung):
 
 
 def test_combed_while_playing(swung):
-    """Other guides end what is played: it begins again in the start frame."""
+    """Combing during playback ends the simulation, which restarts in the start frame."""
     guides, _hair = swung
     play(1, 6)
     combed = points(guides)
@@ -209,7 +209,7 @@ def test_deleted_or_undone_guides_end_what_is_played(swung):
 
 
 def test_undo_shows_the_frame_that_was_shown(swung):
-    """It brings Blender's data back, where guides are as they were combed."""
+    """Undo restores Blender's data with combed guides, and the shown simulated frame remains."""
     guides, hair = swung
     play(1, 6)
     sixth, strands = shown(guides).copy(), drawn(hair)

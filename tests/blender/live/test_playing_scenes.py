@@ -57,7 +57,7 @@ def require_roots_on(surface, hair, within):
 
 
 def test_units_of_the_scene_do_not_matter(swung):
-    """A hundred times as large in units of a hundredth: the same in meters."""
+    """Hair that is a hundred times as large in units of a hundredth of a meter moves the same."""
     guides, _hair = swung
     guides.data.vellus.dynamics.cell_size = 0.2
     expected = played(guides)
@@ -125,7 +125,7 @@ def test_a_style_is_changed_while_simulated_frames_are_shown(swung):
 
 
 def test_systems_on_one_surface_do_not_meet(swung, tmp_path):
-    """Each moves as it does alone."""
+    """Hair systems on one surface move as they do alone."""
     guides, hair = swung
     alone, strands = played(guides), None
     strands = drawn(hair)
@@ -169,7 +169,7 @@ def test_roots_stay_on_a_surface_that_an_armature_bends(arm, tmp_path, window):
 
 
 def test_frames_may_be_negative(swung):
-    """A fall is the same fall, whatever its frames are called; baked ones too."""
+    """Simulated and baked frames are the same for any number of the first frame, also negative ones."""
     guides, _hair = swung
     bpy.data.objects["Sphere"].animation_data_clear()
     guides.data.vellus.dynamics.sag_free = False
@@ -184,7 +184,7 @@ def test_frames_may_be_negative(swung):
 
 
 def test_slow_motion_is_the_same_motion(swung):
-    """Time stretched to twice as many frames, of half as many substeps; baked frames too."""
+    """With Time Stretching, twice as many frames show the same motion, simulated or baked."""
     guides, hair = swung
     dynamics = guides.data.vellus.dynamics
     dynamics.automatic_substeps, dynamics.sag_free, dynamics.substeps = False, False, 8

@@ -15,7 +15,7 @@ from tests.support.reading import points, write_points
 
 @pytest.fixture(params=[False, True], ids=["background", "window"])
 def followed(hair, request, monkeypatch):
-    """(guides, hair), in a Blender without a window, or one that acts as if it had one."""
+    """(guides, hair), without a window, and with handlers that act as if there were one."""
     monkeypatch.setattr(running, "has_window", lambda: request.param)
     guides = bpy.data.objects["Guides"]
     guides.data.vellus.simulates = True
@@ -66,7 +66,7 @@ def test_other_settings_keep_hair_where_it_was_simulated(followed):
 
 
 def test_other_guides_are_shown_as_combed(followed):
-    """Points of other guides than there are, as after an undo, are not used."""
+    """Simulated points of a different number of guides, as after an undo, are not used."""
     guides, hair = followed
     before = written(hair)
     show(guides, swung(guides)[:-1])

@@ -57,7 +57,7 @@ def stroke(combed_guides, steps=3):
 
 
 def made_anew(hair, is_styled):
-    """(S, P, 3): what interpolation makes of the guides as they are now."""
+    """Return the points (S, P, 3) interpolated from the present guides."""
     state = hair.data.vellus
     depsgraph = bpy.context.evaluated_depsgraph_get()  # which may update, so before anything is marked
     styles, is_stale = style_items.styles_of(state), state.is_stale
@@ -88,7 +88,9 @@ def test_strokes_show_straight_hair_and_style_nothing(combed, monkeypatch, chose
 
 
 def test_curves_are_styled_once_the_stroke_is_over(combed, monkeypatch):
-    """Exporters of Blender's own read them, and the viewport goes on showing straight hair."""
+    """After a stroke the Curves contain styled hair for Blender's exporters, while the viewport still shows straight
+    hair.
+    """
     list(stroke([3, 4]))
     shown(combed)
     calls = counts_of(monkeypatch)

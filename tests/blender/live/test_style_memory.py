@@ -47,7 +47,7 @@ def things_alive():
 
 
 def changed(kind, given, step):
-    """{name: value} of the numbers of a kind of style, other ones in each step, near the given ones."""
+    """Return {name: value} of the numbers of a style, near the given ones and different in each step."""
     values = {}
     for name, default, details in declared(KINDS[kind]):
         if isinstance(default, float):
@@ -59,7 +59,7 @@ def changed(kind, given, step):
 
 
 class Changing:
-    """Hair of few strands with a style, all numbers of which change, a step at a time: dragged, keyed or driven."""
+    """Hair with few strands and a style whose numbers all change in each step: dragged, keyed or driven."""
 
     def __init__(self, hair, offer, strand_count):
         self.object, self.hair = hair, hair.data
@@ -106,7 +106,7 @@ class Changing:
         bpy.context.scene.frame_set(number + 2)
 
     def assert_shown(self):
-        """The style acts, and nothing is wrong with the hair."""
+        """Assert that the style has an effect and the hair has no error."""
         assert self.hair.vellus.status == "" and bindings.of(self.hair).styles.styling is not None
 
 
@@ -135,7 +135,7 @@ def resident():
 
 
 def grown(change):
-    """((things, memory) after a hundredth of `LONG` changes, (things, memory) after all); change(number): one."""
+    """Return (objects, memory) after a hundredth of `LONG` changes, and after all; change(number): makes a change."""
     seen = []
     for number in range(LONG):
         change(number)

@@ -61,7 +61,7 @@ def test_exporters_find_one_shader_with_the_texture(card):
 
 
 def test_light_from_behind_reaches_the_eye_in_eevee(card):
-    """EEVEE lights one layer, so that half the light that strands have was missing there, from behind four fifths."""
+    """Cards in EEVEE transmit light from behind, although EEVEE lights only their first layer."""
     nodes = card.data.materials[0].node_tree.nodes
     output = next(n for n in nodes if n.bl_idname == "ShaderNodeOutputMaterial" and n.target == "EEVEE")
     total = output.inputs["Surface"].links[0].from_node

@@ -127,7 +127,7 @@ def test_nodes_compute_the_looks_of_maps(patch, tmp_path):
 
 
 def test_a_dyed_part_looks_as_a_plain_node_of_that_absorption(patch, tmp_path):
-    """Path traced: the tips' last rows beside a material without our nodes."""
+    """In path-traced pictures, dyed tips look like a plain hair node with the same absorption."""
     scene = bpy.context.scene
     scene.world = bpy.data.worlds.new("World")
     background = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")

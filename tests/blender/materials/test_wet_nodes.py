@@ -61,7 +61,7 @@ def test_two_looks_are_mixed_by_the_attribute(hair):
 
 
 def test_the_second_look_goes_with_the_mask(hair):
-    """The nodes of the material are as before, also where an artist has put one between."""
+    """Without the mask, the nodes of the material are as before, even if an artist has inserted a node."""
     tree = hair.data.materials[0].node_tree
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     own = tree.nodes.new("ShaderNodeMixShader")

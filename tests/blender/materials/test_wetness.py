@@ -49,7 +49,7 @@ def test_the_wetter_of_look_and_style_is_seen(hair, wetness, amounts, wanted, mo
 
 
 def test_the_flat_color_darkens_with_the_style(hair):
-    """EEVEE and Blender's own viewport show this color."""
+    """The material's viewport color, which EEVEE and Blender's viewport show, darkens with the style's wetness."""
     state, colors = hair.data.vellus, []
     style_items.assign(state, [wet.Settings(amount=0.0, lock=0.5)])
     for amount in (0.0, 0.5, 1.0):

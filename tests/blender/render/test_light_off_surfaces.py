@@ -98,7 +98,7 @@ def test_a_plane_lights_a_strand_as_much_as_its_directions_say(scene, tilt, sour
 
 
 def test_a_sun_from_the_side_is_reflected_to_strands_close_to_a_plane(scene):
-    """Along that sun the plane slopes: some of it is in front of strands that are above it."""
+    """A plane seen obliquely from the sun, which is partly in front of the strands above it, reflects light to them."""
     tangent, towards, height = (1.0, 0.0, 0.0), (0.0, -0.6, 0.8), 1.0
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.angle = SUN, 0.0

@@ -202,7 +202,9 @@ def test_dyed_tips_are_drawn_in_their_colour(lit, model, mode):
 
 @pytest.mark.parametrize("model", ["KAJIYA_KAY", "MARSCHNER"])
 def test_a_strand_has_the_colour_of_its_random_number(lit, model):
-    """Numbers of no pigment on the left and of much on the right."""
+    """Strands with random numbers for little pigment, on the left, are brighter than those for much pigment, on the
+    right.
+    """
     state = lit.data.vellus
     state.model, state.appearance.melanin = model, 0.6
     bpy.data.objects["Sphere"].hide_render = True

@@ -51,4 +51,4 @@ def test_a_driver_that_refuses_a_texture_is_one_sentence(hair, raised, monkeypat
 def test_textures_beyond_what_any_driver_takes_are_refused(hair):
     """Blender itself refuses these textures, with errors of several classes."""
     with pytest.raises(HairError, match="cannot allocate 4000000 MB"):
-        driver_textures.made((1_000_000, 1_000_000), "R32F")
+        driver_textures.new_texture((1_000_000, 1_000_000), "R32F")

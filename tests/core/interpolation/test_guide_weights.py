@@ -34,7 +34,7 @@ def dense(found, guide_count):
     return full[:, :guide_count]
 
 
-def weights_at(roots, guide_roots, distance=None, limit=8, **kept_apart):
+def weights_at(roots, guide_roots, distance=None, limit=8, **region_labels):
     """(S, G) on flat ground; roots (S, 2), guide_roots (G, 2)."""
     found = find_guides(
         vectors(flat(roots)),
@@ -43,7 +43,7 @@ def weights_at(roots, guide_roots, distance=None, limit=8, **kept_apart):
         up(len(guide_roots)),
         distance,
         limit,
-        **kept_apart,
+        **region_labels,
     )
     return dense(found, len(guide_roots))
 

@@ -6,7 +6,7 @@ import numpy as np
 from hair_addon.core.geometry import mesh as mesh_math
 from hair_addon.core.geometry.mesh import SurfacePoints
 from hair_addon.core.geometry.sampling import sample_surface
-from hair_addon.core.interpolation.regions import Regions, kept_apart, regions_at
+from hair_addon.core.interpolation.regions import Regions, region_labels, regions_at
 
 
 def test_two_regions_of_vertices_meet_halfway(square, rng):
@@ -38,22 +38,22 @@ def test_kept_apart_is_what_differs_in_any(square, rng):
     first = np.repeat(some[rng.integers(0, 3, len(square.triangles))][:, None], 3, axis=1)
     second = others[rng.integers(0, 3, len(square.vertices))][square.triangles]
     own = rng.integers(0, 2, 40).astype(np.int32)
-    strands, guides = kept_apart((Regions(first), Regions(second)), roots, guide_roots)
+    strands, guides = region_labels((Regions(first), Regions(second)), roots, guide_roots)
     of_strands, of_guides = (np.stack([regions_at(c, p) for c in (first, second)], 1) for p in (roots, guide_roots))
     alike = (of_strands[:, None] == of_guides).all(axis=2)
     np.testing.assert_array_equal(strands[:, None] == guides, alike)
     np.testing.assert_array_equal(strands == -1, ~alike.any(axis=1))
-    strands, guides = kept_apart((Regions(None, own),), roots, guide_roots)
+    strands, guides = region_labels((Regions(None, own),), roots, guide_roots)
     assert np.all(strands == -1)
     np.testing.assert_array_equal(guides[:, None] == guides, own[:, None] == own)
 
 
 def test_no_regions_keep_nothing_apart(square):
     points = sample_surface(square, 5, 1)
-    assert kept_apart((), points, points) is None
+    assert region_labels((), points, points) is None
 
 
 def test_empty_regions_keep_nothing_apart(square):
     points = sample_surface(square, 5, 1)
-    strands, guides = kept_apart((Regions(),), points, points)
+    strands, guides = region_labels((Regions(),), points, points)
     assert np.all(strands[:, None] == guides)

@@ -54,7 +54,7 @@ def test_springs_are_near_to_the_hessian(sphere):
 
 
 def test_farthest_points_are_the_farthest(square):
-    """Each is where the distance from all before is largest, by looking at all."""
+    """Each point is the one farthest from all previous points, by brute force."""
     domain = Domain(square, 50, device=DEVICE)
     points, _ = domain.samples(500, np.random.default_rng(2))
     places = mesh_math.positions(domain.mesh, points).astype(np.float64)

@@ -57,7 +57,7 @@ class ShaderInput:
         """(last socket on the way, the linked `ShaderNode`, its output); None for node and output if none is linked."""
         socket, groups = self.socket, self.groups
         while (link := _link_of(socket)) is not None:
-            node, output = _past_what_passes_on(link)
+            node, output = _source_behind(link)
             if node is None:
                 break
             if node.type == "GROUP":
@@ -101,7 +101,7 @@ def _link_of(socket):
     return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
 
 
-def _past_what_passes_on(link):
+def _source_behind(link):
     """(node, output) that a link comes from, through reroutes and muted nodes.
 
     (None, None) if these are not linked: they set no value, as in Cycles.

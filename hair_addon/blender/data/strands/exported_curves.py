@@ -50,7 +50,7 @@ def read_radii(datablock, point_count):
     return lambda some: attributes.valid_radii(rows[some])
 
 
-def counts_kept(datablock):
+def counts_per_curve(datablock):
     """(S,) int32: points of each curve in file formats that keep point counts.
 
     Polylines keep their points. Catmull-Rom splines with few points are subdivided to at least the point count of
@@ -60,14 +60,14 @@ def counts_kept(datablock):
     return ((counts - 1) * _lines_of_segments(datablock, counts) + 1).astype(np.int32)
 
 
-def points_kept(datablock):
-    """(N, 3) float32 local points of curves, `counts_kept` for each."""
-    return _kept(datablock, curves.read_points(datablock))
+def points_per_curve(datablock):
+    """(N, 3) float32 local points of curves, `counts_per_curve` for each."""
+    return _per_curve(datablock, curves.read_points(datablock))
 
 
-def radii_kept(datablock):
-    """(N,) float32 radii in local units, at least zero, of the points of `points_kept`."""
-    radii = _kept(datablock, attributes.valid_radii(curves.read_radii(datablock))[:, None])[:, 0]
+def radii_per_curve(datablock):
+    """(N,) float32 radii in local units, at least zero, of the points of `points_per_curve`."""
+    radii = _per_curve(datablock, attributes.valid_radii(curves.read_radii(datablock))[:, None])[:, 0]
     return np.maximum(radii, np.float32(0.0))
 
 
@@ -77,8 +77,8 @@ def _lines_of_segments(datablock, counts):
     return np.where(is_divided, -((1 - groom.POINT_COUNT) // np.maximum(counts - 1, 1)), 1)
 
 
-def _kept(datablock, values):
-    """Values (N, D) at the points of curves → (M, D) float32 at the points of `points_kept`."""
+def _per_curve(datablock, values):
+    """Values (N, D) at the points of curves → (M, D) float32 at the points of `points_per_curve`."""
     counts = curves.point_counts(datablock)
     lines = _lines_of_segments(datablock, counts)
     is_divided = lines > 1

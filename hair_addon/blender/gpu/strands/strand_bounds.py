@@ -60,7 +60,7 @@ def new_bounds(strand_count: int) -> StrandBounds:
 
 def _boxes_texture(count):
     in_row = min(TEXTURE_WIDTH // _BOX, count)
-    return driver_textures.made((in_row * _BOX, -(-count // in_row)), "RGBA32F")
+    return driver_textures.new_texture((in_row * _BOX, -(-count // in_row)), "RGBA32F")
 
 
 @shaders.cached

@@ -75,10 +75,10 @@ def rows_texture(values: np.ndarray, channels: int) -> tuple[gpu.types.GPUTextur
     height = -(-len(values) // in_row)
     if height * in_row > len(values):
         values = np.concatenate([values, np.zeros((height * in_row - len(values), values.shape[1]), np.float32)])
-    return driver_textures.made((in_row * texels, height), {1: "R32F", 4: "RGBA32F"}[channels], values), in_row
+    return driver_textures.new_texture((in_row * texels, height), {1: "R32F", 4: "RGBA32F"}[channels], values), in_row
 
 
 def empty_rows(count: int, texels: int, texture_format: str = "RGBA32F") -> tuple[gpu.types.GPUTexture, int]:
     """`rows_texture` for `count` rows with undefined values."""
     in_row = min(TEXTURE_WIDTH // texels, count)
-    return driver_textures.made((in_row * texels, -(-count // in_row)), texture_format), in_row
+    return driver_textures.new_texture((in_row * texels, -(-count // in_row)), texture_format), in_row

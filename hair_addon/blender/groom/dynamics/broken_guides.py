@@ -25,7 +25,7 @@ class Broken:
         """Notes for a manifest; empty if no guide broke."""
         return ((_NOTE, f"{self.count} {self.frame}"),) if self.count else ()
 
-    def said_of(self, guides: Curves) -> HairError:
+    def message_of(self, guides: Curves) -> HairError:
         """Return the message for the user."""
         return HairError(
             '{count} of {total} guides of "{name}" broke in frame {frame} and were reset: increase Substeps.',

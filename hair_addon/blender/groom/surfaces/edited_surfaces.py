@@ -60,7 +60,7 @@ def follow_surface(
     roots = stored_roots.places(guide_curves, len(surface.rest))
     stored = stored_roots.points(guide_curves, surface)
     if faces_of(state.topology) != faces_of(surface.topology) or roots is None or stored is None:
-        if not follows_edits or frame_faces.came_with_the_frame(guide_curves, surface):
+        if not follows_edits or frame_faces.differs_by_frame(guide_curves, surface):
             return Followed.NOTHING
         curves.require_not_linked(guide_curves)
         lost, lost_between = edited_faces.reroot(guide_curves, surface, depsgraph)

@@ -97,16 +97,16 @@ def transferring(
     surface = scene.read_surface(target, scene.present_depsgraph())
     check_mesh(surface.mesh)
     warp = _warp(guides.surface, source.surface, target, surface, settings, depsgraph)
-    own_ground, ground = (TransferSurface(one.mesh, one.corner_uvs) for one in (source.surface, surface))
+    its_surface, target_surface = (TransferSurface(one.mesh, one.corner_uvs) for one in (source.surface, surface))
     masks = carried_masks.read(guides, hair, target, depsgraph)
     remembered = tuple(map(Remembered, (guides, hair, target)))
 
     def compute(progress):
         progress("Finding places", 0.0)
-        places = _places(own_ground, ground, source.roots, warp, settings)
+        places = _places(its_surface, target_surface, source.roots, warp, settings)
         meshes = source.surface.mesh, surface.mesh
         points = grooming.groom_transfer.carried(*meshes, source.roots, source.points, source.counts, places)
-        painted = carried_masks.carried(masks, own_ground, ground, warp, settings.reach)
+        painted = carried_masks.carried(masks, its_surface, target_surface, warp, settings.reach)
         return places, points, painted, warp is None and _has_overlap(surface)
 
     places, points, painted, has_overlap = yield compute

@@ -38,13 +38,13 @@ _UNEQUAL = 1e-4  # masks whose weights differ by less are equal
 class LibraryGroom:
     """A saved groom: guides on their surface, masks and settings.
 
-    ground: the surface; roots: G `SurfacePoints`; points: (N, 3) float32 [m] of the guides, concatenated; counts: (G,)
+    source: the surface; roots: G `SurfacePoints`; points: (N, 3) float32 [m] of the guides, concatenated; counts: (G,)
     of each; masks: {name: (V,) weights}; regions: {name: (G,) int32 or float32}, attributes of the guides; left: names
     of objects and images in settings that are not part of the groom.
     """
 
     name: str
-    ground: "TransferSurface"
+    source: "TransferSurface"
     roots: SurfacePoints
     points: np.ndarray
     counts: np.ndarray
@@ -88,7 +88,7 @@ def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:
     if attributes.are_smooth(guides).any():
         points, counts = read.numpy().reshape(-1, 3), np.full(len(counts), read.point_count)
     rotation = _rotation(surface)
-    ground = grooming.groom_transfer.TransferSurface(_turned_mesh(surface.mesh, rotation.T), surface.corner_uvs)
+    source = grooming.groom_transfer.TransferSurface(_turned_mesh(surface.mesh, rotation.T), surface.corner_uvs)
     masks, regions = {}, {}
     for mask in library_settings.masks_of(settings):
         if mask in surface_object.vertex_groups:
@@ -104,7 +104,7 @@ def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:
         settings = replace(settings, hair=replace(settings.hair, region_attribute=""))
     turned = _turned(points, rotation.T)
     return LibraryGroom(
-        name, ground, read.roots, turned, counts, settings, masks, regions, tuple(dict.fromkeys([*left, *lost]))
+        name, source, read.roots, turned, counts, settings, masks, regions, tuple(dict.fromkeys([*left, *lost]))
     )
 
 
@@ -159,10 +159,10 @@ def adding_groom(
     check_mesh(surface.posed_mesh)
     rotation = _rotation(surface)
     target = grooming.groom_transfer.TransferSurface(_turned_mesh(surface.posed_mesh, rotation.T), surface.corner_uvs)
-    found = grooming.groom_passage.passage(groom.ground, target, groom.roots, method)
+    found = grooming.groom_passage.passage(groom.source, target, groom.roots, method)
     places = found.places
     points = grooming.groom_transfer.carried(
-        groom.ground.mesh, target.mesh, groom.roots, groom.points, groom.counts, places
+        groom.source.mesh, target.mesh, groom.roots, groom.points, groom.counts, places
     )
     settings = library_settings.scaled(groom.settings, places.scale)
     settings = settings if changed is None else changed(settings)
@@ -183,7 +183,7 @@ def _painted(surface_object, surface, groom, target, found, depsgraph):
     if not groom.masks:
         return {}
     weights = np.stack(list(groom.masks.values()), axis=1)
-    carried = grooming.groom_passage.carried_weights(groom.ground, target, weights, found.warp)
+    carried = grooming.groom_passage.carried_weights(groom.source, target, weights, found.warp)
     at_own = carried_masks.at_own_vertices(surface_object, surface, carried)
     painted = {}
     for mask, values, own_values in zip(groom.masks, carried.T, at_own.T, strict=True):

@@ -122,7 +122,7 @@ def follow(blender_scene):
         return
     is_its = _is_ours(state.hair_scene) and state.hair_scene.background_set == blender_scene
     if is_its and blender_scene.library is None:
-        _bring_up_to_date(blender_scene, state.hair_scene)
+        _update_hair_scene(blender_scene, state.hair_scene)
     for hair_object in _hair_objects(blender_scene):
         curves_objects.hide_from_engines(hair_object, is_seen_by_rays=state.composite_shadow == "ENGINE")
 
@@ -199,7 +199,7 @@ def _separate(blender_scene):
         state.hair_scene = hair_scene
 
 
-def _bring_up_to_date(blender_scene, hair_scene):
+def _update_hair_scene(blender_scene, hair_scene):
     """Copy shared settings of a scene to its hair scene, and adjust the scene's nodes."""
     state = blender_scene.vellus
     is_ours = blender_scene.render.engine == viewport.ENGINE

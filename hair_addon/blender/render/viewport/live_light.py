@@ -421,4 +421,4 @@ def _grid_of(systems, fibres, device):
 
 def _are_alike(grid, other):
     """Whether sums of a grid can be added to those of another."""
-    return grid.device == other.device and len(grid.kept) == len(other.kept)
+    return grid.device == other.device and len(grid.thinned) == len(other.thinned)

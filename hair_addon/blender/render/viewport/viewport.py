@@ -173,7 +173,7 @@ def drawn_scene_of(context):
     """The `DrawnScene` of the context's viewport, read if something has moved."""
     viewport = context.space_data
     shading = viewport_shading.read(viewport, context.scene, matrices_of(context.region_data)[0])
-    key, shows = viewport.as_pointer(), (is_ours(context), *_what_shows(viewport), shading.strands)
+    key, shows = viewport.as_pointer(), (is_ours(context), *_visibility_key(viewport), shading.strands)
     view = view_cache.get(key)
     if view is None or view.shows != shows:  # settings of a viewport do not change the scene
         view = view_cache.keep(key, _View(shows))
@@ -230,7 +230,7 @@ def _is_lone(view, region, drawn):
     return all(other is not drawn for pointer, other in view.lit.items() if pointer != region)
 
 
-def _what_shows(viewport):
+def _visibility_key(viewport):
     """A key of a viewport's settings that affect which objects, and which of their data, are read."""
     return (
         viewport.shading.type == "MATERIAL",

@@ -90,7 +90,7 @@ class CollidingStrands:
         rods, contacts = self._rods, self._contacts
         planes, found, _middle_planes = contacts.planes
         places = rods.arrays.positions, rods.arrays.positions_before
-        asking, final, again = _ways_of_asking(step)
+        asking, final, again = _options_of_queries(step)
         with_planes, with_found = Surroundings(planes), Surroundings(planes, found)
         for substep in range(first, end):
             contacts.colliders.place((substep + 1) / step.count)
@@ -113,7 +113,7 @@ class CollidingStrands:
         step = rods.begun(step)
         numbers, _ = rod_solver.kernel_inputs(rods.arrays, step, rods.scratch, first, end, surroundings)
         stages = rod_solver.stages_of(rods.arrays, step, PREDICT | SOLVE | AGAIN | FINISH)
-        asking = _ways_of_asking(step)
+        asking = _options_of_queries(step)
         inputs = [stages, _ROUNDS, numbers, rods.arrays, rods.scratch, contacts.surface(), *asking]
         inputs += [contacts.vertices, contacts.middles]
         group_count = len(rods.arrays.positions)
@@ -133,7 +133,7 @@ class CollidingStrands:
         return self._planes[:share_count]
 
 
-def _ways_of_asking(step):
+def _options_of_queries(step):
     """Return the `QueryOptions` before the solve, after it, and after AGAIN."""
     return query_options(step.size), query_options(0.0, is_final=True), query_options(0.0, is_final=True, is_again=True)
 

@@ -223,7 +223,7 @@ def n_trt_caustic(phi: Values, cos_theta_d: Values, settings: Settings) -> np.nd
     """Return N_TRT (..., C) with a glint of finite width in place of the caustic [Marschner03]."""
     phi, cos_theta_d = np.broadcast_arrays(np.abs(phi), cos_theta_d)
     caustic = Caustic.at(cos_theta_d, settings, settings.sigma_a)
-    smooth = n_trt(phi, cos_theta_d, settings.eta, settings.sigma_a) * caustic.kept(phi)[..., None]
+    smooth = n_trt(phi, cos_theta_d, settings.eta, settings.sigma_a) * caustic.remainder(phi)[..., None]
     return smooth + caustic.glint(phi)
 
 
@@ -260,7 +260,7 @@ class Caustic:
         """Return the caustics of some of the cosines."""
         return Caustic(self.phi_c[index], self.fade[index], self.area[index], self.width)
 
-    def kept(self, phi: Values) -> np.ndarray:
+    def remainder(self, phi: Values) -> np.ndarray:
         """Return the factor (...) that removes the caustic from N_TRT at phi (...)."""
         peak = gaussian(0.0, self.width)
         left = 1.0 - self.fade * gaussian(phi - self.phi_c, self.width) / peak

@@ -15,7 +15,7 @@ from ...long_work import Progress, no_progress, part_of
 from . import grid_walk, start_places, view, voxel_means, voxel_sums
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
-from .lamp_light import Event, light_at_once, light_by_share, light_met
+from .lamp_light import Event, light_at_hit, light_at_once, light_by_share
 from .light_sources import Sources, across
 from .media import Surroundings, launch, medium_of, mesh_of, sources_of, unlit_medium_of
 from .seen_rays import Seen
@@ -51,27 +51,27 @@ def _gather(
     first: int,
 ):
     path = first + wp.tid()
-    met, direction, state = start(medium, seen_in, segments[path], keys[path])
+    hit, direction, state = start(medium, seen_in, segments[path], keys[path])
     weight = wp.vec3(1.0, 1.0, 1.0)
     light = wp.vec3(0.0, 0.0, 0.0)
     event = int(0)
     while event < _MOST_EVENTS:
-        if met.kind == PASSED:
+        if hit.kind == PASSED:
             event = _MOST_EVENTS
         else:
             here = Event()
-            here.position = met.position
+            here.position = hit.position
             here.own = -1
             here.weight = weight
             # A separate random sequence: with other lamps a path takes the same directions.
             lamp_state = wp.rand_init(1 + event, keys[path])
-            if met.kind == STRAND:
-                here.fibre = fibre_of(medium, met.index)
+            if hit.kind == STRAND:
+                here.fibre = fibre_of(medium, hit.index)
                 here.facing = -direction
-                here.own = medium.strands[met.index]
-                here.offset = -met.offset
+                here.own = medium.strands[hit.index]
+                here.offset = -hit.offset
                 if event == 0:
-                    out_position[path] = met.position
+                    out_position[path] = hit.position
                     out_even[path] = even_return(here.fibre, here.facing)
                     light_there, lamp_state = light_at_once(medium, sources, here, lamp_state)
                 else:
@@ -80,11 +80,11 @@ def _gather(
                 state = after
             else:
                 here.facing = -direction
-                here.position = met.position - direction * (5e-5 * medium.voxel)
-                color, gloss = medium.albedo[met.index], medium.gloss[met.index]
-                here.surface = surface_of(met.normal, here.facing, color, gloss, medium.reflected)
+                here.position = hit.position - direction * (5e-5 * medium.voxel)
+                color, gloss = medium.albedo[hit.index], medium.gloss[hit.index]
+                here.surface = surface_of(hit.normal, here.facing, color, gloss, medium.reflected)
                 light_there, lamp_state = light_by_share(medium, sources, here, lamp_state)
-                direction, weight, after = surface_turn(here.surface, across(met.normal), weight, state)
+                direction, weight, after = surface_turn(here.surface, across(hit.normal), weight, state)
                 state = after
             light += light_there
             event += 1
@@ -94,8 +94,8 @@ def _gather(
                     event = _MOST_EVENTS
                 weight = weight * (_DIM / wp.max(brightest, 1e-12))
             if event < _MOST_EVENTS:
-                met = walk(medium, here.position, direction, _FAR, here.own)
-                light_there, lamp_state = light_met(medium, sources, here, direction, met, lamp_state)
+                hit = walk(medium, here.position, direction, _FAR, here.own)
+                light_there, lamp_state = light_at_hit(medium, sources, here, direction, hit, lamp_state)
                 light += wp.cw_mul(weight, light_there)
     out_light[path] = light
 

@@ -49,7 +49,7 @@ class Medium:
 
 
 @wp.struct
-class Met:
+class Hit:
     """The hit of a ray: a segment, identified by its first point, or a triangle; its place.
 
     The triangle's normal on the side of the ray. offset: from the segment's axis, as a fraction of the radius, positive
@@ -227,9 +227,9 @@ def _trace_cell(
     direction: wp.vec3,
     own: int,
     end: float,
-    met: Met,
+    hit: Hit,
 ):
-    """Return (distance, `Met`) of the nearest segment of a cell before `end`; the arguments if there is none."""
+    """Return (distance, `Hit`) of the nearest segment of a cell before `end`; the arguments if there is none."""
     for turn in range(medium.starts[index], medium.starts[index + 1]):
         if _comes_near(medium, turn, position - centre, side, direction):
             segment = medium.segments[turn]
@@ -237,10 +237,10 @@ def _trace_cell(
                 distance, offset = crossing(medium, segment, position, direction)
                 if distance < end:
                     end = distance
-                    met.kind = STRAND
-                    met.index = segment
-                    met.offset = offset
-    return end, met
+                    hit.kind = STRAND
+                    hit.index = segment
+                    hit.offset = offset
+    return end, hit
 
 
 @wp.func
@@ -255,7 +255,7 @@ def _trace_brick(
     inverse: wp.vec3,
     own: int,
     end: float,
-    met: Met,
+    hit: Hit,
 ):
     """Return `_trace_cell` of all cells of a voxel that a ray enters at `here` and leaves at `to` [m].
 
@@ -271,7 +271,7 @@ def _trace_brick(
         to_cell = wp.min(leave[0], wp.min(leave[1], leave[2]))
         centre = corner + side * wp.vec3(float(cell[0]) + 0.5, float(cell[1]) + 0.5, float(cell[2]) + 0.5)
         index = ((brick * along + cell[2]) * along + cell[1]) * along + cell[0]
-        end, met = _trace_cell(medium, index, centre, side, position, direction, own, end, met)
+        end, hit = _trace_cell(medium, index, centre, side, position, direction, own, end, hit)
         if to_cell >= wp.min(end, to):
             staying = 0
         for axis in range(3):
@@ -280,11 +280,11 @@ def _trace_brick(
                 leave[axis] = leave[axis] + wp.abs(inverse[axis]) * medium.voxel / float(along)
                 if cell[axis] < 0 or cell[axis] >= along:
                     staying = 0
-    return end, met
+    return end, hit
 
 
 @wp.func
-def _trace_strands(medium: Medium, position: wp.vec3, direction: wp.vec3, own: int, most: float, met: Met):
+def _trace_strands(medium: Medium, position: wp.vec3, direction: wp.vec3, own: int, most: float, hit: Hit):
     """Return `_trace_cell` of all cells of the grid."""
     end = float(most)
     inverse = _inverse_of(direction)
@@ -301,7 +301,7 @@ def _trace_strands(medium: Medium, position: wp.vec3, direction: wp.vec3, own: i
         if brick >= 0:
             corner = medium.corner + medium.voxel * wp.vec3(float(voxel[0]), float(voxel[1]), float(voxel[2]))
             until = wp.min(to, last)
-            end, met = _trace_brick(medium, brick, corner, here, until, position, direction, inverse, own, end, met)
+            end, hit = _trace_brick(medium, brick, corner, here, until, position, direction, inverse, own, end, hit)
         if to >= wp.min(end, last):
             going = 0
         here = to
@@ -311,32 +311,32 @@ def _trace_strands(medium: Medium, position: wp.vec3, direction: wp.vec3, own: i
                 leave[axis] = leave[axis] + wp.abs(inverse[axis]) * medium.voxel
                 if voxel[axis] < 0 or voxel[axis] >= medium.shape[axis]:
                     going = 0
-    return end, met
+    return end, hit
 
 
 @wp.func
 def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int):
-    """Return the `Met` of a ray within a distance [m]; own: the strand that the ray leaves, -1: none."""
-    met = Met()
-    met.kind = PASSED
-    end, met = _trace_strands(medium, position, direction, own, most, met)
+    """Return the `Hit` of a ray within a distance [m]; own: the strand that the ray leaves, -1: none."""
+    hit = Hit()
+    hit.kind = PASSED
+    end, hit = _trace_strands(medium, position, direction, own, most, hit)
     # Surfaces behind the strand do not matter.
     if medium.has_mesh > 0:
         found = wp.mesh_query_ray(medium.mesh, position, direction, end)
         if found.result:
             end = found.t
-            met.kind = SURFACE
-            met.index = found.face
-            met.normal = _shading_normal(medium, found.face, found.u, found.v, found.normal)
+            hit.kind = SURFACE
+            hit.index = found.face
+            hit.normal = _shading_normal(medium, found.face, found.u, found.v, found.normal)
             if wp.dot(found.normal, direction) > 0.0:
-                met.normal = -met.normal
-    met.position = position + direction * end
-    return met
+                hit.normal = -hit.normal
+    hit.position = position + direction * end
+    return hit
 
 
 @wp.func
 def place_on(medium: Medium, segment: int, part: float, offset: float, direction: wp.vec3):
-    """Return the `Met` of a ray with a segment, at a fraction of its length and an offset from its axis, on the side
+    """Return the `Hit` of a ray with a segment, at a fraction of its length and an offset from its axis, on the side
     that faces the ray, as `walk` returns it.
     """
     start = medium.points[segment]
@@ -345,9 +345,9 @@ def place_on(medium: Medium, segment: int, part: float, offset: float, direction
     inwards = wp.normalize(wp.cross(along, sideways))
     radius = medium.radii[segment] + part * (medium.radii[segment + 1] - medium.radii[segment])
     rise = wp.sqrt(wp.max(0.0, 1.0 - offset * offset))
-    met = Met()
-    met.kind = STRAND
-    met.index = segment
-    met.offset = offset
-    met.position = start + part * along + radius * (offset * sideways - rise * inwards)
-    return met
+    hit = Hit()
+    hit.kind = STRAND
+    hit.index = segment
+    hit.offset = offset
+    hit.position = start + part * along + radius * (offset * sideways - rise * inwards)
+    return hit

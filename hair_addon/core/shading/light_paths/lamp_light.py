@@ -9,7 +9,7 @@ neither lamps near a strand nor narrow lobes give few paths much light.
 import warp as wp
 
 from .fibre_walk import Fibre, value
-from .grid_walk import PASSED, Medium, Met, walk
+from .grid_walk import PASSED, Hit, Medium, walk
 from .light_sources import Lit, Sources, choose, lit_by, lit_by_world, lit_from
 from .surface_walk import Surface, surface_value
 from .world_light import world_density, world_radiance
@@ -56,8 +56,8 @@ def _is_shadowed(medium: Medium, lit: Lit, here: Event):
     """Whether an event is in the shadow of a lamp."""
     if lit.casts_shadow == 0:
         return False
-    met = walk(medium, here.position, lit.direction, lit.distance, here.own)
-    return met.kind != PASSED
+    hit = walk(medium, here.position, lit.direction, lit.distance, here.own)
+    return hit.kind != PASSED
 
 
 @wp.func
@@ -128,12 +128,12 @@ def _by_lot(light: wp.vec3, faint: float, random: wp.uint32):
     state = random
     amount = light[0] + light[1] + light[2]
     lot = wp.randf(state) * faint  # always drawn, so that all later numbers are the same
-    kept = light
+    result = light
     if amount < faint:
-        kept = wp.vec3(0.0, 0.0, 0.0)
+        result = wp.vec3(0.0, 0.0, 0.0)
         if lot < amount:
-            kept = light * (faint / amount)
-    return kept, state
+            result = light * (faint / amount)
+    return result, state
 
 
 @wp.func
@@ -165,7 +165,7 @@ def light_by_share(medium: Medium, sources: Sources, here: Event, random: wp.uin
     """
     state = random
     total = float(0.0)
-    kept = wp.vec3(0.0, 0.0, 0.0)
+    result = wp.vec3(0.0, 0.0, 0.0)
     kept_lit = Lit()
     for index in range(wp.min(sources.count, _LAMPS_AT_ONCE) + sources.world.is_uneven):
         lit, share, after = _lamp_at(medium, sources, index, here, state)
@@ -177,9 +177,9 @@ def light_by_share(medium: Medium, sources: Sources, here: Event, random: wp.uin
         if amount > 0.0:
             total += amount
             if wp.randf(state) * total <= amount:
-                kept = light / amount
+                result = light / amount
                 kept_lit = lit
-    found, after_lot = _by_lot(kept * total, sources.faint, state)
+    found, after_lot = _by_lot(result * total, sources.faint, state)
     if wp.max(found) > 0.0:
         if _is_shadowed(medium, kept_lit, here):
             found = wp.vec3(0.0, 0.0, 0.0)
@@ -187,9 +187,9 @@ def light_by_share(medium: Medium, sources: Sources, here: Event, random: wp.uin
 
 
 @wp.func
-def light_met(medium: Medium, sources: Sources, here: Event, direction: wp.vec3, met: Met, random: wp.uint32):
+def light_at_hit(medium: Medium, sources: Sources, here: Event, direction: wp.vec3, hit: Hit, random: wp.uint32):
     """Return (radiance from the direction in which a path leaves an event, weighted by its share of densities, random
-    state). met: the hit in that direction.
+    state). hit: the hit in that direction.
     """
     state = random
     light = wp.vec3(0.0, 0.0, 0.0)
@@ -198,11 +198,11 @@ def light_met(medium: Medium, sources: Sources, here: Event, direction: wp.vec3,
         state = after
         lit = lit_from(sources, chosen, here.position, direction, _LEAST * medium.voxel)
         if wp.max(lit.irradiance) > 0.0:
-            end = wp.dot(met.position - here.position, direction)
-            if met.kind == PASSED or lit.casts_shadow == 0 or lit.distance < end:
+            end = wp.dot(hit.position - here.position, direction)
+            if hit.kind == PASSED or lit.casts_shadow == 0 or lit.distance < end:
                 density = turn_density(here, direction)
                 light += lit.irradiance * (share * lit.density * density / (lit.density + density))
-    if met.kind == PASSED:
+    if hit.kind == PASSED:
         of_turn = float(1.0)
         if sources.world.is_uneven > 0:
             density = turn_density(here, direction)

@@ -43,14 +43,14 @@ def _find(
     x = 2.0 * (float(path % side) + wp.randf(state)) / float(side) - 1.0
     y = 2.0 * (float(path / side) + wp.randf(state)) / float(side) - 1.0
     position, direction = ray_at(view, x, y)
-    met = walk(medium, position, direction, FAR, -1)
+    hit = walk(medium, position, direction, FAR, -1)
     out_segment[path] = -1
-    if met.kind == STRAND:
-        out_segment[path] = met.index
-    out_position[path] = met.position
+    if hit.kind == STRAND:
+        out_segment[path] = hit.index
+    out_position[path] = hit.position
 
 
-def met_by(
+def hits_of(
     grid: StrandGrid, corners: np.ndarray, view: View, ray_count: int, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (segments (N,), places (N, 3)) of strands that rays hit before a surface.
@@ -71,8 +71,8 @@ def met_by(
 
 
 def seen_by(grid: StrandGrid, corners: np.ndarray, view: View, ray_count: int, seed: int = 0) -> Seen:
-    """Return `Seen` with the segments and places of `met_by`, and black drawn light."""
-    segments, places = met_by(grid, corners, view, ray_count, seed)
+    """Return `Seen` with the segments and places of `hits_of`, and black drawn light."""
+    segments, places = hits_of(grid, corners, view, ray_count, seed)
     area = AREA / max(1, round(ray_count**0.5)) ** 2
     with wp.ScopedDevice(grid.device):
         drawn = wp.zeros(len(segments), dtype=wp.vec3)
@@ -115,11 +115,11 @@ def _number(
         if shown >= begin and shown - begin < wp.uint32(drawn_ranges[system, 1]):
             segment = int(shown - begin)
             of_strand = drawn_ranges[system, 2]
-            kept = drawn_ranges[system, 4]
+            point_count = drawn_ranges[system, 4]
             # The middle of the drawn segment, converted from the drawn to the grid's number of segments.
-            along = (2 * (segment % of_strand) + 1) * (kept - 1) / (2 * of_strand)
+            along = (2 * (segment % of_strand) + 1) * (point_count - 1) / (2 * of_strand)
             strand = segment / of_strand / drawn_ranges[system, 3]
-            out_segments[sample] = drawn_ranges[system, 5] + strand * kept + along
+            out_segments[sample] = drawn_ranges[system, 5] + strand * point_count + along
             out_is_hair[sample] = 1
 
 
@@ -155,14 +155,15 @@ def shown_in(
     """
     height, width = picture.shape
     require_count("colors", color.size, 4 * picture.size)
-    require_count("systems in the picture", len(ranges), len(grid.kept))
-    ends_of_systems = [*(kept.first_point for kept in grid.kept[1:]), len(grid.points)]
+    require_count("systems in the picture", len(ranges), len(grid.thinned))
+    ends_of_systems = [*(system.first_point for system in grid.thinned[1:]), len(grid.points)]
     rows = []
-    for (begin, count, of_strand), kept, end in zip(ranges, grid.kept, ends_of_systems, strict=True):
+    for (begin, count, of_strand), system, end in zip(ranges, grid.thinned, ends_of_systems, strict=True):
         if count:
-            last = kept.first_point + (count // of_strand - 1) // kept.stride * kept.point_count + kept.point_count - 1
+            last_strand = (count // of_strand - 1) // system.stride
+            last = system.first_point + last_strand * system.point_count + system.point_count - 1
             require_indices("points", [last], end)
-        rows.append((begin, count, max(of_strand, 1), kept.stride, kept.point_count, kept.first_point))
+        rows.append((begin, count, max(of_strand, 1), system.stride, system.point_count, system.first_point))
     device = grid.device
     with wp.ScopedDevice(device):
         numbers, is_hair = (wp.zeros(picture.size, dtype=int) for _ in range(2))

@@ -13,7 +13,7 @@ import warp as wp
 
 from ...kernels import kernel_cache, running_sums
 from ...kernels.checks import require_count
-from .grid_walk import PASSED, STRAND, Medium, Met, place_on, walk
+from .grid_walk import PASSED, STRAND, Hit, Medium, place_on, walk
 from .media import launch
 from .seen_rays import Seen
 from .view import ViewOnDevice, depth_at, direction_at, on_device, seen_at
@@ -36,7 +36,7 @@ class Starts:
 
 @wp.func
 def start(medium: Medium, view: ViewOnDevice, segment: int, key: int):
-    """Return (`Met` where a path starts, visible or not; direction of the ray there; random state)."""
+    """Return (`Hit` where a path starts, visible or not; direction of the ray there; random state)."""
     state = wp.rand_init(0, key)
     part = wp.randf(state)
     x, y, _area = seen_at(view, (1.0 - part) * medium.points[segment] + part * medium.points[segment + 1])
@@ -46,7 +46,7 @@ def start(medium: Medium, view: ViewOnDevice, segment: int, key: int):
 
 
 @wp.func
-def _is_in_sight(medium: Medium, view: ViewOnDevice, place: Met, direction: wp.vec3):
+def _is_in_sight(medium: Medium, view: ViewOnDevice, place: Hit, direction: wp.vec3):
     """Whether the ray through a place on a strand hits that place first."""
     x, y, area = seen_at(view, place.position)
     if area <= 0.0 or wp.abs(x) >= 1.0 or wp.abs(y) >= 1.0:
@@ -61,10 +61,10 @@ def _is_in_sight(medium: Medium, view: ViewOnDevice, place: Met, direction: wp.v
         return False
     # A place inside another strand is hidden by that strand's side, which rays from inside do not hit.
     radius = medium.radii[place.index]
-    met = walk(medium, place.position - reach * direction, direction, reach + radius, -1)
-    if met.kind != STRAND:
+    hit = walk(medium, place.position - reach * direction, direction, reach + radius, -1)
+    if hit.kind != STRAND:
         return False
-    return medium.strands[met.index] == own and wp.length(met.position - place.position) <= radius
+    return medium.strands[hit.index] == own and wp.length(hit.position - place.position) <= radius
 
 
 @wp.func
@@ -166,8 +166,8 @@ def _see(
     first: int,
 ):
     place = first + wp.tid()
-    met, direction, _state = start(medium, view, segments[place], keys[place])
-    if _is_in_sight(medium, view, met, direction):
+    hit, direction, _state = start(medium, view, segments[place], keys[place])
+    if _is_in_sight(medium, view, hit, direction):
         out_is_seen[place] = 1
 
 

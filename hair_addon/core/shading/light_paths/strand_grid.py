@@ -50,7 +50,7 @@ class Strands:
 
 
 @dataclass(frozen=True)
-class Kept:
+class Thinned:
     """Strands of a system in a grid: each `stride`-th, of `point_count` points each, from `first_point` on."""
 
     stride: int
@@ -77,7 +77,7 @@ class StrandGrid:
     fibres: wp.array[int]  # (S,): rows of `fibre_rows`
     systems: wp.array[int]  # (S,): which hair
     fibre_rows: wp.array2d[float]  # (F, 5): ior, azimuthal scale, tilt, shift of TRT in tilts, coat
-    kept: tuple[Kept, ...]  # of each system
+    thinned: tuple[Thinned, ...]  # of each system
 
     @property
     def origin(self) -> tuple[int, int, int]:
@@ -122,13 +122,13 @@ def build(
         len(range(0, len(strands.points), stride)) for strands, (stride, _at) in zip(systems, chosen, strict=True)
     ]
     firsts = np.cumsum([0, *(count * len(at) for count, (_stride, at) in zip(counts, chosen, strict=True))]).tolist()
-    kept = [Kept(stride, len(at), first) for (stride, at), first in zip(chosen, firsts, strict=False)]
+    thinned = [Thinned(stride, len(at), first) for (stride, at), first in zip(chosen, firsts, strict=False)]
     with wp.ScopedDevice(device):
         device = wp.get_device()
         arrays = [wp.empty(firsts[-1], dtype=kind) for kind in (wp.vec3, float, wp.vec3, int)]
         for index, (strands, (_stride, at)) in enumerate(zip(systems, chosen, strict=True)):
             rows = slice(firsts[index], firsts[index + 1])
-            _thin(strands, kept[index], at, sum(counts[:index]), [array[rows] for array in arrays])
+            _thin(strands, thinned[index], at, sum(counts[:index]), [array[rows] for array in arrays])
         points, radii, sigma_a, strand_of_points = arrays
         low, high, widest, area = _measured(points, radii, strand_of_points)
         if not 0.0 < area < np.inf:
@@ -136,7 +136,7 @@ def build(
         voxels = _voxels(low, high, widest, voxel_count)
         along_voxel = min(max(int(voxels[1] / (2.0 * widest)), 1), CELLS_ALONG_VOXEL)
         cells = strand_cells.build(points, radii, strand_of_points, widest, voxels, along_voxel)
-        strided = [(strands, one.stride) for strands, one in zip(systems, kept, strict=True)]
+        strided = [(strands, one.stride) for strands, one in zip(systems, thinned, strict=True)]
         roughness = np.concatenate([strands.roughness[::stride] for strands, stride in strided])
         fibre = np.concatenate([strands.fibre[::stride] for strands, stride in strided])
         return StrandGrid(
@@ -150,7 +150,7 @@ def build(
             wp.array(fibre.astype(np.int32), dtype=int),
             wp.array(np.repeat(np.arange(len(counts), dtype=np.int32), counts), dtype=int),
             wp.array(np.array([_fibre_row(settings) for settings in fibres], np.float32).reshape(-1, 5), dtype=float),
-            tuple(kept),
+            tuple(thinned),
         )
 
 
@@ -194,25 +194,25 @@ def _keep(
     out_strands: wp.array[int],
     first: int,
 ):
-    kept = first + wp.tid()
-    strand = kept / at.shape[0]
-    point = at[kept % at.shape[0]]
+    item = first + wp.tid()
+    strand = item / at.shape[0]
+    point = at[item % at.shape[0]]
     row = wp.min(strand, sigma_a.shape[0] - 1)
-    out_points[kept] = turn * points[strand, point] + shift
-    out_radii[kept] = wider * radii[strand, point]
-    out_sigma_a[kept] = sigma_a[row, 0] + gradient[point] * (sigma_a[row, 1] - sigma_a[row, 0])
-    out_strands[kept] = first_strand + strand
+    out_points[item] = turn * points[strand, point] + shift
+    out_radii[item] = wider * radii[strand, point]
+    out_sigma_a[item] = sigma_a[row, 0] + gradient[point] * (sigma_a[row, 1] - sigma_a[row, 0])
+    out_strands[item] = first_strand + strand
 
 
-def _thin(strands, kept, at, first_strand, outputs):
-    """Write the points, radii, sigma_a and strands of the kept part of a system; first_strand: its index."""
+def _thin(strands, thinned, at, first_strand, outputs):
+    """Write the points, radii, sigma_a and strands of the thinned part of a system; first_strand: its index."""
     device, count = outputs[0].device, len(strands.points)
-    chosen = np.arange(0, count, kept.stride)
+    chosen = np.arange(0, count, thinned.stride)
     sigma_a = np.asarray(strands.absorption(chosen), np.float32)
     require_count("absorptions", len(sigma_a), len(chosen) if len(sigma_a) != 1 else 1)
     to_world = np.asarray(strands.to_world, np.float32)
     points, radii = (
-        np.ascontiguousarray(values[:: kept.stride], np.float32) for values in (strands.points, strands.radii)
+        np.ascontiguousarray(values[:: thinned.stride], np.float32) for values in (strands.points, strands.radii)
     )
     given = [
         wp.array(points, dtype=wp.vec3, ndim=2, copy=False),

@@ -144,7 +144,7 @@ class VoxelSums:
     def __init__(self, grid: StrandGrid) -> None:
         self.grid = grid
         self._voxels = grid.shape[::-1]
-        rows = len(grid.kept) * int(np.prod(self._voxels))
+        rows = len(grid.thinned) * int(np.prod(self._voxels))
         self._sums = wp.zeros((rows, CHANNELS), dtype=wp.float64, device=grid.device)
 
     def of_systems(self) -> list[wp.array4d[wp.float64]]:
@@ -163,7 +163,7 @@ class VoxelSums:
         shift: (3,) offset of the other grid's voxels [m]. Voxels outside the other grid do not change.
         """
         own, other = self.grid, before.grid
-        require_count("systems of hair", len(other.kept), len(own.kept))
+        require_count("systems of hair", len(other.thinned), len(own.thinned))
         size = (own.voxel / other.voxel) ** 3
         corner, shifted = own.corner.tolist(), (other.corner + shift).tolist()
         given = [before._sums, wp.vec3i(*other.shape), wp.vec3(*shifted), other.voxel]

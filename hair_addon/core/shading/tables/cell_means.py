@@ -70,7 +70,7 @@ def _trt_cell_means(edges, cos_theta_d, settings, sigma_a):
 
 def _cell_means(p, edges, cos_theta_d, eta, sigma_a, caustic=None):
     """Return means of N_p over cells of phi, (H, W, C): ½ ∫ A dh over the rays that leave through a cell, divided by
-    its width. With a `Caustic` (H, 1), each ray is weighted by `Caustic.kept` at its exit angle.
+    its width. With a `Caustic` (H, 1), each ray is weighted by `Caustic.remainder` at its exit angle.
     """
     eta_prime, _ = bravais_indices(cos_theta_d[:, None], eta)
     light = np.zeros((len(cos_theta_d), len(edges) - 1, 1 if p == paths.R else len(sigma_a)))
@@ -81,7 +81,7 @@ def _cell_means(p, edges, cos_theta_d, eta, sigma_a, caustic=None):
         gamma = gamma_edges[row, cell, None] + half_width * (1.0 + NODES)  # (cells, nodes)
         dh = 0.5 * np.cos(gamma) * np.abs(half_width) * WEIGHTS
         if caustic is not None:
-            dh *= caustic.rows(row).kept(paths.exit_angle(p, gamma, eta_prime[row]))
+            dh *= caustic.rows(row).remainder(paths.exit_angle(p, gamma, eta_prime[row]))
         attenuated = paths.path_attenuation(p, gamma, cos_theta_d[row, None], eta, sigma_a)
         light[row, cell] += np.einsum("nkc,nk->nc", attenuated, dh)
     return light / np.abs(np.diff(edges))[:, None]

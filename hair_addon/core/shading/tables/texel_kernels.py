@@ -70,7 +70,7 @@ def _trt_gamma(phi: F, low: F, high: F, slope_sign: F, row: _Inclination):
 
 @wp.func
 def _kept(phi: F, phi_c: F, fade: F, width: F):
-    """What the caustic treatment keeps of N_TRT: `Caustic.kept`."""
+    """Return the part of N_TRT that the treatment of the caustic keeps: `Caustic.remainder`."""
     peak = gaussian(F(0.0), width)
     left = F(1.0) - fade * gaussian(phi - phi_c, width) / peak
     return left * (F(1.0) - fade * gaussian(phi + phi_c, width) / peak)

@@ -57,7 +57,7 @@ def test_strands_have_the_fraction_of_their_length_that_the_map_gives(hair):
 
 
 def test_a_constant_map_is_the_value(hair):
-    """A map of one half gives the points of the setting at one half bit for bit; the value multiplies the map."""
+    """A constant map of 0.5 gives bit for bit the points of the setting 0.5; the setting multiplies the map."""
     uncut, before = points(hair.data), lengths(hair.data)
     hair.data.vellus.hair.strand_length = 0.5
     bpy.context.view_layer.update()

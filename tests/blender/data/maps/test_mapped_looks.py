@@ -208,7 +208,7 @@ def test_a_map_is_set_by_panel_script_and_command_line(coat):
     with pytest.raises(HairError, match="No map can vary"):
         api.set_map(coat, "look.ior", "strand")
     wanted = api.set_map(coat, "look.color", "strand", seed=5, amount=0.5)
-    assert api.maps_of(coat) == (wanted,) == (map_options.one_map("look.color=strand,seed=5,amount=0.5"),)
+    assert api.maps_of(coat) == (wanted,) == (map_options.parsed_map("look.color=strand,seed=5,amount=0.5"),)
     bpy.context.view_layer.update()
     assert strand_maps.read_looks(coat) is not None
     bpy.ops.vellus.remove_map(setting="look.color")

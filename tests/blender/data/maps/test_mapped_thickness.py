@@ -85,7 +85,7 @@ def test_a_missing_source_is_a_status_and_the_value_is_used(hair):
 def test_thickness_is_set_by_scripts_options_and_settings(hair):
     """Scripts and options give the same map; settings that are read and applied keep it; other names are refused."""
     wanted = api.set_map(hair.data, SETTING, "group:top", low=0.5)
-    assert map_options.one_map("strands.thickness=group:top,low=0.5") == wanted
+    assert map_options.parsed_map("strands.thickness=group:top,low=0.5") == wanted
     bpy.context.view_layer.update()
     mapped, settings = radii(hair.data), groom_settings.settings_of(hair.data)
     api.clear_map(hair.data, SETTING)

@@ -73,7 +73,7 @@ def whole_in_two_groups(image):
 
 
 def shader_in_a_group(image):
-    """The color is linked to the group from outside; numbers are set on the group."""
+    """A shader in a group whose color is linked from outside and whose numbers are set on the group."""
     material, tree, shown = new_material()
     sockets = [("Color", "NodeSocketColor"), ("Rough", "NodeSocketFloat"), ("Metal", "NodeSocketFloat")]
     inside, start, end = new_group("Shader", sockets, [("BSDF", "NodeSocketShader")])
@@ -91,7 +91,7 @@ def shader_in_a_group(image):
 
 
 def picture_in_a_group(image):
-    """With a muted gamma node and a reroute in between."""
+    """An image in a group, followed by a muted gamma node and a reroute."""
     material, tree, shown = new_material()
     inside, _start, end = new_group("Picture", outputs=[("Value", "NodeSocketFloat"), ("Color", "NodeSocketColor")])
     skin = add_skin(inside, image)
@@ -151,7 +151,7 @@ def test_groups_that_lead_nowhere_leave_the_color_of_the_viewport(scene):
 
 @pytest.mark.parametrize("kind", ["NodeReroute", "ShaderNodeGamma"])
 def test_what_nothing_leads_to_sets_nothing(scene, kind):
-    """A reroute, or a muted node: as in Cycles, the color is the shader's own."""
+    """A reroute or a muted node without an input sets no value: as in Cycles, the shader's own color is used."""
     material, tree, shown = new_material()
     shader, first, second = (tree.nodes.new(one) for one in ("ShaderNodeBsdfPrincipled", kind, kind))
     for node in (first, second):
@@ -180,7 +180,9 @@ def test_nodes_in_a_circle_end(scene):
 
 
 def test_a_world_in_a_group_shines_as_one_without(scene):
-    """Its color is set on the group, and its strength by a node of one value, through the group."""
+    """A world whose color is set on a node group, and whose strength is set by a Value node, shines like a world
+    without groups.
+    """
     inside, start, end = new_group(
         "Sky", [("Color", "NodeSocketColor"), ("Strength", "NodeSocketFloat")], [("Background", "NodeSocketShader")]
     )

@@ -279,5 +279,5 @@ def test_guides_that_were_told_other_roots_are_carried_from_there(sphere):
     curves.write_roots(guides.data, surface, roots[::-1])
     update()
     drawn = drawn_points(guides)
-    events.strands_made(guides.data)
+    events.strands_computed(guides.data)
     np.testing.assert_array_equal(drawn, drawn_points(guides))

@@ -20,7 +20,7 @@ FREE = {"angle_limit": math.pi, "length_limit": 1e6}
 
 @pytest.fixture
 def ground(scene):
-    """A square of one meter, 40 faces to a side."""
+    """A square of one meter with 40 × 40 faces."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=40, size=1.0)
     return bpy.context.object
 
@@ -94,7 +94,7 @@ def test_without_limits_a_third_points_in_between(guides):
 
 
 def test_blenders_own_interpolation_points_in_between(guides, ground):
-    """The scene is one where it does."""
+    """Blender's own interpolation makes strands between both sides in this scene, so the scene tests partings."""
     folder = bpy.utils.system_resource("DATAFILES", path="assets/nodes")
     with bpy.data.libraries.load(os.path.join(folder, "procedural_hair_node_assets.blend"), link=False) as (_, wanted):
         wanted.node_groups = ["Interpolate Hair Curves"]

@@ -71,7 +71,9 @@ def test_strands_whose_roots_are_lost_are_rooted_where_it_is_nearest(bent):
 
 
 def test_where_it_is_nearest_is_a_matter_of_the_mesh_not_of_its_object_s_scale(hair):
-    """So it is for the nodes that renders read, and strands stay where they are drawn when the scale changes."""
+    """The nearest place is found in the mesh's local coordinates, as by the nodes for renders, so that a changed scale
+    moves no strand.
+    """
     surface, (points, *_rooted) = hair.data.surface, at_rest(hair)
     twist = surface.modifiers.new("Twist", "SIMPLE_DEFORM")
     twist.deform_method, twist.angle = "TWIST", 1.0

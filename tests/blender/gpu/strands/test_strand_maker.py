@@ -34,7 +34,7 @@ def vectors(array):
 
 
 def bound_hair(rng, point_count, slots, angle_limit=np.pi / 3, length_limit=3.0, keep_length=1.0):
-    """(`HairBinding`, guides as `Strands`): strands over a ball, curled guides of many lengths, one of them none."""
+    """(`HairBinding`, guides as `Strands`): strands over a ball, curled guides of many lengths, one of them zero."""
     guide_roots, roots = unit(rng.normal(size=(GUIDES, 3))), unit(rng.normal(size=(STRANDS, 3)))
     roots[:5] = guide_roots[:5]  # at guides, and straight below
     roots[5] = (0.0, 0.0, -1.0)
@@ -144,7 +144,7 @@ def test_much_hair_keeps_no_second_texture(blender, rng, monkeypatch):
 
 
 def test_an_edit_uploads_guides_and_nothing_else(blender, rng, monkeypatch):
-    """One texture of twelve bytes a point, no program, no block."""
+    """An edit uploads one texture of twelve bytes per point, and compiles no program."""
     binding, guides = bound_hair(rng, 9, 4)
     before = uploaded(by_warp(binding, guides, np.eye(3)))
     maker = new_maker(binding, 9, np.eye(3))

@@ -88,7 +88,7 @@ def shaken(hair, rng, wanted, *styles, **given):
 
 
 def assert_same(hair, rng, styles, axes=None, **given):
-    """The GPU's strands are Warp's; those that are made in other axes are turned back first."""
+    """Assert that the GPU's strands equal Warp's; strands in other axes are rotated back first."""
     axes = np.eye(3) if axes is None else axes
     styling, wanted = hair.bound(*styles, **given), hair.styled(*styles, **given)
     assert style_maker.can_style(styling)
@@ -139,7 +139,7 @@ def test_other_numbers_of_points(hair, rng, point_count):
 
 
 def test_strands_that_are_made_in_parts_are_the_same(hair, monkeypatch, one_program):
-    """What styles take them from holds some of the strands, of a number that no part divides."""
+    """The texture before styles contains a part of the strands, whose number is not a multiple of that part."""
     styling = hair.bound(*STACKS["locks that curl"])
     found = []
     for count in (STRANDS, 64):
@@ -150,7 +150,7 @@ def test_strands_that_are_made_in_parts_are_the_same(hair, monkeypatch, one_prog
 
 
 def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
-    """The rows of each pass, and neither guides nor textures; then strands are those of the new settings."""
+    """A slider uploads only the rows of each pass, and the strands are those of the new settings."""
     styles = STACKS["locks that curl"]
     styling = hair.bound(*styles)
     maker = style_maker.maker_of(hair.binding, styling, 41, np.eye(3))
@@ -173,7 +173,7 @@ def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
 
 
 def test_masks_that_are_painted_further(hair, rng, one_program):
-    """A mask that is painted or removed causes an upload of the data per strand and of nothing else."""
+    """Painting or removing a mask uploads only the data per strand."""
     maker, strands = None, uploaded(hair.plain)
     for weights in (rng.random(hair.mesh.triangles.shape), rng.random(hair.mesh.triangles.shape), None):
         inputs = Inputs(masks={("Mask", "", False): Mask(None if weights is None else weights.astype(np.float32))})

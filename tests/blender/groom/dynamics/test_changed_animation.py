@@ -121,7 +121,7 @@ def test_baking_goes_on_before_what_has_changed(guides):
 
 
 def test_frames_after_a_change_that_is_over_are_simulated_again(guides):
-    """Their own animation is the one they were baked with, what led to it is not."""
+    """Frames are simulated again if earlier frames have changed, even if their own animation has not."""
     bake(guides)
     turn(0.3, 6)
     bake(guides, stops_at=21)  # all that has changed is baked again: the surface stands still from frame 16 on
@@ -132,7 +132,7 @@ def test_frames_after_a_change_that_is_over_are_simulated_again(guides):
 
 
 def test_baking_goes_on_with_a_collider_that_stopped(guides):
-    """One whose topology changes stays where it was, also where baking was stopped meanwhile."""
+    """A collider whose topology changes keeps its last pose, also if baking was interrupted meanwhile."""
     ball = bpy.data.objects["Ball"]
     for frame, height in ((1, 0.0), (20, 0.5)):
         ball.location.z = height

@@ -121,7 +121,7 @@ def test_baking_goes_on_whatever_becomes_of_a_collider(guides, ball, disturb):
 
 
 def test_baking_ends_with_the_addon(guides, window):
-    """Disabling it ends what runs, while its settings are there still: the scene is at its frame again."""
+    """Disabling the add-on ends a bake while the settings still exist, and restores the scene's frame."""
     folder, operator = frame_folders.folder_of(guides.data), Operator(guide_baking.baking([guides.data], 500, scene()))
     assert operator.begin(window) == {"RUNNING_MODAL"}
     while len([*folder.glob("+*.npz")]) < 4:
@@ -162,7 +162,7 @@ def test_baking_ends_with_a_sentence_and_keeps_its_frames(guides, disturb, sente
 
 @pytest.mark.usefixtures("made_anew")
 def test_a_keyed_setting_that_becomes_no_number_is_reported_and_hair_stays(guides, hair, monkeypatch):
-    """While it plays: baked frames are shown, and others as combed, until the setting is a number again."""
+    """During playback baked frames are shown and others as combed, until the setting is finite again."""
     combed = points(hair)
     bake(guides)
     bpy.context.scene.frame_set(LAST)

@@ -304,7 +304,10 @@ def test_a_copy_bakes_to_a_folder_of_its_own(swung):
 
 @pytest.mark.parametrize("is_stored", [True, False])
 def test_files_in_one_folder_have_frames_of_their_own(swung, tmp_path, is_stored):
-    """Guides of one name; a file that is saved under another name keeps its frames, also those of the command line."""
+    """Guides with the same name have separate frames.
+
+    A file saved under another name keeps its frames, also on the command line.
+    """
     guides, _hair = swung
     guides.data.vellus.cache_folder = "//frames"
     folders = []

@@ -39,7 +39,7 @@ def baked(guides, last=LAST, starts_over=True):
 
 
 def sides(guides):
-    """Whether each guide is rooted well inside the weighted side, and whether on the other one; (G,) bool each."""
+    """Return two (G,) bool: whether guides are rooted well inside the weighted side, and whether on the other side."""
     x = np.array([curve.points[0].position.x for curve in guides.data.curves])
     return x > 0.25, x < -0.25
 
@@ -134,7 +134,7 @@ def test_baked_frames_follow_from_the_mask(hair, swung):
 
 
 def test_baking_goes_on_to_the_same_bits_with_keyed_weight(hair, swung):
-    """A state is of the material in its frame, also where that is keyed, and of the wetness there."""
+    """A stored state includes the keyed material and wetness of its frame, so resumed baking gives the same bits."""
     dynamics = swung.data.vellus.dynamics
     for frame, weight in ((1, 1.0), (20, 4.0)):
         dynamics.weight = weight

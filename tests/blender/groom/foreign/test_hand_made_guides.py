@@ -151,7 +151,7 @@ def test_names_materials_and_attributes_of_the_curves_are_kept(imported, head):
 
 
 def test_guides_follow_only_their_surface(imported, head, scene):
-    """A parent of their own, an offset and a constraint are seen, and are no more."""
+    """A separate parent, an offset and a constraint are removed, and guides stay in place."""
     holder = bpy.data.objects.new("Holder", None)
     scene.collection.objects.link(holder)
     holder.location, imported.parent, imported.delta_location = (0.0, 0.1, 0.0), holder, (0.0, 0.0, 0.05)
@@ -211,7 +211,7 @@ def roots_of_strands():
 
 @pytest.mark.parametrize("levels", [0, 1])
 def test_hair_grows_where_the_guides_are(head, rng, levels):
-    """Guides on the upper half alone: with a subdivided surface too, and the same when it is made again."""
+    """Hair of guides on the upper half grows only there, also on a subdivided surface and when it is regenerated."""
     if levels:
         head.modifiers.new("Subdivision", "SUBSURF").levels = levels
     matrix = np.linalg.inv(np.array(head.matrix_world))
@@ -233,7 +233,7 @@ def test_hair_grows_where_the_guides_are(head, rng, levels):
 
 
 def assert_near_guides():
-    """No root is further from a guide's than these are from each other, and an edge of the surface."""
+    """Assert that each root is near a guide's root: within the spacing of guides and an edge of the surface."""
     counts = curves.point_counts(bpy.data.objects["Imported"].data)
     guides = stored(bpy.data.objects["Imported"])[np.cumsum(counts) - counts]
     apart = np.linalg.norm(guides[:, None] - guides, axis=-1)
@@ -283,7 +283,7 @@ def test_an_edited_surface_carries_them_and_they_stay_hand_made(imported, head):
 
 
 def test_hair_follows_them_while_they_are_combed(imported, monkeypatch):
-    """Guides of mixed point counts, in a window: strands follow a stroke without being bound again."""
+    """In a window strands follow a stroke on guides of mixed point counts without being bound again."""
     use(imported)
     monkeypatch.setattr(running, "has_window", lambda: True)
     hair = bpy.data.objects["Hair"]

@@ -21,7 +21,7 @@ def composited(lit):
 
 
 def copied(kind):
-    """A copy of the scene, which is the active one then, with a first frame of its own."""
+    """Copy the scene and make the copy active, with another first frame."""
     bpy.ops.scene.new(type=kind)
     scene = bpy.context.scene
     scene.frame_start = 7
@@ -91,7 +91,7 @@ def test_without_the_add_on_engines_render_their_own_hair(composited):
 
 
 def test_hair_is_laid_over_the_view_layer_that_it_is_rendered_with(composited):
-    """The first one: it is what Blender shows of a background scene."""
+    """Hair is composited over the first view layer, which is the one that Blender renders of a background scene."""
     bpy.ops.vellus.toggle_composite()
     scene = bpy.context.scene
     first = scene.view_layers[0].name

@@ -18,7 +18,9 @@ NAMES = (*data_passes.SETTINGS.values(), *data_passes.DENOISING[1:])
 
 
 def straighten(hair, starts, ends, radius):
-    """Leave a hair that many strands (N, 3) → (N, 3), of one radius, and stop its updates."""
+    """Replace the strands of a hair by straight strands from `starts` to `ends`, (N, 3) each, of one radius, and stop
+    its updates.
+    """
     hair.data.vellus.hair.strand_count = len(starts)
     bpy.context.view_layer.update()
     hair.data.vellus.is_live = False
@@ -154,7 +156,7 @@ def test_holdouts_are_empty(described, tmp_path):
 
 @pytest.mark.parametrize("depth", ["16", "32"])
 def test_files_have_the_channels_of_cycles(described, tmp_path, depth):
-    """Of the same names, with as many bits as the scene says."""
+    """Channels have Cycles' names and the scene's number of bits."""
 
     def channels(engine):
         configure(engine=engine, filepath=str(tmp_path / "passes.exr"), sample_count=1, **SIZE)

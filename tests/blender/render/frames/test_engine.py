@@ -236,7 +236,7 @@ def test_unsupported_renders_are_reported_in_one_sentence(lit, tmp_path):
     ],
 )
 def test_an_interrupted_render_writes_no_picture(lit, tmp_path, monkeypatch, error, reported):
-    """A defect of ours, Ctrl-C, what the artist can mend: said, in this frame and without going on to the next."""
+    """A bug, Ctrl-C or a `HairError` ends the render with a message in this frame, without continuing with the next."""
     calls = []
 
     def broken(*_args):

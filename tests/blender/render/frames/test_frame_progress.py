@@ -11,7 +11,7 @@ from tests.support.pictures.rendering import configure
 
 
 class Recorder:
-    """The render engine that is told, and what it was told: parts of the bar, and texts."""
+    """A render engine that records its progress: fractions of the bar, and texts."""
 
     def __init__(self):
         self.engine, self.parts, self.texts, self.stops_in = None, [], [], None

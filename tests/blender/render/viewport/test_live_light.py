@@ -75,7 +75,10 @@ def turned(camera, degrees):
 
 
 def test_at_rest_the_light_is_that_of_renders(view):
-    """To 3 % of the mean in blocks of pixels; dual scattering differs by more."""
+    """At rest the light of blocks of pixels equals that of renders within 3 % of the mean.
+
+    Dual scattering differs by more.
+    """
     camera, read = view
     drawn = read()
     found = at_rest(live_light.LiveLight(), drawn, camera)

@@ -145,7 +145,7 @@ def test_the_nearest_strand_is_met(rng):
     points = strands_in_a_box(rng, 60)
     points += 0.03 * rng.normal(size=points.shape)
     grid = grid_of(points, BLACK, 0.02, voxel_count=375)
-    segments, places = seen_rays.met_by(grid, np.zeros((0, 3)), ALONG_Y, 900)
+    segments, places = seen_rays.hits_of(grid, np.zeros((0, 3)), ALONG_Y, 900)
     start = points[:, :-1].reshape(-1, 3)
     along = np.diff(points, axis=1).reshape(-1, 3)
     x, z = (np.stack([places[:, axis] for axis in (0, 2)], axis=0))[:, :, None]
@@ -201,7 +201,7 @@ def test_paths_start_as_often_as_rays_meet_strands(rng):
     points[len(thin) :, :, 0] += 0.6
     radii = np.repeat([0.002, 0.02], [len(thin), len(thick)])
     grid = grid_of(points, WHITE, radii[:, None], voxel_count=2_500)
-    _segments, places = seen_rays.met_by(grid, np.zeros((0, 3)), ALONG_Y, 200_000)
+    _segments, places = seen_rays.hits_of(grid, np.zeros((0, 3)), ALONG_Y, 200_000)
     expected = (places[:, 0] < 0.0).mean()
     found = found_by(grid, surroundings(world=1.0), ALONG_Y, 3_000, seed=3)
     even = found[0, ..., 3].sum(axis=(0, 1))  # one a path
@@ -228,7 +228,7 @@ def test_bent_strands_have_no_gaps():
     turn = np.linspace(0.0, 1.9 * np.pi, 12)
     points = np.stack([0.5 * np.cos(turn), 0.0 * turn, 0.5 * np.sin(turn)], axis=-1)[None]
     grid = grid_of(points, BLACK, 0.2, voxel_count=250)
-    _segments, position = seen_rays.met_by(grid, np.zeros((0, 3)), ALONG_Y, 40_000)
+    _segments, position = seen_rays.hits_of(grid, np.zeros((0, 3)), ALONG_Y, 40_000)
     around, out = np.arctan2(position[:, 2], position[:, 0]) % (2.0 * np.pi), np.hypot(position[:, 0], position[:, 2])
     outer = (out > 0.6) & (out < 0.66) & (around < turn[-1])
     counts = np.histogram(around[outer], bins=19, range=(0.0, turn[-1]))[0]
@@ -270,12 +270,12 @@ def test_samples_show_the_segments_and_places_that_are_drawn(rng):
         seen_rays.shown_in(grid, ALONG_Y, picture, color, [(7, 93, of_strand)])
 
 
-def test_samples_show_segments_that_are_kept(rng):
-    """Half of the strands with 16 segments is kept, with 8 segments each."""
+def test_samples_show_segments_of_thinned_strands(rng):
+    """Every second strand of 16 segments remains, with 8 segments."""
     points = np.concatenate([strands_in_a_box(rng, 40)] * 5, axis=1)[:, :17]
     thin = grid_of(points, BLACK, 0.001, segment_count=160)
-    (kept,) = thin.kept
-    assert (kept.stride, kept.point_count) == (2, 9)
+    (system,) = thin.thinned
+    assert (system.stride, system.point_count) == (2, 9)
     picture = np.arange(640, dtype=np.uint32).reshape(20, 32)
     found = seen_rays.shown_in(thin, ALONG_Y, picture, np.zeros((20, 32, 4), np.float32), [(0, 640, 16)])
     strand, along = np.divmod(np.arange(640), 16)

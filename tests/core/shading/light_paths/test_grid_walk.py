@@ -28,10 +28,10 @@ def _by_walking(
     out_segment: wp.array[int],
 ):
     ray = wp.tid()
-    met = walk(medium, places[ray], directions[ray], most, own[ray])
-    out_kind[ray] = met.kind
-    out_distance[ray] = wp.length(met.position - places[ray])
-    out_segment[ray] = met.index
+    hit = walk(medium, places[ray], directions[ray], most, own[ray])
+    out_kind[ray] = hit.kind
+    out_distance[ray] = wp.length(hit.position - places[ray])
+    out_segment[ray] = hit.index
 
 
 @wp.kernel

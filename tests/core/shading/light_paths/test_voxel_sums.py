@@ -120,8 +120,8 @@ def test_kept_points_are_in_the_world_with_the_absorption_of_their_places(rng):
         to_world,
     )
     grid = strand_grid.build([strands], [lookup_tables.Settings(mode="energy")], segment_count=4 * count)
-    (kept,) = grid.kept
-    assert (kept.stride, kept.point_count) == (2, 9)
+    (system,) = grid.thinned
+    assert (system.stride, system.point_count) == (2, 9)
     chosen, at = np.arange(0, count, 2), np.arange(0, 17, 2)
     world = points[chosen][:, at] @ to_world[:3, :3].T + to_world[:3, 3]
     np.testing.assert_allclose(grid.points.numpy(), world.reshape(-1, 3), atol=2e-6)

@@ -65,8 +65,8 @@ def test_directions_and_paths_that_meet_the_sky_find_the_same_light(rng, monkeyp
     count = len(seen.segments)
     by_both, _taken = gathered(grid, light, seen, count, most_paths=8 * count)
     monkeypatch.setattr(world_light, "_UNEVEN", np.inf)
-    met, _taken = gathered(grid, light, seen, count, most_paths=8 * count)
-    np.testing.assert_allclose(ratio(by_both), ratio(met), rtol=0.05)
+    hit, _taken = gathered(grid, light, seen, count, most_paths=8 * count)
+    np.testing.assert_allclose(ratio(by_both), ratio(hit), rtol=0.05)
 
 
 def test_a_small_bright_place_is_found_by_few_paths(rng):
