@@ -74,6 +74,7 @@ def distributing_guides(
     hair_memory.require_guides(settings, len(surface.mesh.triangles))
     roots = reused_roots.of(target, surface, key, settings.guide_count) if keeps_roots else None
     flow = drawn_lines.read(surface_object, surface, settings.flow_lines, depsgraph)
+    flow_key = drawn_lines.key(surface_object, settings.flow_lines, depsgraph)
     place, target, device = Remembered(surface_object), Remembered(target), preferences.device()
     shown = scene.shown_surface(surface_object, surface)
 
@@ -82,7 +83,6 @@ def distributing_guides(
         return grown_guides.grow(surface, settings, mask, laid_flow, progress, roots)
 
     grown = yield compute
-    flow_key = drawn_lines.key(flow)
     return writing.write_guides(target.find(), place.find(), surface, grown, settings, key, flow_key, sized.fits)
 
 
@@ -218,6 +218,7 @@ def adding_hair(
     hair_memory.require_strands(hair_settings, other_bytes=guide_bytes)
     parting = partings.read(surface_object, surface, None, hair_settings, depsgraph)
     flow = drawn_lines.read(surface_object, surface, guide_settings.flow_lines, depsgraph)
+    flow_key = drawn_lines.key(surface_object, guide_settings.flow_lines, depsgraph)
     styling = styled_hair.read_styles(styles, surface_object, surface, None, depsgraph)
     device, place = preferences.device(), Remembered(surface_object)
     shown = scene.shown_surface(surface_object, surface)
@@ -236,7 +237,7 @@ def adding_hair(
         return grown, _growing(bound, progress)
 
     grown, bound = yield compute
-    keys = of_guides.root_key, drawn_lines.key(flow), of_guides.fits
+    keys = of_guides.root_key, flow_key, of_guides.fits
     guide_curves = writing.write_guides(None, place.find(), surface, grown, guide_settings, *keys)
     return guide_curves, write_between(guide_curves, bound)
 

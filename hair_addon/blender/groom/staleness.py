@@ -88,8 +88,7 @@ def has_other_flow(guides: Curves, depsgraph: Depsgraph) -> bool:
     name = text_of(guides.vellus.guides, "flow_lines")
     if not name or guides.surface is None:
         return False
-    surface = scene.read_surface(guides.surface, depsgraph)
-    return drawn_lines.key(drawn_lines.read(guides.surface, surface, name, depsgraph)) != guides.vellus.flow_key
+    return drawn_lines.key(guides.surface, name, depsgraph) != guides.vellus.flow_key
 
 
 def has_other_mask(target: Curves, depsgraph: Depsgraph) -> bool:

@@ -118,11 +118,14 @@ def follow_mask(guides, depsgraph):
                 _mark(hair)
 
 
-def follow_partings(changed, depsgraph):
-    """Mark hair as stale if its part lines or guide regions are among `changed` datablocks and differ."""
+def follow_partings(changed, transformed, depsgraph):
+    """Mark hair as stale if its part lines or guide regions are among `changed` datablocks and differ.
+
+    transformed: datablocks with another transform; part lines stay on such a surface only as its children.
+    """
     for hair in bpy.data.hair_curves:
         state = hair.vellus
-        if state.kind != "HAIR" or not _parts_by(state, changed):
+        if state.kind != "HAIR" or not _parts_by(hair, changed, transformed):
             continue
         if not state.is_live:
             state.is_stale = True
@@ -132,12 +135,12 @@ def follow_partings(changed, depsgraph):
                 _mark(hair)
 
 
-def follow_flow(changed, depsgraph):
-    """Mark guides as stale if their flow lines are among `changed` datablocks and differ."""
+def follow_flow(changed, transformed, depsgraph):
+    """Mark guides as stale if their flow lines have moved on the surface; arguments as for `follow_partings`."""
     for guides in bpy.data.hair_curves:
         state = guides.vellus
         lines = text_of(state.guides, "flow_lines")
-        if state.kind != "GUIDES" or not drawn_lines.is_among(lines, changed):
+        if state.kind != "GUIDES" or not drawn_lines.have_moved(lines, guides.surface, changed, transformed):
             continue
         if not state.is_live:
             state.is_stale = True
@@ -147,8 +150,9 @@ def follow_flow(changed, depsgraph):
                 state.is_stale = True
 
 
-def _parts_by(state, changed):
-    if drawn_lines.is_among(text_of(state.hair, "part_lines"), changed):
+def _parts_by(hair, changed, transformed):
+    state = hair.vellus
+    if drawn_lines.have_moved(text_of(state.hair, "part_lines"), hair.surface, changed, transformed):
         return True
     # Guides are read with each step of a stroke, so only if they have a region attribute.
     guides = state.guide_curves

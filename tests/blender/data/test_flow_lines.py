@@ -148,6 +148,43 @@ def test_a_moved_surface_with_its_lines_grows_the_same_guides(plane):
     expect(grow(flow_lines="Flow"), 1.0, 0.0)  # in the surface's own axes
 
 
+TURNED = {"location": (3.0, -2.0, 1.0), "rotation_euler": (0.4, 0.2, 0.7)}
+PLACES = {
+    "turned": TURNED,
+    "small": {"scale": (0.01,) * 3},
+    "uneven": {"scale": (0.5, 1.0, 2.0), **TURNED},
+    "mirrored": {"scale": (-1.0, 1.0, 1.0)},
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_lines_of_a_surface_move_with_it_and_guides_stay(plane, place):
+    drawn = spline("POLY")
+    drawn.parent = plane
+    bpy.context.view_layer.update()
+    guides = grow(flow_lines="Flow")
+    before = points(guides)
+    for name, value in PLACES[place].items():
+        setattr(plane, name, value)
+    bpy.context.view_layer.update()
+    drawn.name = "Flow lines"  # Blender reports the lines
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(points(guides), before)
+
+
+def test_guides_follow_lines_under_which_their_surface_turns(plane):
+    """The lines are no child of the surface; the result is that of turning the lines the other way."""
+    drawn = spline("POLY")
+    guides = grow(flow_lines="Flow")
+    plane.rotation_euler.z = -np.pi / 2
+    bpy.context.view_layer.update()
+    expect(guides, 0.0, 1.0)
+    before = points(guides)
+    drawn.name = "Flow lines"
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(points(guides), before)
+
+
 def test_lines_are_drawn_on_the_surface_as_modifiers_leave_it(plane):
     """A modifier lifts the plane by two meters, and guides follow a line drawn on the lifted plane."""
     drawn = spline("POLY")

@@ -18,6 +18,21 @@ def read(surface_object, surface, name, depsgraph):
 
     Lines run from the start to the end of their curves. None for an empty name. Raises `HairError`.
     """
+    local = _read_local(surface_object, name, depsgraph)
+    return None if local is None else local @ surface.to_world_axes.T
+
+
+def key(surface_object, name, depsgraph):
+    """A digest of the lines that `read` returns, which stays while they move with the surface; empty for none.
+
+    Raises `HairError`.
+    """
+    local = _read_local(surface_object, name, depsgraph)
+    return "" if local is None else hashlib.blake2b(local.tobytes(), digest_size=16).hexdigest()
+
+
+def _read_local(surface_object, name, depsgraph):
+    """The segments of `read` in the coordinates of the surface's object."""
     if not name:
         return None
     drawn = bpy.data.objects.get(name)
@@ -33,10 +48,16 @@ def read(surface_object, surface, name, depsgraph):
     if len(edges) > _POINT_LIMIT:
         sentence = '"{name}" has {count} points, too many for lines on a surface: lower its resolution.'
         raise HairError(sentence, name=name, count=len(edges))
-    to_local = np.array(surface_object.matrix_world.inverted_safe() @ drawn.matrix_world, np.float64)
+    to_local = np.array(_to_local(surface_object, drawn), np.float64)
 
-    local = points @ to_local[:3, :3].T + to_local[:3, 3]
-    return (local @ surface.to_world_axes.T)[interpolation.part_lines.in_order(edges)]
+    return (points @ to_local[:3, :3].T + to_local[:3, 3])[interpolation.part_lines.in_order(edges)]
+
+
+def _to_local(surface_object, drawn):
+    """The transform from an object's coordinates to the surface's; of a child without the rounding of its parent's."""
+    if drawn.parent == surface_object and drawn.parent_type == "OBJECT" and not drawn.constraints:
+        return drawn.matrix_parent_inverse @ drawn.matrix_basis
+    return surface_object.matrix_world.inverted_safe() @ drawn.matrix_world
 
 
 def at_rest(lines, shown, surface, device):
@@ -49,15 +70,10 @@ def at_rest(lines, shown, surface, device):
     return interpolation.part_lines.at_rest(shown.mesh, lines, shown.drawn_on, device)
 
 
-def key(lines):
-    """A digest of lines; empty for None."""
-    return "" if lines is None else hashlib.blake2b(lines.tobytes(), digest_size=16).hexdigest()
-
-
-def is_among(name, changed):
-    """Whether the object of a name, or its data, is among changed datablocks."""
+def have_moved(name, surface_object, changed, transformed):
+    """Whether lines may have moved on their surface: they are among `changed` datablocks, or it among `transformed`."""
     drawn = bpy.data.objects.get(name) if name else None
-    return drawn is not None and (drawn in changed or drawn.data in changed)
+    return drawn is not None and (drawn in changed or drawn.data in changed or surface_object in transformed)
 
 
 def _read_edges(drawn, depsgraph):

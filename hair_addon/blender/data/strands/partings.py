@@ -18,10 +18,14 @@ _WHOLE = {"INT", "INT8", "BOOLEAN"}
 
 @dataclass(frozen=True)
 class Partings:
-    """regions: tuple of `Regions`; lines: (L, 2, 3) float64 [m] in a `Surface`'s coordinates, or None."""
+    """regions: tuple of `Regions`; lines: (L, 2, 3) float64 [m] in a `Surface`'s coordinates, or None.
+
+    lines_key: `drawn_lines.key` of the lines.
+    """
 
     regions: tuple
     lines: np.ndarray | None
+    lines_key: str
 
     @property
     def key(self):
@@ -29,8 +33,9 @@ class Partings:
         if not self.regions and self.lines is None:
             return ""
         digest = hashlib.blake2b(digest_size=16)
-        for array in (*(part for r in self.regions for part in (r.corners, r.guides)), self.lines):
+        for array in (part for r in self.regions for part in (r.corners, r.guides)):
             digest.update(b"-" if array is None else array.tobytes())
+        digest.update(self.lines_key.encode() or b"-")
         return digest.hexdigest()
 
 
@@ -48,7 +53,7 @@ def read(surface_object, surface, guide_curves, settings, depsgraph):
     if settings.region_attribute:
         regions.append(_read_numbers(surface_object, surface, guide_curves, settings.region_attribute, depsgraph))
     lines = drawn_lines.read(surface_object, surface, settings.part_lines, depsgraph)
-    return Partings(tuple(regions), lines)
+    return Partings(tuple(regions), lines, drawn_lines.key(surface_object, settings.part_lines, depsgraph))
 
 
 def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):

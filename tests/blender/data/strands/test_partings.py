@@ -235,6 +235,26 @@ def test_hair_follows_its_part_line(guides):
     assert bindings.of(hair.data) is bound
 
 
+def test_hair_follows_its_part_line_on_a_moved_surface(guides, ground):
+    """A line that is a child of the surface moves with it, and no weights are computed; any other line moves on it."""
+    line = LINES["poly"]()
+    line.parent = ground
+    grown(part_lines="Line", **FREE)
+    hair = bpy.data.objects["Hair"]
+    before, bound = points(hair), bindings.of(hair.data)
+    ground.rotation_euler.z, ground.location.y = 0.3, 0.2
+    bpy.context.view_layer.update()
+    assert bindings.of(hair.data) is bound
+    np.testing.assert_array_equal(points(hair), before)
+    line.parent = None
+    ground.rotation_euler.z = ground.location.y = 0.0
+    bpy.context.view_layer.update()
+    comb(guides, 0.1)
+    ground.location.x = -0.1
+    bpy.context.view_layer.update()
+    assert not on_the_wrong_side(points(hair), 0.1).any()
+
+
 @pytest.mark.parametrize(("kind", "how"), pairs(LINES, ["hide_viewport", "hide_set", "unlinked"]))
 def test_a_line_parts_hair_out_of_sight_too(guides, kind, how):
     line = LINES[kind]()
