@@ -87,10 +87,17 @@ class Artist(Operations, Exchanges):
 
     def _step(self, move):
         with in_viewport():
-            move()
-            # Refused for a moment after a file was opened.
-            if bpy.context.mode == "OBJECT" and not self.is_working() and bpy.ops.ed.undo_push.poll():
-                bpy.ops.ed.undo_push(message=move.__name__)
+            try:
+                move()
+            finally:
+                # As Blender does after each operator of an artist, also if a later operator of the move is refused:
+                # undo from objects that a script added without a step has ended Blender (seed 4003).
+                self._push_undo(move.__name__)
+
+    def _push_undo(self, message):
+        # Refused for a moment after a file was opened.
+        if bpy.context.mode == "OBJECT" and not self.is_working() and bpy.ops.ed.undo_push.poll():
+            bpy.ops.ed.undo_push(message=message)
 
     def _try(self, action, *arguments):
         """Do something and go on: what raises stays in the log, where it is looked for at the end."""
