@@ -33,7 +33,7 @@ farm: $(installed) ## tests on a farm of this machine's own: Slurm, OpenJobDescr
 	$(python) -m pytest -m farm tests/command_line $(ARGS)
 
 desktop: $(installed) ## tests in a window of Blender, with OpenGL and Vulkan: screenshots in out/desktop
-	$(python) -m pytest -m "desktop and not long" --numprocesses 2 --dist loadfile tests/desktop $(ARGS)
+	$(python) -m pytest -m "desktop and not long" --numprocesses 2 --dist loadfile --no-loadscope-reorder tests/desktop $(ARGS)
 
 bench: $(installed) $(peers) ## the benchmarks, with their figures
 	$(python) -m pytest tests/benchmarks -s $(ARGS)

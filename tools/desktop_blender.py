@@ -26,7 +26,8 @@ VARIABLE = "VELLUS_DESKTOP_BLENDER"
 WINDOW_SIZE = (1280, 800)
 BACKENDS = ("opengl", "vulkan")
 
-_SHADERS = ROOT / "build" / "compiled-shaders"
+# Software drivers take minutes to compile a window's shaders: the next clone finds them again beside this Blender.
+_SHADERS = Path("/var/cache/mesa")
 
 # Mesa draws on the processor where there is no GPU. The modules are what Debian's Blender runs without and this one
 # needs: NumPy for every add-on, OpenColorIO for the display transform.
@@ -59,7 +60,7 @@ class DesktopBlender:
         """
         width, height = size
         command = [
-            *("env", *_environment(profile)),
+            *("env", *self._environment(profile)),
             *("xvfb-run", "--auto-servernum", "--server-args", f"-screen 0 {width}x{height}x24 -nolisten tcp"),
             *("timeout", "--kill-after=10", str(limit)),
             *(self.executable, "--gpu-backend", backend, "--window-geometry", "0", "0", str(width), str(height)),
@@ -81,24 +82,22 @@ class DesktopBlender:
 
     def command(self, *arguments, profile, folders=(), limit=300):
         """Blender without a window, as `blender ARGUMENT …`; returns the finished process. Others as for `run`."""
-        command = ["env", *_environment(profile), "timeout", str(limit), self.executable, *arguments]
+        command = ["env", *self._environment(profile), "timeout", str(limit), self.executable, *arguments]
         if self.folder is not None:
             command = _inside(self.folder, command, [ROOT, profile, *folders])
         words = list(map(str, command))
         return subprocess.run(words, capture_output=True, text=True, timeout=limit + 60, env=_inherited())
 
+    def _environment(self, profile):
+        """Return NAME=VALUE for a Blender with its user files and home in a folder."""
+        values = {"HOME": profile, "BLENDER_USER_RESOURCES": profile, "LC_ALL": "C.UTF-8"}
+        values["MESA_SHADER_CACHE_DIR"] = _SHADERS if self.folder else ROOT / "build" / "compiled-shaders"
+        return [f"{name}={value}" for name, value in values.items()]
+
 
 def _inherited():
     """Return this process's original environment: bpy adds paths that another Blender cannot read."""
     return dict(os.environ)
-
-
-def _environment(profile):
-    """Return NAME=VALUE for a Blender with its user files and home in a folder."""
-    values = {"HOME": profile, "BLENDER_USER_RESOURCES": profile, "LC_ALL": "C.UTF-8"}
-    # Software drivers take minutes to compile a window's shaders, which are the same in all profiles.
-    values["MESA_SHADER_CACHE_DIR"] = _SHADERS
-    return [f"{name}={value}" for name, value in values.items()]
 
 
 def find_or_install():
