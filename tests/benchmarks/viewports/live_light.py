@@ -32,6 +32,7 @@ from hair_addon.core.shading import presets
 
 PAIRS = 30  # of frames
 TURN = 0.02  # of the view from frame to frame [radians]
+PAUSE = 1.0 / 60.0  # [s] after a frame at rest, in which a window leaves Python to other threads
 SMALL = (2_000, (160, 100))  # strands and size of the scene that compiles
 
 _started = time.perf_counter()
@@ -95,6 +96,7 @@ def rest(view):
         was_busy = view.live.is_busy
         found, seconds = view.draw(view.camera)
         (waiting if was_busy and view.live.is_busy else showing).append(seconds)
+        time.sleep(PAUSE)
         if first is None and found is not view.drawn:
             first = time.perf_counter() - started
             say(f"first light of paths after {first:.2f} s, of which {live_light._REST} s at rest")
