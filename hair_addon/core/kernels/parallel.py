@@ -8,6 +8,7 @@ with its own launch. `launch` is for independent rows, `launch_shares` for sums 
 import contextlib
 import itertools
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -23,6 +24,9 @@ PARTS_PER_CORE = 2  # for load balancing, because a core may have other work
 UNEVEN_PARTS_PER_CORE = 4  # if parts may take unequal times
 LEAST_ROWS = 4096  # fewer are not worth a thread
 MOST_SHARES = 8  # of sums, each in its own memory
+
+_SLICE = 0.004  # [s] of a launch on one core, after which it pauses
+_FIRST_SLICE = 64  # rows
 
 _limits = threading.local()  # of the threads that `on_one_core` limits
 
@@ -104,19 +108,26 @@ def _core_count(device):
 
 
 @contextlib.contextmanager
-def on_one_core() -> Iterator[None]:
-    """Launch kernels from the calling thread on no other thread."""
-    before = getattr(_limits, "is_single", False)
-    _limits.is_single = True
+def on_one_core(pause: Callable[[], None] | None = None) -> Iterator[None]:
+    """Launch kernels from the calling thread on no other thread.
+
+    pause: called every few milliseconds of a launch on the CPU; it may wait, or raise an exception to end the launch.
+    """
+    before = getattr(_limits, "is_single", False), getattr(_limits, "pause", None)
+    _limits.is_single, _limits.pause = True, pause
     try:
         yield
     finally:
-        _limits.is_single = before
+        _limits.is_single, _limits.pause = before
 
 
 def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=None, threads_per_row=1):
     """Launch a kernel on parts of the rows, with a thread for each core; arguments(part, first, end): of a part."""
     if part_count == 1:
+        pause = getattr(_limits, "pause", None)
+        if device.is_cpu and pause is not None:
+            _launch_slices(kernel, arguments, row_count, device, threads_per_row, pause)
+            return
         if under_way is not None:
             under_way()
         kernel_cache.launch(kernel, dim=row_count * threads_per_row, inputs=arguments(0, 0, row_count), device=device)
@@ -144,6 +155,22 @@ def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=No
             prepared[part].launch()
 
     _on_threads(launch_part, part_count, min(_core_count(device), part_count))
+
+
+def _launch_slices(kernel, arguments, row_count, device, threads_per_row, pause):
+    """Launch a kernel on consecutive rows, with a pause before each launch."""
+    first, size = 0, _FIRST_SLICE
+    while first < row_count:
+        pause()
+        end = min(first + size, row_count)
+        started = time.perf_counter()
+        kernel_cache.launch(kernel, dim=(end - first) * threads_per_row, inputs=arguments(0, first, end), device=device)
+        taken = time.perf_counter() - started
+        first = end
+        if taken < 0.5 * _SLICE:
+            size *= 2
+        elif taken > 2.0 * _SLICE:
+            size = max(size // 2, 1)
 
 
 def _on_threads(run, part_count, thread_count):

@@ -62,6 +62,33 @@ def test_the_start_of_kernels_is_signaled_once(rng, monkeypatch, core_count):
     np.testing.assert_array_equal(outputs[0].numpy(), factors.numpy() * values.numpy())
 
 
+@pytest.mark.parametrize("row_count", [0, 1, 50_001])
+def test_a_launch_on_one_core_pauses_before_its_first_and_between_its_rows(rng, row_count):
+    """Results are the same, and an exception of a pause ends the launch."""
+    values, factors = rng.random((row_count, 3), np.float32), np.float32([1.0, 2.0, 4.0])
+    there = wp.array(values, dtype=float, device="cpu", ndim=2)
+    given = [Rows(there), wp.array(factors, dtype=float, device="cpu")]
+    out_values, out_sums = wp.zeros_like(there), wp.zeros(row_count, dtype=float, device="cpu")
+    done = []  # rows at each pause
+    with parallel.on_one_core(lambda: done.append(int(np.count_nonzero(out_sums.numpy())))):
+        parallel.launch(_scale, row_count, given, [out_values, out_sums], "cpu")
+    np.testing.assert_array_equal(out_values.numpy(), factors * values)
+    assert done[:1] == [0][: len(done)] and (row_count < 2 or 0 < done[1] < row_count)
+    if row_count < 2:
+        return
+    out_sums.zero_()
+
+    def end():
+        if out_sums.numpy().any():
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError), parallel.on_one_core(end):
+        parallel.launch(_scale, row_count, given, [out_values, out_sums], "cpu")
+    assert not out_sums.numpy().all()
+    parallel.launch(_scale, row_count, given, [out_values, out_sums], "cpu")  # without pauses
+    assert out_sums.numpy().all()
+
+
 def test_no_thread_is_left(rng):
     before = threading.active_count()
     test_rows_are_computed_once_each_on_any_number_of_cores(rng, pytest.MonkeyPatch(), 50_001, 2)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light Grid in viewports: paths are followed in the background while nothing moves, one share after the other.
 
-A share runs in a thread and starts with a redraw, so nothing is followed for a region that is not shown. The picture
-changes from dual scattering to paths in steps. While something moves, the measured light stays in its voxels. Its part
-of the picture decreases with changes of hair, lights and looks; its weight relative to new paths also decreases with
-the angle by which the view has turned.
+A share runs in a thread and starts with a redraw, so nothing is followed for a region that is not shown. On the
+processor it pauses while viewports are redrawn. The picture changes from dual scattering to paths in steps. While
+something moves, the measured light stays in its voxels. Its part of the picture decreases with changes of hair, lights
+and looks; its weight relative to new paths also decreases with the angle by which the view has turned.
 """
 
 import os
@@ -31,12 +31,12 @@ from ...settings import preferences
 from .. import light_paths, seen_strands
 
 _REST = 0.3  # [s] without a change after which paths are followed
-_INTERVAL = 0.1  # [s] between checks whether a share is done
+_INTERVAL = 0.05  # [s] between checks whether a share is done
+_PASSES = 4  # of a picture, after which paths have priority: the picture starts again with each share
 _MOST_ASKED = 20  # requested redraws after which a region that was not drawn counts as hidden
 _SHARES = 16  # number of shares of a picture's paths, each followed between two redraws
 _RAMP = 6  # shares after which paths have replaced dual scattering, at the earliest
 _LEAST_SHARE, _MOST_SHARE = 1024, 16_384  # paths
-_PATHS_AT_ONCE = 1024  # paths between two checks whether a share on the processor must stop
 _HALF_TURN = np.radians(20.0)  # angle of the view at which former paths have half their weight
 _NICE = 10  # priority of the thread, if the system has priorities of threads
 _STILL = 0.01  # fraction of the hair's radius by which strands may move and still count as still
@@ -51,6 +51,43 @@ light_cache = Cache(capacity=4)  # pointer of a region → LiveLight
 _jobs = []  # of all regions: at most one that is not done
 
 
+class _Rest:
+    """Whether viewports are at rest: none was redrawn between the last two checks of the timer."""
+
+    def __init__(self):
+        self._is_on, self._is_redrawn = threading.Event(), False
+        self.begin()
+
+    @property
+    def is_on(self):
+        """Whether shares go on."""
+        return self._is_on.is_set()
+
+    def begin(self):
+        """Let shares go on."""
+        self._is_redrawn = False
+        self._is_on.set()
+
+    def interrupt(self):
+        """Let shares wait, since a viewport is redrawn."""
+        self._is_redrawn = True
+        self._is_on.clear()
+
+    def check(self):
+        """Begin rest if no viewport was redrawn since the last check."""
+        if self._is_redrawn:
+            self._is_redrawn = False
+        else:
+            self._is_on.set()
+
+    def wait(self):
+        """Wait until viewports are at rest, or someone waits for shares."""
+        self._is_on.wait()
+
+
+_rest = _Rest()
+
+
 def unregister():
     """Stop following paths, wait for the share that is running, and remove the timer."""
     if bpy.app.timers.is_registered(_wake):
@@ -62,6 +99,7 @@ def end():
     """Stop all shares, wait for them, and drop all light."""
     for job in _jobs:
         job.stop()
+        _rest.begin()
         job.wait()
     _jobs.clear()
     light_cache.clear()
@@ -70,20 +108,36 @@ def end():
 def lit(context, drawn, camera):
     """A `DrawnScene` of the context's region, lit by the paths followed so far; camera: (world to view, view to clip).
 
-    Starts the next share at rest. Returns the scene unchanged with dual scattering.
+    Starts the next share at rest; none continues while viewports are drawn. Returns the scene unchanged with dual
+    scattering.
     """
     key, count = context.region.as_pointer(), 0
     if drawn.hair and drawn.light.kind == viewport_shading.SCENE and preferences.has_live_light():
         count = light_paths.path_count(context.scene, (context.region.width, context.region.height))
     if not count or not running.has_window():
         drop(key)
+        if not all(job.is_done for job in _jobs):
+            _interrupt()
         return drawn
+    _interrupt()
     live = light_cache.get(key, LiveLight)
     may_follow = not (scene_time.is_playing() or running.is_rendering())
-    found = live.lit(drawn, camera, count, time.monotonic(), may_follow)
-    if live.is_waiting and not bpy.app.timers.is_registered(_wake):
+    return live.lit(drawn, camera, count, time.monotonic(), may_follow)
+
+
+def is_next(context, pass_count):
+    """Whether the context's region should not be redrawn before more paths are followed; pass_count: of its picture."""
+    live = light_cache.get(context.region.as_pointer())
+    if live is None or pass_count < _PASSES or scene_time.is_playing() or running.is_rendering():
+        return False
+    return live.is_waiting
+
+
+def _interrupt():
+    """Let shares wait until viewports are at rest."""
+    _rest.interrupt()
+    if not bpy.app.timers.is_registered(_wake):
         bpy.app.timers.register(_wake, first_interval=_INTERVAL, persistent=True)
-    return found
 
 
 def drop(key):
@@ -104,9 +158,12 @@ def obstacles(blender_scene):
 
 
 def _wake():
-    """For `bpy.app.timers`: redraw regions whose share is done, or due."""
+    """For `bpy.app.timers`: let shares go on at rest, and redraw regions whose share is done, or due."""
+    _rest.check()
     waiting = [live for live in light_cache.values() if live.is_waiting]
-    due = {id(live) for live in waiting if live.is_due(time.monotonic())}
+    # Redraws for nothing would interrupt the share of another region.
+    is_free = all(job.is_done for job in _jobs)
+    due = {id(live) for live in waiting if is_free and live.is_due(time.monotonic())}
     for window in bpy.context.window_manager.windows if due else ():
         for area in window.screen.areas:
             for region in area.regions if area.type == "VIEW_3D" else ():
@@ -115,7 +172,7 @@ def _wake():
                     region.tag_redraw()
     for live in waiting:
         live.asked += id(live) in due
-    return _INTERVAL if waiting else None
+    return _INTERVAL if waiting or not _rest.is_on else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,10 +334,12 @@ class LiveLight:
         """Ask the running share to end."""
         if self._job is not None:
             self._job.stop()
+            _rest.begin()
 
     def wait(self):
         """Wait until no share is running."""
         if self._job is not None:
+            _rest.begin()
             self._job.wait()
 
     def lit(self, drawn, camera, count, now, may_follow=True):
@@ -336,7 +395,12 @@ class LiveLight:
         """In the thread: (paths of the share, paths of the picture, shares by voxel); None if no strand is in sight."""
         if sys.platform == "linux":
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
-        with kernels.parallel.on_one_core():
+
+        def pause():
+            _rest.wait()
+            progress(paths.gather.FOLLOWING, 0.0)
+
+        with kernels.parallel.on_one_core(pause):
             found, former = self._paths, self._former
             if work.surroundings is not None:
                 grid = self._paths.grid if work.systems is None else _grid_of(*work.systems)
@@ -345,19 +409,18 @@ class LiveLight:
                 found, former = paths.gather.PathSums(grid, work.surroundings), None
                 if self._paths is not None and _are_alike(self._paths.grid, grid):
                     former = self._paths, work.weight, work.shift
-                progress("", 0.0)
-            elif work.shown is not None:
-                found.fade(work.weight)
+                weight = 1.0
+            else:
+                weight = work.weight
             if work.shown is not None:
                 seen = work.shown.seen(found.grid)
-                found.see(seen)
+                found.see(seen, weight)
                 self._paths, self._former, self._followed = found, former, (work.content, work.camera)
                 self._goal = -(-len(seen.segments) // light_paths.SAMPLES_A_PATH)
             if not self._goal:
                 return None
             taken = found.taken
-            at_once = _PATHS_AT_ONCE if found.grid.device.is_cpu else 0
-            found.follow(work.count, work.seed, progress, at_once)
+            found.follow(work.count, work.seed, progress)
             if not found.taken:
                 return None
             if former is None:

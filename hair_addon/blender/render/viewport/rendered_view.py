@@ -22,7 +22,7 @@ def draw(context):
         if not film.is_fine:
             film.add_pass(drawn, *camera, lens)
         film.show()
-        return not film.is_fine
+        return not film.is_fine and not live_light.is_next(context, film.pass_count)
 
 
 def _is_transparent(context, drawn):

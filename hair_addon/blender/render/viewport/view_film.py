@@ -25,9 +25,14 @@ class ViewFilm:
         self._view = None  # record of the last pass
 
     @property
+    def pass_count(self):
+        """Number of passes since the last restart."""
+        return self._film.pass_count
+
+    @property
     def is_fine(self):
         """Whether all passes are drawn."""
-        return self._film.pass_count >= self._pass_total
+        return self.pass_count >= self._pass_total
 
     def restart(self, is_moved=False):
         """Start another picture; is_moved: as for `HairPicture.restart`."""

@@ -120,7 +120,9 @@ def _draw_hair(context):
     if region_picture.outline is not None:
         region_picture.outline.show()
     # At rest, programs for the next edit are compiled, one per redraw, as each may take a second.
-    if not region_picture.picture.is_fine or hair_cache.prepare_makers():
+    picture = region_picture.picture
+    is_waiting = picture.is_fine or live_light.is_next(context, picture.pass_count)
+    if not is_waiting or hair_cache.prepare_makers():
         region.tag_redraw()
 
 

@@ -163,33 +163,41 @@ class PathSums:
             self._medium = medium_of(grid, self._mesh, *of_surfaces)
             self._in_sight, self._hiding = _sight_of(grid, surroundings) or (self._medium, self._mesh)
 
-    def see(self, seen: Seen) -> None:
-        """Start further paths in another view, and add the light drawn there to the sums."""
+    def see(self, seen: Seen, weight: float = 1.0) -> None:
+        """Start further paths in another view, and add the light drawn there to the sums multiplied by a weight.
+
+        An exception raised by a pause of `parallel.on_one_core` leaves all unchanged.
+        """
         count = len(seen.segments)
         require_indices("segments", seen.segments.numpy(), len(self.grid.points) - 1)
         for name in ("places", "drawn"):
             require_count(name, len(getattr(seen, name)), count)
-        self._seen = seen
-        if not count:
-            return
         with wp.ScopedDevice(self.grid.device):
-            segments, places, drawn = seen.segments, seen.places, seen.drawn
-            self._sources = sources_of(self._surroundings, _FAINT * voxel_sums.brightness(drawn)[0] / count)
-            even = _even_there(self._medium, seen.view, segments, places)
-            self._sums.add(places, segments, drawn, even, 6)
-            self._voxels = start_places.voxels_of(self._medium, places)
+            even = self._start_in(seen) if count else None
+            if weight != 1.0:
+                self._fade(weight)
+            if even is not None:
+                self._sums.add(seen.places, seen.segments, seen.drawn, even, 6)
+        self._seen = seen
 
-    def follow(self, count: int, seed: int, progress: Progress = no_progress, share: int = 0) -> None:
+    def _start_in(self, seen):
+        """Prepare paths from a view with visible hair; returns the light drawn there in uniform light."""
+        even = _even_there(self._medium, seen.view, seen.segments, seen.places)
+        faint = _FAINT * voxel_sums.brightness(seen.drawn)[0] / len(seen.segments)
+        self._sources = sources_of(self._surroundings, faint)
+        self._voxels = start_places.voxels_of(self._medium, seen.places)
+        return even
+
+    def follow(self, count: int, seed: int, progress: Progress = no_progress) -> None:
         """Trace about `count` paths from visible hair, and add them to the sums.
 
-        share: paths between progress reports, 0 for the default. The sums change only at the end, so an exception
-        raised by `progress` leaves them unchanged.
+        The sums change only at the end, so an exception raised by `progress`, or by a pause, leaves them unchanged.
         """
         if self._seen is None or not len(self._seen.segments):
             return
         with wp.ScopedDevice(self.grid.device):
             starts = start_places.of_seen(self._in_sight, self._seen, self._voxels, count, seed)
-            traced = _traced(self._medium, self._sources, self._seen.view, starts, progress, share)
+            traced = _traced(self._medium, self._sources, self._seen.view, starts, progress)
             positions, light, even = traced
             self._sums.add(positions, starts.segments, light, even, 0)
             total, squares = voxel_sums.brightness(light)
@@ -200,8 +208,7 @@ class PathSums:
         """Return the estimated factor of paths that reduces the relative standard error of the mean light to 1.5 %."""
         return (_standard_error(self._total, self._squares, self.taken) / _KNOWN) ** 2
 
-    def fade(self, weight: float) -> None:
-        """Multiply all sums by a weight."""
+    def _fade(self, weight):
         self._sums.scale(weight)
         self._total, self._squares, self.taken = weight * self._total, weight * self._squares, weight * self.taken
 
@@ -245,12 +252,12 @@ def _even_there(medium, seen_in, segments, places):
     return found
 
 
-def _traced(medium, sources, seen_in, starts, progress, share=0):
+def _traced(medium, sources, seen_in, starts, progress):
     """Trace paths; returns their starts, their light, and the light in uniform light, (N,) each."""
     count, seen_here, device = len(starts.segments), view.on_device(seen_in), medium.points.device
     found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
     # On a GPU a share takes about as long as all paths.
-    share = share or (max(count // _SHARES, _LEAST_SHARE) if device.is_cpu else max(count, 1))
+    share = max(count // _SHARES, _LEAST_SHARE) if device.is_cpu else max(count, 1)
     for first in range(0, count, share):  # none if no place is visible: Warp has no empty slices
         some = slice(first, min(first + share, count))
         rows = [array[some] for array in (starts.segments, starts.keys, *found)]

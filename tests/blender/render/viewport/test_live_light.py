@@ -174,6 +174,74 @@ def test_nothing_is_followed_for_a_region_that_is_not_drawn(view, region, monkey
     assert len(followed) == 1 and not live.is_busy
 
 
+def test_a_share_waits_while_viewports_are_redrawn(view, region, monkeypatch):
+    """It goes on once a check finds that none was redrawn since the last check."""
+    camera, read = view
+    context, _timers = region
+    waits = []
+
+    def wait(rest):
+        for _ in range(2):
+            waits.append((rest.is_on, live.traced))
+            if not rest.is_on:
+                live_light._wake()
+
+    live = SimpleNamespace(traced=0)
+    real = gather._traced
+
+    def traced(*given):
+        live.traced += 1
+        return real(*given)
+
+    monkeypatch.setattr(live_light, "_SHARES", 1_000)
+    monkeypatch.setattr(gather, "_traced", traced)
+    monkeypatch.setattr(live_light._Rest, "wait", wait)
+    drawn = read()
+    live_light.lit(context, drawn, camera)
+    (found,) = live_light.light_cache.values()
+    found._job.result()
+    assert waits[:3] == [(False, 0), (False, 0), (True, 0)] and live.traced == 1
+
+
+def test_a_region_that_waits_for_another_is_not_redrawn(view, region, monkeypatch):
+    """A redraw would interrupt the share that it waits for."""
+    camera, read = view
+    context, _timers = region
+    asked = []
+    drawn = read()
+    other = SimpleNamespace(width=SIZE, height=SIZE, as_pointer=lambda: 8, tag_redraw=lambda: asked.append(8))
+    place = SimpleNamespace(width=SIZE, height=SIZE, as_pointer=lambda: 7, tag_redraw=lambda: asked.append(7))
+    window = SimpleNamespace(screen=SimpleNamespace(areas=[SimpleNamespace(type="VIEW_3D", regions=[place, other])]))
+    manager = SimpleNamespace(windows=[window])
+    monkeypatch.setattr(live_light.bpy, "context", SimpleNamespace(window_manager=manager))
+    light_there, light_here = (
+        live_light.lit(SimpleNamespace(region=one, scene=context.scene), drawn, camera) for one in (place, other)
+    )
+    assert light_there is light_here is drawn
+    live_light._wake()
+    assert not live_light._rest.is_on and asked == []
+    for live in live_light.light_cache.values():
+        live.wait()
+    live_light._wake()
+    assert asked == [7, 8]
+
+
+def test_a_picture_is_refined_once_its_light_is_known(view, region, monkeypatch):
+    """Until then it starts again with each share, and has few passes."""
+    camera, read = view
+    context, _timers = region
+    monkeypatch.setattr(live_light, "_SHARES", 2)
+    drawn = read()
+    asked, live = [], None
+    while live is None or not live.is_done:
+        live_light.lit(context, drawn, camera)
+        (live,) = live_light.light_cache.values()
+        asked.append([live_light.is_next(context, passes) for passes in (0, 32)])
+        live.wait()
+    live_light.lit(context, drawn, camera)
+    assert asked[0] == [False, True] and not live_light.is_next(context, 32)
+
+
 @pytest.mark.parametrize("way", ["dual", "preference", "solid"])
 def test_nothing_is_followed_where_it_is_not_wanted(view, region, monkeypatch, way):
     camera, read = view

@@ -9,6 +9,7 @@ import warp as wp
 
 from hair_addon.core.errors import HairError
 from hair_addon.core.imaging import lamps
+from hair_addon.core.kernels import parallel
 from hair_addon.core.shading.fibre import energy_conserving
 from hair_addon.core.shading.light_paths import gather, media, seen_rays, strand_grid, view, voxel_means
 from hair_addon.core.shading.tables import lookup_tables
@@ -102,6 +103,33 @@ def test_paths_are_the_same_again(rng):
     light = surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
     first, again = (found_by(grid, light, ALONG_Y, 20_000) for _ in range(2))
     np.testing.assert_array_equal(first, again)
+
+
+def test_what_ends_at_a_pause_leaves_sums_as_they_are(rng):
+    """Another view that is stopped at any of its pauses has no part in the light, nor do its paths."""
+    grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.2, 0.3), device="cpu")
+    light = surroundings(world=1.0)
+    other_view = level_view((-4.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (2.0, 2.0), 8.0)
+    here, there = (seen_rays.seen_by(grid, np.zeros((0, 3)), seen_in, 900) for seen_in in (ALONG_Y, other_view))
+    found = []
+    for stops in (False, True):
+        sums = gather.PathSums(grid, light)
+        sums.see(here)
+        works = (2, lambda sums=sums: sums.see(there, 0.5)), (12, lambda sums=sums: sums.follow(500, 1))
+        for most, work in works if stops else ():
+            for number in range(most):
+                left = iter(range(number))
+
+                def pause(left=left):
+                    if next(left, None) is None:
+                        raise InterruptedError
+
+                with pytest.raises(InterruptedError), parallel.on_one_core(pause):
+                    work()
+        sums.follow(500, 2)
+        found.append((sums.taken, sums.shares()))
+    assert found[0][0] == found[1][0] > 0
+    np.testing.assert_array_equal(found[0][1], found[1][1])
 
 
 def test_faint_light_counts_as_much_in_the_mean(rng):
