@@ -124,6 +124,11 @@ def present_depsgraph():
         return bpy.context.evaluated_depsgraph_get()
 
 
+def last_depsgraph():
+    """The dependency graph of the view layer as it is, for functions that handlers call: an update would call these."""
+    return bpy.context.view_layer.depsgraph or present_depsgraph()
+
+
 def triangle_count(surface_object, view_layer):
     """Return the triangle count of an evaluated mesh object, without reading its geometry."""
     depsgraph = view_layer.depsgraph

@@ -41,7 +41,7 @@ def read(guides: Curves | None, surface: Surface) -> LayersBefore | None:
         return None
     if not len(guides.curves) or attributes.is_from_library(guides):
         return None
-    depsgraph = scene.present_depsgraph()
+    depsgraph = scene.last_depsgraph()
     recording.update(guides, depsgraph)
     followers = curves.followers(guides)
     settings = HairSettings()

@@ -40,6 +40,9 @@ from . import (
 # Whether a window is about to evaluate a file that was just opened, which reports all datablocks as updated.
 _is_opening = False
 
+# UIDs of Curves that are evaluated now: an update meanwhile must not begin again.
+_evaluated = set()
+
 # Whether an undo or redo may have restored guides without the hair that was written for them, or the reverse.
 _is_undone = False
 
@@ -217,24 +220,41 @@ def _evaluate(depsgraph, combed):
         stack.callback(live_layers.follow, combed, depsgraph)
 
 
+@contextlib.contextmanager
+def _once(datablock):
+    """Leave Curves out of updates during their evaluation."""
+    uid = datablock.session_uid
+    _evaluated.add(uid)
+    try:
+        yield
+    finally:
+        _evaluated.discard(uid)
+
+
 def _evaluate_guides(guides, depsgraph, combed):
+    if guides.session_uid in _evaluated:
+        return
     if guides.vellus.is_shading_stale:
         looks.evaluate_guides(guides)
     if guides.vellus.is_stale and guides.vellus.is_live and _is_ready(guides, depsgraph):
-        pipeline.evaluate(guides, depsgraph)
+        with _once(guides):
+            pipeline.evaluate(guides, depsgraph)
         events.strands_computed(guides)
         stale_marks.follow_mask(guides, depsgraph)
         combed[guides] = None  # to be read
 
 
 def _evaluate_hair(hair, depsgraph, combed):
+    if hair.session_uid in _evaluated:
+        return
     state = hair.vellus
     follows = state.guide_curves in combed
     if not (state.is_live and _is_ready(hair, depsgraph)):
         # Guides that are reported for the first time may be the guides that the hair was made with.
         state.is_stale = state.is_stale or (follows and staleness.is_left_by_undo(hair))
     elif state.is_stale and not live_hair.is_ahead(hair):
-        live_hair.regenerate(hair, depsgraph)
+        with _once(hair):
+            live_hair.regenerate(hair, depsgraph)
     elif follows:
         live_hair.follow_guides(hair, depsgraph, combed[state.guide_curves])
     if state.is_shading_stale:

@@ -10,7 +10,7 @@ from mathutils import Matrix
 from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves
-from hair_addon.blender.groom import pipeline
+from hair_addon.blender.groom import pipeline, writing
 from hair_addon.core.geometry.strands import from_numpy
 from hair_addon.core.grooming import guide_count
 from tests.support.reading import attribute, points, write_points
@@ -241,3 +241,28 @@ def test_layers_stay_when_the_surface_is_gone(layered, change):
     update()
     comb(layered, (0.0, 0.5, 0.0))
     assert np.isfinite(points(layered)).all()
+
+
+@pytest.mark.parametrize("is_updated", [False, True])
+def test_guides_are_grown_once_if_they_are_tagged_meanwhile(layered, monkeypatch, is_updated):
+    """An update during their evaluation, which marks them again, does not begin it again."""
+    grown = []
+    evaluate, keep = pipeline.evaluate, writing.size_fitting.keep
+
+    def counted(target, depsgraph):
+        grown.append(target.name)
+        assert len(grown) < 9
+        evaluate(target, depsgraph)
+
+    def keep_and_tag(target, fits):
+        keep(target, fits)
+        target.vellus.is_stale = True
+        target.update_tag()
+        if is_updated:
+            update()
+
+    monkeypatch.setattr(pipeline, "evaluate", counted)
+    monkeypatch.setattr(writing.size_fitting, "keep", keep_and_tag)
+    layered.data.vellus.guides.length = 0.7
+    update()
+    assert grown == [layered.data.name]

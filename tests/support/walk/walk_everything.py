@@ -184,14 +184,20 @@ for _number in range(2, 4):
 
 
 def state():
-    """Return {name: state of hair} of all used datablocks, after an update of each.
+    """Return {name: state of hair} of all datablocks that are used by others than unused ones, after an update of each.
 
     Blender does not report data removed by scripts, such as guides of hair; undo and loading update everything.
     """
     for one in ours():
         one.update_tag()
     bpy.context.view_layer.update()
-    return {one.name: _state_of(one) for one in ours() if one.users}
+    return {one.name: _state_of(one) for one in ours() if _is_used(one)}
+
+
+def _is_used(datablock):
+    """Whether a datablock has a user that files keep: one without users is not written."""
+    users = bpy.data.user_map(subset=[datablock]).get(datablock, set()) - {datablock}
+    return any(not isinstance(user, bpy.types.Curves) or _is_used(user) for user in users)
 
 
 def _state_of(datablock):

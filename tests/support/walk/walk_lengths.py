@@ -53,7 +53,8 @@ def _drawn(kinds, is_in_world):
     for one in bpy.context.view_layer.objects:
         if one.type != "CURVES" or one.data.vellus.kind not in kinds or not len(one.data.curves):
             continue
-        if one.data.vellus.status or one.data.vellus.is_stale:
+        guides = one.data if one.data.vellus.kind == "GUIDES" else one.data.vellus.guide_curves
+        if one.data.vellus.status or one.data.vellus.is_stale or (guides is not None and guides.vellus.is_stale):
             continue
         if is_in_world and _is_stretched(one.data.surface):
             continue
@@ -62,7 +63,6 @@ def _drawn(kinds, is_in_world):
             if is_in_world:
                 place = np.array(one.matrix_world)
                 points = points @ place[:3, :3].T + place[:3, 3]
-            guides = one.data if one.data.vellus.kind == "GUIDES" else one.data.vellus.guide_curves
             is_simulated = simulated_guides.is_shown(guides)
             found[one.name] = strands.lengths(points), float(abs(points).max()), is_simulated
     return found

@@ -38,16 +38,11 @@ class Strands:
     clumps: np.ndarray | None
 
 
-def present_depsgraph():
-    """The depsgraph of the view layer as it is: maps are read while handlers run, which must not update it."""
-    return bpy.context.view_layer.depsgraph or scene.present_depsgraph()
-
-
 def stored_strands(hair):
     """The `Strands` of hair Curves as they are stored. Raises `HairError`."""
     surface, roots = None, None
     if hair.surface is not None:
-        surface = scene.read_surface(hair.surface, present_depsgraph())
+        surface = scene.read_surface(hair.surface, scene.last_depsgraph())
         roots = stored_roots.points(hair, surface)
     identities = attributes.read(hair, "id", "INT", "CURVE")
     return Strands(
@@ -230,7 +225,7 @@ def _of_group(surface_object, surface, name):
     if surface_object.vertex_groups.get(name) is None:
         sentence = '"{name}" has no vertex group "{group}": pick another group.'
         raise HairError(sentence, name=surface.name, group=name)
-    weights = scene.read_weights(surface_object, surface, present_depsgraph(), name)
+    weights = scene.read_weights(surface_object, surface, scene.last_depsgraph(), name)
     style_inputs.require_same(surface_object, len(weights) == len(surface.rest))
     return weights[surface.mesh.triangles][..., None]
 
@@ -262,7 +257,7 @@ def _values(attribute):
 
 def _corner_values(surface_object, surface, name):
     """(F, 3, C) float32 at the corners of triangles of an attribute on any domain; None without it."""
-    depsgraph = present_depsgraph()
+    depsgraph = scene.last_depsgraph()
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
