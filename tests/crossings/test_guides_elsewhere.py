@@ -111,7 +111,7 @@ def test_guides_of_ours_keep_the_hair_that_follows_them(hair, tmp_path):
     ("name", "content", "reported"),
     [
         ("none.usdc", None, "is not a file"),
-        ("curves.txt", b"", "curves cannot be read from"),
+        ("curves.txt", b"", "Curves cannot be read from"),
         ("cut.npz", b"PK\x03\x04 and no more", "cannot be read"),
         ("cut.usdc", b"PXR-USDC and no more", "cannot be read"),
         ("cut.abc", b"Ogawa\xff\x00\x01 and no more", "Alembic"),

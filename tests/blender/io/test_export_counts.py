@@ -133,4 +133,4 @@ def test_guides_of_any_number_of_points_are_exported_as_they_are(imported, tmp_p
     assert (found["groom_width"].only > 0.0).all()
     guides.vellus.simulates = guides.vellus.is_live = True
     made = export(tmp_path / "groom.abc")
-    assert [str(note) for note in made.notes if "41 points a guide" in str(note)]
+    assert [str(note) for note in made.notes if "41 points per guide" in str(note)]
