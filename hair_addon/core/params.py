@@ -6,6 +6,7 @@ Blender's properties, panel rows, command-line options and the checks below are 
 
 import math
 import numbers
+import re
 import reprlib
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, fields, replace
@@ -15,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from .errors import HairError
+
+_NO_TEXT = re.compile("[\0\ud800-\udfff]")  # null and surrogates
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ def unit_of(details: Param) -> str:
 
 def is_text(value: str) -> bool:
     """Return whether a str is a valid name or path in Blender: valid UTF-8 without null characters."""
-    return "\0" not in value and not any("\ud800" <= character <= "\udfff" for character in value)
+    return not _NO_TEXT.search(value)
 
 
 def like(default: Any, value: Any) -> Any:

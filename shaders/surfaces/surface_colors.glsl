@@ -28,9 +28,9 @@ SurfaceColors surface_colors(SurfacePoint point, float n_dot_v)
   // A surface without reflectance at normal incidence reflects nothing at any angle.
   float grazing = share.z * min(50.0 * surface.reflectance, 1.0);
   colors.coat = surface.reflectance * (share.x - share.z) + grazing;
-  vec3 of_metal = colors.base * (share.x - share.y) + share.y;
+  vec3 metal_reflectance = colors.base * (share.x - share.y) + share.y;
   colors.gain = multiple_reflections(share, mix(vec3(surface.reflectance), colors.base, surface.metallic));
-  colors.reflected = colors.gain * mix(vec3(colors.coat), of_metal, surface.metallic);
+  colors.reflected = colors.gain * mix(vec3(colors.coat), metal_reflectance, surface.metallic);
   colors.diffuse = (1.0 - surface.metallic) * max(1.0 - colors.coat, 0.0) * colors.base;
   return colors;
 }

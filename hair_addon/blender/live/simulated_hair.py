@@ -209,7 +209,7 @@ def _played_now(guides):
 
 
 def _follow_applied(guides, played):
-    """Keep frames in place in the world if a transform was applied to the surface; returns whether that was all."""
+    """Keep frames in place if a transform was applied to the surface; returns whether nothing else changed."""
     roots = played.simulated.roots
     change = played.simulated.follow_applied(guides)
     if change is None:

@@ -173,7 +173,7 @@ def parsed(data: bytes, path: Path) -> Manifest:
     try:
         found = json.loads(data.decode("utf-8"))
         if type(found) is not dict or (found.pop("format"), found.pop("version")) != (FORMAT, VERSION):
-            raise ValueError("it is of another program or version")
+            raise ValueError("another program or version wrote it")
         found.setdefault("spaces", [])  # of older versions
         if set(found) != {field.name for field in dataclasses.fields(Manifest)}:
             raise ValueError("entries are missing")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-_DEEPEST = 12  # of settings within settings
+_DEEPEST = 12  # maximum depth of nested settings
 _LAYOUT = {"rna_type", "name", "label", "is_active_output", "debug_zone_body_lazy_function_graph"}
 
 
