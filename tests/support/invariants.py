@@ -56,6 +56,18 @@ def orphans():
     return {c.name for c in ours() if c.users == 0}
 
 
+def waits_elsewhere():
+    """Whether hair waits for the end of an edit or paint mode in another scene, which undo and loading end."""
+    there = bpy.context.view_layer.objects
+    return any(
+        one.vellus.is_stale
+        and one.surface is not None
+        and one.surface.mode != "OBJECT"
+        and one.surface.name not in there
+        for one in ours()
+    )
+
+
 def operate(operator, **arguments):
     """Call an operator with undo, as a window does. If it refuses, check the message and that nothing changed."""
     if not operator.poll():

@@ -26,7 +26,7 @@ from hair_addon.blender.settings import animated, style_keys
 from hair_addon.core.errors import HairError
 from hair_addon.core.params import Settings
 from tests.support import invariants, rooted
-from tests.support.invariants import activate, changed, chosen, objects, operate, ours
+from tests.support.invariants import activate, changed, chosen, objects, operate, ours, waits_elsewhere
 from tests.support.scenes import shrink_shadows
 from tests.support.walk import any_values, walk_lengths
 from tests.support.walk.walk_operations import Artist, walk
@@ -144,7 +144,7 @@ class Everyone(Artist):
     @step(steps=st.integers(1, 3))
     def undo_and_redo(self, steps):
         """Check that undo and redo restore the state, outside Edit Mode: there Blender's steps hold only the mesh."""
-        if bpy.context.mode.startswith("EDIT"):
+        if bpy.context.mode.startswith("EDIT") or waits_elsewhere():
             return
         before = state()
         bpy.ops.ed.undo_push(message="here")
@@ -162,9 +162,10 @@ class Everyone(Artist):
     @step()
     def save_and_load_all(self):
         """Check that saving and loading keep the state, except unused datablocks."""
-        before = state()
+        before, is_due = state(), waits_elsewhere()
         self._save_and_load()
-        is_as(before)
+        if not is_due:
+            is_as(before)
 
     @invariant()
     def more_is_well(self):
