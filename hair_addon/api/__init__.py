@@ -55,7 +55,7 @@ from .guide_layers import add_layer, apply_layers, layers, set_layer
 from .guide_tools import change_guides
 from .imports import DerivationSettings, TransferSettings, import_curves, transfer_groom, use_as_guides, use_as_hair
 from .library import apply_groom, groom_names, save_groom
-from .maps import MapSettings, clear_map, maps_of, set_map
+from .maps import MapSettings, clear_map, maps_of, set_map, set_thickness_curve, thickness_curve_of
 from .pictures import draw, render
 from .styles import add_style, apply_style_preset, set_styles, styles_of
 from .systems import delete_hair, hair_systems, look_names, style_preset_names
@@ -110,12 +110,14 @@ __all__ = [
     "set_layer",
     "set_map",
     "set_styles",
+    "set_thickness_curve",
     "settings_of",
     "shade",
     "simulate",
     "style_preset_names",
     "styles_of",
     "table_settings",
+    "thickness_curve_of",
     "transfer_groom",
     "use_as_guides",
     "use_as_hair",

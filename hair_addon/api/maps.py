@@ -13,7 +13,7 @@ from .blender_access import blender
 Curves = Any
 Image = Any
 
-__all__ = ["MapSettings", "clear_map", "maps_of", "set_map"]
+__all__ = ["MapSettings", "clear_map", "maps_of", "set_map", "set_thickness_curve", "thickness_curve_of"]
 
 
 def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any) -> MapSettings:
@@ -21,7 +21,8 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
 
     setting: such as "look.color" or "look.roughness"; source: an image, or "image:NAME", "group:NAME" of a vertex
     group, "attribute:NAME" of the surface, "curves:NAME" of an attribute of the hair's own curves, "strand" or "clump"
-    for random numbers; changes: fields of `MapSettings`: uv, low, high, is_inverted, amount, seed.
+    for random numbers; changes: fields of `MapSettings`: uv, low, high, is_inverted, amount, seed, ramp. ramp: a
+    curve of the map's values such as "0:0 0.3:1 1:1", or a color ramp "0:0.1/0.05/0 1:1/0.8/0.5" that gives the colors.
 
     >>> coat = bpy.data.images.new("Coat", 8, 8)
     >>> hair = bpy.data.objects["Hair"].data
@@ -38,6 +39,7 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
         raise HairError(f"source must be an image or text, not {described(source)}.")
     varied_settings.require_varied(setting)
     settings = changed(MapSettings, MapSettings(setting=setting, kind=kind, source=name), changes)
+    varied_settings.require_map(settings)
     blender.settings.map_items.keep(target.vellus, settings)
     return settings
 
@@ -59,6 +61,33 @@ def clear_map(hair: Curves, setting: str) -> bool:
     """
     varied_settings.require_varied(setting)
     return blender.settings.map_items.remove(_editable(hair).vellus, setting)
+
+
+def set_thickness_curve(hair: Curves, curve: str = "") -> None:
+    """Set the thickness of hair Curves from root to tip by a curve, such as "0:1 0.5:0.3 1:0.2"; empty: remove it.
+
+    Each point is POSITION:VALUE from 0 to 1, where 1 is the tip and the full thickness; POSITION:VALUE:auto rounds the
+    curve at the point.
+
+    >>> hair = bpy.data.objects["Hair"]
+    >>> api.set_thickness_curve(hair, "0:1 0.8:0.9 1:0.1")
+    >>> api.thickness_curve_of(hair)
+    '0:1 0.8:0.9 1:0.1'
+    >>> api.set_thickness_curve(hair)
+    """
+    target = _editable(hair)
+    if not isinstance(curve, str):
+        raise HairError(f"curve must be text, not {described(curve)}.")
+    blender.groom.transfer.groom_settings.assign_thickness_curve(target, curve)
+
+
+def thickness_curve_of(hair: Curves) -> str:
+    """Return the thickness curve of hair Curves; empty without one.
+
+    >>> api.thickness_curve_of(bpy.data.objects["Hair"])
+    ''
+    """
+    return blender.settings.ramp_nodes.text_of(blender.data.arguments.curves_of(hair, "HAIR").vellus.thickness_ramp)
 
 
 def _editable(hair):

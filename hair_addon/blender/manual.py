@@ -69,6 +69,8 @@ _OPERATORS = {
         "paint_map",
         "add_ramp",
         "remove_ramp",
+        "add_map_ramp",
+        "remove_map_ramp",
         "remove_map",
     ),
     "lookup_tables": ("bake_tables",),

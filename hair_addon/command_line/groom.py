@@ -113,7 +113,7 @@ def _from_library(given, surface, console):
     def changed(settings):
         if given.preset:
             settings = replace(settings, appearance=replace(PRESETS[given.preset][1], mode=settings.appearance.mode))
-        return _styled(given, settings, surface)
+        return map_options.mapped(given, _styled(given, settings, surface))
 
     depsgraph = blender.data.scene.present_depsgraph()
     work = blender.groom.transfer.library_groom.adding_groom(surface, groom, depsgraph, changed=changed)

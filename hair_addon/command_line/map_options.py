@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Option of maps: --map look.color=image:coat.png, again for other settings."""
+"""Options of maps, --map look.color=image:coat.png, again for other settings; and of the thickness curve."""
 
 import argparse
 from dataclasses import replace
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..core import lazy
 from ..core.errors import HairError
-from ..core.maps import varied_settings
+from ..core.maps import ramp_text, varied_settings
 from ..core.maps.map_settings import MapSettings
 from . import setting_pairs
 
@@ -25,7 +25,14 @@ def add_maps(parser):
         action="append",
         default=[],
         help="vary a setting by image:FILE or image:NAME, group:NAME, attribute:NAME, curves:NAME, strand or clump, "
-        f"with fields after a comma, as in look.melanin=group:dark,low=0.5; settings: {known}",
+        "with fields after a comma, as in look.melanin=group:dark,low=0.5 or "
+        f"'look.color=strand,ramp=0:0.1/0.05/0 1:1/0.8/0.5'; settings: {known}",
+    )
+    parser.add_argument(
+        "--thickness-curve",
+        metavar="POINTS",
+        type=_parsed_curve,
+        help="thickness from root to tip, as in '0:1 0.8:0.9 1:0.1'",
     )
 
 
@@ -39,15 +46,27 @@ def parsed_map(text):
     try:
         varied_settings.require_varied(setting.strip())
         kind, name = varied_settings.parsed_source(source.strip())
-        return MapSettings(**{"setting": setting.strip(), "kind": kind, "source": name} | changes)
+        settings = MapSettings(**{"setting": setting.strip(), "kind": kind, "source": name} | changes)
+        varied_settings.require_map(settings)
+        return settings
     except HairError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
+def _parsed_curve(text):
+    """Return the text of a curve if it is valid."""
+    try:
+        ramp_text.require_curve(text)
+    except HairError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return text
+
+
 def mapped(given, settings):
-    """Return `GroomSettings` with the maps of options; images are loaded from files. Raises `HairError`."""
+    """Return `GroomSettings` with the maps and the curve of options; images are loaded. Raises `HairError`."""
     maps = {one.setting: one for one in (*settings.maps, *map(_loaded, given.maps))}
-    return replace(settings, maps=tuple(maps.values()))
+    curve = settings.thickness_curve if given.thickness_curve is None else given.thickness_curve
+    return replace(settings, maps=tuple(maps.values()), thickness_curve=curve)
 
 
 def _loaded(one):

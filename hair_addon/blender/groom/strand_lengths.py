@@ -13,7 +13,7 @@ from ...core.maps import combination, varied_settings
 from ...core.styling import program
 from ...core.styling.base import StyleSettings
 from ...core.styling.masks import CutMask
-from ..data.maps import sources
+from ..data.maps import ramps, sources
 from ..data.surfaces import Surface
 from ..settings import map_items
 
@@ -34,7 +34,8 @@ def read(
         settings = map_items.settings_of(item)
         if settings.kind == "CLUMP" and not program.tree_levels(styles):
             raise HairError("There are no clumps for a random map: add the style Clump.")
-        return sources.read(hair, surface_object, surface, settings, item.image), ""
+        ramp = ramps.map_samples(item, False)
+        return sources.read(hair, surface_object, surface, settings, item.image, ramp=ramp), ""
     except HairError as error:
         return None, str(error)
 
@@ -47,6 +48,6 @@ def cut_mask(length: sources.Source | None, settings: HairSettings) -> CutMask |
 
     def fractions(binding: HairBinding, clumps: np.ndarray | None) -> np.ndarray:
         masks = length.values(binding.roots, binding.identities[0], clumps)[:, 0]
-        return combination.varied_number(settings.strand_length, masks, length.settings.combination, details)
+        return combination.varied_number(settings.strand_length, masks, length.combination, details)
 
     return CutMask(settings.strand_length, fractions)

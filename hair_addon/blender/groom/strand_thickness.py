@@ -5,7 +5,6 @@ import numpy as np
 from bpy.types import Curves
 
 from ...core.errors import HairError
-from ...core.maps import combination
 from ...core.params import Param
 from ..data.maps import ramps, sources
 from ..settings import map_items
@@ -39,10 +38,11 @@ def read(hair: Curves, bound: BoundHair) -> tuple[np.ndarray | None, str]:
         return None, status
     try:
         settings = map_items.settings_of(item)
-        mask = sources.masks(strands_of(hair, bound), settings, item.image)
+        ramp = ramps.map_samples(item, False)
+        found = sources.varied_numbers(strands_of(hair, bound), settings, item.image, 1.0, _FACTOR, ramp)
     except HairError as error:
         return None, str(error)
-    return combination.varied_number(1.0, mask, settings.combination, _FACTOR).astype(np.float32), status
+    return found.astype(np.float32), status
 
 
 def apply(hair: Curves, bound: BoundHair) -> None:

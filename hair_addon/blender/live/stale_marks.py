@@ -13,7 +13,7 @@ from ..groom import bindings, frame_faces, staleness
 from ..groom.surfaces import applied_transforms, edited_surfaces
 from ..groom.surfaces.edited_surfaces import Followed
 from ..host.notices import text_of
-from ..settings import marks, style_items
+from ..settings import marks, ramp_nodes, style_items
 from . import events, reported
 
 
@@ -197,19 +197,34 @@ def follow_mapped_surfaces(surfaces):
 
 
 def follow_ramps():
-    """Mark hair as stale whose ramp of the thickness was edited, which Blender does not report.
+    """Mark hair with an edited ramp of the thickness or of a map, which Blender does not report.
 
-    A copy of hair gets a ramp of its own.
+    A copy of hair gets ramps of its own.
     """
     owners = {}
     for hair in bpy.data.hair_curves:
         state = hair.vellus
-        if state.kind != "HAIR" or state.thickness_ramp is None:
+        if state.kind != "HAIR":
             continue
-        if owners.setdefault(state.thickness_ramp, hair) != hair and hair.is_editable:
-            state.thickness_ramp = state.thickness_ramp.copy()
-        if not curves.is_combed(hair) and ramps.digest(state.thickness_ramp) != state.thickness_key:
-            state.is_stale = True
+        if state.thickness_ramp is not None:
+            _own_ramp(state, "thickness_ramp", owners)
+            if not curves.is_combed(hair) and ramps.digest(state.thickness_ramp) != state.thickness_key:
+                state.is_stale = True
+        for item in state.maps:
+            if item.ramp_tree is None:
+                continue
+            _own_ramp(item, "ramp_tree", owners)
+            key = ramp_nodes.text_of(item.ramp_tree)
+            if key != item.ramp_key and hair.is_editable:
+                item.ramp_key = key
+                marks.mark_changed_map(item)
+
+
+def _own_ramp(owner, name, owners):
+    """Copy the ramp of a map or a hair if another one has it; owners: {node group: the first owner's hair}."""
+    tree = getattr(owner, name)
+    if owners.setdefault(tree, owner.id_data) != owner.id_data and owner.id_data.is_editable:
+        setattr(owner, name, tree.copy())
 
 
 def follow_styles(changed):

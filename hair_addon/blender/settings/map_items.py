@@ -9,7 +9,7 @@ import bpy
 from ...core.maps import varied_settings
 from ...core.maps.map_settings import MapSettings
 from ..host.notices import name_of
-from . import setting_properties
+from . import ramp_nodes, setting_properties
 from .marks import mark_map
 from .translations import CONTEXT
 
@@ -24,7 +24,7 @@ class VellusMap(bpy.types.PropertyGroup):
     """A map that varies a setting over the hair"""
 
     __annotations__ = {
-        **setting_properties.annotations(MapSettings, mark_map, skip=("source",)),
+        **setting_properties.annotations(MapSettings, mark_map, skip=("source", "ramp")),
         "source": bpy.props.StringProperty(
             name="Name",
             description="Name of the vertex group or attribute",
@@ -38,6 +38,15 @@ class VellusMap(bpy.types.PropertyGroup):
             type=bpy.types.Image,
             update=_mark_image,
         ),
+        "ramp_tree": bpy.props.PointerProperty(
+            name="Ramp",
+            description="Node group with the ramp of the map's values",
+            translation_context=CONTEXT,
+            type=bpy.types.NodeTree,
+            options={"HIDDEN"},
+            update=mark_map,
+        ),
+        "ramp_key": bpy.props.StringProperty(description="The ramp at the last update", options={"HIDDEN"}),
     }
 
 
@@ -46,7 +55,9 @@ CLASSES = (VellusMap,)
 
 def settings_of(item: VellusMap) -> MapSettings:
     """Return the `MapSettings` of an item. Raises `HairError`."""
-    found = setting_properties.to_settings(item, MapSettings)
+    found = setting_properties.to_settings(item, MapSettings, skip=("ramp",))
+    if item.ramp_tree is not None:
+        found = replace(found, ramp=ramp_nodes.text_of(item.ramp_tree))
     if found.kind != "IMAGE":
         return found
     return found if item.image is None else replace(found, source=name_of(item.image))
@@ -80,6 +91,15 @@ def read_faces(state) -> bool:
     )
 
 
+def set_ramp(item: VellusMap, text: str) -> None:
+    """Give a map the ramp of a text, or none for an empty text. Raises `HairError` before anything changes."""
+    before = item.ramp_tree
+    wanted = ramp_nodes.replaced(before, item.id_data, "Ramp", text)
+    if wanted != before:
+        item.ramp_tree, item.ramp_key = wanted, ramp_nodes.text_of(wanted)
+        ramp_nodes.remove_unused(before)
+
+
 def add(state, setting: str) -> VellusMap:
     """Add a map without a source for a setting that has no map; returns the item."""
     item = state.maps.add()
@@ -89,12 +109,14 @@ def add(state, setting: str) -> VellusMap:
 
 def keep(state, settings: MapSettings) -> VellusMap:
     """Add a map, or replace that of its setting; returns the item. Raises `HairError` before anything changes."""
-    varied_settings.require_varied(settings.setting)
+    varied_settings.require_map(settings)
     item = item_of(state, settings.setting) or state.maps.add()
     item.setting = settings.setting
     item.image = bpy.data.images.get(settings.source) if settings.kind == "IMAGE" else None
     for name in setting_properties.names_of(MapSettings):
-        setattr(item, name, getattr(settings, name))
+        if name != "ramp":
+            setattr(item, name, getattr(settings, name))
+    set_ramp(item, settings.ramp)
     return item
 
 
@@ -103,7 +125,9 @@ def remove(state, setting: str) -> bool:
     for index, item in enumerate(state.maps):
         if item.setting == setting:
             mark_map(item, None)
+            tree = item.ramp_tree
             state.maps.remove(index)
+            ramp_nodes.remove_unused(tree)
             return True
     return False
 
@@ -111,7 +135,7 @@ def remove(state, setting: str) -> bool:
 def assign(state, maps: Sequence[MapSettings]) -> None:
     """Replace all maps. Raises `HairError` before anything changes."""
     for settings in maps:
-        varied_settings.require_varied(settings.setting)
+        varied_settings.require_map(settings)
     wanted = {settings.setting for settings in maps}
     for setting in [item.setting for item in state.maps]:
         if setting not in wanted:

@@ -2,9 +2,8 @@
 """Rows of a map: its kind, the picker of this kind, and how it changes its setting; the curve of the thickness."""
 
 from ...core.maps import varied_settings
-from ..data.maps import ramps
 from ..groom.styles import painted_maps
-from ..settings import map_items
+from ..settings import map_items, ramp_nodes
 
 
 def button(layout, state, setting):
@@ -43,12 +42,26 @@ def draw(layout, item, hair):
         layout.prop(item, "low")
         layout.prop(item, "high")
     layout.prop(item, "is_inverted")
+    _map_ramp_rows(layout, item)
     layout.operator("vellus.remove_map", icon="X").setting = item.setting
+
+
+def _map_ramp_rows(layout, item):
+    """Draw the ramp of a map, or the button that adds it."""
+    node = ramp_nodes.node_of(item.ramp_tree)
+    if node is None:
+        layout.operator("vellus.add_map_ramp", icon="NORMALIZE_FCURVES").setting = item.setting
+        return
+    if ramp_nodes.is_color(node):
+        layout.template_color_ramp(node, "color_ramp")
+    else:
+        layout.template_curve_mapping(node, "mapping")
+    layout.operator("vellus.remove_map_ramp", icon="X").setting = item.setting
 
 
 def ramp_rows(layout, hair):
     """Draw the curve of the thickness of hair Curves, or the button that adds it."""
-    node = ramps.node_of(hair.vellus.thickness_ramp)
+    node = ramp_nodes.node_of(hair.vellus.thickness_ramp)
     if node is None:
         layout.operator("vellus.add_ramp", icon="NORMALIZE_FCURVES")
         return

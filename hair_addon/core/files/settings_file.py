@@ -14,7 +14,7 @@ from typing import Any, TypeVar, get_type_hints
 from ..dynamics.rod.settings import DynamicsSettings
 from ..errors import HairError
 from ..grooming.groom import GuideSettings, HairSettings
-from ..maps import varied_settings
+from ..maps import ramp_text, varied_settings
 from ..maps.map_settings import MapSettings
 from ..params import Param, Settings, declared, described, given, is_text, label_of, like, require_class, unit_of
 from ..shading.appearance import TABLE_FIELDS, Appearance
@@ -43,6 +43,7 @@ class GroomSettings:
     style_names: tuple[str, ...] = ()  # one for each style, "" for unnamed; empty if no style has a name
     dynamics: DynamicsSettings = field(default_factory=DynamicsSettings)
     maps: tuple[MapSettings, ...] = ()  # at most one for each setting; a list is converted to a tuple
+    thickness_curve: str = ""  # from root to tip, as `ramp_text`; empty: a line to the thickness of the tip
 
     def __post_init__(self) -> None:
         for name, settings_class in SECTIONS.items():
@@ -51,6 +52,9 @@ class GroomSettings:
         object.__setattr__(self, "styles", styles)  # the class is frozen
         object.__setattr__(self, "style_names", names)
         object.__setattr__(self, "maps", _require_maps(self.maps))
+        if not isinstance(self.thickness_curve, str):
+            raise HairError(f"thickness_curve must be text, not {described(self.thickness_curve)}.")
+        ramp_text.require_curve(self.thickness_curve)
 
 
 def _require_maps(maps):
@@ -59,7 +63,7 @@ def _require_maps(maps):
         raise HairError(f"maps must be a list of maps, not {described(maps)}.")
     for one in maps:
         require_class(one, MapSettings, "maps")
-        varied_settings.require_varied(one.setting)
+        varied_settings.require_map(one)
     if len({one.setting for one in maps}) < len(maps):
         raise HairError("maps must have at most one map for each setting.")
     return tuple(maps)
@@ -86,7 +90,7 @@ def require_styles(styles: object, names: object = ()) -> tuple[tuple[StyleSetti
 SECTIONS: dict[str, type[Settings]] = {
     name: found
     for name, found in get_type_hints(GroomSettings).items()
-    if not name.startswith("style") and name != "maps"
+    if not name.startswith("style") and name not in ("maps", "thickness_curve")
 }
 
 
@@ -104,7 +108,8 @@ def write(path: str | Path, settings: GroomSettings) -> None:
 def to_object(settings: GroomSettings) -> dict[str, Any]:
     """Convert `GroomSettings` to the JSON object of a file."""
     lists = {"styles": list_of_styles(settings), "maps": list_of_maps(settings)}
-    return {"format": FORMAT, "version": VERSION, **sections_of(settings), **lists}
+    curves = {"thickness_curve": settings.thickness_curve} if settings.thickness_curve else {}
+    return {"format": FORMAT, "version": VERSION, **sections_of(settings), **lists, **curves}
 
 
 def list_of_maps(settings: GroomSettings) -> list[dict[str, Any]]:
@@ -141,12 +146,15 @@ class PartialSettings:
     styles: tuple[StyleSettings, ...] | None = None  # None: unchanged
     style_names: tuple[str, ...] = ()
     maps: tuple[MapSettings, ...] | None = None  # None: unchanged
+    thickness_curve: str | None = None  # None: unchanged
 
     def changed(self, settings: GroomSettings) -> GroomSettings:
         """Return `GroomSettings` with these settings applied."""
         sections = {name: replace(getattr(settings, name), **values) for name, values in self.values.items()}
         settings = replace(settings, **sections)
         settings = settings if self.maps is None else replace(settings, maps=self.maps)
+        if self.thickness_curve is not None:
+            settings = replace(settings, thickness_curve=self.thickness_curve)
         return settings if self.styles is None else self._styled(settings, self.styles)
 
     def _styled(self, settings, styles):
@@ -175,6 +183,7 @@ def partial_of_object(found: dict[str, Any], path: str | Path) -> PartialSetting
     if "styles" in sections:
         styles, names = _styles(sections.pop("styles"), path)
     maps = _maps(sections.pop("maps"), path) if "maps" in sections else None
+    curve = _curve(sections.pop("thickness_curve"), path) if "thickness_curve" in sections else None
     result = {}
     for name, values in sections.items():
         if name not in SECTIONS:
@@ -183,7 +192,7 @@ def partial_of_object(found: dict[str, Any], path: str | Path) -> PartialSetting
             raise HairError('{path}: "{key}" must be a group of settings.', path=path, key=name)
         settings = to_settings(values, SECTIONS[name], path, f"{name}.", declared_in(name))
         result[name] = {setting: getattr(settings, setting) for setting in values}
-    return PartialSettings(result, styles, names, maps)
+    return PartialSettings(result, styles, names, maps, curve)
 
 
 def _maps(found, path):
@@ -201,6 +210,18 @@ def _maps(found, path):
         renamed = {fields.get(key, key): value for key, value in values.items()}
         read.append(to_settings(renamed, MapSettings, path, f"maps[{place}]."))
     return _require_maps(read)
+
+
+def _curve(found, path):
+    """Return the text of a file's curve."""
+    if not isinstance(found, str):
+        raise HairError('{path}: "{key}" must be {kind}.', path=path, key="thickness_curve", kind="a string")
+    try:
+        ramp_text.require_curve(found)
+    except HairError as error:
+        sentence = '{path}: invalid value for "{key}": {reason}'
+        raise HairError(sentence, path=path, key="thickness_curve", reason=error) from error
+    return found
 
 
 def _styles(found, path):
@@ -355,6 +376,10 @@ def schema() -> dict[str, Any]:
             **sections,
             "styles": _style_schema(),
             "maps": _map_schema(),
+            "thickness_curve": {
+                "title": "Thickness curve from root to tip, such as 0:1 0.5:0.3 1:0.2",
+                "type": "string",
+            },
         },
     }
 

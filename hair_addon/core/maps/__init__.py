@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         combination,
         map_settings,
         pixels,
+        ramp_text,
         uv_islands,
         varied_settings,
     )

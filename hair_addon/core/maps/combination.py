@@ -48,6 +48,17 @@ def varied_color(value: tuple, colors: np.ndarray, alpha: np.ndarray, how: Combi
     return np.clip(np.where(is_known, mixed, np.asarray(value, float)), details.low, details.high)
 
 
+def ramped(masks: np.ndarray, ramp: np.ndarray, is_inverted: bool) -> np.ndarray:
+    """Return (S, C) float32: a ramp, given by N even samples (N, C) from 0 to 1, at masks (S,) of strands.
+
+    is_inverted: whether masks are inverted first. Infinite masks count as 0; NaN, a strand without a map, stays.
+    """
+    masks = np.where(np.isinf(masks), 0.0, np.asarray(masks, float))
+    places = np.clip(1.0 - masks if is_inverted else masks, 0.0, 1.0) * (len(ramp) - 1)
+    known = np.arange(len(ramp))
+    return np.stack([np.interp(places, known, channel) for channel in ramp.T], axis=1).astype(np.float32)
+
+
 def random_masks(identities: np.ndarray, seed: int) -> np.ndarray:
     """Return (S,) float32 in [0, 1) by the IDs (S,) int32 of strands or clumps; equal IDs have equal numbers."""
     return random_numbers(np.asarray(identities).astype(np.int32), seed, _PURPOSE)

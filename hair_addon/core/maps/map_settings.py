@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 from ..params import Settings, param
+from . import ramp_text
 from .combination import Combination
 
 KINDS = (
@@ -32,6 +33,11 @@ class MapSettings(Settings):
         1.0, "How much of the map's color replaces the color of the setting", low=0.0, high=1.0, subtype="FACTOR"
     )
     seed: int = param(0, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
+    ramp: str = param("", "Curve of the map's values, or color ramp of a color, such as 0:1 0.5:0.3 1:0.2")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        ramp_text.parsed(self.ramp)
 
     @property
     def combination(self) -> Combination:

@@ -8,7 +8,7 @@ from ..errors import HairError
 from ..grooming.groom import HairSettings
 from ..params import Param, Settings, declared
 from ..shading.appearance import COLOR_FIELDS, Appearance
-from . import map_settings
+from . import map_settings, ramp_text
 
 SECTIONS = {"look": Appearance, "strands": HairSettings}  # first part of a setting's name → class of settings
 
@@ -43,6 +43,16 @@ def require_varied(setting: str) -> None:
     if setting not in all_varied():
         known = ", ".join(all_varied())
         raise HairError('No map can vary "{setting}": use one of {known}.', setting=setting, known=known)
+
+
+def require_map(settings: map_settings.MapSettings) -> None:
+    """Raise `HairError` unless a map may vary its setting, with a ramp of this setting's kind."""
+    require_varied(settings.setting)
+    ramp = ramp_text.parsed(settings.ramp)
+    if isinstance(ramp, ramp_text.Curve) and is_color(settings.setting):
+        raise HairError('The map of "{setting}" needs a color ramp, not a curve.', setting=settings.setting)
+    if isinstance(ramp, ramp_text.Colors) and not is_color(settings.setting):
+        raise HairError('The map of "{setting}" needs a curve, not a color ramp.', setting=settings.setting)
 
 
 def parsed_source(text: str) -> tuple[str, str]:

@@ -287,3 +287,16 @@ def test_maps_are_a_list_of_one_for_each_setting(tmp_path):
         settings_file.GroomSettings(maps=(one, one))
     with pytest.raises(HairError, match="No map can vary"):
         settings_file.GroomSettings(maps=[MapSettings(setting="look.ior")])
+
+
+def test_the_thickness_curve_is_text(tmp_path):
+    """A file has the curve's text only if there is one; colors, numbers and other text are refused with the key."""
+    assert "thickness_curve" not in settings_file.to_object(settings_file.GroomSettings())
+    settings = settings_file.GroomSettings(thickness_curve="0:1 0.5:0.3 1:0.2")
+    settings_file.write(tmp_path / "curve.json", settings)
+    assert settings_file.read(tmp_path / "curve.json") == settings
+    assert settings_file.read_partial(tmp_path / "curve.json").changed(settings_file.GroomSettings()) == settings
+    for wrong in (1, [0, 1], "wide", "0:1/0/0"):
+        found = {"format": settings_file.FORMAT, "version": 1, "thickness_curve": wrong}
+        with pytest.raises(HairError, match="thickness_curve"):
+            settings_file.from_object(found, "curve.json")

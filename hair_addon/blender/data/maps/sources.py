@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Values of maps at the roots of strands, from images, vertex groups and attributes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -11,6 +11,7 @@ from ....core.errors import HairError
 from ....core.geometry.mesh import SurfacePoints
 from ....core.maps import combination, pixels
 from ....core.maps.map_settings import MapSettings
+from ....core.params import Param
 from ...host.caches import Cache
 from ...host.notices import name_of
 from .. import scene
@@ -62,7 +63,8 @@ class Source:
 
     hair_uid: session UID of the hair; corners: (F, 3, C) float32 of a vertex group or attribute, or the UVs for an
     image; pixels: {UDIM tile: (H, W, C)} of an image; of_curves: (S, C) of an attribute of the hair; None for other
-    kinds.
+    kinds. ramp: (N, 1 or 4) samples of the map's ramp, which turns masks into numbers or colors; is_color: of the
+    values before the ramp.
     """
 
     settings: MapSettings
@@ -72,12 +74,23 @@ class Source:
     corners: np.ndarray | None = None
     pixels: dict | None = None
     of_curves: np.ndarray | None = None
+    ramp: np.ndarray | None = None
+
+    @property
+    def combination(self) -> combination.Combination:
+        """How `values` change the setting: a ramp has inverted them already."""
+        how = self.settings.combination
+        return how if self.ramp is None else replace(how, is_inverted=False)
 
     def values(self, roots, identities: np.ndarray, clumps: np.ndarray | None) -> np.ndarray:
         """(S, 1) masks or (S, 4) colors with alpha of strands; NaN where the map has none.
 
         roots, identities, clumps: as of `Strands`.
         """
+        found = self._before_ramp(roots, identities, clumps)
+        return found if self.ramp is None else combination.ramped(found[:, 0], self.ramp, self.settings.is_inverted)
+
+    def _before_ramp(self, roots, identities, clumps):
         if self.pixels is not None:
             return self._of_image(roots)
         if self.corners is not None:
@@ -97,7 +110,7 @@ class Source:
         """Whether both give the same values at the same roots."""
         if other is None or (self.settings, self.is_color) != (other.settings, other.is_color):
             return False
-        pairs = [(self.corners, other.corners), (self.of_curves, other.of_curves)]
+        pairs = [(self.corners, other.corners), (self.of_curves, other.of_curves), (self.ramp, other.ramp)]
         if (self.pixels is None) != (other.pixels is None):
             return False
         if self.pixels is not None and self.pixels is not other.pixels:
@@ -129,31 +142,51 @@ def masks(strands: Strands, settings: MapSettings, image) -> np.ndarray:
 
     image: of a map of the kind IMAGE.
     """
-    return _of_strands(strands, settings, image, is_color=False)[:, 0]
+    return _of_strands(strands, settings, image)[0][:, 0]
 
 
-def colors(strands: Strands, settings: MapSettings, image) -> tuple[np.ndarray, np.ndarray]:
-    """Colors (S, 3) and alpha (S,) of a map; NaN where it has no value. Raises `HairError`."""
-    return pixels.unpremultiplied(_of_strands(strands, settings, image, is_color=True))
+def varied_numbers(
+    strands: Strands, settings: MapSettings, image, value: float, details: Param, ramp: np.ndarray | None = None
+) -> np.ndarray:
+    """(S,) float64 of a setting with a value by its map. Raises `HairError` if the source is missing.
+
+    ramp: (N, 1) of `ramps.map_samples`.
+    """
+    found, how = _of_strands(strands, settings, image, ramp=ramp)
+    return combination.varied_number(value, found[:, 0], how, details)
 
 
-def _of_strands(strands, settings, image, is_color):
+def varied_colors(
+    strands: Strands, settings: MapSettings, image, value: tuple, details: Param, ramp: np.ndarray | None = None
+) -> np.ndarray:
+    """(S, 3) float64 of a color by its map, as `varied_numbers`; ramp: (N, 4)."""
+    found, how = _of_strands(strands, settings, image, ramp is None, ramp)
+    return combination.varied_color(value, *pixels.unpremultiplied(found), how, details)
+
+
+def _of_strands(strands, settings, image, is_color=False, ramp=None):
+    """(values of strands, their `Combination`)."""
     if settings.kind == "CLUMP" and strands.clumps is None:
         raise HairError("There are no clumps for a random map: add the style Clump.")
     if settings.kind in _ON_SURFACE and strands.roots is None:
         raise _without_roots(strands.curves)
-    found = read(strands.curves, strands.surface_object, strands.surface, settings, image, is_color)
+    found = read(strands.curves, strands.surface_object, strands.surface, settings, image, is_color, ramp)
     if found.of_curves is not None and len(found.of_curves) != len(strands.identities):
         sentence = 'The attribute "{attribute}" of "{name}" has values for other strands: pick another attribute.'
         raise HairError(sentence, attribute=settings.source, name=name_of(strands.curves))
-    return found.values(strands.roots, strands.identities, strands.clumps)
+    return found.values(strands.roots, strands.identities, strands.clumps), found.combination
 
 
 _ON_SURFACE = ("IMAGE", "GROUP", "ATTRIBUTE")
 
 
-def read(hair, surface_object, surface, settings: MapSettings, image, is_color=False) -> Source:
+def read(hair, surface_object, surface, settings: MapSettings, image, is_color=False, ramp=None) -> Source:
     """The `Source` of a map of hair Curves on the `Surface` of an object. Raises `HairError` if it is missing."""
+    found = _read(hair, surface_object, surface, settings, image, is_color)
+    return found if ramp is None else replace(found, ramp=ramp)
+
+
+def _read(hair, surface_object, surface, settings, image, is_color):
     known = settings, is_color, hair.session_uid
     if settings.kind in ("STRAND", "CLUMP"):
         return Source(*known)

@@ -7,11 +7,11 @@ One function computes the arrays, which the hair's Curves store for viewports an
 import numpy as np
 
 from ....core.errors import HairError
-from ....core.maps import combination, varied_settings
+from ....core.maps import varied_settings
 from ....core.shading.strand_looks import StrandLooks, strand_looks
 from ...settings import map_items, properties
 from ..strands import attributes
-from . import sources
+from . import ramps, sources
 
 ROOT, TIP, ROUGHNESS = "root_absorption", "tip_absorption", "strand_roughness"  # attributes of the hair's Curves
 _LAYOUT = ((ROOT, "FLOAT_VECTOR"), (TIP, "FLOAT_VECTOR"), (ROUGHNESS, "FLOAT"))
@@ -54,11 +54,9 @@ def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLook
 def _varied(strands, item, value):
     """(S,) or (S, 3) of a setting by its map."""
     settings, details = map_items.settings_of(item), varied_settings.all_varied()[item.setting][1]
-    if varied_settings.is_color(item.setting):
-        found = sources.colors(strands, settings, item.image)
-        return combination.varied_color(value, *found, settings.combination, details)
-    mask = sources.masks(strands, settings, item.image)
-    return combination.varied_number(value, mask, settings.combination, details)
+    is_color = varied_settings.is_color(item.setting)
+    vary = sources.varied_colors if is_color else sources.varied_numbers
+    return vary(strands, settings, item.image, value, details, ramps.map_samples(item, is_color))
 
 
 def write_looks(hair) -> list[HairError]:

@@ -35,7 +35,7 @@ def paint(hair: Curves, item: map_items.VellusMap, context: Context) -> None:
     attribute = _attribute(surface, item.source) if item.kind == "ATTRIBUTE" else None
     if item.kind == "IMAGE" and item.image is not None:
         curves.require_editable(item.image)
-    is_color, color = varied_settings.is_color(item.setting), _first_color(hair, item)
+    is_color, color = _is_colored(item), _first_color(hair, item)
     with contextlib.ExitStack() as undo:
         source: Any
         if item.kind == "IMAGE":
@@ -62,9 +62,14 @@ def paint(hair: Curves, item: map_items.VellusMap, context: Context) -> None:
         undo.pop_all()
 
 
+def _is_colored(item):
+    """Return whether the colors of a map are those of the setting; a color ramp needs numbers."""
+    return varied_settings.is_color(item.setting) and item.ramp_tree is None
+
+
 def _first_color(hair, item):
     """Return the color (3,) of a new source, scene-linear."""
-    if not varied_settings.is_color(item.setting):
+    if not _is_colored(item):
         return np.ones(3)
     _section, _, name = item.setting.partition(".")
     return np.array(getattr(properties.own_look_of(hair.vellus), name))

@@ -7,11 +7,12 @@ from ....core.dynamics.rod.settings import DynamicsSettings
 from ....core.files.settings_file import GroomSettings
 from ....core.grooming.groom import GuideSettings
 from ....core.long_work import Work
+from ....core.maps import ramp_text
 from ....core.shading.appearance import TABLE_FIELDS, Appearance
 from ...data import scene, whole_changes
 from ...data.strands import curves
 from ...materials import looks
-from ...settings import fitted_sizes, map_items, properties, setting_properties, style_items
+from ...settings import fitted_sizes, map_items, properties, ramp_nodes, setting_properties, style_items
 from .. import pipeline, writing
 from ..foreign import hand_made_guides
 
@@ -24,7 +25,8 @@ def settings_of(hair: Curves) -> GroomSettings:
     styles, names = style_items.styles_of(hair.vellus), style_items.names_of(hair.vellus)
     dynamics = properties.own_dynamics_of(guides.vellus)
     maps = map_items.maps_of(hair.vellus)
-    return GroomSettings(guide_settings, hair_settings, look, tables, styles, names, dynamics, maps)
+    curve = ramp_nodes.text_of(hair.vellus.thickness_ramp)
+    return GroomSettings(guide_settings, hair_settings, look, tables, styles, names, dynamics, maps, curve)
 
 
 def apply_settings(hair: Curves, settings: GroomSettings) -> None:
@@ -92,7 +94,22 @@ def using_as_guides(
     return made
 
 
+def assign_thickness_curve(hair: Curves, text: str) -> None:
+    """Give hair Curves the thickness curve of a text, or none for an empty text; an equal one marks nothing stale.
+
+    Raises `HairError` before anything changes.
+    """
+    curves.require_editable(hair)
+    ramp_text.require_curve(text)
+    before = hair.vellus.thickness_ramp
+    wanted = ramp_nodes.replaced(before, hair, "Thickness", text)
+    if wanted != before:
+        hair.vellus.thickness_ramp = wanted
+        ramp_nodes.remove_unused(before)
+
+
 def _assign_shading(hair, settings):
+    assign_thickness_curve(hair, settings.thickness_curve)
     map_items.assign(hair.vellus, settings.maps)
     setting_properties.assign(hair.vellus.marschner, settings.tables, skip=TABLE_FIELDS)
     assign_look(hair, settings.appearance)

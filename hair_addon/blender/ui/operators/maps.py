@@ -10,7 +10,7 @@ from ...data.strands.curves import require_editable
 from ...groom.selection import hair_of
 from ...groom.styles import painted_maps
 from ...host.notices import name_of
-from ...settings import map_items, properties
+from ...settings import map_items, properties, ramp_nodes
 from .. import map_rows
 from .base.hair_operator import HairOperator, needs_hair
 
@@ -98,8 +98,55 @@ class VELLUS_OT_remove_ramp(HairOperator, bpy.types.Operator):
         hair = hair_of(context.object)
         require_editable(hair)
         tree, hair.vellus.thickness_ramp = hair.vellus.thickness_ramp, None
-        if tree is not None and tree.users == 0:
-            bpy.data.node_groups.remove(tree)
+        ramp_nodes.remove_unused(tree)
+
+
+class VELLUS_OT_add_map_ramp(HairOperator, bpy.types.Operator):
+    """Change the values of the map by a curve, or turn them into colors by a color ramp"""
+
+    bl_idname = "vellus.add_map_ramp"
+    bl_label = "Add Ramp"
+    applies = needs_hair
+    __annotations__ = {"setting": setting_property()}
+
+    def change(self, context):
+        """Add a ramp to the map of the setting: a line for numbers, from black to the setting's color for colors."""
+        hair, item = _editable_map(context, self.setting)
+        if ramp_nodes.node_of(item.ramp_tree) is None:
+            map_items.set_ramp(item, _first_ramp(hair, item))
+
+
+class VELLUS_OT_remove_map_ramp(HairOperator, bpy.types.Operator):
+    """Remove the ramp: the values of the map are used directly"""
+
+    bl_idname = "vellus.remove_map_ramp"
+    bl_label = "Remove Ramp"
+    applies = needs_hair
+    __annotations__ = {"setting": setting_property()}
+
+    def change(self, context):
+        """Remove the ramp of the map of the setting."""
+        _hair, item = _editable_map(context, self.setting)
+        map_items.set_ramp(item, "")
+
+
+def _editable_map(context, setting):
+    """Return (hair Curves, item of the map of a setting). Raises `HairError`."""
+    hair = hair_of(context.object)
+    require_editable(hair)
+    varied_settings.require_varied(setting)
+    item = map_items.item_of(hair.vellus, setting)
+    if item is None:
+        raise HairError('The setting "{setting}" has no map: add one first.', setting=setting)
+    return hair, item
+
+
+def _first_ramp(hair, item):
+    """Return the text of a new ramp."""
+    if not varied_settings.is_color(item.setting):
+        return "0:0 1:1"
+    color = getattr(properties.own_look_of(hair.vellus), item.setting.rpartition(".")[2])
+    return "0:0/0/0 1:" + "/".join(f"{min(max(part, 0.0), 1.0):g}" for part in color)
 
 
 class VELLUS_OT_remove_map(HairOperator, bpy.types.Operator):
@@ -123,5 +170,7 @@ CLASSES = (
     VELLUS_OT_paint_map,
     VELLUS_OT_add_ramp,
     VELLUS_OT_remove_ramp,
+    VELLUS_OT_add_map_ramp,
+    VELLUS_OT_remove_map_ramp,
     VELLUS_OT_remove_map,
 )
