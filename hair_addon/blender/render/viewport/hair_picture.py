@@ -15,8 +15,9 @@ from .history import History
 
 SAMPLE_COUNT = 32  # per pixel, in all passes of a picture
 
-# With one sample per pixel, the first pass shares each with the pixels around: the least share that leaves no specks.
-_SPREAD = 0.15
+# With one sample per pixel, the first passes share each with the pixels around it, so that single samples are no specks:
+# share of each neighbor along an axis. A carried history has little noise and would be blurred.
+_SPREADS, _SPREADS_WITH_HISTORY = (0.25, 0.2, 0.15, 0.1), (0.15,)
 
 
 def samples_per_side():
@@ -35,6 +36,7 @@ class HairPicture:
         self.size = size  # [pixels]
         self.per_side = per_side or samples_per_side()
         self.pass_count = self._first_turn = 0
+        self._spreads = _SPREADS
         self._detail = picture_detail.whole(size, self.per_side)
         self._history = History(self.size)
         self._view = None  # record of the last pass
@@ -56,9 +58,11 @@ class HairPicture:
         """Start another picture; is_moved: only the view or objects have moved."""
         if is_moved:
             self._history.turn((self._color, self.pass_count), self.pass_count / self._pass_total)
+            self._spreads = _SPREADS_WITH_HISTORY
             self._first_turn += self.pass_count
         else:
             self._history.forget()
+            self._spreads = _SPREADS
             self._first_turn = 0
         self.pass_count = 0
 
@@ -121,7 +125,8 @@ class HairPicture:
         program.bind()
         program.uniform_int("samples_per_side", self._detail.per_side)
         program.uniform_int("first_place", self._detail.corner)
-        program.uniform_float("spread", _SPREAD if self._detail.per_side == 1 and self.pass_count == 0 else 0.0)
+        is_shared = self._detail.per_side == 1 and self.pass_count < len(self._spreads)
+        program.uniform_float("spread", self._spreads[self.pass_count] if is_shared else 0.0)
         program.uniform_sampler("picture", self._pass.color)
         program.uniform_sampler("depths", self._pass.depths)
         program.uniform_sampler("surface_depth", self._pass.surface_depth)
