@@ -13,7 +13,7 @@ from ...core.files.atomic_file import require_writable_path
 from ...core.geometry.search import clusters
 from ...core.long_work import Stage, part_of
 from ..data import whole_changes
-from ..data.made import armature_weights, card_images, made_meshes
+from ..data.made import card_images, made_meshes
 from ..materials import card_material
 from ..render import card_pictures
 from . import hair_meshes
@@ -63,7 +63,8 @@ def making_cards(hair, settings, folder=None):
     drawn = []
     for index, level in enumerate(levels):
         drawn.append((yield from _drawing(read, level, settings.picture_count, parts[index : index + 2])))
-    return _written(read, drawn, folder)
+    joints = yield lambda _progress: read.joints(settings)
+    return _written(read, drawn, joints, folder)
 
 
 def _drawing(read, level, picture_count, parts):
@@ -90,7 +91,7 @@ def _adding(sums, segments, placed, shift, rows):
 
 
 def _flat_cards(read, level, picture_count, progress):
-    """Compute the cards; returns (mesh in local coordinates, `PlacedStrands`, number of pictures)."""
+    """Compute the cards; returns (mesh beside the surface, `PlacedStrands`, number of pictures)."""
     count = level.card_count
     labels = clusters.clusters(clusters.strand_features(read.points), count, progress)
     progress("Making cards", 1.0)
@@ -105,7 +106,7 @@ def _flat_cards(read, level, picture_count, progress):
     ids = np.random.default_rng(0).permutation(len(strands)) / max(len(strands) - 1, 1)
     placed = texels.PlacedStrands(points, radii, read.colors()[strands], ids.astype(np.float32), heights)
     mesh = outlines.ribbon_mesh(axes, found, places.uvs(found), lifted)
-    return read.local(mesh), placed, len(places.shown)
+    return mesh, placed, len(places.shown)
 
 
 def _stem(name, taken):
@@ -119,17 +120,15 @@ def _stem(name, taken):
     )
 
 
-def _written(read, drawn, folder):
-    surface_object = read.surface_object.find()
+def _written(read, drawn, joints, folder):
     name = f"{read.name} Cards"
     stem = "" if folder is None else _stem(read.name, card_images.files_of_others(f"{name} LOD", folder))
     images = [card_images.new_images(f"{name} LOD{index}", level.maps) for index, level in enumerate(drawn)]
-    collection, made = made_meshes.new_collection(name, surface_object), []
+    pieces, made = hair_meshes.Pieces(read, name, joints), []
     for index, (level, its) in enumerate(zip(drawn, images, strict=True)):
         title = f"{name} LOD{index}"
         material = card_material.new_material(title, read.look, its)
-        mesh_object = made_meshes.new_object(title, level.mesh, surface_object, collection, material)
-        armature_weights.bind(mesh_object, surface_object, len(level.mesh.vertices) // level.card_count)
+        mesh_object = pieces.new_object(title, level.mesh, material, level.card_count, 2)
         if index:
             made_meshes.hide(mesh_object)
         counts = level.card_count, level.picture_count, level.mesh.triangle_count

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.cards import tubes
+from ...core.cards import bone_chains, tubes
 from ...core.cards.polygon_mesh import PolygonMesh
 from ...core.errors import HairError
 from ...core.geometry.mesh import TriMesh
@@ -14,7 +14,7 @@ from ...core.shading import strand_colors
 from ...core.shading.appearance import Appearance
 from ...core.shading.strand_looks import StrandLooks
 from ..data import scene, whole_changes
-from ..data.made import armature_weights, made_meshes
+from ..data.made import armature_weights, chain_armatures, made_meshes
 from ..data.maps import strand_maps
 from ..data.strands import curves, exported_curves
 from ..host import scene_time
@@ -51,6 +51,12 @@ class HairBeside:
     def local(self, made: PolygonMesh) -> PolygonMesh:
         """Transform a mesh to the surface's local coordinates."""
         return made.transformed(self.to_local)
+
+    def joints(self, settings) -> np.ndarray | None:
+        """Joints (C, B + 1, 3) of the bone chains in `CardSettings` or `TubeSettings`, or None without them."""
+        if not settings.chain_count:
+            return None
+        return bone_chains.chains(self.points, min(settings.chain_count, len(self.points)), settings.bone_count)
 
 
 def read_hair(hair):
@@ -104,17 +110,40 @@ def making_tubes(hair, settings):
     settings.require_size(strand_count(hair))
     yield Stage("Reading strands", 0.0)
     read = read_hair(hair)
-    made = yield lambda progress: _tubes(read, settings, progress)
-    surface_object = read.surface_object.find()
+    made, joints = yield lambda progress: _tubes(read, settings, progress)
     name = f"{read.name} Tubes"
-    collection = made_meshes.new_collection(name, surface_object)
-    material = card_material.new_material(name, read.look)
-    mesh_object = made_meshes.new_object(name, made, surface_object, collection, material)
+    pieces = Pieces(read, name, joints)
     tube_count = settings.count_of(len(read.points))
-    armature_weights.bind(mesh_object, surface_object, len(made.vertices) // tube_count)
+    mesh_object = pieces.new_object(
+        name, made, card_material.new_material(name, read.look), tube_count, settings.side_count
+    )
     return MadeTubes(mesh_object, tube_count, made.triangle_count, read.notes)
 
 
 def _tubes(read, settings, progress):
     progress("Making tubes", 0.2)
-    return read.local(tubes.tubes(read.points, read.radii, settings))
+    return tubes.tubes(read.points, read.radii, settings), read.joints(settings)
+
+
+class Pieces:
+    """A new collection of meshes of pieces, which follow the surface, its armature or new bone chains."""
+
+    def __init__(self, read, name, joints):
+        """joints: of the chains, or None."""
+        self._read, self._surface_object = read, read.surface_object.find()
+        self._collection, self._chains = made_meshes.new_collection(name, self._surface_object), None
+        if joints is not None:
+            self._chains = chain_armatures.new(read.name, joints, self._surface_object, read.surface, self._collection)
+
+    def new_object(self, name, made, material, piece_count, vertices_across):
+        """A new mesh object of a `PolygonMesh` of equal pieces, with as many vertices across at each place."""
+        if self._chains is None:
+            local = self._read.local(made)
+            mesh_object = made_meshes.new_object(name, local, self._surface_object, self._collection, material)
+            armature_weights.bind(mesh_object, self._surface_object, len(made.vertices) // piece_count)
+            return mesh_object
+        parent = self._chains.armature_object
+        mesh_object = made_meshes.new_object(name, made, parent, self._collection, material)
+        lines = made.vertices.reshape(piece_count, -1, vertices_across, 3).mean(axis=2)
+        self._chains.bind(mesh_object, lines, vertices_across)
+        return mesh_object

@@ -2,12 +2,14 @@
 """Mesh objects → a file of their own for engines, or the whole scene as a .blend."""
 
 import contextlib
+from pathlib import Path
 
 import bpy
 
 from ...core.errors import HairError
+from ...core.files import gltf_springs
 from ...core.files.atomic_file import atomic_file, require_writable_path
-from ..data.made import armature_weights
+from ..data.made import armature_weights, chain_armatures
 from ..host import paths
 from .chosen_objects import only_chosen
 
@@ -17,7 +19,10 @@ def _blend(path):
 
 
 def _gltf(path):
-    return bpy.ops.export_scene.gltf(filepath=path, export_format="GLB", use_selection=True, export_tangents=True)
+    bpy.ops.export_scene.gltf(filepath=path, export_format="GLB", use_selection=True, export_tangents=True)
+    chosen = [one for one in bpy.context.selected_objects if one.type == "ARMATURE" and chain_armatures.is_made(one)]
+    if chosen:
+        gltf_springs.add(Path(path), [chain_armatures.springs_of(one) for one in chosen])
 
 
 def _fbx(path):
@@ -72,6 +77,7 @@ def write(path, objects):
     require_writable(path)
     export = _FORMATS[path.suffix.lower()][0]
     rigs = [modifier.object for one in objects for modifier in armature_weights.armatures_of(one)]
-    chosen = [*dict.fromkeys([*objects, *rigs])]
+    above = [rig.parent for rig in rigs if rig.parent is not None and rig.parent.type == "ARMATURE"]
+    chosen = [*dict.fromkeys([*objects, *rigs, *above])]
     with contextlib.nullcontext() if export is _blend else only_chosen(chosen), atomic_file(path) as partial:
         export(str(partial.absolute()))  # exporters derive texture paths from this path

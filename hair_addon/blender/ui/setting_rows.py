@@ -101,6 +101,14 @@ def all_rows(layout, owner, settings_class):
     rows(layout, owner, settings_class, others(settings_class))
 
 
+def mesh_rows(layout, owner, settings_class):
+    """Draw the rows of cards or tubes; the bones of chains are gray without chains."""
+    rows(layout, owner, settings_class, others(settings_class, ("bone_count",)))
+    column = layout.column()
+    column.active = owner.chain_count > 0
+    rows(column, owner, settings_class, ("bone_count",))
+
+
 def others(settings_class, *shown):
     """Return the names of a class's settings that are in none of the tuples, so that every new setting has a row."""
     names = {name for names in shown for name in names}

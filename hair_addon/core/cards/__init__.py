@@ -8,11 +8,13 @@ from ..lazy import submodules
 if TYPE_CHECKING:
     from . import (
         atlas,
+        bone_chains,
         card_settings,
         curve_frames,
         outlines,
         polygon_mesh,
         ribbons,
+        spring_colliders,
         texels,
         tubes,
     )

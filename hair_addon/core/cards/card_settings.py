@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 
 from ..errors import HairError
-from ..params import Settings, param
+from ..params import Settings, param, param_of
 
 MOST_TRIANGLES = 5_000_000  # of a mesh: beyond it, Blender's own tools stall
 
@@ -55,6 +55,15 @@ class CardSettings(Settings):
     texture_size: int = param(
         2048, "Width and height of the textures in pixels; a power of two suits most engines", low=128, high=8192
     )
+    chain_count: int = param(
+        0,
+        "Chains of bones that swing the hair in game engines. Zero adds no bones: pieces follow the surface's armature",
+        label="Bone Chains",
+        low=0,
+        high=1_000,
+        soft_high=60,
+    )
+    bone_count: int = param(4, "Bones of each chain, from root to tip", label="Bones per Chain", low=1, high=16)
 
     def levels(self, strand_count: int) -> list[Level]:
         """Return the levels for a number of strands, finest first. Each card has at least one strand."""
@@ -89,6 +98,8 @@ class TubeSettings(Settings):
         high=1.0,
         subtype="FACTOR",
     )
+    chain_count: int = param_of(CardSettings, "chain_count")
+    bone_count: int = param_of(CardSettings, "bone_count")
 
     def count_of(self, strand_count: int) -> int:
         """Return the number of tubes for a number of strands."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         flat_curves,
         frame_cache,
         frame_manifest,
+        gltf_springs,
         groom_curves,
         library_settings,
         light_images,

@@ -22,9 +22,7 @@ def bind(mesh_object, surface_object, piece_size):
     piece_size: number of consecutive vertices of each piece, from root to tip. The mesh is in the current pose; its
     vertices are transformed by the inverse of the pose, so that the armature leaves the mesh in place.
     """
-    modifiers = armatures_of(surface_object)
-    bones = {bone.name for modifier in modifiers for bone in modifier.object.data.bones if bone.use_deform}
-    names = [group.name for group in surface_object.vertex_groups if group.name in bones]
+    modifiers, names = armatures_of(surface_object), _bone_names(surface_object)
     if not names:
         return
     mesh = mesh_object.data
@@ -38,6 +36,25 @@ def bind(mesh_object, surface_object, piece_size):
     unposed = np.einsum("pvi,pij->pvj", offsets, np.linalg.inv(maps[:, :3]))
     mesh.vertices.foreach_set("co", np.ascontiguousarray(unposed, np.float32).ravel())
     mesh.update()
+
+
+def strongest_bone(surface_object, places):
+    """(armature object, bone name) that move a surface most at places (N, 3), or (None, "") without an armature.
+
+    places: around the surface's origin, in world axes.
+    """
+    names = _bone_names(surface_object)
+    if not names:
+        return None, ""
+    to_local = scene.read_surface(surface_object, scene.present_depsgraph()).to_local_axes
+    name = names[_weights_at(places @ to_local.T, surface_object, names).sum(axis=0).argmax()]
+    return next(m.object for m in armatures_of(surface_object) if name in m.object.data.bones), name
+
+
+def _bone_names(surface_object):
+    """Deforming bones with a vertex group of a surface."""
+    bones = {bone.name for m in armatures_of(surface_object) for bone in m.object.data.bones if bone.use_deform}
+    return [group.name for group in surface_object.vertex_groups if group.name in bones]
 
 
 def _weights_at(places, surface_object, names):

@@ -15,8 +15,8 @@ from .history import History
 
 SAMPLE_COUNT = 32  # per pixel, in all passes of a picture
 
-# With one sample per pixel, the first passes share each with the pixels around it, so that single samples are no specks:
-# share of each neighbor along an axis. A carried history has little noise and would be blurred.
+# With one sample per pixel, the first passes share each with the pixels around it, so that single samples are no
+# specks: share of each neighbor along an axis. A carried history has little noise and would be blurred.
 _SPREADS, _SPREADS_WITH_HISTORY = (0.25, 0.2, 0.15, 0.1), (0.15,)
 
 

@@ -135,7 +135,7 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
     applies = needs_hair
 
     def draw(self, context):
-        setting_rows.all_rows(self.layout, self.properties, CardSettings)
+        setting_rows.mesh_rows(self.layout, self.properties, CardSettings)
         setting_rows.row(self.layout, self.properties, "folder")
         settings = setting_properties.to_settings(self.properties, CardSettings)
         for index, level in enumerate(settings.levels(hair_meshes.strand_count(hair_of(context.object)))):
@@ -172,7 +172,7 @@ class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):
     applies = needs_hair
 
     def draw(self, context):
-        setting_rows.all_rows(self.layout, self.properties, TubeSettings)
+        setting_rows.mesh_rows(self.layout, self.properties, TubeSettings)
         settings = setting_properties.to_settings(self.properties, TubeSettings)
         strands = hair_meshes.strand_count(hair_of(context.object))
         counts = {"tubes": settings.count_of(strands), "triangles": settings.triangle_count(strands)}

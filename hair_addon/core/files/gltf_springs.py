@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Springs of bone chains in glTF files, as the extension VRMC_springBone 1.0 [VRMSpring]."""
+
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+_HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
+_NAME = "VRMC_springBone"
+
+
+@dataclass(frozen=True)
+class Springs:
+    """Chains that swing below a root node of a name, [[node name from root to tip]], and spheres that they avoid.
+
+    centers (K, 3) in glTF's axes of the scene, Y upward, and radii (K,) [m]; hit_radius: of each joint [m]; stiffness:
+    force towards the rest shape; drag: 0 to 1, how much of the motion is lost in each step.
+    """
+
+    root: str
+    chains: list[list[str]]
+    centers: np.ndarray
+    radii: np.ndarray
+    hit_radius: float
+    stiffness: float = 0.6
+    drag: float = 0.4
+
+
+def add(path: Path, springs: list[Springs]) -> None:
+    """Add springs to a binary glTF file that Blender's exporter has written."""
+    described, chunks = _read(path)
+    _describe(described, springs)
+    text = json.dumps(described, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    body = _CHUNK.pack(len(text), b"JSON") + text + chunks
+    path.write_bytes(_HEADER.pack(b"glTF", 2, _HEADER.size + len(body)) + body)
+
+
+def _read(path):
+    """(the JSON of a file as a dictionary, its further chunks as bytes)."""
+    content = path.read_bytes()
+    length, _kind = _CHUNK.unpack_from(content, _HEADER.size)
+    start = _HEADER.size + _CHUNK.size
+    return json.loads(content[start : start + length]), content[start + length :]
+
+
+def _describe(described, springs):
+    nodes = described["nodes"]
+    used = described.setdefault("extensionsUsed", [])
+    if _NAME not in used:
+        used.append(_NAME)
+    written = {"specVersion": "1.0", "colliders": [], "colliderGroups": [], "springs": []}
+    to_scene = matrices(nodes)
+    for its in springs:
+        root = next(index for index, node in enumerate(nodes) if node.get("name") == its.root)
+        below = {nodes[index]["name"]: index for index in _below(nodes, root)}
+        first = len(written["colliders"])
+        to_root = np.linalg.inv(to_scene[root])
+        for center, radius in zip(its.centers, its.radii, strict=True):
+            offset = (to_root @ [*center, 1.0])[:3]
+            sphere = {"offset": [float(value) for value in offset], "radius": float(radius)}
+            written["colliders"].append({"node": root, "shape": {"sphere": sphere}})
+        groups = []
+        if len(its.radii):
+            groups = [len(written["colliderGroups"])]
+            numbers = list(range(first, len(written["colliders"])))
+            written["colliderGroups"].append({"name": its.root, "colliders": numbers})
+        for chain in its.chains:
+            joints = [{"node": below[name], **_joint(its)} for name in chain]
+            written["springs"].append({"name": chain[0], "joints": joints, "colliderGroups": groups})
+    described.setdefault("extensions", {})[_NAME] = {key: value for key, value in written.items() if value}
+
+
+def _joint(springs):
+    # Without gravity: the rest shape of hair hangs already.
+    return {
+        "hitRadius": springs.hit_radius,
+        "stiffness": springs.stiffness,
+        "gravityPower": 0.0,
+        "gravityDir": [0.0, -1.0, 0.0],
+        "dragForce": springs.drag,
+    }
+
+
+def _below(nodes, root):
+    """All nodes below one, by index."""
+    found = list(nodes[root].get("children", []))
+    for index in found:
+        found += nodes[index].get("children", [])
+    return found
+
+
+def matrices(nodes: list[dict]) -> list[np.ndarray]:
+    """Return a matrix (4, 4) of each node of a glTF file to the scene."""
+    parents = {child: index for index, node in enumerate(nodes) for child in node.get("children", [])}
+
+    def matrix(index):
+        own = _own_matrix(nodes[index])
+        return matrix(parents[index]) @ own if index in parents else own
+
+    return [matrix(index) for index in range(len(nodes))]
+
+
+def _own_matrix(node):
+    if "matrix" in node:
+        return np.array(node["matrix"], np.float64).reshape(4, 4).T
+    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    found = np.eye(4)
+    found[:3, :3] = turn * np.array(node.get("scale", (1.0, 1.0, 1.0)))
+    found[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+    return found
