@@ -34,7 +34,7 @@ def test_a_chain_follows_its_strands_with_equal_bones(rng):
 
 
 def test_weights_lead_from_the_root_to_the_last_bone(rng):
-    """Weights sum to one; roots follow the root bone alone, ends of bones these bones, and points beyond the last one."""
+    """Weights sum to one; roots follow the root bone alone, ends of bones these bones, and points beyond the last."""
     points = bent(rng)
     joints = bone_chains.chains(points, 6, 4)
     lines = np.concatenate([joints, joints[:, -1:] + (0.0, 0.0, -3.0)], axis=1)
