@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Springs of bone chains in glTF files, as the extension VRMC_springBone 1.0 [VRMSpring]."""
+"""Springs of bone chains in glTF files, as the extension VRMC_springBone 1.0 [VRM22]."""
 
 import json
 import struct
