@@ -102,14 +102,14 @@ def changes(dice, settings_class, cheap, skip=()):
 
 
 def target(dice, kind):
-    """Draw mostly a valid value, sometimes any value."""
+    """Return a target that is mostly valid."""
     of_kind = [o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == kind]
     of_kind += [o for o in bpy.data.objects if kind == "MESH" and o.type == "MESH"]
     return dice.choice(of_kind if dice.random() < 0.85 else [*bpy.data.objects, dice.choice(OTHERS)])
 
 
 def settings(dice):
-    """Return random settings of a groom, mostly valid."""
+    """Return random settings of a groom; most are valid."""
     if dice.random() < 0.1:
         return dice.choice(OTHERS)
     parts = {}
@@ -123,7 +123,7 @@ def settings(dice):
 
 
 def style(dice):
-    """Settings of a style."""
+    """Return the settings of a style."""
     settings_class = dice.choice([*KINDS.values()])
     return settings_class(**changes(dice, settings_class, ()))
 
@@ -146,7 +146,7 @@ def anything(dice, *often):
 
 
 def simulate(dice):
-    """All frames of a mesh of arrays."""
+    """Simulate all frames of guides on a mesh of arrays."""
     mesh = np.eye(3), [[0, 1, 2]]
     guides = anything(dice, api.distribute_guides(mesh, guide_count=3))
     poses = anything(dice, [np.eye(3)] * 2, [np.eye(3), anything(dice, 2.0 * np.eye(3))])
@@ -156,7 +156,7 @@ def simulate(dice):
 
 
 def hair_of_arrays(dice):
-    """Strands on a mesh of arrays, with styles."""
+    """Grow strands with styles on a mesh of arrays."""
     mesh = np.eye(3), [[0, 1, 2]]
     guides = anything(dice, api.distribute_guides(mesh, guide_count=3))
     masks = anything(dice, None, {"top": anything(dice, [0, 1, 1])})
@@ -273,7 +273,7 @@ CALLS = {
 
 
 def set_property(dice):
-    """A property of a random hair's settings, which Blender may refuse."""
+    """Set a property of a random hair's settings, which Blender may refuse."""
     hair = dice.choice([c for c in bpy.data.hair_curves if c.vellus.kind != "NONE"])
     groups = {"guides": api.GuideSettings, "hair": api.HairSettings, "appearance": api.Appearance}
     groups["dynamics"] = api.DynamicsSettings

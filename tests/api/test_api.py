@@ -61,7 +61,7 @@ WITHOUT_BLENDER = "import sys\nfor name in ('bpy', 'gpu', 'mathutils', 'imbuf'):
 
 
 def examples():
-    """The doctests of the functions, in the order of the files; the module's own is the first."""
+    """Return the doctests of the functions, in the order of the files, beginning with that of the module."""
     return [test for module in MODULES for test in examples_of(module)]
 
 
@@ -71,7 +71,7 @@ def examples_of(module):
 
 
 def shown_code():
-    """The blocks of Python code in docs/scripts.md."""
+    """Return the blocks of Python code in docs/scripts.md."""
     text = (ROOT / "docs" / "scripts.md").read_text(encoding="utf-8")
     return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 
@@ -109,7 +109,7 @@ def run_python(program, folder):
 
 
 def test_examples_of_plain_arrays_run_without_blender(tmp_path):
-    """That of the module, and that of docs/scripts.md."""
+    """The examples of the module and of docs/scripts.md on plain arrays run without Blender."""
     program = "import doctest, warp\nfrom hair_addon import api\nwarp.config.log_level = warp.LOG_WARNING\n"
     program += "test = doctest.DocTestFinder(recurse=False).find(api, 'api')[0]\n"
     program += "assert doctest.DocTestRunner().run(test).failed == 0 and test.examples\n"
@@ -284,7 +284,7 @@ def test_styles_are_what_a_script_says(hair):
 
 
 def test_each_kind_of_style_has_its_class_under_its_label():
-    """A kind is registered in kinds.py alone."""
+    """Each kind of style has a class named after its label, although a kind is registered only in kinds.py."""
     classes = {name: getattr(api, name) for name in kinds.__all__}
     assert classes == {kinds.LABELS[kind]: settings_class for kind, settings_class in kinds.KINDS.items()}
     assert set(classes) <= set(api.__all__)
@@ -330,7 +330,7 @@ def test_placing_locks_tells_how_far_it_is_and_leaves_nothing_where_it_is_stoppe
 
 
 def test_new_hair_with_locks_tells_of_them_among_its_stages(sphere):
-    """The command line's `groom` shows these stages."""
+    """New hair whose styles have locks reports placing them among its stages, which `groom` shows on the command line."""
     settings = api.GroomSettings(
         api.GuideSettings(guide_count=20), api.HairSettings(strand_count=100), styles=(api.Clump(size=0.1),)
     )
@@ -357,7 +357,7 @@ def test_a_style_that_is_not_to_be_fitted_keeps_its_lengths(hair, style):
 
 @pytest.mark.parametrize("style", ["CLUMP", "BRAID", "WET"])
 def test_styles_of_the_menu_have_few_locks_on_any_surface(hair, style, monkeypatch):
-    """Locks are scaled to the surface: with their size on a head, a sphere of two meters would have 100,000."""
+    """Locks of styles from the menu are scaled to the surface: a sphere of two meters has few."""
     placed, place = [], cvt.place
     monkeypatch.setattr(
         cvt, "place", lambda mesh, count, *rest, **named: placed.append(count) or place(mesh, count, *rest, **named)

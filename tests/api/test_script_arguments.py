@@ -262,7 +262,7 @@ REFUSED = {
 
 
 def assert_all_goes_on(folder):
-    """The file is saved and drawn, and an undo works."""
+    """Assert that the file can be saved and drawn, and that an undo works."""
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "saved.blend"))
     assert np.isfinite(api.draw(width=16, height=12, samples_per_side=1)).all()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""New hair with styles is styled when the call returns, and no update styles it again."""
+"""New hair with styles is styled when the call returns, and the next update does not style it again."""
 
 import bpy
 import numpy as np

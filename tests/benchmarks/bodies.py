@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole bodies by code, for measurements on surfaces with thin parts: a person, a hand, an animal, a folded cloth.
+"""Models of whole bodies, for measurements on surfaces with thin parts: a person, a hand, an animal, a folded cloth.
 
 Limbs and balls are joined, remeshed by voxels, smoothed and decimated like a scan. The shapes are not adapted to guide
 placement.
@@ -17,7 +17,7 @@ _FINGERS = 0.075, 0.085, 0.08, 0.06  # lengths [m]
 
 
 def body(name):
-    """The `TriMesh` of "person", "hand", "animal" or "cloth"; empties Blender's file."""
+    """Return the `TriMesh` of "person", "hand", "animal" or "cloth"; empties Blender's file."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     makers = {"person": _person, "hand": _lone_hand, "animal": _animal, "cloth": _cloth}
     shown = makers[name]()
@@ -68,7 +68,7 @@ def _half_of_person(parts, side):
 
 
 def _hand(parts, frame):
-    """A hand from its wrist along X, palm down."""
+    """Build a hand from its wrist along X, palm down."""
     for number, length in enumerate(_FINGERS):
         x, y = 0.085 - 0.004 * abs(number - 1), 0.03 - 0.02 * number
         _limbs(parts, [(0, 0.6 * y, 0), (x, y, 0)], [0.015, 0.0115], frame)
@@ -111,7 +111,7 @@ def _animal():
 
 
 def _cloth():
-    """A skirt in folds, two millimeters thick."""
+    """Build a folded skirt, two millimeters thick."""
     around, down = np.meshgrid(np.linspace(0, 2 * np.pi, 240, endpoint=False), np.linspace(0, 1, 60))
     radius = 0.19 + 0.14 * down + (0.004 + 0.045 * down) * np.sin(16 * around + 2 * down)
     radius += 0.01 * down * np.sin(5 * around)
@@ -129,7 +129,7 @@ def _cloth():
 
 
 def _limbs(parts, joints, radii, frame=None):
-    """Add cones from joint to joint [m], rounded at each."""
+    """Add cones from joint to joint [m], rounded at each joint."""
     joints = [Vector(joint) if frame is None else frame @ Vector(joint) for joint in joints]
     for start, end, first, last in zip(joints, joints[1:], radii, radii[1:], strict=False):
         axis = end - start
@@ -146,7 +146,7 @@ def _ball(parts, place, radii, turn=(0, 0, 0)):
 
 
 def _solid(parts, voxel_size, face_count):
-    """An object of one closed surface around all parts, with `face_count` triangles."""
+    """Return an object of one closed surface around all parts, with `face_count` triangles."""
     mesh = bpy.data.meshes.new("Body")
     parts.to_mesh(mesh)
     parts.free()

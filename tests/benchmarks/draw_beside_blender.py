@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A viewport's frame with hair drawn by Vellus, beside the same strands drawn by Blender: milliseconds and ratios.
+"""Times of a viewport's frame with hair drawn by Vellus and with the same strands drawn by Blender, and their ratios.
 
 .venv/bin/python tests/benchmarks/draw_beside_blender.py --strands 30000 100000
 
@@ -76,7 +76,7 @@ class View:
         )
 
     def read(self, width, height):
-        """(height, width, 4) float32 of the picture's corner; waits until all is drawn."""
+        """Return the picture's corner (height, width, 4) float32, once all is drawn."""
         with self.picture.bind():
             pixels = gpu.state.active_framebuffer_get().read_color(0, 0, width, height, 4, 0, "FLOAT")
         return np.array(pixels, np.float32).reshape(height, width, 4)
@@ -87,7 +87,7 @@ def _matrix(values):
 
 
 def by_vellus(view):
-    """A function that draws a frame as the add-on does in a viewport."""
+    """Return a function that draws a frame as the add-on does in a viewport."""
     context = bpy.context
     drawn = drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get())
     picture = hair_picture.HairPicture(view.size)

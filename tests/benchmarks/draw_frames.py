@@ -32,7 +32,7 @@ REPETITIONS = 15
 
 
 def median_milliseconds(work, repetitions=REPETITIONS):
-    """Median time of one call [ms], after two calls that compile and warm up."""
+    """Return the median time of a call [ms], after two calls that compile and warm up."""
     times = []
     for _ in range(repetitions + 2):
         started = time.perf_counter()
@@ -42,7 +42,7 @@ def median_milliseconds(work, repetitions=REPETITIONS):
 
 
 class Frame:
-    """A picture of some samples a pixel, and the view of the scene's camera into it."""
+    """A picture with a number of samples per pixel, seen from the scene's camera."""
 
     def __init__(self, width, height, samples_per_side):
         width, height = width * samples_per_side, height * samples_per_side
@@ -54,7 +54,7 @@ class Frame:
         self._end = gpu.types.GPUFrameBuffer(color_slots=self._pixel)
 
     def draw(self, drawn):
-        """Draw a `DrawnScene` like a viewport whose surfaces Blender shades, and wait until it is drawn."""
+        """Draw a `DrawnScene` as in a viewport whose surfaces Blender shades, and wait for the end."""
         with self._buffer.hiding():
             scene_drawing.draw_hiding(drawn, self.view)
         scene_drawing.draw_hair(drawn, self.view, self._buffer)
@@ -68,7 +68,7 @@ class Frame:
 
 
 def strands_between(guides, strand_count, device):
-    """(S, 41, 3) local points and (S, 41) radii, float32, as the operator would make them."""
+    """Return (S, 41, 3) local points and (S, 41) radii, float32, as the operator would generate them."""
     surface_object = guides.data.surface
     depsgraph = bpy.context.evaluated_depsgraph_get()
     surface = scene.read_surface(surface_object, depsgraph)
@@ -115,7 +115,7 @@ def measure(drawn, frame, points, radii):
 
 
 def shadings():
-    """{model: `Shading`} of the models that are timed."""
+    """Return {model: `Shading`} of the timed models."""
     fibres = {mode: lookup_tables.Settings(mode=mode, sigma_a=head.CHESTNUT) for mode in ("classic", "energy")}
     variation = strand_variation.Settings(pigment=head.CHESTNUT, random_color=0.5, tip_absorption=0.5)
     return {

@@ -32,7 +32,7 @@ TRIANGLES = 20_000
 
 
 def measured(name, way, device, frames):
-    """Print how long frames take."""
+    """Print the times of frames."""
     for _ in range(4):
         way.prepare()
         way.advance()
@@ -58,22 +58,22 @@ class Free:
         self.frame = 0
 
     def prepare(self):
-        """Find out where the roots go in the next frame."""
+        """Find the positions of the roots in the next frame."""
         self.frame += 1
         way = 0.02 * np.sin(2.0 * np.pi * rods.FRAME * self.frame)
         self.simulation.roots = self.simulation.groom[:, 0] + [way, 0.0, 0.0]
 
     def advance(self):
-        """The next frame."""
+        """Simulate the next frame."""
         self.simulation.advance()
 
     def stretch(self):
-        """The largest."""
+        """Return the largest stretch of a segment."""
         return abs(self.simulation.rods.stretch()).max()
 
 
 def ball():
-    """(directions (V, 3), triangles (F, 3) int32) of a ball, of triangles about as large as each other."""
+    """Return (directions (V, 3), triangles (F, 3) int32) of a ball with triangles of nearly equal size."""
     count = TRIANGLES // 2 + 2
     height = 1.0 - (2.0 * np.arange(count) + 1.0) / count  # a spiral that is even in area
     angle = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
@@ -87,7 +87,7 @@ def ball():
 
 
 class OnBody:
-    """Strands all over a ball that bulges and turns, with hair among hair or without."""
+    """Strands on all sides of a ball that bulges and turns, with or without friction and pressure between hairs."""
 
     def __init__(self, count, device, volume):
         rng = np.random.default_rng(0)
@@ -105,7 +105,7 @@ class OnBody:
         self.simulation = simulation.Simulation(groom, settings, pose, world, device)
 
     def _now(self):
-        """(pose of the roots, world) of the frame."""
+        """Return (pose of the roots, world) of the current frame."""
         swing = np.sin(2.0 * np.pi * 1.5 * rods.FRAME * self.frame)
         turn = np.array([0.0, 0.0, np.sin(0.25 * swing), np.cos(0.25 * swing)])
 
@@ -118,16 +118,16 @@ class OnBody:
         return pose, simulation.World(obstacles=(body,))
 
     def prepare(self):
-        """Find out where the roots and the body go in the next frame."""
+        """Find the positions of the roots and of the body in the next frame."""
         self.frame += 1
         self.next = self._now()
 
     def advance(self):
-        """The next frame."""
+        """Simulate the next frame."""
         self.simulation.advance(*self.next, rods.FRAME)
 
     def stretch(self):
-        """The largest."""
+        """Return the largest stretch of a segment."""
         return abs(self.simulation.stretch()).max()
 
 

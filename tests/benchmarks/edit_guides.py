@@ -58,7 +58,7 @@ _NESTED = {"shadows": ("visibility", "all of it")}  # which draw maps of their o
 
 
 class Editing:
-    """Hair of the sample head that is changed, with what follows until it is drawn."""
+    """Hair of the sample head that is changed, and all work until it is drawn."""
 
     def __init__(self, guides, hair, frame, share):
         self.guides, self.hair, self.frame = guides.data, hair.data, frame
@@ -73,7 +73,7 @@ class Editing:
             pass
 
     def read(self, **details):
-        """The `DrawnScene` as a viewport reads it."""
+        """Return the `DrawnScene` as a viewport reads it."""
         context, areas = bpy.context, bpy.context.window_manager.windows[0].screen.areas
         viewport = next(area.spaces.active for area in areas if area.type == "VIEW_3D")
         depsgraph = context.evaluated_depsgraph_get()

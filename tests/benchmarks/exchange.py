@@ -53,7 +53,7 @@ def main(strand_count):
 
 
 def _worked(call):
-    """(seconds of processor time as text, the result)."""
+    """Return (processor time in seconds, as text; the result)."""
     before = time.process_time()
     made = call()
     return f"{time.process_time() - before:.1f} s", made
@@ -96,7 +96,7 @@ def _values(curves, name, width=1):
 
 
 def _of_usd(path, name):
-    """{name: array} of the strands in a USD file, named as in Alembic."""
+    """Return {name: array} of the strands in a USD file, named as in Alembic."""
     bpy.utils.expose_bundled_modules()
     from pxr import Usd, UsdGeom
 
@@ -108,7 +108,7 @@ def _of_usd(path, name):
 
 
 def _far(found, expected):
-    """The largest distance, as text."""
+    """Return the largest distance, as text."""
     return f"{1e6 * np.abs(np.asarray(found) - expected).max():.2f} µm"
 
 

@@ -24,7 +24,7 @@ _DENSITY, _SEED = "Input_15", "Input_16"
 
 
 def head_with_guides():
-    """(mesh object, guide Curves object): the sample head in an empty file; the add-on is registered."""
+    """Return (mesh object, guide Curves object) of the sample head in an empty file; the add-on is registered."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.obj_import(filepath=str(HEAD))
     head = bpy.context.selected_objects[0]
@@ -54,7 +54,7 @@ class Way:
 
     @property
     def strand_count(self):
-        """Of the hair as Blender evaluates it."""
+        """Return the number of strands of the evaluated hair."""
         return len(self._evaluated().curves)
 
     @property
@@ -77,29 +77,29 @@ def move(guides, chosen):
 
 
 class Ours(Way):
-    """The registered add-on: its operators, sliders and handlers without a window."""
+    """The registered add-on with its operators, sliders and handlers, without a window."""
 
     @classmethod
     def grown(cls, guides, strand_count):
-        """Hair between guides, for the first time."""
+        """Return hair that is generated between guides for the first time."""
         way = cls(guides, None)
         way.settings = groom.HairSettings(strand_count=strand_count)
         way.grow()
         return way
 
     def grow(self):
-        """Hair where there was none."""
+        """Generate hair where there is none."""
         self.hair = None
         self._interpolate(None)
 
     def remake(self):
-        """Search, weights, interpolation, the write into Curves, and Blender's own update."""
+        """Search, compute weights, interpolate, write the Curves, and wait for Blender's update."""
         self.step += 1
         self.settings = replace(self.settings, seed=self.step)
         self._interpolate(self.hair.data)
 
     def edit(self):
-        """Move the guides: the handler follows them and writes the hair, and Blender evaluates it."""
+        """Move the guides, so that the handler writes the hair and Blender evaluates it."""
         super().edit()
         bpy.context.view_layer.update()
 
@@ -113,7 +113,7 @@ class Ours(Way):
         bpy.context.view_layer.update()
 
     def drop(self):
-        """Take away the hair, and leave the guides."""
+        """Delete the hair and keep the guides."""
         bpy.data.hair_curves.remove(self.hair.data)
         live_hair.cancel_writing()
         invalidation.data_replaced()
@@ -128,7 +128,7 @@ class Ours(Way):
 
 
 class Asset(Way):
-    """Blender's "Interpolate Hair Curves": Catmull-Rom curves, or with a node after it poly lines."""
+    """Blender's "Interpolate Hair Curves" with Catmull-Rom curves, or with poly lines by another node."""
 
     @classmethod
     def grown(cls, guides, head, strand_count, is_poly):
@@ -156,7 +156,7 @@ class Asset(Way):
 
 
 class LeanGraph(Way):
-    """The fewest of Blender's nodes that grow strands between guides, into poly lines."""
+    """The smallest graph of Blender's nodes that grows strands between guides as poly lines."""
 
     @classmethod
     def grown(cls, guides, head, strand_count):
@@ -173,7 +173,7 @@ class LeanGraph(Way):
 
 
 def area(surface_object):
-    """[m²] of a mesh object whose transform is applied."""
+    """Return the area [m²] of a mesh object whose transform is applied."""
     return sum(polygon.area for polygon in surface_object.data.polygons)
 
 
@@ -200,7 +200,7 @@ def _asset():
 
 
 def _lean_graph(head, density):
-    """(node group, the node that distributes points)."""
+    """Return (node group, node that distributes points)."""
     group = _group("Lean Graph")
     names = {
         "into": "NodeGroupInput",
@@ -226,7 +226,7 @@ def _lean_graph(head, density):
 
 
 def _poly_lines():
-    """A node group that makes any curves poly lines."""
+    """Return a node group that converts curves to poly lines."""
     group = _group("Poly Lines")
     into, poly, out = (
         group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeCurveSplineType", "NodeGroupOutput")

@@ -16,8 +16,8 @@ CANDIDATES = 12
 @dataclass(frozen=True)
 class Evenness:
     """energy: relative to that of as many hexagons; variation: of the cells' areas; closest: least distance of two
-    sites, relative to a honeycomb's. Straight cells belong to the nearest site in space; other cells to the nearest
-    site of the same island that faces the same way.
+    sites, relative to a honeycomb. A straight cell belongs to the nearest site in space, any other cell to the nearest
+    site on the same island that faces the same way.
     """
 
     energy: float
@@ -28,7 +28,7 @@ class Evenness:
 
 
 def evenness(mesh, places):
-    """`Evenness` of places (n, 3) on a `TriMesh`."""
+    """Return the `Evenness` of places (n, 3) on a `TriMesh`."""
     points, weights, triangles = _samples(mesh, SAMPLES_PER_SITE * len(places))
     normals = mesh.scaled_normals / np.maximum(np.linalg.norm(mesh.scaled_normals, axis=1, keepdims=True), 1e-30)
     edges = np.concatenate([mesh.triangles[:, :2], mesh.triangles[:, 1:]])

@@ -40,7 +40,7 @@ def _put(into: mat66, row: int, column: int, part: wp.mat33):
 
 @wp.func
 def _decomposed(matrix: mat66):
-    """The lower triangle L with L Lᵀ = matrix; its diagonal is inverted."""
+    """Return the lower triangle L with L Lᵀ = matrix; its diagonal is inverted."""
     lower = mat66()
     for r in range(6):
         for c in range(r + 1):

@@ -39,7 +39,7 @@ BLOCK = 12  # pixels along each side of a block
 
 
 class Movement:
-    """Something that moves the scene of the sample head a step with each frame."""
+    """A movement that changes the scene of the sample head in each frame."""
 
     is_of_camera = False  # whether nothing else moves
 
@@ -48,12 +48,12 @@ class Movement:
         self.start = self.camera.matrix_world.copy()
 
     def end(self):
-        """Put all back."""
+        """Restore the scene."""
         self.camera.matrix_world = self.start
 
 
 class Orbit(Movement):
-    """The camera goes round the head, a quarter of a degree a frame."""
+    """The camera moves around the head by a quarter of a degree per frame."""
 
     is_of_camera = True
 
@@ -63,14 +63,14 @@ class Orbit(Movement):
 
 
 class Sway(Orbit):
-    """The camera goes round the head by two degrees a frame."""
+    """The camera moves back and forth around the head by two degrees per frame."""
 
     def step(self, frame):
         super().step(8 * frame)
 
 
 class Zoom(Orbit):
-    """The camera goes away from the head, from 1 distance to 50 in 120 frames."""
+    """The camera moves away from the head, from 1 to 50 times the distance in 120 frames."""
 
     def step(self, frame):
         middle = Matrix.Translation(head.LOOK_AT)
@@ -79,7 +79,7 @@ class Zoom(Orbit):
 
 
 class Turntable(Movement):
-    """The head turns by a quarter of a degree a frame."""
+    """The head turns by a quarter of a degree per frame."""
 
     def step(self, frame):
         bpy.data.objects["Head"].rotation_euler.z = np.radians(0.25 * frame)
@@ -89,7 +89,7 @@ class Turntable(Movement):
 
 
 class MovingLight(Movement):
-    """The key light goes round the head, two degrees a frame."""
+    """The key light moves around the head by two degrees per frame."""
 
     def __init__(self):
         super().__init__()
@@ -104,14 +104,14 @@ class MovingLight(Movement):
 
 
 class FastLight(MovingLight):
-    """The key light goes round the head, ten degrees a frame: it comes from behind within a few frames."""
+    """The key light moves around the head by ten degrees per frame, so that it lights from behind within a few frames."""
 
     def step(self, frame):
         super().step(5 * frame)
 
 
 class Dimmer(MovingLight):
-    """The key light grows by a tenth with each frame."""
+    """The key light becomes brighter by a tenth per frame."""
 
     def __init__(self):
         super().__init__()
@@ -125,7 +125,7 @@ class Dimmer(MovingLight):
 
 
 class Combing(Movement):
-    """Guides in front sway to the side: 1 mm at their tips with each frame."""
+    """Guides in front move to the side, by 1 mm per frame at their tips."""
 
     def __init__(self):
         super().__init__()
@@ -146,7 +146,7 @@ class Combing(Movement):
 
 
 class StyleSlider(Movement):
-    """The radius of curls grows by a tenth of a millimeter with each frame."""
+    """The radius of curls grows by a tenth of a millimeter per frame."""
 
     def __init__(self):
         super().__init__()
@@ -161,7 +161,7 @@ class StyleSlider(Movement):
 
 
 class Playback(Movement):
-    """Baked guides of a head that turns to and fro by three degrees, once a second."""
+    """Baked guides on a head that turns to and fro by three degrees once per second."""
 
     def __init__(self):
         super().__init__()
@@ -188,52 +188,52 @@ MOVEMENTS = {one.__name__: one for one in _OF_ALL}
 
 
 class HairFrames:
-    """Pictures of hair alone, as a viewport lays them over what Blender draws."""
+    """Pictures of hair alone, as viewports lay them over Blender's drawing."""
 
     def __init__(self, size, per_side, rests):
         self._picture = hair_picture.HairPicture(size, per_side)
         self._rests = rests
 
     def moved(self, drawn, camera):
-        """(H, W, 3) scene-linear light of the first pass after a movement."""
+        """Return (H, W, 3) scene-linear light of the first pass after a movement."""
         self._picture.restart(is_moved=True)
         self._picture.add_pass(drawn, *camera)
         return _over_grey(self._picture.read_shown())
 
     def alone(self, drawn, camera):
-        """The same without what was shown before."""
+        """Return the same without the earlier frames."""
         self._picture.restart()
         self._picture.add_pass(drawn, *camera)
         return _over_grey(self._picture.read())
 
     def rested(self, drawn, camera):
-        """The same of a picture at rest."""
+        """Return the same for a picture at rest."""
         self._picture.restart()
         _finish(self._picture, drawn, camera, self._rests)
         return _over_grey(self._picture.read())
 
 
 class FilmFrames:
-    """Pictures of hair and surfaces, as in Rendered view."""
+    """Pictures of hair and surfaces, as in Rendered shading."""
 
     def __init__(self, size, per_side, rests):
         self._film = view_film.ViewFilm(size, per_side, False)
         self._rests = rests
 
     def moved(self, drawn, camera):
-        """(H, W, 3) scene-linear light of the first pass after a movement."""
+        """Return (H, W, 3) scene-linear light of the first pass after a movement."""
         self._film.restart(is_moved=True)
         self._film.add_pass(drawn, *camera)
         return self._film.read_shown()[..., :3]
 
     def alone(self, drawn, camera):
-        """The same without what was shown before."""
+        """Return the same without the earlier frames."""
         self._film.restart()
         self._film.add_pass(drawn, *camera)
         return self._film.read()[..., :3]
 
     def rested(self, drawn, camera):
-        """The same of a picture at rest."""
+        """Return the same for a picture at rest."""
         self._film.restart()
         _finish(self._film, drawn, camera, self._rests)
         return self._film.read()[..., :3]
@@ -243,7 +243,7 @@ KINDS = {"hair": HairFrames, "film": FilmFrames}
 
 
 def _finish(picture, drawn, camera, times):
-    """Add passes until a picture is fine, and times - 1 as many."""
+    """Draw passes until a picture is fine, and then `times` - 1 as many again."""
     count = 0
     while not picture.is_fine:
         picture.add_pass(drawn, *camera)
@@ -257,14 +257,14 @@ def _over_grey(light):
 
 
 def levels(light):
-    """Scene-linear light → what the scene's view transform shows of it, from 0 to 255."""
+    """Convert scene-linear light to display values of the scene's view transform, from 0 to 255."""
     transform = display_transform.DisplayTransform.of(bpy.context.scene)
     shown = display_transform.apply(transform, light.reshape(-1, 3).astype(np.float32))
     return 255.0 * np.clip(shown, 0.0, 1.0).reshape(light.shape)
 
 
 def measure(movement, kind, options):
-    """(alone, moved, rested) scene-linear light of the frames after those of the warm-up."""
+    """Return (alone, moved, rested): scene-linear light of the frames after warm-up."""
     sides = (options.per_side, options.per_side, options.rest_per_side or options.per_side)
     moving, alone, resting = (KINDS[kind](tuple(options.size), side, options.rests) for side in sides)
     found, drawn = ([], [], []), None
@@ -305,7 +305,7 @@ def report(name, kind, alone, moved, rested):
 
 
 def _of_blocks(pictures, is_hair):
-    """99th percentile of how far means of blocks change that have hair in a quarter of their pixels."""
+    """Return the 99th percentile of the change of block means, for blocks with hair in a quarter of their pixels."""
     height, width = (length // BLOCK * BLOCK for length in pictures.shape[1:3])
 
     def means(of):
@@ -322,7 +322,7 @@ def _of_means(light, rested):
 
 
 def main():
-    """Print a row of each movement."""
+    """Print a row for each movement."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--strands", type=int, default=10_000)
     parser.add_argument("--size", type=int, nargs=2, default=[240, 180], metavar=("WIDTH", "HEIGHT"))

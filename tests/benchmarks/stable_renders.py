@@ -30,21 +30,21 @@ BLOCK = 12  # pixels along each side
 
 
 def levels(picture):
-    """(H, W, 4) premultiplied light → (H, W, 3), what the scene's view transform shows of it, from 0 to 255."""
+    """Convert premultiplied light (H, W, 4) to display values (H, W, 3) of the scene's view transform, from 0 to 255."""
     transform = display_transform.DisplayTransform.of(bpy.context.scene)
     shown = display_transform.apply(transform, np.ascontiguousarray(picture[..., :3], np.float32).reshape(-1, 3))
     return 255.0 * np.clip(shown, 0.0, 1.0).reshape(*picture.shape[:2], 3)
 
 
 def block_means(values):
-    """(H, W, C) → (H / 12, W / 12, C)."""
+    """Return the means of blocks: (H, W, C) → (H / 12, W / 12, C)."""
     height, width = (length // BLOCK for length in values.shape[:2])
     cut = values[: height * BLOCK, : width * BLOCK].reshape(height, BLOCK, width, BLOCK, -1)
     return cut.mean(axis=(1, 3))
 
 
 def frames(options, scattering, times=1):
-    """(frames, H, W, 4) of a scene that turns; processor seconds a frame."""
+    """Return (frames, H, W, 4) of a scene that turns, and the processor seconds per frame."""
     blender_scene = bpy.context.scene
     blender_scene.vellus.multiple_scattering = scattering
     kept = light_paths._PATHS_A_PIXEL, light_paths._LEAST_PATHS, light_paths._MOST_PATHS

@@ -51,7 +51,7 @@ class Hair:
         )
 
     def on(self, device):
-        """(points, `StrandData`) on a device."""
+        """Return (points, `StrandData`) on a device."""
         arcs = np.pad(np.cumsum(segment_lengths(self.centres), axis=1), ((0, 0), (1, 0)))
         count, centre_count = len(self.points), len(self.centres)
 
@@ -71,7 +71,7 @@ class Hair:
 
 
 def hair(strand_count, point_count):
-    """Strands that rise and bend over, in locks."""
+    """Return strands that rise and bend over, in locks."""
     rng = np.random.Generator(np.random.PCG64(1))
     lock_count = max(strand_count // STRANDS_A_LOCK, 1)
     locks = np.sort(rng.integers(0, lock_count, strand_count)).astype(np.int32)
@@ -92,13 +92,13 @@ def hair(strand_count, point_count):
 
 
 def program_of(styles, centre_count):
-    """The `Program` of styles whose levels all have the same centers; guides are as many again, without points."""
+    """Return the `Program` of styles whose levels all have the same centers, with as many guides without points."""
     first_centres = [0] * len(programs.tree_levels(styles)) + [centre_count]
     return programs.compiled(programs.strand_steps(styles, {}), [], first_centres)
 
 
 def best_time(work, device, repetitions=20):
-    """Shortest time [s] of a call on a device, by its own clock where it has one."""
+    """Return the shortest time [s] of a call on a device, by the device's own clock if it has one."""
     work()
     times = []
     for _ in range(repetitions):

@@ -43,7 +43,7 @@ CHECKED = 2000  # strands that are compared with Warp's
 
 
 class Uploads:
-    """Bytes of all buffers that are handed to the GPU meanwhile."""
+    """Bytes of all buffers that are uploaded to the GPU within the context."""
 
     def __enter__(self):
         self.count, self._real = 0, gpu.types.Buffer
@@ -59,7 +59,7 @@ class Uploads:
 
 
 def median(work):
-    """Milliseconds of the median run."""
+    """Return the milliseconds of the median run."""
     found = []
     for turn in range(REPETITIONS):
         started = time.perf_counter()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baking 256 × 256 tables of every lobe: both modes and the slices, NumPy beside Warp's processor and GPUs."""
+"""Times of baking 256 × 256 tables of all lobes, by NumPy and by Warp on the processor and on GPUs."""
 
 import time
 
@@ -14,7 +14,7 @@ MODES = ["classic", "energy"]
 
 
 def median_time(way, repetitions=7):
-    """Median time [s] after a first call, which compiles."""
+    """Return the median time [s] after a first call, which compiles."""
     way()
     times = []
     for _ in range(repetitions):
@@ -31,7 +31,7 @@ def devices():
 @pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 def test_bake(mode):
-    """Printed: times and their ratio to NumPy's."""
+    """Tables are baked in both modes and as slices; times and their ratio to NumPy's are printed."""
     settings = lookup_tables.Settings(mode=mode)
     varied = appearance.strand_settings(appearance.Appearance(random_color=0.5, tip_absorption=0.5))
     numpy_time = median_time(lambda: lookup_tables.bake(settings))

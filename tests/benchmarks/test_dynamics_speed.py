@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulated strands of 25 points: beside Blender's Hair Dynamics, touching and free, and with hair that follows."""
+"""Times of simulated strands of 25 points, free and in contact, compared with Blender's Hair Dynamics."""
 
 import contextlib
 import functools
@@ -38,13 +38,13 @@ OURS = "ours, 4 substeps"
 
 
 def strands(count):
-    """(count, 25, 3): level strands of 15 cm, their roots apart."""
+    """Return (count, 25, 3): level strands of 15 cm with separate roots."""
     roots = np.random.default_rng(0).normal(scale=0.05, size=(count, 1, 3))
     return line(LENGTH, POINTS) + roots
 
 
 def shaken(simulation):
-    """A call that simulates the next frame of shaken roots."""
+    """Return a function that simulates the next frame of shaken roots."""
     frames = iter(range(10**6))
 
     def advance():
@@ -55,7 +55,7 @@ def shaken(simulation):
 
 
 class HairDynamics:
-    """Blender's own, as it is added, in the mode that simulates."""
+    """Blender's Hair Dynamics with default settings, in the mode that simulates."""
 
     def __init__(self, points):
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -75,12 +75,12 @@ class HairDynamics:
         self.frame = 1
 
     def advance(self):
-        """The next frame."""
+        """Simulate the next frame."""
         bpy.context.scene.frame_set(self.frame)
         self.frame += 1
 
     def stretch(self):
-        """Mean over all segments."""
+        """Return the mean stretch of all segments."""
         evaluated = self.hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         points = np.empty(3 * len(evaluated.points), np.float32)
         evaluated.points.foreach_get("position", points)
@@ -90,7 +90,7 @@ class HairDynamics:
 
 @pytest.mark.long
 def test_a_frame_beside_blenders():
-    """1,000 strands for a second each; both stretches are printed."""
+    """A frame of 1,000 strands is compared with Blender's over a second; the stretch of both is printed."""
     points = strands(1000)
     simulation, peer = Simulation(points), HairDynamics(points)
     calls = {OURS: shaken(simulation), "Hair Dynamics": peer.advance}
@@ -104,7 +104,7 @@ def test_a_frame_beside_blenders():
 
 @pytest.mark.long
 def test_four_thousand_strands(monkeypatch):
-    """By the time that copying their state takes; on two threads too, whose gain is printed."""
+    """A frame of 4,000 strands is compared with copying their state; the gain of a second thread is printed."""
     simulation = Simulation(strands(4000))
     arrays = [getattr(simulation.rods.arrays, name) for name in rod_solver.ROWS]
     copies = [wp.clone(array) for array in arrays]
@@ -132,7 +132,7 @@ def test_four_thousand_strands(monkeypatch):
 
 @pytest.mark.long
 def test_lanes_beside_warps_vectors(monkeypatch):
-    """A whole substep in lanes, and one Newton step of it by the same algebra in Warp's vectors, on one thread."""
+    """A whole substep in lanes is compared with one Newton step by the same algebra in Warp's vectors, on one thread."""
     monkeypatch.setattr(os, "process_cpu_count", lambda: 1)
     simulation = Simulation(strands(1000), damping_time=0.0)
     simulation.advance(3)
@@ -153,7 +153,7 @@ def test_lanes_beside_warps_vectors(monkeypatch):
 
 @pytest.mark.long
 def test_touching_costs_little():
-    """The solve of strands that lie on a ball, beside the same strands that have no planes."""
+    """Solving strands that lie on a ball takes little longer than solving the same strands without contact planes."""
     rng = np.random.default_rng(0)
     out = rng.normal(size=(1024, 1, 3))
     out[..., 2] = abs(out[..., 2]) + 0.2
@@ -181,7 +181,7 @@ def test_touching_costs_little():
 
 
 def finer(mesh):
-    """A mesh whose triangles are split in four."""
+    """Return a mesh whose triangles are split in four."""
     corners = mesh.vertices[mesh.triangles]
     middles = (corners + np.roll(corners, -1, axis=1)) / 2.0
     (a, b, c), (ab, bc, ca) = np.moveaxis(corners, 1, 0), np.moveaxis(middles, 1, 0)
@@ -203,12 +203,12 @@ class LyingOnHead:
         self.simulation = simulation.Simulation(guides, settings, self.pose, self.world(shake(0)))
 
     def world(self, motion):
-        """The world where the head has moved."""
+        """Return the world at the head's position."""
         head = simulation.Obstacle("Head", self.head.vertices.astype(np.float64), self.head.triangles)
         return simulation.World(obstacles=(head.moved(motion),) if self.is_colliding else ())
 
     def advance(self):
-        """The next frame."""
+        """Simulate the next frame."""
         self.frame += 1
         motion = shake(self.frame if self.is_shaken else 0)
         self.simulation.advance(self.pose.moved(motion), self.world(motion), FRAME)
@@ -216,7 +216,7 @@ class LyingOnHead:
 
 @pytest.mark.long
 def test_four_thousand_guides_that_lie_on_a_head():
-    """A dozen points of each strand touch: what that costs is printed, beside the same strands that meet nothing."""
+    """The cost of contact is printed for guides of which a dozen points each touch the head."""
     head = finer(read_obj(HEAD))
     ways = {"free": (False, True), "still": (True, False), "shaken": (True, True)}
     ways = {name: LyingOnHead(head, *way) for name, way in ways.items()}
@@ -247,12 +247,12 @@ class OnHead:
         self.simulation = simulation.Simulation(groom, settings, self.pose, self.world(still))
 
     def world(self, motion):
-        """The world where the head has moved."""
+        """Return the world at the head's position."""
         head = simulation.Obstacle("Head", self.head.vertices.astype(np.float64), self.head.triangles)
         return simulation.World(obstacles=(head.moved(motion),) if self.is_colliding else ())
 
     def advance(self):
-        """The next frame."""
+        """Simulate the next frame."""
         self.frame += 1
         angle = 0.5 * np.sin(2.0 * np.pi * 1.5 * FRAME * self.frame) if self.is_turning else 0.0
         turn = np.array([0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)])
@@ -262,7 +262,7 @@ class OnHead:
 
 @pytest.mark.long
 def test_four_thousand_guides_on_a_head():
-    """Upright guides that swing on 34,000 triangles, beside the same guides that meet nothing."""
+    """The cost of contact is printed for upright guides that swing on 34,000 triangles."""
     head = finer(read_obj(HEAD))
     ways = {"free": OnHead(head, False, True), "still": OnHead(head, True, False), "turning": OnHead(head, True, True)}
     for _ in range(12):
@@ -275,7 +275,7 @@ def test_four_thousand_guides_on_a_head():
 
 
 class Parts:
-    """Time that functions take, called within a frame."""
+    """The time that chosen functions take within a frame."""
 
     def __init__(self, monkeypatch):
         self._patch = monkeypatch
@@ -294,14 +294,14 @@ class Parts:
 
     @contextlib.contextmanager
     def of(self, name):
-        """Add the time until the end of a block."""
+        """Add the time of a block."""
         clock, work = time.perf_counter(), time.process_time()
         yield
         spent = self.times.setdefault(name, [])
         spent.append(Time(time.perf_counter() - clock, time.process_time() - work))
 
     def medians(self):
-        """{name: `Time`}, medians."""
+        """Return {name: `Time`} of medians."""
         return {
             name: Time(*(float(np.median([getattr(t, kind) for t in spent])) for kind in ("clock", "work")))
             for name, spent in self.times.items()
@@ -310,7 +310,9 @@ class Parts:
 
 @pytest.mark.long
 def test_hair_that_follows_simulated_guides(monkeypatch):
-    """100,000 strands between 1,000 guides on a head that bends: a frame of a window, and its parts, printed."""
+    """100,000 strands between 1,000 guides follow a bending head: the time of a window's frame and its parts is
+    printed.
+    """
     hair_addon.register()
     gpu.init()
     try:
@@ -359,5 +361,5 @@ def _play(monkeypatch):
 
 
 def _stretch(guides):
-    """The largest of all simulated segments."""
+    """Return the largest stretch of all simulated segments."""
     return abs(simulated_hair.played_cache.get(guides.session_uid).simulated.simulation.stretch()).max()

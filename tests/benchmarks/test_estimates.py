@@ -22,7 +22,7 @@ FACTOR = 3.0  # that a ratio between two sizes may be off by
 
 
 def hills(side_count):
-    """An open square of hills, 2 side_count² triangles."""
+    """Return an open square of hills with 2 side_count² triangles."""
     flat = flat_grid(side_count)
     vertices = flat.vertices.copy()
     vertices[:, 2] = 0.1 * np.sin(7.0 * vertices[:, 0]) * np.cos(5.0 * vertices[:, 1])
@@ -30,7 +30,7 @@ def hills(side_count):
 
 
 def seconds(work, repetitions=2):
-    """The best time of several."""
+    """Return the best time of several runs."""
     times = []
     for _ in range(repetitions):
         start = time.perf_counter()
@@ -45,7 +45,10 @@ def place(mesh, settings):
 
 
 def assert_proportional(cases):
-    """cases: {what: (measured, estimated)}; the quotients of any two differ by at most the factor."""
+    """Assert that the quotients of measured and estimated values differ by at most the factor.
+
+    cases: {what: (measured, estimated)}.
+    """
     quotients = {what: measured / estimated for what, (measured, estimated) in cases.items()}
     for what, quotient in quotients.items():
         print(f"{what}: {cases[what][0]:.3f} s, {quotient:.2f} of the estimate")
@@ -92,7 +95,7 @@ print(json.dumps({"seconds": [placed - start, time.perf_counter() - placed], "by
 
 
 def worked(*counts):
-    """What placing and growing took: side_count, guide_count, strand_count → seconds, bytes and counts."""
+    """Return the measured seconds, bytes and counts of placing and growing; counts: of side, guides and strands."""
     command = [sys.executable, "-W", "ignore", "-c", WORK, *map(str, counts)]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).parents[2])
     return json.loads(done.stdout.splitlines()[-1])
@@ -122,7 +125,7 @@ def test_memory_equals_the_estimate(counts):
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="no measure of a process's most memory")
 def test_two_million_triangles():
-    """1,000 guides and 100,000 strands."""
+    """The estimates hold for 1,000 guides and 100,000 strands on two million triangles."""
     assert_memory_is_as_said(1000, 1000, 100_000)
 
 
@@ -144,7 +147,9 @@ def test_growth_takes_the_estimated_time():
 
 @pytest.mark.long
 def test_time_goes_with_the_number_of_guides():
-    """Ten times as many take no more than thirty times as long; looking at all pairs took a hundred."""
+    """Ten times as many guides take at most thirty times as long; comparing all pairs would take a hundred times as
+    long.
+    """
     mesh = hills(30)
     few, many = (GuideSettings(guide_count=count, relax_iterations=1) for count in (6000, 60_000))
     assert seconds(lambda: place(mesh, many), 1) < 30.0 * seconds(lambda: place(mesh, few))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What combing repeats, 41 points a strand: `follow_guides` beside filling as much memory, on every device."""
+"""Times of `follow_guides`, which runs in each step of combing, compared with filling as much memory, on every device."""
 
 import time
 
@@ -16,7 +16,7 @@ def devices():
 
 
 def median_time(work, device, repetitions=9):
-    """Median time [s] of one call, including the device's work, after a first call that compiles."""
+    """Return the median time [s] of a call with the device's work, after a first call that compiles."""
     times = []
     for _ in range(repetitions + 1):
         wp.synchronize_device(device)
@@ -31,7 +31,7 @@ def median_time(work, device, repetitions=9):
 @pytest.mark.parametrize("strand_count", [30_000, 100_000, 1_000_000])
 @pytest.mark.parametrize("device", devices())
 def test_follow_guides(strand_count, device):
-    """Printed: times. Asserted: on a GPU, following guides takes less than twice as long as filling the same memory."""
+    """On a GPU, following guides takes less than twice as long as filling the same memory; all times are printed."""
     head = read_obj(HEAD)
     density = np.clip((head.vertices[:, 2] - 0.755) / 0.01, 0.0, 1.0)
     guides = groom.distribute_guides(head, groom.GuideSettings(), density=density, device=device)

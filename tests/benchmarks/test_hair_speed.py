@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands between 4,000 guides of 41 points: ours beside Blender's own nodes and scipy, in one run.
+"""Times of generating strands between 4,000 guides of 41 points, compared with Blender's nodes and scipy in one run.
 
 Prints tables and a line of JSON for each row: the best time of several, called in turns so that all meet the same
 machine, and the peer's time by ours. Asserted are ratios alone, with room for a machine that has other work: those of
@@ -49,7 +49,7 @@ def told():
 
 @pytest.fixture
 def head_and_guides():
-    """The add-on registered, and the head with its guides."""
+    """Return the sample head and its guides; the add-on is registered."""
     hair_addon.register()
     yield hair_peers.head_with_guides()
     live_hair.cancel_writing()
@@ -74,7 +74,7 @@ class Time:
 
 
 def best_times(calls, repetitions):
-    """{name: `Time`}, the shortest of each, of calls that are made in turns."""
+    """Return {name: `Time`}, the shortest time of each call; calls are made in turns."""
     clock, work = ({name: [] for name in calls} for _ in range(2))
     for _ in range(repetitions):
         for name, call in calls.items():
@@ -86,7 +86,7 @@ def best_times(calls, repetitions):
 
 
 def report(title, count, times, asked, ours="ours"):
-    """Print a table with a line of JSON for each row; {name: `Time` by ours}."""
+    """Print a table with a line of JSON for each row; return {name: ratio of `Time` to that of Vellus}."""
     ratios = {
         name: Time(found.clock / times[ours].clock, found.work / times[ours].work) for name, found in times.items()
     }
@@ -104,7 +104,7 @@ def report(title, count, times, asked, ours="ours"):
 
 
 def natives(head, guides, count, is_with_asset):
-    """{name: `Way`} of Blender's own."""
+    """Return {name: `Way`} of Blender's own methods."""
     ways = {LEAN: LeanGraph.grown(guides, head, count)}
     if is_with_asset:
         ways[AS_ADDED] = Asset.grown(guides, head, count, is_poly=False)
@@ -118,7 +118,9 @@ def natives(head, guides, count, is_with_asset):
 @pytest.mark.long
 @pytest.mark.parametrize("count", [100_000, 300_000, 1_000_000])
 def test_making_strands(head_and_guides, count):
-    """Search, weights, interpolation, the write into Curves and Blender's update, beside Blender's own nodes."""
+    """Generating strands, with search, weights, interpolation, writing and Blender's update, is faster than with
+    Blender's nodes.
+    """
     head, guides = head_and_guides
     ways = natives(head, guides, count, is_with_asset=count < 1_000_000)
     ours = Ours.grown(guides, count)
@@ -143,7 +145,7 @@ def test_making_strands(head_and_guides, count):
 @pytest.mark.long
 @pytest.mark.parametrize("count", [100_000, 300_000])
 def test_editing_guides(head_and_guides, count, monkeypatch):
-    """Guides move where they are rooted: no search. Into Curves, and up to the arrays that the live picture reads."""
+    """Moved guides need no search; times end with the Curves, and with the arrays that the live picture reads."""
     head, guides = head_and_guides
     ways = natives(head, guides, count, is_with_asset=True)
     ours = Ours.grown(guides, count)
@@ -177,7 +179,7 @@ def test_editing_guides(head_and_guides, count, monkeypatch):
 @pytest.mark.long
 @pytest.mark.parametrize("count", [100_000, 1_000_000])
 def test_search(count):
-    """Both find the nine guides nearest to each root and their distances, with two workers each."""
+    """Both searches find the nine guides nearest to each root and their distances, with two workers each."""
     head = read_obj(HEAD)
     guides = groom.distribute_guides(head, groom.GuideSettings(guide_count=hair_peers.GUIDE_COUNT))
     points, queries = positions(head, guides.roots), positions(head, sample_surface(head, count, 1))
@@ -196,7 +198,7 @@ def test_search(count):
 @pytest.mark.long
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="the peak is measured on Linux")
 def test_peak_memory():
-    """Making 300,000 strands: what each way adds to the peak memory of a process of its own."""
+    """Generating 300,000 strands adds less to the peak memory of a process than Blender's methods do."""
     peaks = {}
     for name in ("ours", AS_ADDED, POLY, LEAN):
         kind = {"ours": "ours", AS_ADDED: "asset", POLY: "poly", LEAN: "lean"}[name]

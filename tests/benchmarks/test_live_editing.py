@@ -28,7 +28,7 @@ _COMBED = 8  # guides under a brush
 
 @pytest.fixture
 def head():
-    """The sample head in an empty file, as in a window."""
+    """Return the sample head in an empty file, as in a window."""
     hair_addon.register()
     gpu.init()
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -55,7 +55,7 @@ def points_of(datablock):
 
 
 def comb(guides):
-    """One step of a brush: some guides move, and Blender updates."""
+    """Move some guides as one step of a brush does, and update Blender."""
     combed = points_of(guides)
     near = np.linalg.norm(combed[:, 0] - combed[0, 0], axis=1).argsort()[:_COMBED]
     combed[near, 1:] += np.float32([0.0, 0.0, 1e-3])
@@ -86,7 +86,7 @@ class View:
         return drawn_scene.read(context.scene, context.view_layer, depsgraph, before=before, is_draft=is_draft)
 
     def redraw(self):
-        """Redraw after a change of only the hair."""
+        """Redraw after a change of the hair alone."""
         self.drawn = self._read(self.drawn)
         self.picture.restart()
         self.picture.add_pass(self.drawn, *self.matrices)
@@ -94,7 +94,7 @@ class View:
 
 
 def drawing_place():
-    """(world to view, view to clip) of a camera before the face."""
+    """Return (world to view, view to clip) of a camera before the face."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = (0.0, -1.2, 1.75), (math.pi / 2, 0.0, 0.0)
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))

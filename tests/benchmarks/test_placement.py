@@ -36,7 +36,7 @@ THOROUGH = 10, 30  # Lloyd's and Newton's rounds: twice geogram's usual time
 
 @cache
 def surface(name):
-    """A `TriMesh` of some thousands of triangles."""
+    """Return a `TriMesh` of some thousands of triangles."""
     if name in BODIES:
         return body(name)
     if name == "sphere":
@@ -45,7 +45,7 @@ def surface(name):
 
 
 def suzanne():
-    """Blender's monkey, subdivided twice: three islands, thin ears, borders."""
+    """Return Blender's monkey, subdivided twice: three islands, thin ears, borders."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_monkey_add()
     bpy.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 2
@@ -59,7 +59,7 @@ def suzanne():
 
 
 def ours(mesh, count):
-    """What the add-on does, with its settings as they come."""
+    """Place sites as the add-on does with its default settings."""
     fresh = TriMesh(mesh.vertices, mesh.triangles)  # nothing is known of it from the last run
     return positions(fresh, cvt.place(fresh, count, 1, GuideSettings().relax_iterations, device=DEVICE))
 
@@ -69,7 +69,7 @@ def random(mesh, count):
 
 
 def geogram(mesh, count):
-    """Restricted Lloyd and Newton, ten rounds of each, as it comes."""
+    """Place sites by ten rounds of restricted Lloyd and ten of Newton, geogram's defaults."""
     import point_cloud_utils
 
     return point_cloud_utils.sample_mesh_lloyd(mesh.vertices.astype(np.float64), mesh.triangles, count)
@@ -82,13 +82,13 @@ def geogram_thorough(mesh, count):
 
 
 def ours_thorough(mesh, count):
-    """With twice the rounds that the add-on's settings come with."""
+    """Place sites with twice the add-on's default number of rounds."""
     fresh = TriMesh(mesh.vertices, mesh.triangles)
     return positions(fresh, cvt.place(fresh, count, 1, 2 * GuideSettings().relax_iterations, device=DEVICE))
 
 
 def pyacvd(mesh, count):
-    """Clusters of vertices, on a mesh that is subdivided until each has ten."""
+    """Cluster vertices of a mesh that is subdivided until each cluster has ten."""
     import pyacvd
     import pyvista
 
@@ -131,7 +131,7 @@ def _distributed(placed, distance):
 
 
 def poisson(mesh, count):
-    """Blender's node, its distance found beforehand so that about `count` points come."""
+    """Place sites by Blender's node with a distance, found beforehand, that gives about `count` points."""
     placed = _poisson_object(mesh)
     low, high = 0.3 * np.sqrt(mesh.areas.sum() / count), 1.2 * np.sqrt(mesh.areas.sum() / count)
     for _ in range(12):

@@ -30,7 +30,7 @@ def hair():
 
 
 def styling_calls(hair, stacks):
-    """Return {name: function} that styles existing points; "copy" copies them."""
+    """Return {name: function} that styles existing points; "copy" copies the points."""
     plain = following.follow_guides(hair.binding, hair.guides).points
     points = wp.clone(plain)
     calls = {"copy": lambda: wp.copy(points, plain)}
@@ -44,7 +44,7 @@ def styling_calls(hair, stacks):
 
 @pytest.mark.long
 def test_each_style_beside_copying(hair):
-    """The reference is a read and a write of all points: a style that trims nothing."""
+    """Each style is compared with a style that trims nothing, which reads and writes all points."""
     stacks = {kind: (kinds.KINDS[kind](),) for kind in ON_STRANDS} | {"CLUMP": THREE[:1], "Clump, Curl, Frizz": THREE}
     stacks |= {"two levels of Clump": (clump.Settings(levels=2),)}
     times = best_times(styling_calls(hair, stacks), 7)
@@ -55,7 +55,7 @@ def test_each_style_beside_copying(hair):
 
 @pytest.mark.long
 def test_styles_beside_blender(hair):
-    """Blender's assets on poly lines; the time of an update without them is subtracted."""
+    """Styles are compared with Blender's assets on poly lines; the time of an update without the assets is subtracted."""
     hair_addon.register()
     _surface, guides = hair_peers.head_with_guides()
     strands = hair_peers.Ours.grown(guides, STRAND_COUNT).hair
@@ -83,7 +83,7 @@ def test_styles_beside_blender(hair):
 
 
 def add_modifier(strands, asset, inputs):
-    """One of Blender's hair assets as a modifier of a Curves object."""
+    """Add one of Blender's hair assets as a modifier of a Curves object."""
     if asset not in bpy.data.node_groups:
         folder = bpy.utils.system_resource("DATAFILES", path="assets/nodes")
         with bpy.data.libraries.load(folder + hair_peers.NODE_ASSETS, link=False) as (_there, here):

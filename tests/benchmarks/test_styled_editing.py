@@ -28,7 +28,7 @@ THREE = (clump.Settings(levels=1, size=SIZE), curl.Settings(), frizz.Settings())
 
 @pytest.fixture
 def hair(monkeypatch):
-    """Hair of 100,000 strands between 4,000 guides, as in a window."""
+    """Return hair of 100,000 strands between 4,000 guides, as in a window."""
     hair_addon.register()
     _surface, guides = hair_peers.head_with_guides()
     way = hair_peers.Ours.grown(guides, STRAND_COUNT)
@@ -46,7 +46,7 @@ def slide(hair, place, name, values):
 
 
 def made(hair, change):
-    """Make a change and wait for the strands, which are computed in other threads."""
+    """Make a change and wait for the strands, which other threads compute."""
     change()
     return bindings.of(hair).points
 

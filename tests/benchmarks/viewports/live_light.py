@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light Grid in a viewport on the sample head: time to the first and to the last light, the time of frames while light
-is followed beside that of frames without, in pairs, and the difference to a render's light.
+"""Light Grid in a viewport on the sample head: times of its light and of frames, and the difference to a render's
+light.
 
 .venv/bin/python tests/benchmarks/viewports/live_light.py --strands 100000 --device cuda
 
@@ -39,12 +39,12 @@ _started = time.perf_counter()
 
 
 def say(text):
-    """Print a line with the time since the start [s], at once."""
+    """Print a line with the time since the start [s] immediately."""
     print(f"{time.perf_counter() - _started:7.1f} s  {text}", flush=True)
 
 
 class View:
-    """A viewport's picture of the scene, from its camera or turned from there."""
+    """A viewport's picture of the scene, from its camera or a rotated one."""
 
     def __init__(self, size, per_side):
         self.size, self.per_side = size, per_side
@@ -62,7 +62,7 @@ class View:
         return self.camera[0] @ turn, self.camera[1]
 
     def draw(self, camera, is_followed=True):
-        """Redraw, and wait until that is done; returns the lit scene and the time [s]."""
+        """Redraw and wait for the end; returns the lit scene and the time [s]."""
         started = time.perf_counter()
         found = self.live.lit(self.drawn, camera, self.count, time.monotonic(), is_followed)
         self._picture.restart(is_moved=True)
@@ -71,7 +71,7 @@ class View:
         return found, time.perf_counter() - started
 
     def picture(self, drawn):
-        """(H, W, 3) light of all passes."""
+        """Return (H, W, 3) light of all passes."""
         picture = hair_picture.HairPicture(self.size, self.per_side)
         while not picture.is_fine:
             picture.add_pass(drawn, *self.camera)
