@@ -330,7 +330,9 @@ def test_placing_locks_tells_how_far_it_is_and_leaves_nothing_where_it_is_stoppe
 
 
 def test_new_hair_with_locks_tells_of_them_among_its_stages(sphere):
-    """New hair whose styles have locks reports placing them among its stages, which `groom` shows on the command line."""
+    """New hair whose styles have locks reports placing them among its stages, which `groom` shows on the command
+    line.
+    """
     settings = api.GroomSettings(
         api.GuideSettings(guide_count=20), api.HairSettings(strand_count=100), styles=(api.Clump(size=0.1),)
     )

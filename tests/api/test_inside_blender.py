@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""API functions that are called in a driver or during a render, where Blender forbids changes, raise one message each."""
+"""API functions that are called in a driver or during a render, where Blender forbids changes, raise one message
+each.
+"""
 
 import bpy
 import pytest
@@ -56,7 +58,9 @@ def test_a_handler_of_a_render_that_draws_hears_that_blender_has_the_graphics(ha
 
 @pytest.mark.parametrize("digits", [4299, 4301, 5000])
 def test_a_key_with_an_index_of_any_length_is_of_no_style(digits):
-    """A key with an index of any number of digits is no key of a style, as Python refuses to parse very long numbers."""
+    """A key with an index of any number of digits is no key of a style, as Python refuses to parse very long
+    numbers.
+    """
     moved = Rearrangement(["Clump", "Curl"], [1, 0], ["Curl", "Clump"])
     path = f"vellus.styles[{'9' * digits}].curl.radius"
     assert moved.path(path) == moved.path_of_target(path) == path

@@ -104,7 +104,9 @@ class MovingLight(Movement):
 
 
 class FastLight(MovingLight):
-    """The key light moves around the head by ten degrees per frame, so that it lights from behind within a few frames."""
+    """The key light moves around the head by ten degrees per frame, so that it lights from behind within a few
+    frames.
+    """
 
     def step(self, frame):
         super().step(5 * frame)

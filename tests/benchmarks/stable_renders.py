@@ -30,7 +30,9 @@ BLOCK = 12  # pixels along each side
 
 
 def levels(picture):
-    """Convert premultiplied light (H, W, 4) to display values (H, W, 3) of the scene's view transform, from 0 to 255."""
+    """Convert premultiplied light (H, W, 4) to display values (H, W, 3) of the scene's view transform, from 0 to
+    255.
+    """
     transform = display_transform.DisplayTransform.of(bpy.context.scene)
     shown = display_transform.apply(transform, np.ascontiguousarray(picture[..., :3], np.float32).reshape(-1, 3))
     return 255.0 * np.clip(shown, 0.0, 1.0).reshape(*picture.shape[:2], 3)

@@ -132,7 +132,9 @@ def test_four_thousand_strands(monkeypatch):
 
 @pytest.mark.long
 def test_lanes_beside_warps_vectors(monkeypatch):
-    """A whole substep in lanes is compared with one Newton step by the same algebra in Warp's vectors, on one thread."""
+    """A whole substep in lanes is compared with one Newton step by the same algebra in Warp's vectors, on one
+    thread.
+    """
     monkeypatch.setattr(os, "process_cpu_count", lambda: 1)
     simulation = Simulation(strands(1000), damping_time=0.0)
     simulation.advance(3)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Times of `follow_guides`, which runs in each step of combing, compared with filling as much memory, on every device."""
+"""Times of `follow_guides`, which runs in each step of combing, compared with filling as much memory, on every
+device.
+"""
 
 import time
 

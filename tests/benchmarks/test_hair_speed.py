@@ -118,7 +118,7 @@ def natives(head, guides, count, is_with_asset):
 @pytest.mark.long
 @pytest.mark.parametrize("count", [100_000, 300_000, 1_000_000])
 def test_making_strands(head_and_guides, count):
-    """Generating strands, with search, weights, interpolation, writing and Blender's update, is faster than with
+    """Generating strands, with search, weights, interpolation, writing and Blender's update, is compared with
     Blender's nodes.
     """
     head, guides = head_and_guides

@@ -55,7 +55,9 @@ def test_each_style_beside_copying(hair):
 
 @pytest.mark.long
 def test_styles_beside_blender(hair):
-    """Styles are compared with Blender's assets on poly lines; the time of an update without the assets is subtracted."""
+    """Styles are compared with Blender's assets on poly lines; the time of an update without the assets is
+    subtracted.
+    """
     hair_addon.register()
     _surface, guides = hair_peers.head_with_guides()
     strands = hair_peers.Ours.grown(guides, STRAND_COUNT).hair

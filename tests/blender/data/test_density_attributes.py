@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Density by attributes of the surface: as by a vertex group of the same values, on any domain, followed live."""
+"""An attribute of the surface sets density as a vertex group of the same values does, on any domain, and hair follows
+it.
+"""
 
 import bpy
 import numpy as np
@@ -14,7 +16,7 @@ def group_weights(sphere):
 
 
 def add(sphere, data_type, domain, values):
-    """An attribute "density" of numbers, or of gray colors."""
+    """Add an attribute "density" of numbers or of gray colors."""
     attribute = sphere.data.attributes.new("density", data_type, domain)
     if data_type.endswith("COLOR"):
         values = np.repeat(values[:, None], 4, axis=1)
@@ -33,7 +35,7 @@ def roots_with(mask):
 
 @pytest.mark.parametrize("data_type", ["FLOAT", "FLOAT_COLOR"])
 def test_an_attribute_of_vertices_is_a_vertex_group(sphere, data_type):
-    """Roots by an attribute are those by a vertex group of the same weights, bit for bit."""
+    """An attribute of vertices gives the same roots, bit for bit, as a vertex group with the same weights."""
     add(sphere, data_type, "POINT", group_weights(sphere))
     _hair, by_group = roots_with("top")
     bpy.context.view_layer.objects.active = sphere
@@ -43,7 +45,7 @@ def test_an_attribute_of_vertices_is_a_vertex_group(sphere, data_type):
 
 @pytest.mark.parametrize("domain", ["EDGE", "FACE", "CORNER"])
 def test_values_of_other_domains_are_means_around_vertices(sphere, domain):
-    """Values of one on all elements are one at each vertex.
+    """A value of one on all elements of a domain is one at each vertex.
 
     Ones on half of the sphere leave zeros on the other half, except for a ring.
     """
@@ -70,7 +72,7 @@ def test_values_of_other_domains_are_means_around_vertices(sphere, domain):
 
 
 def test_missing_and_unusable_attributes_are_refused_and_bad_values_count_as_zero(sphere):
-    """A name that is neither is refused with a sentence; vectors too; non-finite and negative values grow nothing."""
+    """Missing names and vector attributes are refused with a sentence; non-finite and negative values count as zero."""
     for name in ("nope", "position"):
         with pytest.raises(RuntimeError, match=name):
             bpy.ops.vellus.add_hair(guide_count=12, strand_count=200, density_group=name)

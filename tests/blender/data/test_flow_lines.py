@@ -13,14 +13,14 @@ from tests.support.reading import points, write_points
 
 @pytest.fixture
 def plane(scene):
-    """A square of two meters, facing up; active."""
+    """Return a square of two meters that faces up; it is active."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=10, y_subdivisions=10, size=2.0)
     bpy.context.object.name = "Plane"
     return bpy.context.object
 
 
 def spline(kind):
-    """A curve object "Flow" from (-1, 0) to (1, 0) of a kind."""
+    """Return a curve object "Flow" from (-1, 0) to (1, 0) of a spline type."""
     places = np.array([(-1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], np.float32)
     if kind == "CURVES":
         data = bpy.data.hair_curves.new("Flow")
@@ -173,7 +173,9 @@ def test_lines_of_a_surface_move_with_it_and_guides_stay(plane, place):
 
 
 def test_guides_follow_lines_under_which_their_surface_turns(plane):
-    """The lines are no child of the surface; the result is that of turning the lines the other way."""
+    """Turning the surface under lines that are not its children gives the same guides as turning the lines the other
+    way.
+    """
     drawn = spline("POLY")
     guides = grow(flow_lines="Flow")
     plane.rotation_euler.z = -np.pi / 2
@@ -186,7 +188,7 @@ def test_guides_follow_lines_under_which_their_surface_turns(plane):
 
 
 def test_lines_are_drawn_on_the_surface_as_modifiers_leave_it(plane):
-    """A modifier lifts the plane by two meters, and guides follow a line drawn on the lifted plane."""
+    """Guides follow a line drawn on a plane that a modifier has lifted by two meters."""
     drawn = spline("POLY")
     drawn.location.z = 2.0
     modifier = plane.modifiers.new("Up", "DISPLACE")

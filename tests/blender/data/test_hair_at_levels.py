@@ -19,7 +19,9 @@ RENDERED = (1, 2, 3)
 
 
 def make_surface():
-    """A mesh of bent quads, triangles and hexagons that a modifier subdivides, with UVs, masks and a shape key."""
+    """Return a mesh of bent quads, triangles and hexagons that a modifier subdivides, with UVs, masks and a shape
+    key.
+    """
     bpy.ops.mesh.primitive_cube_add()
     cube = bpy.context.object
     edited = bmesh.new()
@@ -54,7 +56,7 @@ def show(levels):
 
 
 def make_hair(levels):
-    """New hair with styles, a mask and a region, while viewports show a level."""
+    """Return new hair with styles, a mask and a region, generated while viewports show a level."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     surface = make_surface()
     show(levels)
@@ -66,7 +68,7 @@ def make_hair(levels):
 
 
 def rendered(render, at_levels):
-    """{level: strands} of renders; their roots are on the surface."""
+    """Return {level: strands} of renders, and check that their roots are on the surface."""
     found = {}
     for levels in at_levels:
         bpy.data.objects["Cube"].modifiers["Subdivision"].render_levels = levels
@@ -101,9 +103,7 @@ def render(scene):
 
 
 def test_hair_is_the_same_whatever_viewports_show(render, tmp_path):
-    """New hair is the same at all levels, and so is hair whose count or surface was changed at another level after
-    opening the file.
-    """
+    """New hair is the same at all viewport levels, and so is hair whose count or surface changes at another level."""
     path, first = str(tmp_path / "hair.blend"), {}
 
     def change(how):
@@ -134,7 +134,7 @@ def test_hair_is_the_same_whatever_viewports_show(render, tmp_path):
 
 
 def test_cages_are_the_same_at_every_level(scene):
-    """Cages have the same bits, also if Mirror makes them or their faces are turned."""
+    """Cages have the same bits at every level, also behind a Mirror modifier and with flipped faces."""
     surface = make_surface()
     surface.add_rest_position_attribute = True
     for mirrors in (False, True):
@@ -158,7 +158,9 @@ def test_cages_are_the_same_at_every_level(scene):
 
 
 def test_guides_begin_on_the_surface_wherever_they_are_simulated_or_attached(scene):
-    """Roots are on the subdivided surface, not on the bent faces of the cage on which they were placed."""
+    """Simulated and attached guides have their roots on the subdivided surface, not on the cage on which they were
+    placed.
+    """
     make_hair(2)
     guides, surface = bpy.data.objects["Guides"], bpy.data.objects["Cube"]
     pose = guide_poses.read(guides.data, bpy.context.evaluated_depsgraph_get(), 1.0)

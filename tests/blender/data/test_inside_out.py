@@ -47,7 +47,9 @@ def is_mesh_closed(mesh):
 @pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (-0.01, -0.02, -0.03)])
 @pytest.mark.parametrize("kind", MESHES)
 def test_only_closed_meshes_with_normals_inward_are_inside_out(blender_scene, kind, scale):
-    """A mirrored object is inside out only if its mesh is, as hair grows out of it like out of an unmirrored object."""
+    """A mirrored object is inside out only if its mesh is, because its hair grows outward like that of an unmirrored
+    object.
+    """
     made = MESHES[kind]()
     made.scale = scale
     bpy.context.view_layer.update()

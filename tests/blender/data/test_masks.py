@@ -17,14 +17,14 @@ LOWEST = -0.2  # of roots in the group `top`: a ring of faces below its border, 
 
 @pytest.fixture
 def masked(sphere):
-    """40 guides on the upper half of the sphere and 300 strands between them: (guides, hair)."""
+    """Return (guides, hair): 40 guides on the upper half of the sphere and 300 strands between them."""
     bpy.ops.vellus.add_hair(guide_count=40, strand_count=300, density_group="top")
     return bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"]
 
 
 @pytest.fixture
 def image(sphere):
-    """An image that is white in a part of the sphere's UV map: U from an eighth to a half."""
+    """Return an image that is white in a part of the sphere's UV map: U from an eighth to a half."""
     image = bpy.data.images.new("Mask", 32, 32, float_buffer=True)
     pixels = np.zeros((32, 32, 4), np.float32)
     pixels[:, 4:16] = 1.0
@@ -40,7 +40,7 @@ def lowest(curves_object):
 
 
 def add_group(name, chosen):
-    """A vertex group of the sphere with the vertices that chosen(positions) marks."""
+    """Add a vertex group of the vertices of the sphere that chosen(positions) marks."""
     sphere = bpy.data.objects["Sphere"]
     group = sphere.vertex_groups.new(name=name)
     group.add([int(i) for i in np.flatnonzero(chosen(vertex_positions(sphere)))], 1.0, "REPLACE")
@@ -170,7 +170,7 @@ def test_a_missing_mask_is_reported_and_hair_is_kept(masked):
 
 
 def root_u(hair):
-    """(S,) where roots are along the width of the UV map."""
+    """Return (S,) positions of roots along the width of the UV map."""
     uvs = np.empty((len(hair.data.curves), 2), np.float32)
     hair.data.attributes["surface_uv_coordinate"].data.foreach_get("vector", uvs.ravel())
     return uvs[:, 0]
@@ -242,7 +242,7 @@ def test_hand_made_guides_take_the_image_of_their_strands(imported, image):
 
 
 def test_keys_of_roots_tell_settings_from_what_is_painted():
-    """Keys of files without an image do not change."""
+    """The key of roots changes when the image that masks them is painted, and is unchanged without an image."""
     settings = groom.HairSettings(strand_count=7)
     placing = repr([1, None, None, None, None, None, 7])
     assert staleness.root_key(settings, None) == "".join(

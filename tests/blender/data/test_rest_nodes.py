@@ -16,7 +16,7 @@ from tests.support.reading import evaluated_points, points, write_points
 
 @pytest.fixture
 def half(scene):
-    """Half of a ball of 2 m, at positive x."""
+    """Return half of a ball of 2 m, at positive x."""
     bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8)
     ball = bpy.context.object
     cut = bmesh.new()
@@ -158,7 +158,9 @@ def test_copies_of_deformed_faces_are_named(half):
 
 @pytest.mark.parametrize("copying", [mirror, solidify])
 def test_hair_grows_on_the_copies_of_an_added_modifier_immediately(copying, half):
-    """The result equals new hair on the mesh with the modifier; undo restores the hair. No other update is needed."""
+    """Hair regenerated on an added modifier's copies equals new hair on the mesh with the modifier, without another
+    update.
+    """
     bpy.ops.ed.undo_push(message="before")
     grow_upright(half)
     bpy.ops.ed.undo_push(message="grown")

@@ -13,7 +13,7 @@ LACKING = 'Modifiers of "Shown" create faces without rest positions: hair does n
 
 
 def shown(build):
-    """A mesh object named `Shown`, whose geometry nodes `build(nodes, links)` gives the output socket of."""
+    """Return a mesh object `Shown` whose geometry nodes output the socket that `build(nodes, links)` returns."""
     bpy.ops.mesh.primitive_plane_add()
     surface = bpy.context.object
     surface.name = "Shown"
@@ -30,7 +30,7 @@ def shown(build):
 
 @pytest.fixture
 def source(scene):
-    """A ball that a modifier twists, not yet."""
+    """Return a ball with a modifier that twists it, switched off."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
     ball = bpy.context.object
     ball.name = "Source"

@@ -16,7 +16,7 @@ from tests.support.reading import evaluated_points, points, vertex_positions, wr
 
 @pytest.fixture
 def cube(scene):
-    """A cube of 2 m, subdivided twice by a modifier, as an example of a strongly bent cage."""
+    """Return a cube of 2 m, subdivided twice by a modifier, as an example of a strongly bent cage."""
     bpy.ops.mesh.primitive_cube_add()
     subdivision = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
     subdivision.levels, subdivision.render_levels = 2, 3
@@ -25,7 +25,7 @@ def cube(scene):
 
 
 def grow_straight(surface):
-    """Guides and hair that all have the same direction at rest."""
+    """Return guides and hair that all have the same direction at rest."""
     guides, hair = grow(surface, guide_count=80, strand_count=400, gravity=0.0, tilt=0.0, length_variation=0.0)
     combed = points(guides)
     write_points(guides, combed[:, :1] + np.linspace(0.0, 0.3, combed.shape[1])[:, None] * np.float32([0.6, 0.0, 0.8]))
@@ -33,7 +33,7 @@ def grow_straight(surface):
 
 
 def turns(before, after):
-    """(S,) angles [rad] by which strands turned, from root to tip."""
+    """Return (S,) angles [rad] by which strands turned, from root to tip."""
     arms = [np.diff(p[:, [0, -1]], axis=1)[:, 0] for p in (before, after)]
     units = [arm / np.linalg.norm(arm, axis=1, keepdims=True) for arm in arms]
     return np.arccos(np.clip((units[0] * units[1]).sum(axis=1), -1.0, 1.0))
@@ -87,7 +87,9 @@ def test_a_rigid_motion_of_the_cage_moves_hair_rigidly(cube):
 
 
 def test_a_finer_subdivision_turns_no_strands_either(cube):
-    """As in renders, hair stays rooted on the viewport's mesh. The smooth estimates of a cube differ between levels."""
+    """As in renders, hair stays rooted on the viewport's mesh, although estimates of the smooth surface differ by
+    level.
+    """
     guides, hair = grow_straight(cube)
     guides.data.vellus.is_live = hair.data.vellus.is_live = False
     before = evaluated_points(hair)
@@ -121,13 +123,13 @@ def set_eye(surface, levels):
 
 @pytest.fixture
 def rendered(cube):
-    """A function that renders, and returns the strands and the largest distance of a root from the surface."""
+    """Return a function that renders, and returns the strands and the largest distance of a root from the surface."""
     with render_probe.probing() as render:
         yield lambda: render("Hair", cube.name)
 
 
 def bulge(cube):
-    """Bend the cage's faces and deform them, so that levels differ in where they are."""
+    """Bend the cage's faces and deform them, so that levels have different positions."""
     for vertex in cube.data.vertices[:3]:
         vertex.co *= 1.3
     cube.shape_key_add(name="Basis")

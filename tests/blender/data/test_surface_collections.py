@@ -27,7 +27,7 @@ def test_what_is_new_is_seen_beside_its_surface(sphere, way):
 
 
 def test_hair_stays_in_the_only_collection_of_its_surface(sphere):
-    """A hidden collection is found too."""
+    """Hair is in the only collection of its surface, also if that collection is hidden."""
     listed = bpy.data.collections.new("Heads")
     bpy.context.scene.collection.children.link(listed)
     listed.objects.link(sphere)
@@ -39,7 +39,7 @@ def test_hair_stays_in_the_only_collection_of_its_surface(sphere):
 
 
 def test_cards_are_made_beside_a_surface_that_the_view_layer_lacks(hair):
-    """All their levels, which are not hidden there."""
+    """All levels of cards are created beside a surface that is not in the view layer, and none is hidden there."""
     sphere = bpy.data.objects["Sphere"]
     kept = bpy.data.collections.new("Heads")
     bpy.context.scene.collection.children.link(kept)
@@ -52,8 +52,8 @@ def test_cards_are_made_beside_a_surface_that_the_view_layer_lacks(hair):
 
 
 def test_what_is_new_on_an_overridden_character_is_in_the_scene(hair, tmp_path):
-    """New objects are linked to the scene, as Blender links no object to an overridden collection, and the surface's
-    other collection is hidden.
+    """New objects on an overridden character are linked to the scene, because Blender links none to overridden
+    collections.
     """
     character = override(hair, tmp_path)
     present, overridden = set(bpy.data.objects), set(character.objects)

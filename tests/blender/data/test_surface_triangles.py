@@ -13,7 +13,7 @@ SQUARE = [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)
 
 @pytest.fixture
 def concave(scene):
-    """(quad that a shape key makes concave, its evaluated mesh, its `Surface` without the key)."""
+    """Return (a quad that a shape key makes concave, its evaluated mesh, its `Surface` without the key)."""
     mesh = bpy.data.meshes.new("Quad")
     mesh.from_pydata(SQUARE, [], [(0, 1, 2, 3)])
     surface = bpy.data.objects.new("Quad", mesh)

@@ -13,7 +13,7 @@ from hair_addon.blender.render import hair_cache
 
 @pytest.fixture
 def ball(scene):  # an empty one
-    """A sphere of quads with a UV map, rest positions, a shape key and two materials."""
+    """Return a sphere of quads with a UV map, rest positions, a shape key and two materials."""
     bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=8)
     made = bpy.context.object
     made.add_rest_position_attribute = True
@@ -82,7 +82,7 @@ def paint_faces(ball):
 
 
 def cut_otherwise(ball):
-    """The same numbers of polygons and corners: two triangles become a quad, and a quad two triangles."""
+    """Turn two triangles into a quad and a quad into two triangles, which keeps the numbers of polygons and corners."""
     edited = bmesh.new()
     edited.from_mesh(ball.data)
     shared = next(e for e in edited.edges if [len(face.verts) for face in e.link_faces] == [3, 3])
@@ -119,7 +119,7 @@ def test_surfaces_are_as_if_read_for_the_first_time(ball):
 
 
 def test_meshes_that_move_are_drawn_as_if_read_for_the_first_time(ball):
-    """Except for the diagonals of quads: each polygon has the same corners and material."""
+    """Moving meshes are drawn as if read for the first time, except for the diagonals of quads."""
     for change in CHANGES:
         drawn_meshes.read_drawn_meshes(depsgraph_of(ball))
         change(ball)
@@ -150,7 +150,9 @@ def test_a_pose_cuts_no_polygons(ball, monkeypatch):
 
 @pytest.mark.parametrize("is_divided", [True, False])
 def test_hair_of_a_file_that_was_saved_in_edit_mode_is_drawn(ball, is_divided, tmp_path):
-    """In Edit Mode the mesh before its modifiers does not list the attributes of its corners and vertices."""
+    """Hair of a file saved in Edit Mode is drawn, although the mesh then lists no attributes of corners and
+    vertices.
+    """
     if is_divided:
         subdivide(ball)
     bpy.ops.vellus.add_hair(guide_count=6, strand_count=20, relax_iterations=2)

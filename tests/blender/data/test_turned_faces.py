@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Former subdivided faces, after Blender flipped those of the cage by applying a mirroring scale."""
+"""Hair keeps its place on subdivided faces when Blender flips the faces of the cage by applying a mirroring scale."""
 
 import bpy
 import numpy as np
@@ -11,7 +11,7 @@ from tests.support.exchange.imported import select
 
 
 def add_mesh(levels):
-    """Faces with three to six corners and no symmetry, which a modifier subdivides."""
+    """Return a mesh of faces with three to six corners and no symmetry, which a modifier subdivides."""
     mesh = bpy.data.meshes.new("Mixed")
     places = [(0, 0, 0), (2, 0, 0.3), (2.2, 1, 0), (0.1, 1.4, 0.2), (3, 0.4, 1), (3.1, 2, 0), (1, 3, 0.5), (-1, 2, 0)]
     faces = [(0, 1, 2, 3), (1, 4, 2), (4, 5, 2), (2, 5, 6, 7, 3), (0, 3, 7)]

@@ -24,7 +24,9 @@ def unit(vectors):
 
 @pytest.fixture
 def fibres(rng):
-    """T, L, V, each (N, 3) float32: random, and L or V across the fiber, along it, almost along it and opposite."""
+    """Return T, L, V, each (N, 3) float32: random, with L or V across, along, nearly along and opposite to the
+    fiber.
+    """
     T, L, V = unit(rng.normal(size=(3, 3000, 3)))
     along = np.array([0.0, 0.0, 1.0])
     special = unit(np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0], [1e-3, 0, 1], [1, 0, 1e-4], [3, 4, 1]]))
@@ -44,7 +46,7 @@ def doubles(vectors):
 
 @pytest.fixture(scope="module")
 def sines():
-    """All pairs of -1 … 1 and of the edge cases."""
+    """Return all pairs of sines between -1 and 1 and of edge cases."""
     values = np.concatenate([np.linspace(-1.0, 1.0, 51), EDGE_COSINES]).astype(np.float32)
     return [grid.ravel() for grid in np.meshgrid(values, values)]
 
@@ -133,7 +135,7 @@ def test_kajiya_kay_albedo_is_the_mean_answer_to_a_uniform_surrounding(exponent,
 
 
 def shading_model(fragment, settings, expression, textures=None, more="", **inputs):
-    """A function of a .frag, or of more GLSL after it, with its settings in a uniform block as when hair is drawn."""
+    """Return a function of a fragment shader or of GLSL that follows it, with its settings in a uniform block."""
     structs = uniforms.VIEW.source + uniforms.settings_block(type(settings)).source
     view = uniforms.VIEW.record()
     blocks = {"view": ("View", view), "settings": ("Settings", uniforms.fill(settings))}
@@ -277,7 +279,7 @@ def texels(table):
 
 @pytest.fixture(scope="module")
 def strip():
-    """The strip of 5 strands of 7 points: (V, 3) integers strand, point, side."""
+    """Return (V, 3) integers strand, point, side of the triangle strip of 5 strands of 7 points."""
     text = glsl.source("strands/strip.glsl") + (
         "vec3 strip(int vertex) { int s, p; float side; strip_vertex(vertex, 7, s, p, side); "
         "return vec3(float(s), float(p), side); }\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Position of a strand's highlight in a picture: on the mirror cone, shifted by the cuticle's tilt."""
+"""The highlight of a strand is on the mirror cone, shifted by the cuticle's tilt."""
 
 import math
 
@@ -22,7 +22,7 @@ STEP = math.radians(0.5)
 
 @pytest.fixture(scope="module")
 def strand():
-    """One straight strand along Z, root below."""
+    """Return a straight strand along Z with its root below."""
     points = np.zeros((1, 9, 3), np.float32)
     points[0, :, 2] = np.linspace(-2.0, 2.0, 9)
     return strand_textures.upload_strands(points, np.full((1, 9), RADIUS, np.float32))
@@ -30,17 +30,17 @@ def strand():
 
 @pytest.fixture(scope="module")
 def no_shadow_maps():
-    """Textures for the samplers of shadow maps, which no light of these tests has."""
+    """Return textures for the samplers of shadow maps, which no light of these tests has."""
     return {name: gpu.types.GPUTexture((1, 1), layers=2, format="R32F") for name in scene_programs.SHADOW_SAMPLERS}
 
 
 def towards(theta, phi=0.0):
-    """Unit vector at an inclination and an azimuth about the strand."""
+    """Return the unit vector at an inclination and an azimuth about the strand."""
     return Vector((math.cos(theta) * math.cos(phi), math.cos(theta) * math.sin(phi), math.sin(theta)))
 
 
 def brightness(strand, shading, shadow_maps, to_light, to_view):
-    """(3,) radiance of the strand under a sun of 1 W/m², in the middle of a picture."""
+    """Return (3,) radiance of the strand under a sun of 1 W/m², in the middle of a picture."""
     lights = uniforms.LIGHTS.record()
     lights["count"] = 1
     lights["light"][0]["axis"][:3] = -to_light
@@ -84,7 +84,9 @@ def test_kajiya_kay_is_brightest_on_the_mirror_cone(strand, no_shadow_maps, thet
 def test_the_first_highlight_of_marschner_is_shifted_towards_the_root_by_twice_the_tilt(
     strand, no_shadow_maps, theta_i, tilt
 ):
-    """M_R peaks where (theta_i + theta_o) / 2 = -tilt; in a black fiber there is no other path [Marschner03]."""
+    """The first highlight peaks where (theta_i + theta_o) / 2 = -tilt; a black fiber has no other path
+    [Marschner03].
+    """
     settings = lookup_tables.Settings(sigma_a=(50.0, 50.0, 50.0), tilt=tilt, beta_r=math.radians(3.0), glint_gain=0.0)
     shading = hair_shading.marschner_shading(lookup_tables.bake(settings))
     # Half a degree of leave: 1 / cos²(theta_d) and Fresnel's factor vary across the lobe, and texels are 0.7° wide.
@@ -93,7 +95,7 @@ def test_the_first_highlight_of_marschner_is_shifted_towards_the_root_by_twice_t
 
 
 def test_marschner_reads_its_tables_as_bright_as_they_are(strand, no_shadow_maps):
-    """The picture from any direction equals the tables' own sampling."""
+    """The picture from any direction has the brightness of the tables."""
     tables = lookup_tables.bake(lookup_tables.Settings())
     shading = hair_shading.marschner_shading(tables)
     for theta_i, theta_o, phi in [(0.3, -0.2, 0.4), (-0.6, 0.5, 2.9), (0.1, 0.3, -1.5), (0.0, 0.0, 0.0)]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Warp kernels as compute programs: what they write is what Warp writes on the processor."""
+"""Warp kernels run as compute programs write the same values as Warp on the processor."""
 
 from dataclasses import replace
 
@@ -45,14 +45,14 @@ class _Given:
 
 @pytest.fixture(autouse=True)
 def on_the_processor():
-    """Arrays are made where the kernels run that they are compared with, on a computer with CUDA too."""
+    """Create the compared arrays on the processor, also on a computer with CUDA."""
     with wp.ScopedDevice("cpu"):
         yield
 
 
 @wp.func
 def _both(given: _Given, index: int, half: float):
-    """Two values, of which one is a struct."""
+    """Hold two values, one of them a struct."""
     pair = _Pair()
     pair.first = given.vectors[index]
     if half > _HALF:
@@ -100,7 +100,7 @@ def _everything(
 
 
 def run_in_warp(kernel, count, given, written):
-    """{array: values} of a kernel on the processor."""
+    """Return {array: values} of a kernel on the processor."""
     found = {name: wp.zeros(count, dtype=kind) for name, kind in written.items()}
     arguments = [(given | found)[argument.label] for argument in kernel.adj.args]
     wp.launch(kernel, dim=count, inputs=arguments, device="cpu")
@@ -159,7 +159,9 @@ def test_rays_hit_the_triangles_that_they_hit_in_warp(rng):
 
 
 def lit_scene(rng, sigma_a):
-    """(grid, surroundings): strands in a box on a glossy floor, by four kinds of lamps and an uneven world."""
+    """Return (grid, surroundings): strands in a box on a glossy floor, lit by four kinds of lamps and an uneven
+    world.
+    """
     grid = grid_of(strands_in_a_box(rng, 300), sigma_a, voxel_count=625)
     near = np.zeros(2, LAMP)
     near["kind"], near["radius"], near["casts_shadow"] = [lamps.POINT, lamps.AREA], [0.1, 0.5], 1
@@ -172,7 +174,9 @@ def lit_scene(rng, sigma_a):
 
 
 def paths_of(grid, light, count):
-    """({parameter: value} of `gather._gather`, number of paths, the mesh, which Warp knows while it is held)."""
+    """Return ({parameter: value} of `gather._gather`, number of paths, the mesh, which Warp knows while it is
+    referenced).
+    """
     seen, mesh = seen_rays.seen_by(grid, light.corners, ALONG_Y, count), media.mesh_of(light.corners)
     medium = media.medium_of(grid, mesh, light.normals, light.albedo, light.gloss)
     starts = start_places.of_seen(medium, seen, start_places.voxels_of(medium, seen.places), count, 0)
@@ -223,7 +227,9 @@ def test_paths_of_light_are_those_of_the_processor(rng):
 
 
 def test_light_of_one_event_is_the_same_to_rounding(rng):
-    """Black hair without surfaces leaves almost no light for further events."""
+    """The light of one scattering event is the same to rounding, on black hair that leaves almost no light for more
+    events.
+    """
     grid, light = lit_scene(rng, (1e4, 1e4, 1e4))
     light = surroundings(lamps=light.lamps)
     given, count, _mesh = paths_of(grid, light, 1000)

@@ -17,7 +17,7 @@ SIZE = 96
 
 
 def seen_from(distance, size=SIZE):
-    """(world to view, view to clip) of a camera along -Y that holds the ball of hair from 3 m."""
+    """Return (world to view, view to clip) of a camera along -Y that sees the whole ball of hair from 3 m."""
     world_to_view = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, -distance], [0, 0, 0, 1.0]])
     return world_to_view, np.array([[2.0, 0, 0, 0], [0, 2.0, 0, 0], [0, 0, -1.002, -0.2002], [0, 0, -1, 0]])
 
@@ -30,7 +30,7 @@ def steps_from(strands, distance, part=1.0, coverage_turn=0.0):
 
 @pytest.fixture
 def many(rng):
-    """50,000 strands of 41 points on a ball, on the GPU."""
+    """Return 50,000 strands of 41 points on a ball, on the GPU."""
     roots = rng.normal(size=(50_000, 1, 3))
     roots /= np.linalg.norm(roots, axis=2, keepdims=True)
     points = (roots * np.linspace(1.0, 1.4, 41)[:, None]).astype(np.float32)
@@ -68,7 +68,7 @@ def drawn_strands(strand_count, steps):
 
 @pytest.mark.parametrize("count", [1, 2, 7, 1000, 32_768, 32_769, 100_003, 1_000_000])
 def test_any_turns_are_spread_over_all_strands(count):
-    """Neighbors in memory are neighbors on the surface, so a subset of strands must be spread over all of them."""
+    """A subset of strands is spread over all of them, although neighbors in memory are neighbors on the surface."""
     drawn = max(count - 1, 1)
     first = count // 3
     found = drawn_strands(count, drawing.Steps(strand_count=drawn, first_strand=first))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's lights in the shaders are as bright as in Cycles, measured on a white wall."""
+"""Blender's lights have the same brightness in the shaders and in Cycles, measured on a white wall."""
 
 import math
 
@@ -22,7 +22,7 @@ ASLANT = Matrix.Translation((-0.5, 0.3, 1.5)) @ Euler((0.5, 0.2, 0.3)).to_matrix
 
 @pytest.fixture
 def wall(scene):
-    """A scene of a white matt wall in the plane z = 0, seen from straight in front by Cycles, without lights."""
+    """Return a scene of a matte white wall in the plane z = 0, seen from the front by Cycles, without lights."""
     mesh = bpy.data.meshes.new("Wall")
     mesh.from_pydata([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [], [(0, 1, 2, 3)])
     material = bpy.data.materials.new("White")
@@ -61,7 +61,7 @@ def add_light(scene, kind, matrix, **settings):
 
 
 def cycles_irradiance(scene, folder):
-    """(SIZE², 3) irradiance of the wall [W/m²], rendered: a white matt wall has the radiance E / pi."""
+    """Return (SIZE², 3) irradiance [W/m²] of the wall by Cycles, from the radiance E / pi of a white matte wall."""
     scene.render.filepath = str(folder / "wall.exr")
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(scene.render.filepath)
@@ -73,7 +73,7 @@ def cycles_irradiance(scene, folder):
 
 
 def shader_irradiance(lights):
-    """(SIZE², 3) irradiance of the wall by the shaders' functions, from a `uniforms.LIGHTS` record."""
+    """Return (SIZE², 3) irradiance of the wall by the shaders' functions, from a `uniforms.LIGHTS` record."""
     middles = (np.arange(SIZE) + 0.5) / SIZE * WALL - 0.5 * WALL
     x, y = (grid.ravel() for grid in np.meshgrid(middles, middles))
     text = glsl.source("light/lights.glsl") + (
@@ -166,8 +166,8 @@ def test_a_disk_lights_by_its_solid_angle(radius):
 
 
 def test_python_has_the_irradiance_of_the_shaders(rng):
-    """Python and the shaders compute the same irradiance for lamps of all kinds around random places, inside and
-    outside their cones and beams.
+    """Python and the shaders compute the same irradiance for lamps of all kinds, inside and outside their cones and
+    beams.
     """
     count = 400
     some = np.zeros(count, uniforms.LIGHT.dtype)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Counts of strands in deep opacity maps, and the light that they transmit: shadows/opacity.glsl."""
+"""Deep opacity maps count the strands in front of a place and give the light that they transmit:
+shadows/opacity.glsl.
+"""
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ def opacity(expression, returns="float", **inputs):
 
 @pytest.fixture
 def stack(rng):
-    """Depths of 500 strands behind the first, and the four counts that they leave in a texel."""
+    """Return the depths of 500 strands behind the first, and the four counts that they leave in a texel."""
     depths = np.concatenate([[0.0], rng.random(499) ** 3 * 1.2]).astype(np.float32)
     return depths, counts_of(depths)
 

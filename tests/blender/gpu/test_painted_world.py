@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair is lit by the present pixels of the world's image, however they were changed."""
+"""Hair is lit by the current pixels of the world's image, however they were changed."""
 
 import bpy
 import numpy as np
@@ -22,7 +22,7 @@ def fill(image, color):
 
 
 def saved(folder, color, name="sky.exr"):
-    """The path of an image of one color."""
+    """Return the path of an image of one color."""
     image = bpy.data.images.new("Saved", *SIZE, float_buffer=True)
     fill(image, color)
     image.filepath_raw, image.file_format = str(folder / name), "OPEN_EXR"
@@ -87,7 +87,7 @@ NAMES = ["float", "byte", "packed", "generated", "saved", "reloaded"]
 
 @pytest.fixture
 def dark(lit):
-    """A scene with a little hair and a camera, and no light."""
+    """Return a scene with a little hair and a camera, without light."""
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 50, 0.02
     bpy.context.view_layer.update()
     for light in [o for o in bpy.data.objects if o.type == "LIGHT"]:
@@ -113,7 +113,7 @@ def test_a_picture_is_lit_by_the_image_of_now(dark, tmp_path, make, change):
 
 @pytest.mark.parametrize(("make", "change"), [WAYS[0], WAYS[3], WAYS[5]], ids=["float", "generated", "reloaded"])
 def test_viewports_are_lit_by_the_image_of_now(dark, tmp_path, make, change):
-    """Viewports read the light again when Blender has reported a change."""
+    """Viewports read the world's image again when Blender has reported a change."""
     image = make(tmp_path)
     environment_node(dark, image)
     bpy.context.view_layer.update()
@@ -125,7 +125,7 @@ def test_viewports_are_lit_by_the_image_of_now(dark, tmp_path, make, change):
 
 
 def test_an_image_that_could_not_be_read_is_read_again(dark, tmp_path, monkeypatch):
-    """Former light does not remain after reading the new image has failed once."""
+    """An image that could not be read is read again, and its former light does not remain."""
     image = packed(tmp_path)
     environment_node(dark, image)
     _lobes, before = world_texture.light_of(lights.read_world(dark))
@@ -159,7 +159,9 @@ def test_an_image_that_is_the_same_is_taken_apart_once(dark, tmp_path, monkeypat
 
 
 def test_a_sequence_shows_the_frame_of_the_scene(dark, tmp_path):
-    """The node sets the first frame, the number of frames, and the image to begin with."""
+    """An image sequence lights hair with the image of the scene's frame, by the node's first frame, length and
+    offset.
+    """
     colors = {number: (0.1 * number, 0.2, 0.3, 1.0) for number in (1, 2, 3)}
     for number, color in colors.items():
         saved(tmp_path, color, f"sky_{number:04}.exr")
@@ -183,7 +185,7 @@ def test_a_sequence_shows_the_frame_of_the_scene(dark, tmp_path):
 
 
 def test_an_unloaded_world_image_lights_hair(dark, tmp_path):
-    """Images are not loaded in a file that was just opened in background mode."""
+    """An image that is not loaded, as in a file just opened in background mode, lights hair."""
     environment_node(dark, loaded(tmp_path))
     before = drawn()
     assert np.abs(before[..., :3]).max() > 0.1

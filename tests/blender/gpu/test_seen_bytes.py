@@ -41,7 +41,7 @@ vec4 kept(vec4 x_y, vec4 z, vec4 surface, vec4 channels, vec4 color, int which)
 
 
 def sums(rng):
-    """Five (N, 4) sums over directions as light/world_visibility.comp makes them, of dark and of open places."""
+    """Return five (N, 4) sums over directions, as by light/world_visibility.comp, of dark and of open places."""
     axes, weights = ambient_cube.DIRECTIONS, 6.0 * ambient_cube.WEIGHTS
 
     def parts(*more):
@@ -108,7 +108,7 @@ def test_bytes_of_visibility_are_no_visible_step_in_pictures(thin, monkeypatch):
 
 @pytest.mark.parametrize("point_count", [5, 41])
 def test_memory_of_visibility_is_as_it_is_counted(scene, rng, point_count):
-    """A byte for each of twenty numbers, at every fourth point and the tip."""
+    """Ambient visibility takes a byte for each of twenty numbers, at every fourth point and the tip."""
     points = rng.random((50, point_count, 3)).astype(np.float32)
     strands = strand_textures.upload_strands(points, np.full((50, point_count), 1e-4, np.float32))
     (seen,), _surfaces = ambient_visibility.measure([(strands, np.eye(4))], [], [0.5], [])

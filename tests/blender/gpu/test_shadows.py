@@ -9,7 +9,7 @@ from hair_addon.blender.gpu.programs import uniforms
 
 
 def tuft(rng, strand_count=3000):
-    """Strands all over a ball of radius 10 cm, bent by gravity: (S, P, 3) points, (S, P) radii."""
+    """Return strands all over a ball of radius 10 cm, bent by gravity: (S, P, 3) points, (S, P) radii."""
     roots = rng.normal(size=(strand_count, 3))
     roots *= 0.1 / np.linalg.norm(roots, axis=1)[:, None]
     along = np.linspace(0.0, 1.0, 21)[None, :, None]
@@ -18,7 +18,7 @@ def tuft(rng, strand_count=3000):
 
 
 def sun(azimuth, height, radius=0.0):
-    """A `uniforms.LIGHTS` record of a sun that stands at these angles [rad]; radius: the tangent of its own."""
+    """Return a `uniforms.LIGHTS` record of a sun at these angles [rad]; radius: the tangent of its angular radius."""
     lights = uniforms.LIGHTS.record()
     lights["count"] = 1
     light = lights["light"][0]
@@ -30,7 +30,7 @@ def sun(azimuth, height, radius=0.0):
 
 
 def lit(lights, hair, surfaces, places, size=512):
-    """(N,) part of a sun's light that arrives at places (N, 3), by way of what the world's visibility reads of maps."""
+    """Return (N,) the part of a sun's light that arrives at places (N, 3), read like the world's visibility."""
     maps = shadows.ShadowMaps(size, 1)
     maps.draw(lights, [(hair, np.eye(4))], surfaces)
     receiver = surface_textures.upload_surface(places.astype(np.float32), np.zeros(3, np.int32))
@@ -43,7 +43,7 @@ def lit(lights, hair, surfaces, places, size=512):
 
 
 def test_shadows_in_hair_do_not_flicker_while_the_sun_turns(scene, rng):
-    """Between two steps of half a degree light changes smoothly; what does not is noise of the maps' texels."""
+    """Between steps of the sun of half a degree light changes smoothly, without noise by the maps' texels."""
     points, radii = tuft(rng)
     hair = strand_textures.upload_strands(points, radii)
     places = points[:, 1::4].reshape(-1, 3)
@@ -60,7 +60,8 @@ def test_shadows_in_hair_do_not_flicker_while_the_sun_turns(scene, rng):
 )
 @pytest.mark.parametrize("radius", [4e-5, 8e-4])
 def test_triangles_and_the_computed_make_the_same_map(scene, rng, radius, steps):
-    """Maps by triangles and by compute programs have the same mean count in each layer.
+    """Maps drawn by triangles and by compute programs have the same mean count in each layer; few texels differ, by a
+    strand.
 
     Texels rarely differ, by a strand.
     """
@@ -106,7 +107,7 @@ def test_short_strands_shade_what_spheres_along_them_shade(scene, rng, radius, t
 
 
 def test_turning_past_the_pole_keeps_the_shadow(scene, rng):
-    """A light from almost straight above has its map turned the other way round."""
+    """A light that passes the zenith keeps its shadow, although its map turns the other way round."""
     points, radii = tuft(rng)
     hair = strand_textures.upload_strands(points, radii)
     places = points[:, 1::4].reshape(-1, 3)
@@ -152,7 +153,7 @@ def test_curls_shade_as_much_where_few_of_their_points_are_drawn(scene, rng):
 
 
 def test_a_floor_lets_no_light_of_a_low_sun_through(scene, rng):
-    """A slope between texels does not cast a penumbra: places right above a floor are dark for light from below."""
+    """Places right above a floor are dark for light from below, as a slope between texels casts no penumbra."""
     points, radii = tuft(rng, 100)
     hair = strand_textures.upload_strands(points, np.full_like(radii, 1e-9))
     corners = 9.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
@@ -167,7 +168,7 @@ def test_a_floor_lets_no_light_of_a_low_sun_through(scene, rng):
 @pytest.mark.parametrize("kind", [1, 3], ids=["point", "area"])
 @pytest.mark.parametrize("height", [0.05, 0.14, 0.2], ids=["inside", "among tips", "above"])
 def test_lights_near_hair_cast_shadows(scene, rng, kind, height):
-    """Lights closer than the corners of the hair's box: below a floor between light and hair it is dark."""
+    """A floor between hair and a light that is closer than the corners of the hair's box keeps the hair dark."""
     points, radii = tuft(rng, 300)
     hair = strand_textures.upload_strands(points, radii)
     corners = 9.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
@@ -182,7 +183,7 @@ def test_lights_near_hair_cast_shadows(scene, rng, kind, height):
 
 
 def test_the_sphere_around_hair_touches_it(scene, rng):
-    """It encloses hair after some strands have moved, and hair of scaled and rotated objects."""
+    """The bounding sphere touches the hair after some strands have moved, and for scaled and rotated objects."""
     points, radii = tuft(rng, 300)
     hair = strand_textures.upload_strands(points, radii)
     strand_textures.move_strands(hair, np.array([3, 5]), points[[3, 5]] + np.float32(0.02))
@@ -197,7 +198,7 @@ def test_the_sphere_around_hair_touches_it(scene, rng):
 
 
 def test_maps_at_rest_are_drawn_from_the_points_that_show_the_strands(scene, rng):
-    """Straight strands are drawn with two points and curls with all.
+    """At rest, maps draw straight strands with two points and curls with all, and differ by at most half a texel.
 
     The map differs from that of all points by at most half a texel.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Highlights on surfaces: laws of their distributions of normals."""
+"""Highlights on surfaces obey the laws of their distributions of normals."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from tests.support.pictures import glsl
 
 @pytest.mark.parametrize("half_radius, alpha", [(0.09, 0.002), (0.05, 0.01), (0.03, 0.03)])
 def test_a_disk_is_mirrored_with_the_light_that_it_sends(half_radius, alpha):
-    """The integral over all normals is one, as for a small lamp.
+    """The integral of a disk's mirrored light over all normals is one; a smooth surface shows the disk with its border.
 
     A smooth surface shows a uniform disk with a border.
     """

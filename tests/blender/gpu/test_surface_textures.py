@@ -16,7 +16,7 @@ from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
 @pytest.fixture
 def ball(scene):
-    """A smooth sphere before a camera, in the light of a sun."""
+    """Return a smooth sphere before a camera, in the light of a sun."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=0.5)
     ball = bpy.context.object
     ball.data.shade_smooth()
@@ -32,7 +32,7 @@ def ball(scene):
 
 @pytest.fixture
 def floats(monkeypatch):
-    """[numbers in each texture that is uploaded] from now on."""
+    """Return a list of the counts of numbers in each texture that is uploaded from now on."""
     sent, buffer = [], gpu.types.Buffer
 
     def counted(kind, size, values):
@@ -45,7 +45,7 @@ def floats(monkeypatch):
 
 
 def surfaces():
-    """[SurfaceOnGPU] of the scene as a render reads it."""
+    """Return [SurfaceOnGPU] of the scene as a render reads it."""
     bpy.context.view_layer.update()
     meshes = drawn_meshes.read_drawn_meshes(bpy.context.evaluated_depsgraph_get())
     shown = drawn_scene._upload(meshes, is_shaded=True, has_paths=False)
@@ -73,7 +73,9 @@ def test_a_pose_uploads_places_and_normals_of_vertices_and_a_turn_nothing(ball, 
 
 
 def test_another_topology_is_another_surface(ball):
-    """The same number of vertices with other triangles, and the same number of triangles with other materials."""
+    """A surface with other triangles or materials is another surface, also if its numbers of vertices and triangles are
+    equal.
+    """
     (first,) = surfaces()
     ball.data.flip_normals()
     (flipped,) = surfaces()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light that varies around a fiber, by the functions of shaders/fibre/zonal_light.glsl."""
+"""Light that varies around a fiber is scattered by shaders/fibre/zonal_light.glsl as by its integrals."""
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def test_even_light_has_no_part_but_one(rng):
 
 
 def test_a_mirror_sees_light_that_varies_exponentially_as_it_is(rng):
-    """A smooth fiber under light exp(b sin(theta_i)) shows the light at -theta_o, however weak it is."""
+    """A smooth fiber under light exp(b sin(theta_i)) shows the light at -theta_o, even if it is weak."""
     b = rng.uniform(-10.0, 10.0, COUNT)
     seen = rng.uniform(-1.0, 1.0, COUNT)
     sine = np.linspace(-1.0, 1.0, 20001)[:, None]

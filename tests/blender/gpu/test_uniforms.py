@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Values written to a uniform block in Python arrive in the shader."""
+"""Values that Python writes to a uniform block arrive in the shader."""
 
 from itertools import pairwise
 
@@ -31,12 +31,12 @@ BLOCKS = [
 
 
 def members(dtype):
-    """Names of a record's members, without what lies between them."""
+    """Return the names of a record's members without padding."""
     return [name for name in dtype.names if not name.startswith("unused")]
 
 
 def scalars(dtype, name):
-    """GLSL expressions of every number in a record, in the order of `np.ndenumerate` over its members."""
+    """Return GLSL expressions of every number in a record, in the order of `np.ndenumerate` over its members."""
     if dtype.subdtype:
         scalar, shape = dtype.subdtype
         indices = np.ndindex(*shape)
@@ -47,7 +47,7 @@ def scalars(dtype, name):
 
 
 def number(record, start=1):
-    """Fill every number of a record with the next integer; returns the one after the last."""
+    """Fill every number of a record with the next integer, and return the integer after the last."""
     for member in members(record.dtype):
         values = record[member]
         if values.dtype.names:
@@ -68,7 +68,7 @@ def test_copies_of_a_record_have_its_bytes(block):
 
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.type_name)
 def test_a_vec3_takes_four_words_as_metal_has_it(block):
-    """The Metal Shading Language pads it to 16 bytes, where std140 lets a scalar into the last four."""
+    """A vec3 takes four words, because Metal pads it to 16 bytes, where std140 places a scalar in the last four."""
     fields = sorted((block.dtype.fields[name][1], block.dtype[name].shape) for name in members(block.dtype))
     for (offset, shape), (after, _shape) in pairwise(fields):
         assert shape != (3,) or after - offset >= 16

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Varied strands: the shaders' functions equal their references in Python, and so do the models."""
+"""The shaders' functions and models of varied strands equal their references in Python."""
 
 from dataclasses import replace
 
@@ -41,13 +41,13 @@ STRAND = "int strand_index; float strand_position;\n"
 
 @pytest.fixture
 def strands(rng):
-    """Random numbers and positions of COUNT strands, both ends among them."""
+    """Return random numbers and positions of COUNT strands, including both ends."""
     ends = [grid.ravel() for grid in np.meshgrid([0.0, 1.0], [0.0, 0.5, 1.0])]
     return [np.concatenate([end, rng.random(COUNT - 6)]).astype(np.float32) for end in ends]
 
 
 def block(instance, settings):
-    """(declaration, what `glsl.evaluate` takes for it)."""
+    """Return (declaration, value) of a uniform block for `glsl.evaluate`."""
     declared = uniforms.settings_block(type(settings), instance)
     return declared.source, (declared.type_name, uniforms.fill(settings))
 
@@ -82,7 +82,9 @@ def test_roughness_of_strands(rng):
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 3.0), (0.2, 0.7), (0.5, 0.5)])
 def test_place_among_slices(rng, low, high):
-    """The index of the slice may differ by one for values on a slice; the interpolated position may not."""
+    """The interpolated position among slices equals the reference; the index may differ by one for values on a
+    slice.
+    """
     sigma_a = np.concatenate([[0.0, 99.0], np.square(rng.uniform(0.0, 3.0, COUNT))]).astype(np.float32)
     text = glsl.source("fibre/absorption_slices.glsl")
     shader = glsl.evaluate(text, "vec2", f"slice_of(x, {low}, {high}, 16)", x=sigma_a).sum(axis=1)
@@ -126,7 +128,7 @@ def test_color_and_highlight_of_strands(rng):
 
 
 def model(fragment, expression, settings, textures, strands, **inputs):
-    """A function of a .frag at strands' (random, position): each is a strand of its own."""
+    """Return a function of a fragment shader at (random, position) of strands."""
     random, position = strands
     blocks = [(name, *block(name, values)) for name, values in settings.items()]
     view = uniforms.VIEW.record()
@@ -153,14 +155,14 @@ def model(fragment, expression, settings, textures, strands, **inputs):
 
 
 def as_halves(tables):
-    """Tables as textures keep them."""
+    """Return tables rounded to half floats, as in textures."""
     slices = tables.slices
     n, n_g = (None if texels is None else texels.astype(np.float16).astype(float) for texels in (slices.n, slices.n_g))
     return replace(tables, slices=replace(slices, n=n, n_g=n_g))
 
 
 def directions(rng):
-    """T, L, V, each (COUNT, 3) float32."""
+    """Return T, L, V, each (COUNT, 3) float32."""
     return dict(zip("TLV", unit(rng.normal(size=(3, COUNT, 3))).astype(np.float32), strict=True))
 
 
@@ -180,7 +182,7 @@ def settings_of(tables):
 
 
 def test_marschner_models_read_the_slices(rng, tables, strands):
-    """hair_bsdf() of both modes: absorption and roughness of each strand by itself."""
+    """hair_bsdf() of both modes uses the absorption and roughness of each strand."""
     shading = hair_shading.marschner_strand_shading(tables)
     fragment = (
         "fibre/energy_conserving_varied.comp" if tables.settings.mode == "energy" else "fibre/marschner_varied.comp"
@@ -202,7 +204,7 @@ def test_marschner_models_read_the_slices(rng, tables, strands):
 
 
 def test_inner_reflection_of_elliptic_fibres(rng, strands):
-    """Each strand's major axis is its own; along the strand's own direction it has none."""
+    """The major axis of each strand is its own; inner reflection along a strand's own direction has no axis."""
     look, base = replace(LOOKS[0], mode="classic"), lookup_tables.Settings(size=64, eccentricity=0.85)
     tables = strand_tables.bake(appearance.table_settings(look, base), appearance.strand_settings(look))
     shading = hair_shading.marschner_strand_shading(tables)

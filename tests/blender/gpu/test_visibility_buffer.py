@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The strand that each sample shows: compared with analytic positions, and between triangles and compute program."""
+"""The strand that each sample shows equals analytic positions, and is the same by triangles and by compute programs."""
 
 import gpu
 import numpy as np
@@ -24,7 +24,8 @@ def shading():
 
 
 def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL, clip_planes=None):
-    """(segments, depths), each (height, width), of [(points, radii, object to world)] seen along -Z from the origin.
+    """Return (segment, depth), each (height, width), of [(points, radii, object to world)] seen along -Z from the
+    origin.
 
     A segment is negative where there is none. hiding_at: distance of a surface that fills the left half of the view.
     """
@@ -64,7 +65,7 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL, 
 
 
 def tuft(rng, strand_count=60, point_count=33, thickness=0.004):
-    """Arcs that cross the whole view, and the near plane: (S, P, 3) points, (S, P) radii."""
+    """Return arcs that cross the whole view and the near plane: (S, P, 3) points, (S, P) radii."""
     start = rng.uniform([-0.3, -0.2, -1.6], [0.3, 0.2, -0.1], (strand_count, 1, 3))
     axes = rng.normal(size=(2, strand_count, 1, 3)) * [0.15, 0.1, 0.2]
     turn = np.linspace(0.0, 4.0, point_count)[None, :, None]
@@ -74,7 +75,7 @@ def tuft(rng, strand_count=60, point_count=33, thickness=0.004):
 
 @pytest.mark.parametrize("in_compute", [True, False])
 def test_a_sample_is_covered_if_its_centre_lies_in_the_strand(shading, in_compute):
-    """A sample of a parallel view is covered if the distance of its center from a strand's axis is below the radius."""
+    """In a parallel view, a sample is covered if its center is nearer to a strand's axis than the radius."""
     height, width = np.indices(SIZE[::-1])
     centres = np.stack([(width + 0.5) / SIZE[0] * 2 - 1, (height + 0.5) / SIZE[1] * 2 - 1], axis=-1)
     centres *= [HALF_WIDTH, 0.2]
@@ -97,8 +98,8 @@ def test_a_sample_is_covered_if_its_centre_lies_in_the_strand(shading, in_comput
 
 @pytest.mark.parametrize("in_compute", [True, False])
 def test_a_wide_angle_sees_strands_as_thick_as_its_rays_do(shading, in_compute):
-    """A sample near the corner of a wide perspective is covered if the distance of its ray from a strand's axis is
-    below the radius.
+    """Near the corner of a wide perspective, a sample is covered if its ray is nearer to a strand's axis than the
+    radius.
     """
     wide = PERSPECTIVE.copy()
     wide[0, 0], wide[1, 1] = SIZE[1] / SIZE[0], 1.0
@@ -156,9 +157,7 @@ def test_a_strand_behind_a_surface_is_hidden(shading):
 
 @pytest.mark.parametrize("in_compute", [True, False])
 def test_thin_strands_in_one_line_cover_what_one_of_them_does(shading, in_compute):
-    """Strands a fifth of a sample wide, in one picture of lines of many slopes: together they cover as much as one
-    strand.
-    """
+    """Strands a fifth of a sample wide that lie in one line cover together as much as one strand, at any slope."""
     sample = 2.0 * HALF_WIDTH / SIZE[0]
     hits = columns = 0
     for slope in np.linspace(-0.4, 0.4, 35):
@@ -211,7 +210,7 @@ def test_thin_strands_cover_what_spheres_along_them_cover(rng, shading, in_compu
 
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
 def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
-    """Small tufts in the picture, over its edges and beyond; `drawn` compares what is found with what is shaded."""
+    """Hair covers no pixel outside of its window, for small tufts inside the picture, across its edges and beyond."""
     points, radii = tuft(rng, strand_count=12, thickness=0.02)
     points -= points.mean(axis=(0, 1))
     for x, y in ((0.0, 0.0), (0.3, 0.1), (-0.33, -0.2), (0.0, 0.19), (2.0, 0.0)):
@@ -231,9 +230,7 @@ def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
 
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
 def test_leaving_out_what_tiles_hide_changes_no_sample(shading, rng, monkeypatch, view_to_clip):
-    """Culling by tiles changes no sample of dense hair, part of it in front of the near plane and half of it behind a
-    surface.
-    """
+    """Culling by tiles changes no sample of dense hair, some in front of the near plane and half behind a surface."""
     placed = [(*tuft(rng, 1500, thickness=0.006), np.eye(4)), (*tuft(rng, 40, thickness=0.02), np.eye(4))]
     found = []
     for few in (1 << 30, 0):
@@ -245,7 +242,7 @@ def test_leaving_out_what_tiles_hide_changes_no_sample(shading, rng, monkeypatch
 
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
 def test_bends_and_ends_are_left_out_only_where_strands_are_too_thin_for_them(shading, rng, monkeypatch, view_to_clip):
-    """Tufts of all widths look the same whether bends and ends are drawn or omitted for thin strands."""
+    """Tufts of all widths look the same with all bends and ends drawn, and with those of thin strands omitted."""
     may_be_wide, chosen = windows.may_be_wide, []
     for x, thickness in ((0.0, 2e-3), (0.1, 6e-3), (0.0, 0.012), (0.1, 0.018), (0.0, 0.025), (0.1, 0.06)):
         points, radii = tuft(rng, strand_count=12, thickness=thickness)
@@ -262,7 +259,7 @@ def test_bends_and_ends_are_left_out_only_where_strands_are_too_thin_for_them(sh
 
 
 def planes(*rows):
-    """(6, 4) of some planes, and of others that cut nothing off."""
+    """Return (6, 4) planes: some given, and others that clip nothing."""
     return np.array([*rows, *[(0.0, 0.0, 0.0, 0.0)] * (6 - len(rows))], np.float32)
 
 
@@ -270,7 +267,7 @@ def planes(*rows):
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL], ids=["perspective", "parallel"])
 @pytest.mark.parametrize("thickness", [0.004, 0.03])
 def test_planes_along_the_view_leave_a_rectangle_of_the_picture(rng, shading, view_to_clip, thickness, in_compute):
-    """Blender's Clipping Region: inside nothing changes, and outside nothing is drawn."""
+    """Inside Blender's Clipping Region nothing changes, and outside nothing is drawn."""
     placed = [(*tuft(rng, thickness=thickness), np.eye(4)), (*tuft(rng, 20), np.diag([1.5, 1.5, 1.5, 1.0]))]
     # x and y of clip space between parts of its w, where the camera is at the origin.
     sides = [view_to_clip[row] * sign + 0.5 * view_to_clip[3] for row in (0, 1) for sign in (1.0, -1.0)]
@@ -290,7 +287,7 @@ def test_planes_along_the_view_leave_a_rectangle_of_the_picture(rng, shading, vi
 
 @pytest.mark.parametrize("in_compute", [True, False])
 def test_a_plane_across_the_view_shows_what_is_behind_it(rng, shading, in_compute):
-    """Strands and surfaces before it are cut off, and hide nothing."""
+    """A clipping plane across the view cuts off strands and surfaces before it, which then hide nothing."""
     placed, behind = [(*tuft(rng), np.eye(4))], planes((0.0, 0.0, -1.0, -0.8))
     whole, depths = drawn(placed, PARALLEL, shading, in_compute)
     left, later = drawn(placed, PARALLEL, shading, in_compute, clip_planes=behind)

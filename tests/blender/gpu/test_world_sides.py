@@ -14,7 +14,7 @@ pytestmark = pytest.mark.usefixtures("fine_world")
 
 
 def sides_of(seen, opacity, forward, channels):
-    """(N, 6, 3) radiance that arrives from the sides of a white world."""
+    """Return (N, 6, 3) radiance that arrives from the sides of a white world."""
     lights = uniforms.LIGHTS.record()
     lights["world"] = 1.0
     text = shaders.expand("light/world.glsl")[0]
@@ -59,7 +59,7 @@ def test_strands_color_light_and_surfaces_do_not(scene, rng):
 
 
 def test_a_floor_hides_half_of_the_world_of_every_channel(scene, rng):
-    """A floor hides half of the world, in every channel, from single strands just above it with any transmittance."""
+    """A floor hides half of the world in every channel from strands just above it, with any transmittance."""
     roots = np.append(rng.uniform(-1.0, 1.0, (50, 2)), np.zeros((50, 1)), axis=1)
     points = roots[:, None] + np.linspace(0.0, 0.3, 5)[:, None] * np.array([0.3, 0.0, 1.0])
     hair = strand_textures.upload_strands(points.astype(np.float32), np.full((50, 5), 1e-7, np.float32))

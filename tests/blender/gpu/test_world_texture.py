@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""World light: the image as in Cycles, and the light that arrives among strands and on surfaces."""
+"""World light has the image's radiance as in Cycles, and arrives among strands and on surfaces."""
 
 import math
 import sys
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("fine_world")
 
 
 def picture(rng):
-    """A Blender image of a smooth colored picture with one bright spot."""
+    """Return a Blender image of a smooth colored picture with one bright spot."""
     width, height = 64, 32
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     pixels = np.ones((height, width, 4), np.float32)
@@ -40,7 +40,7 @@ def picture(rng):
 
 
 def environment_node(scene, image, **settings):
-    """Light the scene with a picture; returns the node that holds it."""
+    """Light the scene with a picture, and return the environment node."""
     scene.world = bpy.data.worlds.new("World")
     # Cycles would look for bright places at more pixels than the picture has, for a second.
     scene.world.cycles.sampling_method, scene.world.cycles.sample_map_resolution = "MANUAL", 64
@@ -55,7 +55,7 @@ def environment_node(scene, image, **settings):
 
 
 def turn(node, kind, rotation, scale=(1.0, 1.0, 1.0)):
-    """Put a Mapping node before an environment's."""
+    """Add a Mapping node before an environment node."""
     tree = node.id_data
     mapping, coordinates = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
     mapping.vector_type = kind
@@ -65,7 +65,7 @@ def turn(node, kind, rotation, scale=(1.0, 1.0, 1.0)):
 
 
 def panorama(scene, folder):
-    """(H, 2 H, 3) radiance of the world by longitude and latitude, rendered by Cycles."""
+    """Return (H, 2 H, 3) radiance of the world by longitude and latitude, rendered by Cycles."""
     camera = bpy.data.cameras.new("Camera")
     camera.type, camera.panorama_type = "PANO", "EQUIRECTANGULAR"
     scene.camera = bpy.data.objects.new("Camera", camera)
@@ -178,7 +178,7 @@ def test_the_digest_of_a_world_does_not_depend_on_the_order_of_its_links(scene):
 
 
 def test_a_view_has_one_process_while_nodes_change(scene, monkeypatch):
-    """Each step of a dragged slider is another world: the next process begins when the last has ended."""
+    """While nodes change with each step of a slider, a view starts one process at a time."""
     rotation, _part = mixed_world(scene)
     started = []
     real = world_panoramas.OtherProcess
@@ -202,7 +202,9 @@ def test_a_view_has_one_process_while_nodes_change(scene, monkeypatch):
 
 
 def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, monkeypatch):
-    """Until then, the world has its viewport color, which it keeps with a message if Cycles cannot render it."""
+    """Until Cycles has rendered other nodes, the world has its viewport color, which it keeps with a message after an
+    error.
+    """
     mixed_world(scene)[0].default_value = (0.1, 0.0, 0.0)
     monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "raise SystemExit('no Cycles')"])
     for _look in range(200):
@@ -215,7 +217,7 @@ def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, monkeypat
 
 
 def test_a_view_has_the_last_panorama_while_the_next_is_rendered(scene, monkeypatch):
-    """Panels say so with the name of the world, until it is ready."""
+    """A view shows the last panorama until the next is rendered, and panels name the world that is being rendered."""
     rotation, _part = mixed_world(scene)
     rotation.default_value = (0.21, 0.0, 0.0)
     former = world_panoramas._folder() / f"{world_digest.digest_of(scene.world)}.exr"
@@ -256,7 +258,7 @@ def test_the_picture_is_seen_behind_the_scene(scene, rng, tmp_path):
 
 
 def seen(places, strands=None, opacity=1.0):
-    """(N, 6) part of each side that places (N, 3) see among strands (S, P, 3) of radius (S, P)."""
+    """Return (N, 6) the part of each side that places (N, 3) see among strands (S, P, 3) of radius (S, P)."""
     surface = surface_textures.upload_surface(places.astype(np.float32), np.zeros(3, np.int32))
     hair = [(strand_textures.upload_strands(*strands), np.eye(4))] if strands else []
     _hair, (found,) = ambient_visibility.measure(hair, [surface], [opacity] * len(hair), [surface])
@@ -269,7 +271,9 @@ def test_nothing_hides_the_world_from_places_without_hair(scene, rng):
 
 
 def test_transmittance_of_a_cloud_equals_ray_tracing(scene, rng):
-    """Brute force: rays from the middle of a cloud cross as many strands as its density says."""
+    """The transmittance of a cloud equals ray tracing, by which rays cross as many strands as the cloud's density
+    gives.
+    """
     middles = rng.normal(size=(6000, 3))
     middles *= (rng.random(6000) ** (1 / 3) / np.linalg.norm(middles, axis=1))[:, None]
     along = rng.normal(size=(6000, 3))
@@ -289,7 +293,7 @@ def test_transmittance_of_a_cloud_equals_ray_tracing(scene, rng):
 
 @pytest.mark.parametrize("has_hair", [False, True])
 def test_an_even_world_gives_a_surface_its_colour(sphere, scene, has_hair):
-    """The law holds with and without hair in the scene."""
+    """An even world gives a surface its color, with and without hair in the scene."""
     color = np.array([0.2, 0.4, 0.6])
     scene.world = bpy.data.worlds.new("World")
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)

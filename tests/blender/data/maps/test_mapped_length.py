@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Length by maps: each strand is cut at the fraction of its length that its map gives."""
+"""A map of *Strand Length* cuts each strand at the fraction of its length that the map gives at its root."""
 
 import bpy
 import numpy as np
@@ -21,7 +21,7 @@ SETTING = "strands.strand_length"
 
 
 def points(hair):
-    """(S, P, 3) float32 that hair Curves store."""
+    """Return (S, P, 3) float32, the points that hair Curves store."""
     return curves.read_points(hair).reshape(len(hair.curves), -1, 3)
 
 
@@ -36,13 +36,15 @@ def vary(hair, **changes):
 
 
 def weights(hair):
-    """(S,) of the vertex group "top" at the roots of strands."""
+    """Return (S,) weights of the vertex group "top" at the roots of strands."""
     settings = MapSettings(setting=SETTING, kind="GROUP", source="top")
     return sources.masks(sources.stored_strands(hair), settings, None)
 
 
 def test_strands_have_the_fraction_of_their_length_that_the_map_gives(hair):
-    """Each strand's length is its length without a map times From to To by its weight; roots and count stay."""
+    """Each strand has its length without a map times a factor between From and To by its weight; roots and count
+    stay.
+    """
     before, uncut = lengths(hair.data), points(hair.data)
     cut = vary(hair.data, kind="GROUP", source="top", low=0.25, high=1.0)
     wanted = 0.25 + 0.75 * weights(hair.data).astype(float)
@@ -113,7 +115,9 @@ def test_painted_weights_cut_at_once(hair):
 
 
 def test_drawn_strands_are_cut_and_written_as_they_are_drawn(hair, window):  # noqa: F811
-    """In a window strands are drawn at the fractions of the map, and are written so; without the map they are whole."""
+    """In a window, strands are drawn at the fractions of the map, and later written as drawn; without the map they are
+    whole.
+    """
     drawn(hair)
     for low in (0.5, 0.25):
         vary(hair.data, kind="GROUP", source="top", low=low)

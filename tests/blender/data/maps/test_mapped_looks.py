@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Looks of strands by maps: each strand has the look that its map gives it."""
+"""A map of the look gives each strand its own color and roughness."""
 
 import bpy
 import numpy as np
@@ -19,7 +19,7 @@ RED, BLUE = (0.6, 0.1, 0.05), (0.05, 0.1, 0.6)
 
 
 def image_of(pixels, name="coat", **options):
-    """A generated image, Non-Color, of (H, W, 4) pixels."""
+    """Return a generated Non-Color image of (H, W, 4) pixels."""
     height, width, _channels = pixels.shape
     image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True, is_data=True, **options)
     image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
@@ -28,7 +28,7 @@ def image_of(pixels, name="coat", **options):
 
 
 def halves():
-    """(8, 64, 4): red on the left, blue on the right."""
+    """Return (8, 64, 4) pixels: red on the left, blue on the right."""
     pixels = np.ones((8, 64, 4))
     pixels[:, :32, :3], pixels[:, 32:, :3] = RED, BLUE
     return pixels
@@ -42,7 +42,7 @@ def vary(hair, setting, **changes):
 
 @pytest.fixture
 def coat(hair):
-    """Hair with a color."""
+    """Return hair with a color."""
     hair.data.vellus.appearance.parametrization = "COLOR"
     bpy.context.view_layer.update()
     return hair.data
@@ -62,7 +62,7 @@ def test_a_constant_map_is_the_constant(coat):
 
 
 def test_two_looks_are_the_two_grooms(coat):
-    """Strands on each half of an image have, bit for bit, the look of the groom with the color of this half."""
+    """Strands on each half of an image have, bit for bit, the look of a groom with the color of this half."""
     image = image_of(halves())
     material = bpy.data.materials.new("Painted")  # Blender reports changes of images that a material shows
     material.node_tree.nodes.new("ShaderNodeTexImage").image = image
@@ -118,7 +118,7 @@ def test_every_source_is_read(coat):
 
 
 def test_a_missing_source_is_a_status_and_the_value_is_used(coat):
-    """Hair with a map whose source is missing has its value, and a status with the name of the source."""
+    """Hair whose map has a missing source uses the value of the setting, and a status names the source."""
     coat.vellus.appearance.color = RED
     for kind in ("GROUP", "ATTRIBUTE", "CURVES"):
         looks = vary(coat, "look.color", kind=kind, source="lost")
@@ -134,7 +134,7 @@ def test_a_missing_source_is_a_status_and_the_value_is_used(coat):
 
 
 def test_maps_follow_a_moved_turned_and_scaled_surface(coat):
-    """Looks belong to roots: an object that is moved, turned, mirrored or scaled keeps each strand's look."""
+    """A moved, turned, mirrored or scaled object keeps the look of each strand, as looks belong to roots."""
     image_of(halves())
     before = vary(coat, "look.color", source="coat")
     sphere = bpy.data.objects["Sphere"]
@@ -168,7 +168,7 @@ SIZE = 32
 
 
 def picture():
-    """(SIZE, SIZE, 4) linear."""
+    """Return the picture (SIZE, SIZE, 4), linear."""
     settings = PictureSettings(width=SIZE, height=SIZE, samples_per_side=1, is_transparent=True)
     return offscreen.draw_picture(settings).astype(np.float64)
 

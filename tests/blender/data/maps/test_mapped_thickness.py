@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Thickness by maps: each strand has the radii of the hair multiplied by the factor of its map."""
+"""A map of *Thickness* multiplies the radii of each strand."""
 
 import bpy
 import numpy as np
@@ -22,7 +22,7 @@ SETTING = "strands.thickness"
 
 
 def radii(hair):
-    """(S, P) float32 that hair Curves store."""
+    """Return (S, P) float32, the radii that hair Curves store."""
     return curves.read_radii(hair).reshape(len(hair.curves), -1)
 
 
@@ -33,7 +33,7 @@ def vary(hair, **changes):
 
 
 def test_a_map_multiplies_the_radii_of_each_strand(hair):
-    """A map of 1 gives the radii of the setting bit for bit, 0.5 exactly half; without the map they are as before."""
+    """A map of 1 keeps the radii bit for bit, a map of 0.5 halves them, and removing the map restores them."""
     before = radii(hair.data)
     np.testing.assert_array_equal(vary(hair.data, kind="STRAND", low=1.0, high=1.0), before)
     np.testing.assert_array_equal(vary(hair.data, kind="STRAND", low=0.5, high=0.5), np.float32(0.5) * before)
@@ -73,7 +73,7 @@ def test_bound_hair_and_exports_have_the_radii_of_the_map(hair, window, tmp_path
 
 
 def test_a_missing_source_is_a_status_and_the_value_is_used(hair):
-    """Hair with a map of thickness whose source is missing has its value, and a status with the source's name."""
+    """Hair whose map of thickness has a missing source uses the value of the setting, and a status names the source."""
     before = radii(hair.data)
     vary(hair.data, kind="GROUP", source="top")
     np.testing.assert_array_equal(vary(hair.data, kind="GROUP", source="lost"), before)
@@ -97,7 +97,7 @@ def test_thickness_is_set_by_scripts_options_and_settings(hair):
 
 
 def test_undo_files_and_appending_keep_maps(hair, tmp_path):
-    """Undo takes a map back, redo applies it; saved, appended and linked hair has its maps and radii."""
+    """Undo removes a map and redo restores it; saved, appended and linked hair has its maps and radii."""
     before = radii(hair.data)
     bpy.ops.ed.undo_push(message="before")
     mapped = vary(hair.data, kind="GROUP", source="top", low=0.5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paint: a map gets a source that leaves the hair as it was, and its paint mode; the hair follows what is painted."""
+"""*Paint* gives a map a source that does not change the hair, and enters its paint mode; the hair follows the paint."""
 
 import bpy
 import numpy as np
@@ -17,7 +17,7 @@ MODES = {"IMAGE": "PAINT_TEXTURE", "GROUP": "PAINT_WEIGHT", "ATTRIBUTE": "PAINT_
 
 @pytest.fixture
 def painted(hair):
-    """A function that begins to paint a map of a setting of the hair; returns the map."""
+    """Begin to paint a map of a setting of the hair; returns the map."""
 
     def begin(setting, kind):
         api.shade(hair.data, color=COLOR)
@@ -38,7 +38,9 @@ def root_absorption(hair):
 
 @pytest.mark.parametrize("kind", MODES)
 def test_a_new_source_leaves_the_hair_as_it_was(hair, painted, kind):
-    """Lengths and radii stay exactly, colors within a step of 8 bits; the mode is that of the kind, on the surface."""
+    """A new source keeps lengths and radii exactly and colors within a step of 8 bits; the paint mode is that of the
+    kind.
+    """
     before, radii = curves.read_points(hair.data), curves.read_radii(hair.data)
     item = painted("strands.strand_length", kind)
     assert bpy.context.mode == MODES[kind]
@@ -52,7 +54,7 @@ def test_a_new_source_leaves_the_hair_as_it_was(hair, painted, kind):
 
 @pytest.mark.parametrize("kind", ["IMAGE", "ATTRIBUTE"])
 def test_new_colors_are_those_of_the_setting(hair, painted, kind):
-    """A new image and a new attribute have the setting's color, so each strand keeps its absorption."""
+    """A new image or attribute has the setting's color, so each strand keeps its absorption."""
     painted("look.color", kind)
     found = root_absorption(hair)
     api.clear_map(hair.data, "look.color")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images that are painted: only rows that have changed are converted, with the values of the whole image."""
+"""Only changed rows of painted images are converted, with the same result as converting the whole image."""
 
 import bpy
 import numpy as np
@@ -10,7 +10,7 @@ from hair_addon.core.maps import pixels
 
 
 def converted_rows(monkeypatch):
-    """The numbers of rows that are converted from now on."""
+    """Return a list of the rows that are converted from now on."""
     counts = []
     for name in ("colors", "masks"):
         convert = getattr(pixels, name)
@@ -31,7 +31,9 @@ def fresh(image, is_color):
 @pytest.mark.parametrize("is_color", [True, False])
 @pytest.mark.parametrize("is_float", [False, True])
 def test_strokes_convert_their_rows_alone(hair, rng, monkeypatch, is_color, is_float):
-    """A stroke over five rows converts five; results before it keep their values; all equal a new conversion."""
+    """A stroke over five rows converts five rows; earlier results keep their values, and all rows equal a new
+    conversion.
+    """
     image = bpy.data.images.new("Painted", 24, 40, alpha=True, float_buffer=is_float)
     values = rng.random((40, 24, 4), np.float32)
     image.pixels.foreach_set(values.ravel())
@@ -50,7 +52,7 @@ def test_strokes_convert_their_rows_alone(hair, rng, monkeypatch, is_color, is_f
 
 
 def test_other_color_spaces_and_sizes_convert_all(hair, rng):
-    """An image that gets another color space or size has the values of a new conversion."""
+    """An image whose color space or size changes is converted as a whole."""
     image = bpy.data.images.new("Painted", 16, 16, alpha=True)
     image.pixels.foreach_set(rng.random(16 * 16 * 4, np.float32))
     before = image_pixels.read(image, True)[None]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The ramp of the thickness: Blender's curve from root to tip in place of a straight line."""
+"""The thickness curve replaces the straight line from root to tip by Blender's curve widget."""
 
 import bpy
 import numpy as np
@@ -11,12 +11,12 @@ from hair_addon.core.maps.map_settings import MapSettings
 
 
 def radii(hair):
-    """(S, P) float32 that hair Curves store."""
+    """Return (S, P) float32, the radii that hair Curves store."""
     return curves.read_radii(hair).reshape(len(hair.curves), -1)
 
 
 def ramped(hair):
-    """The radii of hair after its ramp was added."""
+    """Return the radii of hair after its thickness curve was added."""
     bpy.context.view_layer.objects.active = hair
     assert bpy.ops.vellus.add_ramp() == {"FINISHED"}
     bpy.context.view_layer.update()
@@ -24,7 +24,7 @@ def ramped(hair):
 
 
 def bend(tree, middle):
-    """Add a point in the middle of a ramp, as a click in the widget does."""
+    """Add a point in the middle of a curve, as a click in the widget does."""
     mapping = ramps.node_of(tree).mapping
     mapping.curves[0].points.new(0.5, middle).handle_type = "VECTOR"
     mapping.update()
@@ -33,7 +33,9 @@ def bend(tree, middle):
 
 
 def test_a_new_ramp_changes_nothing_and_a_bent_ramp_is_the_thickness(hair):
-    """A new ramp keeps the radii; a bent one gives its values times the radius; removed, the radii are as before."""
+    """A new curve keeps the radii, a bent curve multiplies the radius by its values, and removing it restores the
+    radii.
+    """
     before = radii(hair.data)
     np.testing.assert_allclose(ramped(hair), before, rtol=1e-4)
     bend(hair.data.vellus.thickness_ramp, 0.1)
@@ -52,7 +54,7 @@ def test_a_new_ramp_changes_nothing_and_a_bent_ramp_is_the_thickness(hair):
 
 
 def test_a_map_multiplies_the_ramp(hair):
-    """Each strand has the radii of the ramp times its factor."""
+    """Each strand has the radii of the thickness curve times the factor of its map."""
     ramped(hair)
     bend(hair.data.vellus.thickness_ramp, 0.8)
     plain = radii(hair.data)
@@ -62,7 +64,9 @@ def test_a_map_multiplies_the_ramp(hair):
 
 
 def test_copies_undo_and_files_have_their_ramp(hair, tmp_path):
-    """A copy of hair has a ramp of its own; undo takes an edit back; a linked file shows the radii of its ramp."""
+    """A copy of hair has its own thickness curve, undo restores an edited curve, and linked hair has the radii of its
+    curve.
+    """
     ramped(hair)
     bpy.ops.ed.undo_push(message="straight")
     straight = radii(hair.data)
@@ -93,7 +97,7 @@ def test_copies_undo_and_files_have_their_ramp(hair, tmp_path):
 
 
 def test_a_damaged_ramp_is_ignored(hair):
-    """A node group that has lost its node leaves the thickness to the settings; the button adds another ramp."""
+    """If a node group has lost its curve node, the settings give the thickness, and the button adds another curve."""
     before = radii(hair.data)
     ramped(hair)
     tree = hair.data.vellus.thickness_ramp

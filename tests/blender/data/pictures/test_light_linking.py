@@ -13,7 +13,7 @@ PLACES = ("plain", "inner", "instanced", "other")
 
 @pytest.fixture
 def tiles(scene):
-    """White tiles side by side under a sun, rendered by Cycles from above; an empty instances the third."""
+    """Return white tiles side by side under a sun, rendered by Cycles from above; an empty instances the third."""
     mesh = bpy.data.meshes.new("Tile")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [], [(0, 1, 2, 3)])
     held = bpy.data.collections.new("Held")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colors of objects by the color type of Solid shading."""
+"""*Random* in Solid shading gives hair the color that Blender gives a mesh of the same name."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ from hair_addon.blender.data.pictures.viewport_shading import HairColor
 
 
 def test_random_colors_are_those_that_blender_gives_the_name():
-    """The colors are those of a mesh of this name in a window of Blender 5.2, as display colors."""
+    """Random colors equal those of a mesh of the same name in a window of Blender 5.2, as display colors."""
     for name, shown in (("Suzanne.001", (203, 231, 170)),):
         linear = np.array(object_colors.random_color(name))
         display = 1.055 * linear ** (1.0 / 2.4) - 0.055

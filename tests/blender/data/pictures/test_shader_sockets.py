@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials in node groups are read as the same nodes without groups."""
+"""Materials with node groups are read as if their nodes were not grouped."""
 
 import bpy
 import numpy as np
@@ -17,7 +17,7 @@ def image(scene):
 
 
 def new_group(name, inputs=(), outputs=()):
-    """(tree, its input node, its output node); inputs, outputs: (name, type of socket)."""
+    """Return (tree, its input node, its output node); inputs, outputs: (name, type of socket)."""
     tree = bpy.data.node_groups.new(name, "ShaderNodeTree")
     for sockets, direction in ((inputs, "INPUT"), (outputs, "OUTPUT")):
         for socket, kind in sockets:
@@ -32,7 +32,7 @@ def add_group(tree, inside):
 
 
 def new_material():
-    """(material, its tree, the input that is shown); without any other node."""
+    """Return (material, its tree, the input of its output node); the tree has no other node."""
     material = bpy.data.materials.new("Skin")
     material.diffuse_color = (1.0, 0.0, 1.0, 1.0)
     for node in list(material.node_tree.nodes):
@@ -41,7 +41,7 @@ def new_material():
 
 
 def add_skin(tree, image):
-    """A Principled BSDF with an image that is moved on its UV map, and numbers."""
+    """Add a Principled BSDF with numbers and with an image that is moved on its UV map."""
     shader, picture, mapping = (
         tree.nodes.new(kind) for kind in ("ShaderNodeBsdfPrincipled", "ShaderNodeTexImage", "ShaderNodeMapping")
     )
@@ -73,7 +73,7 @@ def whole_in_two_groups(image):
 
 
 def shader_in_a_group(image):
-    """A shader in a group whose color is linked from outside and whose numbers are set on the group."""
+    """Add a shader in a group, its color linked from outside and its numbers set on the group."""
     material, tree, shown = new_material()
     sockets = [("Color", "NodeSocketColor"), ("Rough", "NodeSocketFloat"), ("Metal", "NodeSocketFloat")]
     inside, start, end = new_group("Shader", sockets, [("BSDF", "NodeSocketShader")])
@@ -91,7 +91,7 @@ def shader_in_a_group(image):
 
 
 def picture_in_a_group(image):
-    """An image in a group, followed by a muted gamma node and a reroute."""
+    """Add an image in a group, followed by a muted gamma node and a reroute."""
     material, tree, shown = new_material()
     inside, _start, end = new_group("Picture", outputs=[("Value", "NodeSocketFloat"), ("Color", "NodeSocketColor")])
     skin = add_skin(inside, image)
@@ -134,7 +134,7 @@ def test_one_group_with_two_settings_is_two_materials(scene):
 
 
 def test_groups_that_lead_nowhere_leave_the_color_of_the_viewport(scene):
-    """Groups without nodes, deleted groups, and groups without an output."""
+    """Groups without nodes, deleted groups and groups without an output leave the material in its viewport color."""
     empty, _start, _end = new_group("Empty", outputs=[("BSDF", "NodeSocketShader")])
     lost, _start, _end = new_group("Lost", outputs=[("BSDF", "NodeSocketShader")])
     endless, _start, end = new_group("Endless", outputs=[("BSDF", "NodeSocketShader")])
@@ -151,7 +151,7 @@ def test_groups_that_lead_nowhere_leave_the_color_of_the_viewport(scene):
 
 @pytest.mark.parametrize("kind", ["NodeReroute", "ShaderNodeGamma"])
 def test_what_nothing_leads_to_sets_nothing(scene, kind):
-    """A reroute or a muted node without an input sets no value: as in Cycles, the shader's own color is used."""
+    """A reroute or a muted node without an input sets no value, so the shader's own color is used, as in Cycles."""
     material, tree, shown = new_material()
     shader, first, second = (tree.nodes.new(one) for one in ("ShaderNodeBsdfPrincipled", kind, kind))
     for node in (first, second):
@@ -165,7 +165,7 @@ def test_what_nothing_leads_to_sets_nothing(scene, kind):
 
 
 def test_nodes_in_a_circle_end(scene):
-    """Blender keeps cyclic links, shown in red, and ignores them."""
+    """Reading ends for nodes linked in a circle, which Blender keeps, shows in red and ignores."""
     material, tree, shown = new_material()
     shader, gamma, way = (
         tree.nodes.new(kind) for kind in ("ShaderNodeBsdfPrincipled", "ShaderNodeGamma", "NodeReroute")
@@ -180,8 +180,8 @@ def test_nodes_in_a_circle_end(scene):
 
 
 def test_a_world_in_a_group_shines_as_one_without(scene):
-    """A world whose color is set on a node group, and whose strength is set by a Value node, shines like a world
-    without groups.
+    """A world whose color is set on a node group, and whose strength comes from a Value node, is as bright as without
+    groups.
     """
     inside, start, end = new_group(
         "Sky", [("Color", "NodeSocketColor"), ("Strength", "NodeSocketFloat")], [("Background", "NodeSocketShader")]

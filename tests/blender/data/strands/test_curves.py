@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands as Blender's Curves: reading returns what was written, and Blender's own tools work on them."""
+"""Strands stored as Blender's Curves are read as they were written, and Blender's own tools work on the Curves."""
 
 import bpy
 import numpy as np
@@ -42,7 +42,9 @@ def test_curves_carry_what_blender_expects(kind, request, sphere):
 
 
 def test_written_points_reach_what_is_evaluated_and_no_copy(hair):
-    """Blender shares arrays between a datablock, its evaluated copies and undo steps."""
+    """Written points reach the evaluated Curves, but no copy or undo step, although Blender shares arrays between
+    them.
+    """
     copy, before = hair.data.copy(), points(hair)
     evaluated = hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert np.array_equal(attribute(evaluated, "position", 3), before.reshape(-1, 3))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides and hair stay rooted on a deforming surface, in Blender's evaluation and in our picture."""
+"""Guides and hair stay rooted on a deforming surface, both evaluated by Blender and drawn by Vellus."""
 
 import bpy
 import numpy as np
@@ -28,9 +28,9 @@ def test_hair_follows_an_armature_in_every_frame(arm, scene):
 
 
 def test_strands_between_guides_stay_between(arm, scene):
-    """A strand's arm lies among its guides' arms, at rest and bent, as far as their neighbors lie apart.
+    """A strand of 98 in 100 lies as close to its guides at rest and bent as the guides' neighbors.
 
-    This holds for 98 of 100 strands: guides in the elbow's fold, and strands next to it, are random.
+    Guides in the elbow's fold are random, and so are strands beside them.
     """
     guides, hair = grow(arm, guide_count=80, tilt=0.0, gravity=0.0, length_variation=0.0)
     roots = np.linalg.norm(points(hair)[:, None, 0] - points(guides)[None, :, 0], axis=-1)
@@ -67,7 +67,7 @@ def test_hair_grown_in_another_frame_is_the_same_hair(arm, scene):
 
 
 def key_shape(surface, transform, name="Key"):
-    """Add a shape key with value 1 that moves each vertex (N, 3); returns it."""
+    """Add a shape key of value 1 that moves each vertex (N, 3), and return it."""
     if surface.data.shape_keys is None:
         surface.shape_key_add(name="Basis")
     key = surface.shape_key_add(name=name)
@@ -124,7 +124,7 @@ def test_combing_a_deformed_surface_moves_the_hair_that_is_drawn(sphere):
 
 
 def test_nodes_find_roots_on_a_surface_of_other_vertices(sphere):
-    """A render with a finer subdivision needs the nearest point of the surface at rest."""
+    """Nodes find roots at the nearest point of the surface at rest if a render subdivides the surface more finely."""
     _guides, hair = grow(sphere)
     key_shape(sphere, shear)
     wanted = evaluated_points(hair)
@@ -142,7 +142,7 @@ def test_hair_is_not_deformed_without_rest_positions(sphere):
 
 
 def edit(surface, transform):
-    """Move a mesh's vertices as edit mode does."""
+    """Move a mesh's vertices as Edit Mode does."""
     surface.data.vertices.foreach_set("co", transform(vertex_positions(surface)).astype(np.float32).ravel())
     surface.data.update()
     update()

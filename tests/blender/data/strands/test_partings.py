@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair combed to two sides: no strand points in between, with limits, regions or a part line."""
+"""Between hair that is combed to two sides no strand points in between, with limits, regions or a part line."""
 
 import math
 import os
@@ -20,14 +20,16 @@ FREE = {"angle_limit": math.pi, "length_limit": 1e6}
 
 @pytest.fixture
 def ground(scene):
-    """A square of one meter with 40 × 40 faces."""
+    """Return a square of one meter with 40 × 40 faces."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=40, size=1.0)
     return bpy.context.object
 
 
 @pytest.fixture
 def guides(ground):
-    """200 guides that lean by 60 degrees to their own side of the plane x = 0; active."""
+    """Return 200 guides that lean by 60 degrees away from the plane x = 0, each to its own side; their object is
+    active.
+    """
     bpy.ops.vellus.distribute_guides(guide_count=200, length=0.2, length_variation=0.0, tilt=0.0, gravity=0.0)
     guides = bpy.data.objects["Guides"]
     comb(guides)
@@ -43,7 +45,7 @@ def comb(guides, border=0.0):
 
 
 def grown(**settings):
-    """(S, P, 3) of hair between the active guides."""
+    """Return (S, P, 3), the points of hair between the active guides."""
     assert bpy.ops.vellus.interpolate_hair(strand_count=6000, **settings) == {"FINISHED"}
     return points(bpy.data.objects["Hair"])
 
@@ -68,7 +70,7 @@ def on_the_wrong_side(strands, border=0.0):
 
 
 def draw_line(*corners, name="Line", kind="POLY", cyclic=False):
-    """A curve object through corners (x, y, z)."""
+    """Return a curve object through corners (x, y, z)."""
     data = bpy.data.curves.new(name, "CURVE")
     data.dimensions = "3D"
     spline = data.splines.new(kind)
@@ -94,7 +96,7 @@ def test_without_limits_a_third_points_in_between(guides):
 
 
 def test_blenders_own_interpolation_points_in_between(guides, ground):
-    """Blender's own interpolation makes strands between both sides in this scene, so the scene tests partings."""
+    """Blender's own interpolation makes strands point in between in this scene, so the scene tests partings."""
     folder = bpy.utils.system_resource("DATAFILES", path="assets/nodes")
     with bpy.data.libraries.load(os.path.join(folder, "procedural_hair_node_assets.blend"), link=False) as (_, wanted):
         wanted.node_groups = ["Interpolate Hair Curves"]
@@ -110,7 +112,7 @@ def test_blenders_own_interpolation_points_in_between(guides, ground):
 
 
 def test_limits_alone_part_hair(guides):
-    """Strands lean as far as their nearest guide."""
+    """With limits alone, strands lean as far as their nearest guide."""
     strands = grown()
     assert in_between(strands) == 0.0
     arms = strands[:, -1] - strands[:, 0]
@@ -191,7 +193,9 @@ def test_a_part_line_parts_hair(guides, kind):
 
 
 def test_a_part_line_is_where_it_is_in_the_world(guides, ground):
-    """A surface that was moved, rotated, scaled and mirrored, with a line whose object has another transform."""
+    """A part line acts where it is in the world, on a moved, rotated, scaled and mirrored surface, with any transform
+    of its own.
+    """
     ground.location, ground.rotation_euler, ground.scale = (3.0, -2.0, 5.0), (0.3, 0.2, 1.0), (-2.0, 2.0, 2.0)
     bpy.context.view_layer.update()
     ends = [ground.matrix_world @ (ground.data.vertices[0].co * 0 + type(ground.location)(end)) for end in ENDS]
@@ -206,7 +210,7 @@ ENDS = [(0.0, -0.5, 0.0), (0.0, 0.5, 0.0)]
 
 
 def test_a_part_line_on_a_posed_surface_parts_it_at_rest(guides, ground):
-    """A line drawn on a surface that a shape key has moved by one meter."""
+    """A line drawn on a surface that a shape key has moved by one meter parts the hair at the same place at rest."""
     ground.shape_key_add(name="Basis")
     key = ground.shape_key_add(name="Key")
     for point in key.data:
@@ -218,7 +222,7 @@ def test_a_part_line_on_a_posed_surface_parts_it_at_rest(guides, ground):
 
 
 def test_hair_follows_its_part_line(guides):
-    """A moved line changes the parting; an update without movement computes nothing."""
+    """A moved part line changes the parting; an update without movement computes nothing."""
     line = LINES["poly"]()
     grown(part_lines="Line", **FREE)
     hair = bpy.data.objects["Hair"]
@@ -236,7 +240,9 @@ def test_hair_follows_its_part_line(guides):
 
 
 def test_hair_follows_its_part_line_on_a_moved_surface(guides, ground):
-    """A line that is a child of the surface moves with it, and no weights are computed; any other line moves on it."""
+    """A part line that is a child of the surface moves with it, and no weights are computed; for other lines they
+    are.
+    """
     line = LINES["poly"]()
     line.parent = ground
     grown(part_lines="Line", **FREE)

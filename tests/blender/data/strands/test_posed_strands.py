@@ -13,7 +13,7 @@ from tests.support.dynamics.following import drawn_points, grow
 
 @pytest.fixture
 def bent(arm, scene):
-    """(guides, hair) on an arm that is bent to a right angle."""
+    """Return (guides, hair) on an arm that is bent to a right angle."""
     grown = grow(arm)
     scene.frame_set(11)
     return grown
@@ -24,7 +24,7 @@ def pose_of(curves_object):
 
 
 def at_rest(curves_object):
-    """Points (S, P, 3), their surface's topology, and where they are rooted."""
+    """Return points (S, P, 3) at rest, the topology of their surface, and their roots."""
     datablock = curves_object.data
     stored = curves.read_points(datablock).reshape(len(datablock.curves), -1, 3)
     return stored, datablock.vellus.topology, stored_roots.places(datablock, np.inf)
@@ -71,8 +71,8 @@ def test_strands_whose_roots_are_lost_are_rooted_where_it_is_nearest(bent):
 
 
 def test_where_it_is_nearest_is_a_matter_of_the_mesh_not_of_its_object_s_scale(hair):
-    """The nearest place is found in the mesh's local coordinates, as by the nodes for renders, so that a changed scale
-    moves no strand.
+    """The nearest place is found in the mesh's local coordinates, as by the nodes for renders, so a changed scale moves
+    no strand.
     """
     surface, (points, *_rooted) = hair.data.surface, at_rest(hair)
     twist = surface.modifiers.new("Twist", "SIMPLE_DEFORM")

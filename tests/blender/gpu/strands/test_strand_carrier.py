@@ -17,7 +17,7 @@ CLOSE = 4e-6  # [m] beside places of 1 m
 
 
 def sheet():
-    """(V, 3) vertices and `Faces` of a sheet of quads, 1 m wide."""
+    """Return (V, 3) vertices and `Faces` of a sheet of quads, 1 m wide."""
     along = np.linspace(0.0, 1.0, SIDE, dtype=np.float32)
     x, y = np.meshgrid(along, along)
     first = (np.arange(SIDE - 1)[:, None] * SIDE + np.arange(SIDE - 1)).ravel()
@@ -28,7 +28,7 @@ def sheet():
 
 @pytest.fixture
 def rooted(rng):
-    """(vertices, faces, places, points) of strands all over a sheet."""
+    """Return (vertices, faces, places, points) of strands all over a sheet."""
     vertices, faces = sheet()
     quads = faces.corner_vertices.reshape(-1, 4)[rng.integers(0, (SIDE - 1) ** 2, STRANDS)]
     barycentric = rng.dirichlet(np.ones(3), STRANDS).astype(np.float32)
@@ -39,7 +39,7 @@ def rooted(rng):
 
 
 def bent(vertices, amount):
-    """Rolled up where x is above a half, and as it was elsewhere."""
+    """Return vertices that are rolled up where x is above a half, and unchanged elsewhere."""
     angle = amount * np.maximum(vertices[:, 0] - 0.5, 0.0)
     moved = vertices.copy()
     far = angle > 0.0
@@ -77,7 +77,7 @@ def test_strands_are_where_warp_carries_them(blender, rooted):
 
 
 def test_strands_that_begin_apart_from_their_places_are_carried_to_these(blender, rooted):
-    """Strands are carried to places apart from their first points, as on a cage; strands at rest do not change."""
+    """Strands whose first points are apart from their places, as on a cage, are carried with these places."""
     vertices, faces, places, points = rooted
     slides = np.random.default_rng(3).normal(scale=0.02, size=(len(points), 3)).astype(np.float32)
     slides[::3] = 0.0

@@ -34,7 +34,7 @@ def vectors(array):
 
 
 def bound_hair(rng, point_count, slots, angle_limit=np.pi / 3, length_limit=3.0, keep_length=1.0):
-    """(`HairBinding`, guides as `Strands`): strands over a ball, curled guides of many lengths, one of them zero."""
+    """Return (`HairBinding`, guides as `Strands`): curled guides of many lengths, one of them zero, over a ball."""
     guide_roots, roots = unit(rng.normal(size=(GUIDES, 3))), unit(rng.normal(size=(STRANDS, 3)))
     roots[:5] = guide_roots[:5]  # at guides, and straight below
     roots[5] = (0.0, 0.0, -1.0)
@@ -132,7 +132,7 @@ def test_an_edit_leaves_where_strands_were(blender, rng):
 
 
 def test_much_hair_keeps_no_second_texture(blender, rng, monkeypatch):
-    """Former points of much hair are unknown, as after two changes at once."""
+    """Much hair keeps no second texture, and its former points count as unknown, as after two changes at once."""
     monkeypatch.setattr(strand_changes, "MOST_MOVED", STRANDS * 9 - 1)
     binding, guides = bound_hair(rng, 9, 4)
     wanted = by_warp(binding, guides, np.eye(3))

@@ -18,19 +18,19 @@ CLOSE = 2e-6  # of axes, which are unit vectors
 
 @pytest.fixture
 def ball():
-    """A closed unit ball."""
+    """Return a closed unit ball."""
     return subdivided_sphere(2)
 
 
 def nearest_rotations(matrices):
-    """(N, 3, 3) by the shader."""
+    """Return (N, 3, 3) rotations by the shader."""
     inputs = {f"c{column}": np.float32(matrices[:, :, column]) for column in range(3)}
     text, call = glsl.source("strands/nearest_rotation.glsl"), "nearest_rotation(mat3(c0, c1, c2))"
     return np.stack([glsl.evaluate(text, "vec3", f"{call}[{column}]", **inputs) for column in range(3)], axis=2)
 
 
 def turned(turner, posed):
-    """((M, 3) places, (M,) whether they moved, (M, 2, 3) axes) of all vertices that turn."""
+    """Return ((M, 3) places, (M,) whether they moved, (M, 2, 3) axes) of all vertices that turn."""
     texture = turner.turn(posed)
     texels = np.array(texture.read(), np.float32).reshape(-1, 3, 4)[: turner.turned_count]
     return texels[:, 0, :3], texels[:, 0, 3] > 0.0, texels[:, 1:, :3]
@@ -61,7 +61,7 @@ def test_flat_matrices_have_rotations_that_are_as_near_as_any(blender, rng):
 
 @pytest.mark.parametrize("kind", ["bend", "shear", "twist", "bulge"])
 def test_turns_are_those_of_double_precision(blender, ball, rng, kind):
-    """The law holds for a part of the vertices, far from the origin and on smooth surfaces."""
+    """Rotations agree with double precision for a part of the vertices, far from the origin and on smooth surfaces."""
     faces, rest = faces_of(ball), ball.vertices
     after = deformations(rest)[kind] @ rotation(rng).T
     smooth = (rest * (1.0 + 0.01 * np.sin(9.0 * rest))).astype(np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked frames whose animation changed: the change is detected when shown, and simulated again from there."""
+"""A changed animation of baked frames is detected when a changed frame is shown, and simulated again from there."""
 
 import bpy
 import numpy as np
@@ -16,7 +16,7 @@ LAST = 30  # a state is kept after frame 25
 
 @pytest.fixture
 def guides(hair, tmp_path):
-    """Guides that simulate on a sphere that swings, and collide with a ball of the collection Body."""
+    """Return guides that simulate on a swinging sphere, and collide with a ball of the collection Body."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=0.3, location=(1.3, 0.0, 0.0))
     ball = bpy.context.object
     ball.name = "Ball"
@@ -30,7 +30,7 @@ def guides(hair, tmp_path):
 
 
 def bake(guides, last=LAST, starts_over=False, stops_at=None):
-    """How many frames were simulated."""
+    """Bake, and return how many frames were simulated."""
 
     def progress(step, _part):
         if step == f"Frame {stops_at}":
@@ -55,14 +55,14 @@ def reported(guides, *frames):
 
 
 def turn(angle, frame):
-    """Another angle of the surface in a frame."""
+    """Change the angle of the surface in a frame."""
     ball = bpy.data.objects["Sphere"]
     ball.rotation_euler.y = angle
     ball.keyframe_insert("rotation_euler", frame=frame)
 
 
 def lift_ball(frame):
-    """Let the ball rise from a frame on, until ten frames later."""
+    """Animate the ball to rise from a frame on, during ten frames."""
     ball = bpy.data.objects["Ball"]
     for number, height in ((frame, 0.0), (frame + 10, 0.4)):
         ball.location.z = height
@@ -132,7 +132,7 @@ def test_frames_after_a_change_that_is_over_are_simulated_again(guides):
 
 
 def test_baking_goes_on_with_a_collider_that_stopped(guides):
-    """A collider whose topology changes keeps its last pose, also if baking was interrupted meanwhile."""
+    """A collider whose topology changes keeps its last pose, and baking continues, also after an interruption."""
     ball = bpy.data.objects["Ball"]
     for frame, height in ((1, 0.0), (20, 0.5)):
         ball.location.z = height

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changes of guides, the scene and settings while frames are baked: baking continues, or ends with one message."""
+"""Baking continues, or ends with one message, if guides, the scene or settings change meanwhile."""
 
 import math
 
@@ -20,7 +20,7 @@ LAST, PRESENT = 8, 3
 
 @pytest.fixture
 def guides(hair, tmp_path):
-    """Guides that swing; the scene is at a frame of its own."""
+    """Return guides that swing; the scene is in a frame of its own."""
     guides = bpy.data.objects["Guides"]
     swing(bpy.data.objects["Sphere"])
     simulate(guides, tmp_path / "frames")
@@ -29,7 +29,7 @@ def guides(hair, tmp_path):
 
 
 def bake(guides, disturb=lambda: None, at=4):
-    """Bake, and do something when a frame was written."""
+    """Bake, and call a function after each written frame."""
     told = []
 
     def tell(frame):
@@ -92,7 +92,7 @@ def ball(guides):
 
 @pytest.mark.parametrize("name", ["Sphere", "Icosphere"])
 def test_meshes_may_be_edited_while_guides_bake_and_play(guides, ball, name, request, capfd):
-    """Blender's evaluated mesh has no attributes then."""
+    """Meshes may be edited while guides bake and play, although their evaluated mesh has no attributes then."""
     request.addfinalizer(leave_edit_mode)
     bpy.context.view_layer.objects.active = guides.data.surface if name == "Sphere" else ball
     bpy.ops.object.mode_set(mode="EDIT")
@@ -162,7 +162,9 @@ def test_baking_ends_with_a_sentence_and_keeps_its_frames(guides, disturb, sente
 
 @pytest.mark.usefixtures("made_anew")
 def test_a_keyed_setting_that_becomes_no_number_is_reported_and_hair_stays(guides, hair, monkeypatch):
-    """During playback baked frames are shown and others as combed, until the setting is finite again."""
+    """A keyed setting that becomes non-finite is reported, and guides keep their baked or combed shape until it is
+    finite.
+    """
     combed = points(hair)
     bake(guides)
     bpy.context.scene.frame_set(LAST)

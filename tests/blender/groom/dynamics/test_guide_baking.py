@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked guides: the groom comes first, resuming gives the same bits, and hair follows in every frame."""
+"""Baked guides start from the groom, resuming gives the same bits, and hair follows in every frame."""
 
 import shutil
 
@@ -25,7 +25,7 @@ LAST = 28
 
 @pytest.fixture
 def swung(hair, tmp_path):
-    """(guides, hair) whose sphere swings, and that simulate."""
+    """Return (guides, hair) that simulate on a swinging sphere."""
     guides = bpy.data.objects["Guides"]
     swing(bpy.data.objects["Sphere"])
     simulate(guides, tmp_path / "frames")
@@ -109,7 +109,7 @@ def test_a_folder_that_goes_away_ends_baking(swung):
 
 
 def test_a_surface_that_only_turns_keeps_its_size(swung):
-    """A rotation in any direction keeps the size, so guides do not compute their rest shape again in each frame."""
+    """Guides do not compute their rest shape again on a surface that only turns, as its size stays the same."""
     guides, _hair = swung
     scene, sphere = bpy.context.scene, bpy.data.objects["Sphere"]
     sphere.rotation_euler, sphere.scale = (0.3, 0.2, 0.1), (1.7, 1.7, 1.7)
@@ -127,7 +127,7 @@ def test_a_surface_that_only_turns_keeps_its_size(swung):
 
 
 def test_roots_stay_on_a_surface_that_bends(arm, tmp_path):
-    """Points that are carried back to rest, and forward by the nodes, are where they were simulated."""
+    """Roots of baked guides stay on a bending surface: points carried back to rest and forward again are unchanged."""
     bpy.context.view_layer.objects.active = arm
     bpy.ops.object.select_all(action="DESELECT")
     arm.select_set(True)
@@ -185,7 +185,9 @@ def test_what_has_changed_since_is_shown(swung, change):
 
 
 def test_a_moved_part_line_outdates_what_was_baked(swung):
-    """Frames are valid while the line divides guides as it did in the bake; without the line, baking is refused."""
+    """Baked frames are valid while part lines divide guides as in the bake; with a missing part line baking is
+    refused.
+    """
     guides, hair = swung
     unparted = guide_baking.key_of(guides.data, bpy.context.scene)
     line = draw_line((0.0, -0.9, 1.2), (0.0, 0.9, 1.2))
@@ -214,7 +216,9 @@ def test_a_moved_part_line_outdates_what_was_baked(swung):
 
 
 def test_a_part_line_that_the_deformed_surface_leaves_behind_outdates_nothing(swung):
-    """The law holds after the file is opened in another frame; moving the line outdates the bake."""
+    """A part line that the deformed surface leaves behind keeps baked frames valid, also after opening the file in
+    another frame.
+    """
     guides, hair = swung
     sphere = bpy.data.objects["Sphere"]
     sphere.shape_key_add(name="Basis")
@@ -251,9 +255,9 @@ def test_a_part_line_that_the_deformed_surface_leaves_behind_outdates_nothing(sw
 @even_guides
 @pytest.mark.parametrize("is_parted", [True, False])
 def test_guides_do_not_feel_those_beyond_a_part_line(swung, is_parted):
-    """The combing of guides beyond the line has no effect, but for rounding in sums of mean masses.
+    """Combing guides beyond a part line has no effect on guides, except for rounding in sums of mean masses.
 
-    Without contact: guides that a surface pushes buckle, by which rounding grows threefold in a frame.
+    Guides do not touch the surface here: buckling multiplies rounding by three in each frame.
     """
     guides, hair = swung
     settings = guides.data.vellus.dynamics
@@ -280,7 +284,7 @@ def test_guides_do_not_feel_those_beyond_a_part_line(swung, is_parted):
 
 
 def comb_tips(guides, chosen):
-    """Bend some guides."""
+    """Bend the tips of some guides."""
     there = points(guides)
     there[chosen] += np.float32([0.0, 0.0, -0.1]) * np.linspace(0.0, 1.0, there.shape[1], dtype=np.float32)[:, None]
     guides.data.attributes["position"].data.foreach_set("vector", there.ravel())
@@ -304,7 +308,7 @@ def test_a_copy_bakes_to_a_folder_of_its_own(swung):
 
 @pytest.mark.parametrize("is_stored", [True, False])
 def test_files_in_one_folder_have_frames_of_their_own(swung, tmp_path, is_stored):
-    """Guides with the same name have separate frames.
+    """Files in one folder have separate frames for guides of one name.
 
     A file saved under another name keeps its frames, also on the command line.
     """

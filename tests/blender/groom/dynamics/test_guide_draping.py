@@ -21,7 +21,7 @@ def draping(guides):
 
 @pytest.mark.parametrize("last", [0.0, 0.3])
 def test_esc_leaves_guides_as_they_were(guides, last):
-    """Esc restores the guides at the beginning and between frames."""
+    """Esc restores the guides, at the beginning and between frames."""
     before, told = points(guides), []
 
     def stop(_step, part):
@@ -52,7 +52,7 @@ def test_a_thread_comes_to_the_same_bits(guides):
 
 
 def test_a_surface_that_cannot_be_collided_with_is_refused(guides, monkeypatch):
-    """Guides would fall through it."""
+    """A surface without usable faces is refused, as guides would fall through it."""
     before = points(guides)
     monkeypatch.setattr(colliders, "_cause", lambda *_arguments: "its faces have no area")
     with pytest.raises(HairError, match="Guides cannot be draped on this surface: its faces have no area"):

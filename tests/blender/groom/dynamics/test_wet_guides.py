@@ -17,7 +17,7 @@ LAST = 6
 
 @pytest.fixture
 def swung(hair, tmp_path):
-    """Guides that swing, and do not touch each other."""
+    """Return guides that swing without touching each other."""
     swing(bpy.data.objects["Sphere"])
     guides = bpy.data.objects["Guides"]
     apart = {"hair_friction": 0.0, "hair_pressure": 0.0, "collides_with_surface": False, "sag_free": False}
@@ -39,7 +39,9 @@ def baked(guides, last=LAST, starts_over=True):
 
 
 def sides(guides):
-    """Return two (G,) bool: whether guides are rooted well inside the weighted side, and whether on the other side."""
+    """Return two (G,) bool arrays: guides rooted well inside the weighted side, and guides rooted well outside of
+    it.
+    """
     x = np.array([curve.points[0].position.x for curve in guides.data.curves])
     return x > 0.25, x < -0.25
 
@@ -62,7 +64,7 @@ def test_guides_are_wet_where_the_mask_is(hair, swung):
 
 
 def test_guides_are_as_wet_as_their_strands_on_the_mean(hair, swung):
-    """The law holds for varied wetness, with and without a mask, and with keyframes."""
+    """Guides have the mean wetness of their strands, with varied wetness, masks and keyframes."""
     wet_side, dry_side = sides(swung)
     swung.data.vellus.dynamics.wetness = 0.5
     half = baked(swung)
@@ -86,7 +88,7 @@ def test_guides_are_as_wet_as_their_strands_on_the_mean(hair, swung):
 
 
 def test_draped_guides_are_as_wet_as_the_mask_says(hair, swung):
-    """Wet guides sink lower."""
+    """Draped guides have the wetness of the mask, so wet guides sink lower."""
     wet_side, dry_side = sides(swung)
 
     def draped():
@@ -134,7 +136,9 @@ def test_baked_frames_follow_from_the_mask(hair, swung):
 
 
 def test_baking_goes_on_to_the_same_bits_with_keyed_weight(hair, swung):
-    """A stored state includes the keyed material and wetness of its frame, so resumed baking gives the same bits."""
+    """Resumed baking gives the same bits with a keyed weight, as stored states include the keyed material and
+    wetness.
+    """
     dynamics = swung.data.vellus.dynamics
     for frame, weight in ((1, 1.0), (20, 4.0)):
         dynamics.weight = weight

@@ -38,7 +38,7 @@ def made_of_particles(head, _folder):
 
 
 def made_of_empty_hair(head, _folder):
-    """Empty Hair with curves as the Add brush makes them: Catmull-Rom, few points."""
+    """Return Empty Hair with curves as by the Add brush: Catmull-Rom splines with few points."""
     select(head)
     bpy.ops.object.curves_empty_hair_add()
     made = bpy.context.object
@@ -69,7 +69,7 @@ def made_of_a_file(write, read, ending):
 
 
 def made_of_legacy_curves(head, _folder):
-    """Curve objects of before Curves: Bezier, NURBS and polylines, as tubes."""
+    """Return legacy curve objects: Bezier, NURBS and polylines, as tubes."""
     datablock = bpy.data.curves.new("Legacy", "CURVE")
     datablock.dimensions, datablock.bevel_depth = "3D", 0.01
     rng = np.random.default_rng(5)
@@ -91,7 +91,7 @@ def made_of_legacy_curves(head, _folder):
 
 
 def as_seen(made):
-    """(N, 3) in the world; of a tube its middle."""
+    """Return (N, 3) points in the world; for a tube those of its axis."""
     if made.type != "CURVE":
         return world(made)
     made.data.bevel_depth = 0.0
@@ -103,7 +103,7 @@ def as_seen(made):
 
 
 def world_of_polylines(made):
-    """(N, 3): the mesh edges that Blender makes of thin curves."""
+    """Return (N, 3) vertices of the mesh edges that Blender makes of thin curves."""
     mesh = made.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     points = np.array([vertex.co for vertex in mesh.vertices])
     matrix = np.array(made.matrix_world)
@@ -128,7 +128,7 @@ SOURCES = {
 
 @pytest.mark.parametrize("source", SOURCES)
 def test_hair_stays_where_the_artist_sees_it(head, tmp_path, source):
-    """Hair of a posed head stays in place; its guides are stored at the rest pose."""
+    """Hair of a posed head stays in place, and its guides are stored at the rest pose."""
     made = SOURCES[source](head, tmp_path)
     twist = head.modifiers.new("Twist", "SIMPLE_DEFORM")
     twist.deform_method, twist.angle = "TWIST", 0.4
@@ -204,7 +204,7 @@ def test_the_surface_carries_them(imported, head):
 
 
 def roots_of_strands():
-    """(S, 3) in the surface's coordinates."""
+    """Return (S, 3) roots in the surface's coordinates."""
     hair = bpy.data.objects["Hair"]
     return stored(hair).reshape(len(hair.data.curves), -1, 3)[:, 0]
 
@@ -283,7 +283,7 @@ def test_an_edited_surface_carries_them_and_they_stay_hand_made(imported, head):
 
 
 def test_hair_follows_them_while_they_are_combed(imported, monkeypatch):
-    """In a window strands follow a stroke on guides of mixed point counts without being bound again."""
+    """In a window, strands follow a stroke on guides of unequal point counts without being bound again."""
     use(imported)
     monkeypatch.setattr(running, "has_window", lambda: True)
     hair = bpy.data.objects["Hair"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several curve objects that are selected for Use as Guides or Use as Hair: all of them become one hair system."""
+"""Several selected curve objects become one hair system by Use as Guides and by Use as Hair."""
 
 import bpy
 import numpy as np
@@ -12,7 +12,7 @@ from tests.support.reading import snapshot
 
 
 def directions(count, rng):
-    """(count, 3) unit vectors to the upper half."""
+    """Return (count, 3) unit vectors to the upper half."""
     ways = rng.normal(size=(count, 3))
     ways[:, 2] = abs(ways[:, 2])
     return ways / np.linalg.norm(ways, axis=1)[:, None]
@@ -20,9 +20,10 @@ def directions(count, rng):
 
 @pytest.fixture
 def curves_around(sphere, rng):
-    """(three objects around the sphere, (20, 2, 3) ends in the world of all curves, (20,) radii at their roots).
+    """Return (three objects around the sphere, (20, 2, 3) ends of curves in the world, (20,) radii at roots).
 
-    Curves, moved and twice as large, with radii; legacy curves as thick as their bevel; curves without radii.
+    The objects are Curves, moved and twice as large, with radii; legacy curves as thick as their bevel; and curves
+    without radii.
     """
     ways = directions(20, rng)
     ends = ways[:, None] * np.linspace(1.0, 1.5, 2)[:, None]
@@ -61,7 +62,7 @@ def curves_around(sphere, rng):
 
 
 def ends_and_radii(curves_object):
-    """((C, 2, 3) ends of curves in the world, (C,) radii at their roots)."""
+    """Return ((C, 2, 3) ends of curves in the world, (C,) radii at their roots)."""
     datablock, found, radii = curves_object.data, [], []
     for curve in datablock.curves:
         for place in (curve.first_point_index, curve.first_point_index + curve.points_length - 1):

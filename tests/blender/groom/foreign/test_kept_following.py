@@ -14,13 +14,13 @@ from tests.support.exchange.imported import curves_object, lines_on, select, sto
 
 @pytest.fixture
 def scale():
-    """Of the sphere; also as a test's parameter."""
+    """Set the scale of the sphere; also usable as a test's parameter."""
     return 1.0
 
 
 @pytest.fixture
 def kept(sphere, rng, scale):
-    """Hair on the sphere, of 5 to 12 points a strand, with 40 guides."""
+    """Return kept hair on the sphere, of 5 to 12 points a strand, with 40 guides."""
     sphere.scale = (scale, scale, scale)
     update()
     hair = curves_object(list(lines_on(sphere, rng, 300, least=5)))
@@ -35,7 +35,7 @@ def guides_of(hair):
 
 
 def comb(guides, arms):
-    """Multiply guides by (3, 3) from their roots, all or where a (G, 1, 1) factor is 1."""
+    """Multiply guides by (3, 3) from their roots, where a (G, 1, 1) factor is 1."""
     points = curves.read_points(guides).reshape(len(guides.curves), -1, 3)
     write(guides, points[:, :1] + (points - points[:, :1]) @ np.asarray(arms).T)
 
@@ -185,7 +185,7 @@ def test_strands_whose_mesh_was_deleted_say_so(kept, sphere, capfd):
 
 @pytest.mark.parametrize("is_overridden", [False, True])
 def test_linked_strands_follow_simulated_guides_and_come_back(kept, tmp_path, is_overridden):
-    """They behave like other hair of a linked character: nothing of it is stored in the file that links it."""
+    """Linked kept hair follows simulated guides and returns to its shape; the linking file stores none of its data."""
     path = tmp_path / "character.blend"
     bpy.data.libraries.write(str(path), {kept})
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

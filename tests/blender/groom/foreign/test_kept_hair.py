@@ -22,13 +22,13 @@ def use(*chosen, **options):
 
 @pytest.fixture
 def strands(sphere, rng):
-    """Polylines out of the sphere, of 5 to 12 points each."""
+    """Return polylines that start on the sphere, of 5 to 12 points each."""
     return curves_object(list(lines_on(sphere, rng, COUNT, least=5)))
 
 
 @pytest.fixture
 def kept(sphere, strands):
-    """Return the same curves, used as hair."""
+    """Return the polylines used as hair."""
     use(sphere, strands)
     return strands
 
@@ -152,7 +152,7 @@ def test_strands_of_any_point_counts_are_drawn_with_their_radii(sphere, rng):
 
 
 def test_splines_are_drawn_round(sphere):
-    """A half circle of four control points is drawn as the spline through them, not as three lines at 60°."""
+    """A half circle of four control points is drawn as a spline, not as three lines at 60°."""
     angles = np.linspace(0.0, np.pi, 4)
     arc = np.stack([0.2 * np.sin(angles), np.zeros(4), 1.0 + 0.2 * (1.0 - np.cos(angles))], axis=1)
     hair = curves_object([arc, arc + np.array([0.0, 0.1, 0.0])], kind="CATMULL_ROM")
@@ -165,7 +165,7 @@ def test_splines_are_drawn_round(sphere):
 
 @pytest.fixture
 def particles(sphere):
-    """The sphere with a particle system of 40 hairs."""
+    """Return the sphere with a particle system of 40 hairs."""
     select(sphere)
     bpy.ops.object.particle_system_add()
     settings = sphere.particle_systems[0].settings

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Masks of styles are painted: hair follows in the paint mode, and masks are made of selected guides."""
+"""Hair follows while the mask of a style is painted, and masks are created from selected guides."""
 
 import bpy
 import numpy as np
@@ -15,7 +15,7 @@ from tests.support.reading import points, vertex_positions
 
 @pytest.fixture
 def styled(hair):
-    """Hair on the sphere with a Trim to a fifth of its length, which is active."""
+    """Return hair on the sphere with an active Trim to a fifth of its length."""
     style_items.add(hair.data.vellus, trim.Settings(factor=0.2), "Trim")
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="trim")
@@ -52,7 +52,7 @@ def active_group():
 
 
 def unstyled():
-    """Lengths (S,) without the style."""
+    """Return the lengths (S,) without the style."""
     active_group().is_on = False
     bpy.context.view_layer.update()
     found = lengths()
