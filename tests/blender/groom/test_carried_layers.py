@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers of guides are carried along by tools that add, remove, mirror and transfer guides, and by any transform."""
+"""Tools that add, remove, mirror and transfer guides, and any transform, carry the layers of guides."""
 
 import bmesh
 import bpy
@@ -40,7 +40,7 @@ def comb(guides, by):
 
 
 def weigh(guides, *weights):
-    """Set the weights of all layers; returns the points of the guides."""
+    """Set the weights of all layers, and return the points of the guides."""
     for item, weight in zip(guides.data.vellus.layers, weights, strict=True):
         item.weight = weight
     update()
@@ -49,7 +49,7 @@ def weigh(guides, *weights):
 
 @pytest.fixture
 def layered(hair):
-    """The guides' object, with two combed layers: Combing, with a keyed weight, and Side."""
+    """Return the guides' object with two combed layers: Combing, with a keyed weight, and Side."""
     guides = bpy.data.objects["Guides"]
     api.add_layer(guides)
     update()
@@ -61,7 +61,7 @@ def layered(hair):
 
 
 def test_change_guide_count_carries_layers(layered):
-    """With 60, then 150, then 60 guides, remaining guides are exact, and each layer combs new guides as it combs
+    """With 60, then 150, then 60 guides, remaining guides are exact, and layers comb new guides as they comb
     strands.
     """
     state = layered.data.vellus
@@ -97,9 +97,7 @@ def test_change_guide_count_carries_layers(layered):
 
 
 def test_first_layer_keeps_guides_that_were_added(hair):
-    """The first layer takes the guides with all their points, including added ones, and settings no longer grow its
-    base.
-    """
+    """The first layer takes all points of the guides, also of added guides, and settings no longer grow its base."""
     guides = bpy.data.objects["Guides"]
     api.change_guides(guides, "COUNT", method="COUNT", guide_count=2 * len(guides.data.curves))
     update()

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair is not evaluated while guides are baked without a window, and is again after any end of baking."""
+"""Hair is not evaluated while guides are baked without a window, and is evaluated again after baking ends in any
+way.
+"""
 
 import bpy
 import pytest
@@ -12,7 +14,7 @@ from tests.support.dynamics.swung import simulate, swing
 
 @pytest.fixture
 def swung(hair, tmp_path):
-    """(guides, hair) that simulate on a sphere that swings and waves."""
+    """Return (guides, hair) that simulate on a sphere that swings and waves."""
     sphere, guides = bpy.data.objects["Sphere"], bpy.data.objects["Guides"]
     swing(sphere)
     sphere.modifiers.new("Wave", "WAVE").height = 0.05
@@ -61,7 +63,7 @@ def test_hair_is_not_evaluated_meanwhile(swung, ending):
 
 
 def test_a_surface_that_only_hair_has_evaluated_is_baked_all_the_same(swung):
-    """A scalp that is disabled in viewports is evaluated because hair follows it."""
+    """Guides are baked on a surface that is disabled in viewports and evaluated only because hair follows it."""
     guides, _hair = swung
     visible = bake(guides)
     bpy.data.objects["Sphere"].hide_viewport = True

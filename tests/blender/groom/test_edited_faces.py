@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on a surface with changed faces: it keeps its place if its own face still exists."""
+"""Hair on a surface with changed faces keeps its place if its own face still exists."""
 
 import re
 from contextlib import contextmanager
@@ -18,7 +18,9 @@ GRID = 8  # faces along a side, 1 m wide
 
 @pytest.fixture
 def hair(scene):
-    """Combed guides and 400 strands on a bumpy grid with a weight group and an eye beside it; the hair's object."""
+    """Return the object of 400 strands between combed guides on a bumpy grid with a weight group and an eye beside
+    it.
+    """
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=GRID, y_subdivisions=GRID, size=1.0)
     grid = bpy.context.object
     grid.name = "Skin"
@@ -45,7 +47,7 @@ def edit_mode():
 
 
 def select(*faces):
-    """Select these faces of the skin, in Object Mode."""
+    """Select the given faces of the skin, in Object Mode."""
     skin = bpy.data.objects["Skin"].data
     skin.polygons.foreach_set("select", np.isin(np.arange(len(skin.polygons)), faces))
     skin.edges.foreach_set("select", np.zeros(len(skin.edges), bool))
@@ -57,12 +59,12 @@ def select(*faces):
 
 
 def faces_of(curves_object, count):
-    """(S,) bool: which strands are rooted on one of the first faces."""
+    """Return (S,) bool: whether strands are rooted on one of the first faces."""
     return attribute(curves_object, "root_triangle") // 2 < count
 
 
 def roots_apart(curves_object):
-    """The largest distance of a stored root from where its strand begins."""
+    """Return the largest distance of a stored root from the first point of its strand."""
     skin = bpy.data.objects["Skin"].data
     vertices, weights = stored_roots.places(curves_object.data, len(skin.vertices))
     places = np.array([vertex.co for vertex in skin.vertices])
@@ -135,7 +137,7 @@ def test_strands_stay_whose_face_is_left_alone(hair, name):
 
 
 def test_strands_are_carried_with_what_is_moved_while_faces_come_and_go(hair):
-    """Strands follow when faces are deleted and others are moved in a single visit to Edit Mode."""
+    """Strands follow their faces when faces are deleted and others moved in a single visit to Edit Mode."""
     before, moved = points(hair), slice(20, 60)
     lost = faces_of(hair, 1)
     corners = np.array([attribute(hair, name) for name in stored_roots.VERTICES])
@@ -180,7 +182,7 @@ def test_a_mask_that_is_painted_in_the_same_edit_places_strands_again(hair):
 
 
 def test_a_quad_that_is_cut_otherwise_keeps_its_strands(scene):
-    """One of four quads becomes concave at its second corner: Blender cuts it along its other diagonal."""
+    """Strands of a quad keep their places when it becomes concave and Blender divides it along its other diagonal."""
     mesh = bpy.data.meshes.new("Skin")
     places = [(x, y, 0.0) for y in range(3) for x in range(3)]
     mesh.from_pydata(places, [], [(0, 1, 4, 3), (1, 2, 5, 4), (3, 4, 7, 6), (4, 5, 8, 7)])
@@ -206,8 +208,8 @@ def test_a_quad_that_is_cut_otherwise_keeps_its_strands(scene):
 
 
 def test_strands_that_were_edited_by_hand_are_carried_too(hair):
-    """Hand-edited strands are moved with the surface instead of being regenerated, when an edit moves vertices, and
-    when it adds faces.
+    """Strands edited by hand move with the surface when an edit moves vertices or adds faces, and are not
+    regenerated.
     """
     edited = points(hair)
     edited[:, :, 1] += np.linspace(0.0, 0.2, edited.shape[1]) ** 2
@@ -234,7 +236,7 @@ def test_strands_that_were_edited_by_hand_are_carried_too(hair):
 
 @pytest.fixture
 def changing(hair, scene):
-    """The hair, on a skin that loses most of its faces until frame 10 by a keyed modifier; an undo step in frame 1."""
+    """Return hair on a skin that a keyed modifier strips of most faces until frame 10, with an undo step in frame 1."""
     decimate = bpy.data.objects["Skin"].modifiers.new("Decimate", "DECIMATE")
     for frame, ratio in ((1, 1.0), (10, 0.2)):
         decimate.ratio = ratio
@@ -246,13 +248,13 @@ def changing(hair, scene):
 
 
 def step(name):
-    """Undo or redo, and what Blender evaluates for it."""
+    """Undo or redo, and evaluate the scene."""
     getattr(bpy.ops.ed, name)()
     bpy.context.view_layer.update()
 
 
 def test_undo_across_frames_of_changing_faces_roots_nothing_again(changing, scene):
-    """Faces that differ because of the frame are not an edit, whatever reports the surface."""
+    """Undo across frames with different faces keeps all roots, as a change by the frame is no edit."""
     before = {name: points(bpy.data.objects[name]) for name in ("Hair", "Hair Guides")}
     topology = bpy.data.objects["Hair"].data.vellus.topology
     scene.frame_set(5)
@@ -282,7 +284,7 @@ def test_an_edit_in_such_a_frame_is_followed(changing, scene):
 
 
 def test_a_setting_that_is_changed_back_is_an_edit_too(hair, scene):
-    """Changing a ratio and changing it back within a frame both count as edits of the topology."""
+    """A ratio that is changed and changed back within a frame counts as two edits of the topology."""
     decimate = bpy.data.objects["Skin"].modifiers.new("Decimate", "DECIMATE")
     topologies = []
     for frame, ratio in ((1, 0.5), (2, 0.5), (2, 1.0), (2, 0.5)):

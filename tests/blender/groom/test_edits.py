@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair systems: adding in one step, finding, deleting, and repairing the surface; with undo."""
+"""Hair systems are added in one step, found, deleted and repaired, with undo."""
 
 import bpy
 import numpy as np
@@ -24,7 +24,7 @@ def activate(name):
 
 
 def in_world(curves_object):
-    """(S, P, 3) points in world space."""
+    """Return (S, P, 3) points in world space."""
     bpy.context.view_layer.update()
     matrix = np.array(curves_object.matrix_world)
     return points(curves_object) @ matrix[:3, :3].T + matrix[:3, 3]
@@ -75,7 +75,7 @@ def test_guides_stay_while_other_hair_follows_them(guides):
 
 
 def test_guides_that_nothing_follows_any_more_are_no_orphans(hair):
-    """Their object was deleted, and they are on another mesh than the hair."""
+    """Delete Hair also deletes guides whose object was deleted and which are on another mesh than the hair."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
     bpy.data.objects["Guides"].data.surface = bpy.context.object
     bpy.data.objects.remove(bpy.data.objects["Guides"])
@@ -166,7 +166,7 @@ def test_a_renamed_uv_map_is_found_again(hair):
 
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 3.0, 0.5), (-1.0, 1.0, 1.0)])
 def test_applying_the_scale_moves_nothing(sphere, scale):
-    """Neither the mesh nor its hair moves, now or when the hair is regenerated."""
+    """Applying the scale moves neither the mesh nor its hair, at once or when the hair is regenerated."""
     sphere.scale = scale
     bpy.context.view_layer.update()
     bpy.ops.vellus.add_hair(guide_count=20, strand_count=50)
@@ -212,7 +212,7 @@ def test_guides_without_object_and_surface_wait_for_a_surface(hair):
 
 
 def test_a_flat_surface_is_not_attached_to(hair):
-    """Attaching to a surface with a scale of zero raises an error, as its coordinates have no inverse."""
+    """Attaching hair to a surface with a scale of zero is refused, as its coordinates have no inverse."""
     before = points(hair)
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=1.0)
     other = bpy.context.object
@@ -244,7 +244,7 @@ def test_hair_that_lost_its_surface_is_attached_to_another(hair):
 
 @pytest.fixture
 def user_folder(tmp_path, monkeypatch):
-    """The add-on's own folder, as if it were installed."""
+    """Return the add-on's own folder, as if it were installed."""
     monkeypatch.setattr(preferences, "ADDON_MODULE", "bl_ext.user_default.vellus")
     monkeypatch.setattr(bpy.utils, "extension_path_user", lambda _module, *, path, create: str(tmp_path / path))
     (tmp_path / "looks").mkdir()

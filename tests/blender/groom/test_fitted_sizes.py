@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sizes follow the surface and its mask until they are set by hand, whichever is chosen first."""
+"""Sizes are fitted to the surface and its mask until they are set by hand, whichever is chosen first."""
 
 from types import SimpleNamespace
 
@@ -39,7 +39,7 @@ def choose_mask(hair, group="top"):
 
 @pytest.fixture
 def mask_first(sphere):
-    """Return the fitted sizes of hair with a mask, and without one."""
+    """Return the fitted sizes of hair with a mask and of hair without a mask."""
     masked = sizes_of(add(**MASKED))
     bpy.ops.vellus.delete_hair()
     bpy.context.view_layer.objects.active = sphere
@@ -129,7 +129,7 @@ def test_a_driven_size_is_its_drivers(mask_first):
 
 
 def test_other_frames_and_levels_change_no_size(sphere):
-    """A surface that moves, or is subdivided otherwise, does not fit anything again."""
+    """Sizes do not change when a surface moves or is subdivided differently."""
     hair = add(**COUNTS)
     before = sizes_of(hair)
     sphere.modifiers.new("Cast", "CAST").factor = -0.5
@@ -157,7 +157,9 @@ def test_a_window_shows_sizes_before_strands_are_written(mask_first, monkeypatch
 
 
 def test_a_group_that_is_named_like_hair_is_picked(sphere):
-    """The group is picked before hair is made and in the panel, unless it is a bone's, empty or used by hair."""
+    """A group named after hair is picked before hair is made and in the panel, unless it is a bone's, empty or used
+    by hair.
+    """
     sphere.vertex_groups["top"].name = "Kopfhaar"
     for name, vertices in (("scalp", []), ("hair", range(40)), ("beard", range(40))):
         sphere.vertex_groups.new(name=name).add(list(vertices), 1.0, "REPLACE")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frozen points of guides stay bit for bit while others are combed, with and without layers."""
+"""Frozen points of guides keep their bits while other points are combed, with and without layers."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,9 @@ SELECTED = ".selection"
 
 @pytest.fixture
 def guides(hair):
-    """Guides in Sculpt Mode; of the even ones all points are frozen, of the third the first half."""
+    """Return guides in Sculpt Mode: all points of every second guide and the first half of the third guide are
+    frozen.
+    """
     found = bpy.data.objects["Guides"]
     found.data.vellus.keeps_outside = False
     bpy.context.view_layer.objects.active = found
@@ -32,7 +34,7 @@ def guides(hair):
 
 
 def comb(found, by=0.2):
-    """Move all points sideways as a brush does, all the more the nearer to the tip; returns the points."""
+    """Move all points sideways as a brush does, more toward the tip; returns the points."""
     bpy.context.view_layer.update()
     shape = points(found)
     shape = shape + np.linspace(0.0, by, shape.shape[1], dtype=np.float32)[None, :, None] * np.float32([1.0, 0.0, 0.0])

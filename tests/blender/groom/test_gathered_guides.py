@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gather in Blender: on surfaces with any transform and pose, outside of them, recorded by layers."""
+"""*Gather* works on surfaces with any transform and pose, keeps guides outside, and is recorded by layers."""
 
 import bpy
 import numpy as np
@@ -16,7 +16,7 @@ LINE = ((0.0, 0.6, 0.8), (0.0, 0.9, 1.1), (0.0, 1.3, 0.6), (0.0, 1.3, -1.0))
 
 @pytest.fixture
 def guides(hair):
-    """Guides on a sphere of radius 1, as long as half its circumference."""
+    """Return guides on a sphere of radius 1, as long as half its circumference."""
     found = bpy.data.objects["Guides"]
     api.change_guides(found, "LENGTH", method="SET", length=3.0)
     bpy.context.view_layer.update()
@@ -24,7 +24,7 @@ def guides(hair):
 
 
 def add_line(matrix=None, lines=(LINE,)):
-    """A curve object whose points are at places in the coordinates of the sphere."""
+    """Return a curve object with points at places in the coordinates of the sphere."""
     data = bpy.data.curves.new("Tie", "CURVE")
     data.dimensions = "3D"
     for line in lines:
@@ -77,7 +77,7 @@ def test_a_line_through_the_surface_keeps_guides_outside(guides):
 
 @pytest.mark.parametrize("change", ["small", "uneven", "mirrored", "turned and parented"])
 def test_transformed_surfaces(guides, change):
-    """Guides are gathered at the drawn place of the world, with their lengths there."""
+    """Guides are gathered at the place of the line in the world, with their lengths in the world."""
     sphere = bpy.data.objects["Sphere"]
     if change == "turned and parented":
         parent = bpy.data.objects.new("Parent", None)

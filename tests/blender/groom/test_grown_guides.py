@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""New guides are draped by the panel's operators on a dome such as a scalp, unless growth settings are given."""
+"""On a dome such as a scalp, the panel's operators drape new guides, unless growth settings are given."""
 
 import bpy
 import numpy as np
@@ -15,7 +15,7 @@ FEW = {"guide_count": 30, "strand_count": 100}
 
 @pytest.fixture
 def dome(sphere):
-    """The upper half of a sphere as the mask: a scalp."""
+    """Return the upper half of a sphere as a mask, like a scalp."""
     sphere.scale = (0.1,) * 3
     bpy.context.view_layer.update()
     return {"density_group": "top"}
@@ -38,7 +38,7 @@ def test_new_hair_on_a_dome_is_draped(dome):
 
 
 def test_fur_stands(sphere):
-    """Closed surfaces and planes get short fur, which is not draped."""
+    """New hair on closed surfaces and planes is short fur that is not draped."""
     assert not new_guides().vellus.guides.drape
     bpy.ops.mesh.primitive_plane_add()
     assert not new_guides().vellus.guides.drape

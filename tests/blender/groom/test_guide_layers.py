@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers of guides in Blender: recorded combing, weights, order, and everything that moves or grows guides again."""
+"""Layers record combing, with weights and an order, and hold through everything that moves or grows guides again."""
 
 import bpy
 import numpy as np
@@ -18,7 +18,7 @@ def update():
 
 @pytest.fixture
 def layered(hair):
-    """The guides' object, with an empty layer."""
+    """Return the guides' object with an empty layer."""
     guides = bpy.data.objects["Guides"]
     api.add_layer(guides)
     update()
@@ -35,7 +35,7 @@ def leaned(shape, by):
 
 
 def comb(guides, by=(0.0, 1.0, 0.0)):
-    """Comb guides as a brush does; returns their points."""
+    """Comb guides as a brush does, and return their points."""
     shape = leaned(points(guides), by)
     write_points(guides, shape)
     guides.data.update_tag()
@@ -161,7 +161,9 @@ def test_a_mask_limits_a_layer(layered):
 
 
 def test_the_status_names_a_missing_mask_until_it_is_restored(layered):
-    """Combing does not clear the status about a missing mask, and adds that a layer without weight is not combed."""
+    """The status names a missing mask until it is restored, also after combing, and adds that a weightless layer is
+    not combed.
+    """
     layered.data.vellus.layers[0].mask = "top"
     update()
     sphere = bpy.data.objects["Sphere"]
@@ -180,7 +182,7 @@ def test_the_status_names_a_missing_mask_until_it_is_restored(layered):
 
 
 def test_a_mask_can_be_painted_later(layered):
-    """Guides follow a mask that is painted, and without their surface they keep the weights of its mask."""
+    """Guides follow a mask that is painted later, and keep its weights when their surface is gone."""
     base, shape = points(layered), comb(layered)
     layered.data.vellus.layers[0].mask = "top"
     update()
@@ -230,7 +232,7 @@ def test_weights_are_animated(layered):
 
 
 def test_combing_survives_other_settings_and_another_number_of_guides(layered):
-    """With 60, then 120, then 60 guides the combing is the same, and settings still apply to the base."""
+    """With 60, then 120, then 60 guides, the combing is the same, and settings still apply to the base."""
     base, shape = points(layered), comb(layered)
     turn = shape[:, -1] - shape[:, 0] - (base[:, -1] - base[:, 0])
     group = layered.data.vellus.guides

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that need much of the free memory are refused or confirmed, and no hair is lost if memory is short."""
+"""Strands that need much of the free memory are refused or confirmed, and no hair is lost if memory runs out."""
 
 import ctypes
 import gc
@@ -26,7 +26,7 @@ REFUSED = r"These strands need [\d.]+ GB of memory, and [\d.]+ GB are free"
 
 @pytest.fixture
 def free(monkeypatch):
-    """A function of the part of the free memory that 10,000 strands of 41 points are to take."""
+    """Return a function that sets the part of free memory that 10,000 strands of 41 points take."""
 
     def leave(part):
         needed = cost.strand_bytes(10_000, 41, 4)
@@ -37,7 +37,7 @@ def free(monkeypatch):
 
 
 def resident(name):
-    """A figure of this process [bytes]."""
+    """Return a figure of this process [bytes]."""
     lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     return 1024 * next(int(line.split()[1]) for line in lines if line.startswith(f"{name}:"))
 
@@ -89,7 +89,7 @@ def test_the_command_line_refuses_and_says(free, tmp_path, capsys):
 
 
 def test_what_hair_has_already_is_not_asked_for_again(hair, free, monkeypatch):
-    """In a window, a slider that needs much more memory waits for the button; others do not."""
+    """In a window, hair that needs much more memory than it has waits for the button; other hair does not."""
     monkeypatch.setattr(running, "has_window", lambda: True)
     state = hair.data.vellus
     free(0.4)
@@ -110,7 +110,7 @@ def test_what_hair_has_already_is_not_asked_for_again(hair, free, monkeypatch):
 
 
 class _Asked(modal.LongOperator):
-    """An operator of hair in a window, as Blender would run it."""
+    """An operator of hair in a window, as Blender runs it."""
 
     bl_idname = "VELLUS_OT_interpolate_hair"
     properties = SimpleNamespace(is_property_set=lambda name: name == "strand_count")

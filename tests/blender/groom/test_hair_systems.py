@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of a mesh's hair systems: its rows, the edited row, and its buttons."""
+"""The list of hair systems has a row for each system of a mesh, an edited row, and buttons."""
 
 import bpy
 import pytest
@@ -12,7 +12,7 @@ from tests.support.interface.layout import draw, draw_all
 
 
 def add_system(name, strand_count=30):
-    """A hair system on the sphere; its hair is active."""
+    """Add a hair system to the sphere; its hair is active."""
     activate("Sphere")
     bpy.ops.vellus.add_hair(guide_count=10, strand_count=strand_count)
     bpy.context.object.vellus_system.title = name
@@ -21,7 +21,7 @@ def add_system(name, strand_count=30):
 
 @pytest.fixture
 def systems(sphere):
-    """Two systems on the sphere and one on another mesh; the second one is active."""
+    """Return two systems on the sphere and one on another mesh; the second system is active."""
     other = bpy.data.objects.new("Other", sphere.data)
     bpy.context.scene.collection.objects.link(other)
     activate("Other")
@@ -108,7 +108,9 @@ def test_the_eye_hides_hair_from_viewports_and_the_camera_from_renders(systems):
 
 
 def test_deleting_a_row_leaves_the_others_alone(systems):
-    """Only the row's hair is deleted, also if the mesh is active, where Delete Hair would delete all hair."""
+    """Deleting a row deletes only its hair, also if the mesh is active, in which case Delete Hair would delete all
+    hair.
+    """
     activate("Sphere")
     bpy.ops.ed.undo_push(message="systems")
     bpy.ops.vellus.delete_system("EXEC_DEFAULT", True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw Parting, Draw Flow, Stop Drawing, Stop Combing, and guides named after their hair."""
+"""Draw Parting, Draw Flow, Stop Drawing and Stop Combing work, and guides are named after their hair."""
 
 import bpy
 import numpy as np
@@ -19,7 +19,7 @@ def buttons():
 
 
 def draw_line(lines, *corners):
-    """Add a line as a stroke would: Blender's Draw tool needs a window."""
+    """Add a line as a stroke would, because Blender's Draw tool needs a window."""
     bpy.ops.object.mode_set(mode="OBJECT")
     spline = lines.data.splines.new("POLY")
     spline.points.add(len(corners) - 1)
@@ -29,7 +29,7 @@ def draw_line(lines, *corners):
 
 
 def arc(normal, steps=24):
-    """Points on the upper half of the sphere's circle at right angles to an axis of X or Y."""
+    """Return points on the upper half of the sphere's circle at right angles to the X or Y axis."""
     angles = np.linspace(0.1, np.pi - 0.1, steps)
     along = np.stack([np.cos(angles), np.zeros(steps), np.sin(angles)], axis=1)
     return along[:, [1, 0, 2]] if normal == "X" else along
@@ -114,7 +114,7 @@ def test_combing_stops_where_it_began(hair):
 
 
 def test_guides_of_the_first_system_are_named_after_it_too(sphere):
-    """Guides that a script made on their own keep their name until their hair is named."""
+    """Guides that a script has made keep their name until their hair is named."""
     bpy.ops.vellus.add_hair(guide_count=10, strand_count=20)
     hair = bpy.context.object
     guides = hair.data.vellus.guide_curves

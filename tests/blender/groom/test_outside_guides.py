@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that are combed stay outside of their surface as it is posed, with their roots and lengths."""
+"""Combed guides stay outside of their surface as it is posed, with their roots and lengths."""
 
 import bmesh
 import bpy
@@ -14,7 +14,7 @@ from tests.support.reading import evaluated_points, points, write_points
 
 @pytest.fixture
 def guides(hair):
-    """Guides in Sculpt Mode."""
+    """Return guides in Sculpt Mode."""
     found = bpy.data.objects["Guides"]
     enter(found)
     yield found
@@ -29,7 +29,7 @@ def enter(found, mode="SCULPT_CURVES"):
 
 
 def inward(shape):
-    """Bend guides into the sphere; segments keep their lengths."""
+    """Bend guides into the sphere and keep the lengths of segments."""
     steps = np.diff(shape.astype(np.float64), axis=1)
     lengths = np.linalg.norm(steps, axis=2, keepdims=True)
     steps = steps / lengths - 3.0 * np.linspace(0.0, 1.0, steps.shape[1])[None, :, None] * shape[:, :1]
@@ -38,7 +38,7 @@ def inward(shape):
 
 
 def comb(found, wanted):
-    """Write points of an event of a stroke; Blender's next update reports them."""
+    """Write the points of one event of a stroke, which Blender's next update reports."""
     write_points(found, wanted)
     found.data.update_tag()
     bpy.context.view_layer.update()
@@ -50,7 +50,7 @@ def segments(shape):
 
 
 def depths(shape, radius=1.0):
-    """How far points (G, P, 3) behind the roots are inside of the sphere, whose faces are flat."""
+    """Return how far points (G, P, 3) other than roots are inside of the sphere, whose faces are flat."""
     return 0.993 * radius - np.linalg.norm(shape[:, 1:], axis=2)
 
 
@@ -85,7 +85,7 @@ def test_only_guides_that_a_stroke_moves_are_pushed(guides):
 
 
 def test_frozen_points_stay(guides):
-    """Frozen points stay, also slightly inside the surface; the rest of the guide is moved outside."""
+    """Frozen points stay, also slightly inside the surface, while the rest of the guide is moved outside."""
     state = guides.data.vellus
     state.keeps_outside = False
     inside = comb(guides, inward(points(guides)))
@@ -110,7 +110,7 @@ def test_frozen_points_stay(guides):
 
 @pytest.mark.parametrize("change", ["small", "large", "uneven", "mirrored", "turned and parented", "open"])
 def test_transformed_surfaces_keep_guides_outside(guides, change):
-    """In the coordinates of the sphere the shape of guides is the same as without the transform."""
+    """In the coordinates of the sphere, guides have the same shape with and without a transform."""
     sphere, alone = bpy.data.objects["Sphere"], points(guides)
     if change == "open":
         bpy.ops.object.mode_set(mode="OBJECT")
@@ -141,7 +141,7 @@ def test_transformed_surfaces_keep_guides_outside(guides, change):
 
 
 def test_guides_stay_outside_of_the_posed_surface(guides):
-    """On a sphere that a shape key enlarges and twists, at rest and in the pose that is seen."""
+    """Guides stay outside of a sphere that a shape key enlarges and twists, at rest and in the visible pose."""
     sphere, before = bpy.data.objects["Sphere"], points(guides)
     sphere.shape_key_add(name="Basis")
     key = sphere.shape_key_add(name="Large")

@@ -12,7 +12,7 @@ from tests.support.interface.layout import draw
 
 @pytest.fixture
 def two(hair):
-    """An older hair with a Trim and a Frizz, and a newer one with a Curl; the older one is active."""
+    """Return an older hair with Trim and Frizz and a newer hair with Curl; the older hair is active."""
     sphere = hair.data.surface
     style_items.add(hair.data.vellus, trim.Settings(factor=0.5), "Trim")
     style_items.add(hair.data.vellus, frizz.Settings(), "Frizz")
@@ -34,7 +34,7 @@ def sphere():
 
 
 def shown():
-    """The hair that panels show, asked in each of the ways that they ask."""
+    """Return the hair that panels show, by each of the functions that panels call."""
     found = selection.hair_of(bpy.context.object)
     systems = bpy.data.hair_curves[bpy.context.view_layer.vellus_system]
     assert systems == found

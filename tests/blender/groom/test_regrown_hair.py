@@ -13,7 +13,7 @@ from tests.support.reading import points
 
 
 def regrown(hair, **changes):
-    """Generate strands again with other settings; their `BoundHair`."""
+    """Regenerate strands with other settings, and return their `BoundHair`."""
     guides, settings = pipeline.inputs_of(hair.data)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     pipeline.interpolate_hair(guides, replace(settings, **changes), depsgraph, hair.data)
@@ -56,7 +56,7 @@ def test_binding_hair_without_writing_it_leaves_its_points(hair):
 
 
 def test_hair_that_cannot_be_written_is_what_it_was(hair, monkeypatch):
-    """Hair that cannot be written keeps the points in its datablock, and can be generated again."""
+    """Hair that cannot be written keeps the points in its datablock, and can be regenerated."""
     regrown(hair, seed=2)
     before = points(hair)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Caches: values are computed once, evicted, and computed again."""
+"""Values in caches are computed once, evicted, and computed again."""
 
 from hair_addon.blender.host.caches import Cache
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths of a .blend that Windows would follow to another computer, in every spelling."""
+"""Paths of a .blend that lead to another computer on Windows are recognized in every spelling."""
 
 import itertools
 import ntpath
@@ -16,9 +16,7 @@ SLASHES = ["".join(row) for count in range(1, 5) for row in itertools.product("/
 
 
 def leads_elsewhere(path):
-    """Whether Windows would treat the path as a network share: resolved by `bpy.path.abspath` with Python's Windows
-    rules.
-    """
+    """Whether Windows would treat the path as a network share, by `bpy.path.abspath` with Python's Windows rules."""
     whole = ntpath.join("C:\\shot", path[2:]) if path.startswith("//") else path
     return ntpath.splitdrive(ntpath.normpath(whole))[0].startswith("\\\\")
 

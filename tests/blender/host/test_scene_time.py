@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Going to another time, and back."""
+"""A visit to another time ends at the scene's own time."""
 
 import bpy
 import pytest
@@ -22,7 +22,7 @@ def test_moments_are_visited_in_turn_and_the_scene_comes_back(at_frame_7):
 
 
 def test_its_own_frame_is_gone_to_between_others(at_frame_7):
-    """The visit sets the scene's own time again between other motion samples."""
+    """A visit sets the scene's own time again between other motion samples."""
     visit = scene_time.visit(at_frame_7, [-0.5, 0.0, 0.5], at_frame_7.frame_set)
     assert [at_frame_7.frame_current_final for _ in visit] == [6.75, 7.25, 7.75]
 

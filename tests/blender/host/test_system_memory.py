@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Free memory of Windows and macOS, with mock system libraries that write the bytes of the system."""
+"""Free memory of Windows and macOS is read correctly from mock system libraries."""
 
 import ctypes
 import struct
@@ -15,7 +15,7 @@ STATUS = "<IIQQQQQQQ"
 
 
 class Windows:
-    """Stands in for kernel32: 16 GB, of which `free` are free and `committed` may still be committed."""
+    """A mock of kernel32 with 16 GB, of which `free` are free and `committed` may still be committed."""
 
     def __init__(self, free=6 * GB, committed=20 * GB, answer=1):
         self.free, self.committed, self.answer = free, committed, answer
@@ -31,7 +31,9 @@ class Windows:
 
 
 class Mac:
-    """The library of the system: pages of 4,096 or 16,384 bytes, and versions that answer with few numbers or many."""
+    """A mock of the system's library, with pages of 4,096 or 16,384 bytes and versions that return few or many
+    numbers.
+    """
 
     def __init__(self, answer=0, count=38):
         self.answer, self.count = answer, count
@@ -50,7 +52,7 @@ class Mac:
 
 @pytest.fixture
 def system(monkeypatch, tmp_path):
-    """A function of (name, library) that simulates another system without limits of the process."""
+    """Return a function of (name, library) that simulates another system without limits of the process."""
 
     def be(name, library):
         monkeypatch.setattr(sys, "platform", name)

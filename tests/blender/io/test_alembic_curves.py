@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Alembic files of other programs as guides and hair: by Blender's exporter, and with one object per curve."""
+"""Alembic files of other programs are read as guides and as hair, by Blender's exporter and with one object per
+curve.
+"""
 
 import bpy
 import numpy as np
@@ -15,7 +17,7 @@ from tests.support.exchange.imported import curves_object, lines_on, world
 
 @pytest.fixture
 def lines(sphere, rng):
-    """12 lines of 5 points out of a sphere that is elsewhere, in the world."""
+    """Return 12 lines of 5 points on a sphere that is elsewhere, in the world."""
     sphere.location, sphere.scale = (0.4, -0.3, 1.5), (0.1, 0.1, 0.1)
     update()
     return np.float32(list(lines_on(sphere, rng, 12, 5, 5)))
@@ -23,7 +25,7 @@ def lines(sphere, rng):
 
 @pytest.mark.parametrize("kind", ["POLY", "CATMULL_ROM"])
 def test_blenders_curves_are_read_as_they_are_seen_in_every_frame(scene, lines, tmp_path, kind):
-    """Curves of an object that is turned, scaled and parented to a moving object are read."""
+    """Blender's curves are read as they are seen in every frame, turned, scaled and parented to a moving object."""
     made = curves_object(lines, kind=kind)
     made.data.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", np.full(60, 0.001, np.float32))
     made.rotation_euler, made.scale = (0.5, 0.2, 0.1), (2.0, 2.0, 2.0)
@@ -46,7 +48,10 @@ def test_blenders_curves_are_read_as_they_are_seen_in_every_frame(scene, lines, 
 
 
 def test_one_object_a_curve_is_hair_of_all_of_them(scene, sphere, lines, tmp_path):
-    """Unit and axis are inferred and reported; wrong ones are refused with a sentence that names fitting ones."""
+    """A file with one object per curve becomes hair of all curves.
+
+    Unit and axis are inferred and reported; wrong ones are refused with a sentence that names fitting ones.
+    """
     of_maya(tmp_path / "curves.abc", lines)
     bpy.ops.wm.obj_export(filepath=str(tmp_path / "sphere.obj"), forward_axis="Y", up_axis="Z")
     words = ["groom", tmp_path / "sphere.obj", "--hair-from", tmp_path / "curves.abc", "--out", tmp_path / "out.npz"]
@@ -87,7 +92,7 @@ def test_scripts_read_them_too(scene, sphere, lines, tmp_path):
 
 @pytest.mark.parametrize(("ending", "kind"), [(".abc", "POLY"), (".usdc", "POLY"), (".abc", "CATMULL_ROM")])
 def test_hair_of_a_file_that_moves_plays_all_of_its_frames(scene, sphere, lines, tmp_path, ending, kind):
-    """A .blend file plays all frames; other files get the present frame and a warning. Splines play as polylines."""
+    """Animated hair plays all its frames in a .blend file, and gives other files the current frame and a warning."""
     lines[::3] = lines[::3, ::-1]  # from tip to root
     made = curves_object(lines, kind=kind)
     for frame, place in ((1, 0.0), (4, 0.3)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards in exported files, read back: faces, UV coordinates, pictures and armature."""
+"""Exported cards are read back with the same faces, UV coordinates, pictures and armature."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ READERS = {".glb": ("import_scene", "gltf"), ".fbx": ("import_scene", "fbx"), ".
 
 @pytest.fixture
 def cards(hair, tmp_path):
-    """Cards of hair on a sphere with an armature of one bone, their textures in a folder."""
+    """Return cards of hair on a sphere with an armature of one bone; their textures are in a folder."""
     sphere, data = bpy.data.objects["Sphere"], bpy.data.armatures.new("Rig")
     rig = bpy.data.objects.new("Rig", data)
     bpy.context.scene.collection.objects.link(rig)
@@ -32,7 +32,9 @@ def cards(hair, tmp_path):
 
 
 def layout(mesh_object):
-    """Return what any importer keeps of a mesh: number of triangles and sorted UV coordinates of their corners."""
+    """Return the number of triangles of a mesh and the sorted UV coordinates of its corners, which all importers
+    keep.
+    """
     mesh = mesh_object.data
     mesh.calc_loop_triangles()
     uvs = np.empty((len(mesh.loops), 2), np.float32)

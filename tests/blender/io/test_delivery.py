@@ -28,13 +28,13 @@ LAST = 5
 
 @pytest.fixture(scope="module")
 def shots(tmp_path_factory):
-    """An empty folder, which the first test fills with a shot."""
+    """Return a folder in which the first test creates a shot."""
     return tmp_path_factory.mktemp("shots")
 
 
 @pytest.fixture
 def shot(request, shots, tmp_path):
-    """A saved file of hair on an arm that bends, moves and blurs, whose guides are baked; its guides."""
+    """Return a saved file of hair on an arm that bends, moves and blurs, with baked guides; its guides."""
     if not [*shots.iterdir()]:
         save_baked(request.getfixturevalue("arm"), shots)
     shutil.copytree(shots, tmp_path, dirs_exist_ok=True)
@@ -75,7 +75,7 @@ def largest_difference(some, others):
 
 @pytest.mark.gate(id="V23")
 def test_a_blender_without_the_addon_has_the_same_hair_and_picture(shot, tmp_path):
-    """The same hair is in files of Blender's own exporter too."""
+    """A Blender without the add-on has the same hair and picture, and its own exporter writes the same hair."""
     set_up_camera()
     times = (0.75, 1.0, 1.25, 4.75, LAST + 0.25, LAST, 4.0)
     before, blurred = live(times), rendered(tmp_path / "live.png", 4)
@@ -114,7 +114,7 @@ def rendered(path, frame):
 
 
 def test_hair_in_slow_motion_is_delivered_as_it_moves(shot):
-    """If an animation is stretched in time, hair falls in the animation's time."""
+    """Delivered hair in an animation that is stretched in time moves in the animation's time."""
     scene = bpy.context.scene
     scene.render.frame_map_old, scene.render.frame_map_new = 100, 250
     run_now(guide_baking.baking([shot], LAST, scene))
@@ -182,7 +182,9 @@ def refuse(guides, sentence):
 
 
 def test_a_file_that_hair_of_other_guides_plays_is_not_replaced(shot):
-    """File names are compared without case, as some systems do."""
+    """A file that hair of other guides plays is not replaced; file names are compared without case, as by some
+    systems.
+    """
     made, other, third = deliver(shot), bpy.data.hair_curves.new("guides"), bpy.data.hair_curves.new("Grün (2)")
     names = [delivery.path_of(guides).name for guides in (shot, other, third)]
     assert names == ["shot_Guides.usdc", "shot_guides.001.usdc", "shot_Grün (2).usdc"] and names[0] == made.path.name
@@ -213,7 +215,7 @@ def test_what_cannot_be_delivered_is_refused(shot, tmp_path):
 
 
 def test_guides_that_begin_after_the_last_frame_need_none(shot):
-    """Guides that start after the last frame need no baked frames: they are as combed in all frames."""
+    """Guides that start after the last frame are delivered without baked frames, in their combed shape."""
     frame_cache.remove(frame_folders.folder_of(shot))
     frame_folders.have_changed(shot)
     shot.vellus.dynamics.start_frame = LAST + 10
@@ -288,7 +290,7 @@ def test_all_hair_of_the_guides_is_delivered_whatever_its_name_and_the_frame_rat
 
 
 def test_in_a_window_hair_is_followed_although_an_operator_runs(window, shot, monkeypatch):
-    """In a window, hair follows for viewports even while a long operation runs."""
+    """In a window, hair follows for viewports even while an operator runs."""
     before = live((4.0, 4.75))
     monkeypatch.setattr(running, "has_window", lambda: True)
     operator = Operator(delivery.delivering(shot, delivery.path_of(shot), bpy.context.scene))

@@ -16,7 +16,7 @@ from tests.support.exchange.exported import export, shape, widths
 
 
 def ragged(curves_object):
-    """(counts (S,), points (N, 3) [m]) of curves of any point counts, as Blender renders them."""
+    """Return (counts (S,), points (N, 3) [m]) of curves with any point counts, as Blender renders them."""
     evaluated = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get())
     matrix = np.array(evaluated.matrix_world)
     there = curves.read_points(evaluated.data) @ matrix[:3, :3].T + matrix[:3, 3]
@@ -25,7 +25,7 @@ def ragged(curves_object):
 
 @pytest.mark.parametrize(("ending", "animation"), [(".abc", "NONE"), (".usda", "NONE"), (".usdc", "ALL")])
 def test_curves_keep_their_numbers_of_points(imported, tmp_path, ending, animation):
-    """60 curves of 2 to 12 points, as hair that a twisted surface carries: no corner is cut, in any frame."""
+    """60 curves of 2 to 12 points, carried by a twisted surface, keep their numbers of points in all frames."""
     radii = np.linspace(0.001, 0.002, len(imported.data.points), dtype=np.float32)
     imported.data.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", radii)
     made = api.use_as_hair(imported, bpy.data.objects["Sphere"])
@@ -50,7 +50,7 @@ def test_curves_keep_their_numbers_of_points(imported, tmp_path, ending, animati
 
 
 def test_arrays_keep_them_too(imported, tmp_path):
-    """60 curves of 2 to 12 points in an .npz file, and read back, as hair and as guides."""
+    """60 curves of 2 to 12 points keep their numbers of points in an .npz file that is read as hair and as guides."""
     radii = np.linspace(0.001, 0.002, len(imported.data.points), dtype=np.float32)
     imported.data.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", radii)
     made = api.use_as_hair(imported, bpy.data.objects["Sphere"])
@@ -99,7 +99,7 @@ def test_catmull_rom_splines_are_written_through_their_points(imported, tmp_path
 
 
 def arrays_of(path):
-    """{name: array} [m] of the strands of the only group of an exported file, at its last time."""
+    """Return {name: array} [m] of the strands of the only group of an exported file, at its last time."""
     if path.suffix == ".abc":
         archive = alembic_reader.read(path)
         (name,) = (n for n in archive.objects["groom"].children if "_guides" not in n)

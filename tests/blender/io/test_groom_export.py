@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Alembic for Unreal: hair has its posed positions in Blender and in an independent reader; refusals and notes."""
+"""Alembic grooms for Unreal have the posed positions in Blender and in an independent reader, or are refused with
+notes.
+"""
 
 import bpy
 import numpy as np
@@ -89,7 +91,9 @@ def test_strands_are_given_the_guides_that_weigh_most(hair, tmp_path):
 
 
 def test_guide_weights_are_exported_whether_hair_stores_them_or_not(hair, tmp_path):
-    """Computed weights equal stored ones, also after combing and in a file that was just opened."""
+    """Exported guide weights are the same whether hair stores them, also after combing and in a file that was just
+    opened.
+    """
     guides = bpy.data.objects["Guides"]
     combed = points(guides).copy()
     combed[::2, 1:] += np.linspace(0.0, 0.2, combed.shape[1] - 1)[:, None] * np.float32([1.0, 0.5, 0.0])
@@ -113,7 +117,7 @@ def test_guide_weights_are_exported_whether_hair_stores_them_or_not(hair, tmp_pa
 
 
 def exported_map(path):
-    """Guides of strands, and their weights, of the groom in a new Alembic file."""
+    """Return the guides of strands and their weights from a new Alembic file."""
     export(path)
     found = shape(alembic_reader.read(path), "Hair")
     return found["groom_closest_guides"].only, found["groom_guide_weights"].only
@@ -136,7 +140,7 @@ def test_hair_that_lost_its_guides_is_exported_alone(hair, tmp_path):
 
 @pytest.mark.parametrize("way", ["excluded", "deleted"])
 def test_guides_without_an_object_are_where_they_were(twisted, tmp_path, way):
-    """A collection that is excluded from the view layer, or an object that was deleted, takes no guides away."""
+    """Guides in an excluded collection, or whose object was deleted, are exported in place."""
     _, guides = twisted
     wanted_points, wanted_widths = 100.0 * world(guides).reshape(-1, 3), 100.0 * widths(guides)
     if way == "deleted":
@@ -170,7 +174,7 @@ def test_surfaces_and_hair_without_height_are_one_sentence(hair, tmp_path):
 
 
 def test_guides_without_object_and_surface_are_one_sentence(hair, tmp_path):
-    """Without an object and a surface the location of guides is unknown."""
+    """Guides without an object and a surface are refused with one sentence, as their location is unknown."""
     guides = bpy.data.objects["Guides"]
     guides.data.surface = None
     bpy.data.objects.remove(guides)

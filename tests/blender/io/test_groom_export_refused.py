@@ -19,7 +19,7 @@ from tests.support.reading import evaluated_points, write_points
 
 @pytest.fixture
 def baked(hair, tmp_path):
-    """Guides that simulate on a sphere that swings, with their frames baked."""
+    """Return guides that simulate on a swinging sphere, with baked frames."""
     return bake(tmp_path)
 
 

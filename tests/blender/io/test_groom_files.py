@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of a groom and its surface, read back by Blender's own importers."""
+"""Blender's own importers read back the files of a groom and its surface."""
 
 import bpy
 import numpy as np
@@ -10,7 +10,7 @@ from tests.support.dynamics.following import update
 
 
 def hide_all():
-    """Each object of the groom in its own way."""
+    """Hide each object of the groom in another way."""
     kept = bpy.data.collections.new("Kept")
     bpy.context.scene.collection.children.link(kept)
     hair = bpy.data.objects["Hair"]

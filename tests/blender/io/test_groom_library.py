@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms as assets: saved grooms are restored on the same surface and on copies; other files are refused."""
+"""Grooms saved as assets are restored on the same surface and on copies; other files are refused."""
 
 import bpy
 import numpy as np
@@ -19,7 +19,7 @@ PICTURE = np.linspace(0.0, 1.0, 16 * 16 * 4, dtype=np.float32).reshape(16, 16, 4
 
 @pytest.fixture
 def groom(sphere):
-    """Combed guides on the upper half of the sphere and their hair, with a mask, styles, a look and dynamics."""
+    """Return combed guides on the upper half of the sphere and their hair, with a mask, styles, a look and dynamics."""
     settings = api.GroomSettings(
         api.GuideSettings(guide_count=40, density_group="top", length=0.4),
         api.HairSettings(strand_count=200, radius=0.002),
@@ -37,7 +37,7 @@ def groom(sphere):
 
 @pytest.fixture
 def library(groom, tmp_path):
-    """The file of the saved groom."""
+    """Return the file of the saved groom."""
     return api.save_groom(groom[1], tmp_path / "library", name="Bob", catalog="Hair/Short", picture=PICTURE)
 
 
@@ -142,7 +142,7 @@ def write_foreign(path):
 
 
 def write_damaged(path, change):
-    """Save a groom and then replace some of the file's data."""
+    """Save a groom and replace some of the file's data."""
     with bpy.data.libraries.load(str(path), assets_only=True) as (_there, wanted):
         wanted.objects = ["Bob"]
     asset = wanted.objects[0]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards and tubes in the scene: counts are as announced, textures show the strands, undo removes everything."""
+"""Cards and tubes in the scene have the announced counts, textures show the strands, and undo removes everything."""
 
 import itertools
 
@@ -94,7 +94,7 @@ def test_a_card_covers_as_much_as_its_strands_from_the_same_side(scene):
 
 
 def drawn_area(points, radii, step=1.5e-4):
-    """Area that (S, P, 2) strands with (S, P) radii cover together [m²], by squares of a side."""
+    """Return the area [m²] that (S, P, 2) strands with (S, P) radii cover together, by squares of a given side."""
     low = points.min(axis=(0, 1)) - 0.01
     found = np.zeros(np.ceil((points.max(axis=(0, 1)) + 0.01 - low) / step).astype(int), bool)
     for strand, its_radii in zip(points, radii, strict=True):
@@ -110,7 +110,7 @@ def drawn_area(points, radii, step=1.5e-4):
 
 
 def test_samples_show_the_nearest_strand_there(rng):
-    """Samples agree with brute force for strands that cross each other at several heights."""
+    """Each sample shows the nearest strand by brute force, for strands that cross at several heights."""
     places = rng.uniform(0.1, 0.9, (9, 4, 3)).astype(np.float32)
     places[..., 2] *= 0.2
     radii = np.full((9, 4), 0.02, np.float32)

@@ -48,7 +48,7 @@ def stl_text(path):
 
 
 def gltf_content(uri):
-    """A node that is moved, turned a quarter about Y and twice as large; and the bytes of its mesh."""
+    """Return the bytes of a glTF mesh and a node that is moved, turned a quarter about Y and twice as large."""
     points, indices = VERTICES.astype("<f4").tobytes(), TRIANGLES.astype("<u2").tobytes()
     least, most = VERTICES.min(axis=0).tolist(), VERTICES.max(axis=0).tolist()
     document = {
@@ -124,7 +124,7 @@ def Xform "Place"
 
 
 def build(scale_length):
-    """The tetrahedron in Blender, moved, in a scene whose unit has a length."""
+    """Build the tetrahedron in Blender, moved, in a scene with a given unit of length."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.unit_settings.scale_length = scale_length
     mesh = bpy.data.meshes.new("Tetrahedron")
@@ -142,7 +142,7 @@ def blend(path):
 
 
 def alembic(path):
-    """Which Blender writes with Y up, as is the custom."""
+    """Write Alembic with Blender, which uses Y up."""
     build(1.0)
     bpy.ops.wm.alembic_export(filepath=str(path), start=1, end=1, as_background_job=False)
     x, y, z = (VERTICES + MOVED).T
@@ -228,7 +228,7 @@ def test_exchange_files_hold_the_same_points_in_meters(scene, tmp_path, ending, 
 
 
 def usd_strands(path):
-    """{number of strands: points [m]}, by what the file says of places and units; Z is up."""
+    """Return {number of strands: points [m]} from the file's own positions and units, with Z up."""
     bpy.utils.expose_bundled_modules()
     from pxr import Usd, UsdGeom
 
@@ -244,7 +244,7 @@ def usd_strands(path):
 
 
 def alembic_strands(path):
-    """{number of strands: points [m]}, in Blender's axes."""
+    """Return {number of strands: points [m]} in Blender's axes."""
     bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)
     found = {}
     for shown in (o for o in bpy.context.scene.objects if o.type == "CURVES"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An artist's modifiers in files and meshes of hair: as rendered, or left out with a message."""
+"""An artist's modifiers are included in files and meshes of hair as rendered, or left out with a message."""
 
 import itertools
 
@@ -19,7 +19,7 @@ from tests.support.reading import attribute
 
 
 def add_modifier(hair, *kinds):
-    """Add a nodes modifier that processes strands one after the other."""
+    """Add a modifier with the given nodes in a row."""
     group = bpy.data.node_groups.new("Artist", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards and tubes of hair on a rigged surface: its armature moves them as it moves the surface at their roots."""
+"""The armature of a rigged surface moves cards and tubes as it moves the surface at their roots."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ CARDS = 24
 
 @pytest.fixture
 def rig(hair):
-    """An armature on the hair's sphere: a bone for each half, and weights that change between them."""
+    """Add an armature to the hair's sphere, with a bone for each half and weights that change between them."""
     sphere = bpy.data.objects["Sphere"]
     armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.scene.collection.objects.link(armature)

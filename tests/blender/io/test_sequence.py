@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sequences of frames, stopped, resumed and shared by processes: no frame is rendered twice, none is broken."""
+"""Sequences of frames may be stopped, resumed and shared by processes: no frame is rendered twice or damaged."""
 
 import contextlib
 import errno
@@ -40,7 +40,7 @@ ENVIRONMENT = os.environ | {"PYTHONPATH": PYTHONPATH}
 
 @pytest.fixture(scope="module", autouse=True)
 def shadows_of_child_processes():
-    """Shadow maps as small as in the processes that this file starts: pictures must be equal."""
+    """Use shadow maps as small as in the processes that this file starts, because pictures must be equal."""
     with pytest.MonkeyPatch.context() as patch:
         shrink_shadows(patch)
         yield
@@ -48,7 +48,7 @@ def shadows_of_child_processes():
 
 @pytest.fixture(scope="module")
 def turning(tmp_path_factory):
-    """A .blend of a ball with hair that turns before a camera."""
+    """Return a .blend of a ball with hair that turns before a camera."""
     path = tmp_path_factory.mktemp("turning") / "ball.blend"
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
@@ -72,14 +72,14 @@ def words(turning, folder, *more, ending="png"):
 
 
 def start(turning, folder):
-    """Start the command in a separate process, whose standard output can be read."""
+    """Start the command in a separate process whose standard output can be read."""
     line = list(map(str, command(*words(turning, folder))))
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen(line, text=True, env=ENVIRONMENT, cwd=ROOT, **pipes)
 
 
 def pixels(path):
-    """(N,) float32 of a picture."""
+    """Return (N,) float32 values of a picture."""
     image = bpy.data.images.load(str(path))
     values = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(values)
@@ -104,7 +104,7 @@ ALL = [f"f_{number:03}.png" for number in range(1, COUNT + 1)]
 
 @pytest.fixture(scope="module")
 def whole(turning, tmp_path_factory):
-    """A folder with the sequence rendered by this process at once, as the reference."""
+    """Return a folder with the sequence rendered by this process at once, as the reference."""
     folder = tmp_path_factory.mktemp("whole")
     ended = run_here(*words(turning, folder))
     assert ended.status == 0, ended.errors
@@ -149,7 +149,9 @@ def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
 
 
 def test_another_machine_goes_on(turning, whole, tmp_path):
-    """The file and the frames have other paths there: only their contents count."""
+    """Another machine continues a sequence under other paths of the file and of the frames, as only their contents
+    count.
+    """
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()
     shutil.copy(turning, here / "ball.blend")
@@ -162,7 +164,7 @@ def test_another_machine_goes_on(turning, whole, tmp_path):
 
 
 def test_processes_share_the_frames(turning, whole, tmp_path, monkeypatch):
-    """Workers of one command, and another command that runs at the same time: here once the first frame is there."""
+    """Workers of one command share the frames, also with another command that runs at the same time."""
     others, sentence_of = [], render._sentence
 
     def told(values):
@@ -200,7 +202,7 @@ def test_frames_of_another_sequence_are_kept(turning, tmp_path):
 
 
 def test_a_full_disk_keeps_complete_frames(turning, tmp_path):
-    """The error is that of a file that may not grow further."""
+    """A disk that becomes full keeps complete frames; a limit on the size of files stands in for it."""
     with largest_file(4096):
         ended = run_here(*words(turning, tmp_path, ending="exr"))
     assert ended.status == 1 and len(ended.errors.splitlines()) == 1
@@ -234,7 +236,7 @@ def test_a_failing_worker_reports_its_error_once(turning, tmp_path, monkeypatch)
 
 
 def test_it_waits_for_frames_of_other_processes(tmp_path):
-    """A frame that another process has claimed is made here if that ends without it."""
+    """A frame that another process has claimed is rendered here if that process ends without it."""
     pattern = tmp_path / "f_#.png"
     left = tmp_path / "left"
     line = [*command()[:1], "-c", HOLD, str(frames.path_of(pattern, 1)), left]
@@ -261,7 +263,7 @@ def test_sequences_are_started_by_one_process_at_a_time(tmp_path):
 
 
 def spoil(folder, ending):
-    """Leave frame 1 empty and frame 2 cut short, as another program or a lost network drive does."""
+    """Leave frame 1 empty and frame 2 truncated, as another program or a lost network drive does."""
     (folder / f"f_001.{ending}").write_bytes(b"")
     cut = folder / f"f_002.{ending}"
     cut.write_bytes(cut.read_bytes()[: cut.stat().st_size // 2])
@@ -308,7 +310,9 @@ def test_an_unwritten_file_does_not_replace_another(tmp_path):
 
 
 def test_frames_are_not_written_through_links_that_others_have_prepared(tmp_path):
-    """Names of files that are being written cannot be guessed; a claim that is a link is refused."""
+    """Frames are not written through links: names of unfinished files cannot be guessed, and a claim that is a link
+    is refused.
+    """
     victim, pattern = tmp_path / "victim", tmp_path / "shots" / "f_#.png"
     victim.write_text("mine")
     pattern.parent.mkdir()

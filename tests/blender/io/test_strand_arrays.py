@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exported strands: on the curve that Blender draws, with its widths."""
+"""Exported strands lie on the curves that Blender draws, and have their widths."""
 
 import bpy
 import numpy as np
@@ -12,7 +12,7 @@ CONTROLS = 6
 
 
 def test_splines_are_exported_as_points_on_the_curve(sphere):
-    """Half circles of a few control points: points of the export are on the circle, lines between controls are not."""
+    """Exported points of half circles with few control points are on the circle, unlike lines between the controls."""
     angles = np.linspace(0.0, np.pi, CONTROLS)
     arc = np.stack([0.2 * np.sin(angles), np.zeros(CONTROLS), 1.2 - 0.2 * np.cos(angles)], axis=1)
     hair = curves_object([arc, arc[:4]], kind="CATMULL_ROM")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strand files of other programs: read onto surfaces of any place, written, and read back."""
+"""Strand files of other programs are read onto surfaces with any transform, written, and read back."""
 
 import json
 from pathlib import Path
@@ -81,7 +81,8 @@ def test_strands_lie_where_the_file_has_them(scene, sphere, rng, tmp_path, place
 
 
 def test_unit_and_axis_are_found_by_the_surface(scene, sphere, rng, tmp_path):
-    """The conventions of CT2Hair (millimeters) and HairSalon (meters, Y up) are preferred.
+    """The unit and the axis that fit the surface are found; CT2Hair's millimeters and HairSalon's meters with Y up
+    come first.
 
     Else unit and axis fit the surface.
     """
@@ -103,7 +104,7 @@ def test_unit_and_axis_are_found_by_the_surface(scene, sphere, rng, tmp_path):
 
 @pytest.mark.parametrize("ending", OF_STRANDS)
 def test_written_strands_come_back(hair, tmp_path, ending):
-    """Points and widths come back with the same bits; guides, IDs and weights come back from formats that have them."""
+    """Points and widths are read back with the same bits; guides, IDs and weights as well, if the format has them."""
     bpy.data.objects["Sphere"].location = (1.0, 2.0, 3.0)
     update()
     path = tmp_path / f"groom{ending}"
@@ -145,7 +146,7 @@ def test_guides_alone_are_written_where_strands_are_left_out(hair, tmp_path):
 
 
 def test_the_command_line_reads_and_writes_them(scene, sphere, rng, tmp_path):
-    """The command line reads files with --hair-from, --guides-from and info, in the given unit and axis, and export
+    """The command line reads strand files by --hair-from, --guides-from and info, with unit and axis, and export
     writes them.
     """
     lines = [np.float32(line) for line in lines_on(sphere, rng, 8, 5, 5)]
@@ -171,7 +172,7 @@ def test_the_command_line_reads_and_writes_them(scene, sphere, rng, tmp_path):
 
 
 def test_every_ending_has_a_reader():
-    """The list that options and file browsers show is that of the readers."""
+    """Every file name extension that options and file browsers show has a reader."""
     assert set(curve_file.ENDINGS) == set(curve_files._READERS)
     docs = Path(__file__).parents[3] / "docs" / "strand_files.md"
     for ending in (*FORMATS, *OF_STRANDS):

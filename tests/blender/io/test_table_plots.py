@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plots of tables: one for each table, with texels at the positions of its axes."""
+"""There is a plot for each table, with texels at the positions of its axes."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from hair_addon.core.shading.tables import dual_scattering, lookup_tables, table
 
 
 def pixels(picture):
-    """(H, W, 3) float, its first line on top."""
+    """Return (H, W, 3) floats, the top line first."""
     with picture.with_buffer() as buffer:
         return np.array(buffer)[::-1, :, :3].astype(float)
 
@@ -24,7 +24,9 @@ def test_every_table_has_its_picture(mode):
 
 
 def test_light_is_where_its_texel_is_and_labels_stand_outside():
-    """One bright column of N_TRT at phi = 3/4 pi, in the row of the greatest cosine: the lowest line."""
+    """One bright column of N_TRT is drawn at phi = 3/4 pi, in the row of the greatest cosine, and labels are
+    outside.
+    """
     tables = lookup_tables.bake(lookup_tables.Settings(mode="energy", size=16))
     tables.n_trt[:] = 0.0
     tables.n_trt[15, 12] = 1.0

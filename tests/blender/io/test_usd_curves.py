@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of USD files created by pxr are read as they are drawn."""
+"""Curves of USD files written by pxr are read as they are drawn."""
 
 from itertools import pairwise
 from types import SimpleNamespace
@@ -63,7 +63,7 @@ def length(line):
 
 
 def pinned_bspline(points):
-    """The course of one pinned B-spline."""
+    """Return the points of a pinned B-spline."""
     points = np.float64(points)
     near = np.concatenate([[2 * points[0] - points[1]], points, [2 * points[-1] - points[-2]]])
     return BSpline(np.arange(len(near) + 4.0) - 3.0, near, 3)(np.linspace(0.0, len(points) - 1.0, 4001))
@@ -144,7 +144,7 @@ def test_hermite_curves_and_nurbs_are_read(rng, tmp_path):
 
 @pytest.mark.parametrize("name", ["widths", "primvars:widths"])
 def test_widths_are_where_their_interpolation_says(rng, tmp_path, name):
-    """Two pinned B-splines of 4 and 3 points: 3 and 2 segments."""
+    """Widths of two pinned B-splines of 4 and 3 points are read at the 3 and 2 segments, by their interpolation."""
     points = np.float32([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0]])
     cases = {
         "constant": ([2.0], lambda x, y: 2.0 + 0.0 * x),
@@ -412,7 +412,9 @@ def test_values_of_another_type_are_left_out(tmp_path, line, is_left_out):
 
 
 def test_an_array_of_negative_size_is_damaged():
-    """Damaged .usdz files contain such arrays: their conversion raises, and so does their truth value."""
+    """An array of negative size, as in damaged .usdz files, is an error of the file, although USD raises on its
+    conversion.
+    """
 
     class Values:
         def __array__(self, *_options, **_names):

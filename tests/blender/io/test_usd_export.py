@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""USD for other programs: curves with primvars in their scopes, and the same arrays as in Alembic."""
+"""USD for other programs has curves with primvars in their scopes, and the same arrays as Alembic."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of stereoscopic scenes: a file per view or one for all, written completely or not at all."""
+"""Frames of stereoscopic scenes have a file per view or one for all views, written completely or not at all."""
 
 import bpy
 import numpy as np
@@ -16,7 +16,7 @@ SMALL = {"width": 16, "height": 12, "sample_count": 1}
 
 @pytest.fixture
 def stereo(scene, sphere):
-    """The scene with a sphere, seen by two eyes."""
+    """Return the scene with a sphere, seen by two eyes."""
     sphere.location.x = 0.3
     bpy.ops.object.light_add(type="SUN")
     bpy.ops.object.camera_add(location=(0.0, -3.0, 0.0), rotation=(np.pi / 2.0, 0.0, 0.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands deformed on the GPU with an animated surface equal those of Warp, without uploads of strands."""
+"""Strands that the GPU deforms with an animated surface equal those deformed by Warp, without uploads of strands."""
 
 import bpy
 import numpy as np
@@ -35,9 +35,7 @@ def bend(surface_object, amount):
 
 
 def carried(hair, target=None):
-    """Return (S, P, 3): hair interpolated between the present guides and deformed by Warp; target: the hair with the
-    styles.
-    """
+    """Return (S, P, 3): hair between the current guides, deformed by Warp; target: the hair with the styles."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     pose = posed_strands.read_pose(hair.data.surface, depsgraph)
     bound = pipeline.bind_hair(*pipeline.inputs_of(hair.data), depsgraph, target)
@@ -75,7 +73,7 @@ def test_hair_that_was_opened_on_a_bent_surface_is_carried_from_its_second_pose(
 
 
 def test_styles_are_applied_before_strands_are_carried(watched, monkeypatch):
-    """A stroke and a slider on a bent surface upload no strands either."""
+    """Styles are applied before strands are deformed, and strokes and sliders on a bent surface upload no strands."""
     style_items.add(watched.data.vellus, curl.Settings(radius=0.02, pitch=0.1))
     bend(watched.data.surface, 0.3)
     drawn(watched)
@@ -109,7 +107,9 @@ def test_styled_hair_is_carried_too(watched, monkeypatch):
 
 
 def test_another_topology_while_the_surface_bends_is_carried_anew(watched, monkeypatch):
-    """Strands are carried by an upload at first, and on the GPU from the next pose on."""
+    """A changed topology of a bending surface uploads the strands once, and the GPU deforms them from the next pose
+    on.
+    """
     surface = watched.data.surface
     bend(surface, 0.5)
     drawn(watched)
@@ -124,7 +124,7 @@ def test_another_topology_while_the_surface_bends_is_carried_anew(watched, monke
 
 
 def carried_as_stored(hair):
-    """(S, P, 3): the points of Curves where Warp carries them from the roots that are stored."""
+    """Return (S, P, 3): the points of Curves, deformed by Warp from the stored roots."""
     pose = posed_strands.read_pose(hair.data.surface, bpy.context.evaluated_depsgraph_get())
     return pose.carry(points(hair), hair.data.vellus.topology, stored_roots.places(hair.data, np.inf))
 
@@ -176,14 +176,14 @@ def read(**details):
 
 
 def parts_seen(texture):
-    """What a visibility texture holds: of strands bytes, which are the roots of parts."""
+    """Return the content of a visibility texture: bytes of strands, the roots of parts."""
     found = np.array(texture.read(), float)
     return (found / 255.0) ** 2 if texture.format == "RGBA8" else found
 
 
 def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_shadows, monkeypatch):
-    """Each frame adds one direction, and after all directions the light equals that measured at rest, except for
-    rounding.
+    """Each frame adds one direction to the light, and after all directions it equals that measured at rest, except
+    for rounding.
     """
     measured, real = [], ambient_visibility.measure
     monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
@@ -210,7 +210,7 @@ def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_sh
 
 
 def test_a_surface_that_turns_as_an_object_passes_a_matrix(hair, window, coarse_shadows, monkeypatch):
-    """Vertices and strands are not moved or uploaded; lighting only needs a direction per frame."""
+    """A surface that turns as an object uploads no vertices and strands; each frame adds one direction to the light."""
     bpy.ops.object.light_add(type="SUN")
     surface = hair.data.surface
     frame, called = read(), []
@@ -241,7 +241,9 @@ def test_hair_that_warp_computes_is_lit_as_at_rest_while_it_plays(hair, coarse_s
 
 
 def test_guides_are_drawn_at_the_roots_that_are_stored_with_their_hair(hair):
-    """Guides have the stored roots in the update that stores them, before Blender reports the guides."""
+    """Guides are drawn at the roots stored with their hair in the update that stores them, before Blender reports
+    them.
+    """
     guides = bpy.data.objects["Guides"]
     bend(hair.data.surface, 0.5)
     hair.data.vellus.is_live = False

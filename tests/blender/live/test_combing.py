@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Combing: the picture follows immediately, Blender's data after the stroke; counted, not timed."""
+"""Combing changes the picture immediately and Blender's data after the stroke; the test counts the work."""
 
 import threading
 from dataclasses import replace
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("made_anew")
 
 @pytest.fixture
 def window(monkeypatch):
-    """Act as in a window: hair is written when an interaction is over, which the test says by `write_all`."""
+    """Act as in a window, where hair is written when an interaction ends; the test ends it by `write_all`."""
     monkeypatch.setattr(running, "has_window", lambda: True)
     yield
     live_hair.cancel_writing()
@@ -33,12 +33,12 @@ def window(monkeypatch):
 
 
 def drawn(hair):
-    """(S, P, 3) in the texture that the shader reads."""
+    """Return (S, P, 3) in the texture that the shader reads."""
     return drawn_strands.places(hair_cache.strands_on_gpu(hair.data))
 
 
 def stroke(guides, combed_guides, steps=4):
-    """Pull some guides aside in small steps, a depsgraph update each, as a brush does."""
+    """Move some guides aside in small steps with a depsgraph update each, as a brush does."""
     for _ in range(steps):
         combed = points(guides)
         combed[combed_guides, 1:] += np.float32([0.0, 0.01, 0.02])
@@ -47,7 +47,7 @@ def stroke(guides, combed_guides, steps=4):
 
 
 def grown_from_nothing(hair):
-    """Return the points (S, P, 3) interpolated from the present guides."""
+    """Return the points (S, P, 3) interpolated from the current guides."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     return pipeline.bind_hair(*pipeline.inputs_of(hair.data), depsgraph).points
 
@@ -73,7 +73,7 @@ def test_a_stroke_searches_nothing_and_writes_once(hair, window, monkeypatch):
 
 
 def grown(hair):
-    """Return the points (S, P, 3) of all strands by their binding, for the present guides."""
+    """Return the points (S, P, 3) of all strands by their binding, for the current guides."""
     bound = bindings.of(hair.data)
     return following.follow_guides(
         bound.binding, curves.read_guides(hair.data.vellus.guide_curves, bound.surface, "cpu")
@@ -239,7 +239,9 @@ def test_hair_from_a_file_follows_by_the_roots_that_it_stores(hair, tmp_path):
 
 @pytest.mark.parametrize("is_reported_first", [True, False])
 def test_own_writes_are_no_news(hair, monkeypatch, is_reported_first):
-    """Our own writes are not reported as changes; changes by others are, before and after Blender reports our write."""
+    """The add-on's own writes are not reported as changes; changes by others are, before and after Blender reports
+    our write.
+    """
     calls = counts_of(monkeypatch)
     pipeline.interpolate_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get(), hair.data)
     if is_reported_first:
@@ -274,7 +276,9 @@ def test_hair_that_was_sculpted_itself_is_kept(hair):
 
 @pytest.mark.parametrize("is_written_before_undo_push", [True, False])
 def test_undo_and_redo_keep_hair_and_guides_together(hair, window, is_written_before_undo_push):
-    """A stroke's undo step is pushed at its end, before or after the hair was written."""
+    """Undo and redo keep hair and guides together, whether a stroke's undo step is pushed before or after the hair
+    is written.
+    """
     bpy.ops.ed.undo_push(message="grown")
     before = points(hair)
     list(stroke(bpy.data.objects["Guides"], [3]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Play from Start plays every frame, and playback is as it was before when it stops."""
+"""Play from Start plays every frame, and restores the playback settings when it stops."""
 
 import bpy
 import pytest
@@ -7,7 +7,7 @@ import pytest
 
 @pytest.fixture
 def window(guides):
-    """The window whose screen plays."""
+    """Return the window whose screen plays."""
     found = bpy.context.window_manager.windows[0]
     yield found
     with bpy.context.temp_override(window=found, screen=found.screen):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The first-time setup in the background: once, never without a window, and over when the add-on is disabled."""
+"""The first-time setup runs once in the background, never without a window, and ends when the add-on is disabled."""
 
 import threading
 import time
@@ -17,7 +17,7 @@ from hair_addon.core.kernels import kernel_setup
 
 @pytest.fixture
 def stamp(tmp_path, monkeypatch):
-    """An installed extension, for which the setup was not done yet; its file of the version that was set up."""
+    """Act as an installed extension whose setup is not done, and return the file with the version that was set up."""
     path = tmp_path / "version"
     monkeypatch.setattr(first_setup, "_stamp", lambda: path)
     monkeypatch.setattr(preferences, "is_extension", lambda: True)
@@ -35,7 +35,7 @@ def advance_to_the_end():
 
 
 def slow(_device, progress, most_threads):
-    """Kernels that take for ever to compile."""
+    """Act as kernels whose compilation never ends."""
     assert most_threads == 1
     while True:
         progress(kernel_setup.COMPILING, 0.5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands generated on the GPU during combing equal the strands written afterwards; with counts of uploads."""
+"""Strands generated on the GPU during combing equal the strands written afterwards, with counted uploads."""
 
 from itertools import cycle
 
@@ -53,7 +53,7 @@ def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, m
 
 
 def test_drawn_strands_take_eight_bytes_a_point(hair, window):
-    """The memory of the programs that compute strands is counted too."""
+    """Drawn strands take eight bytes per point, and the memory of the programs that compute strands is counted."""
     drawn(hair)
     on_gpu = hair_cache.strands_on_gpu(hair.data)
     rows = on_gpu.texture.height * on_gpu.row_strands
@@ -184,7 +184,7 @@ def test_nothing_is_measured_without_a_window(monkeypatch):
 
 @pytest.mark.usefixtures("made_anew")
 def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkeypatch):
-    """The first drawing measures the GPU, and all later edits of bound hair use the choice."""
+    """The first drawing of hair in a viewport measures the GPU, and all later edits of bound hair use the choice."""
     viewport.view_cache.clear()
     calls, asked = counts_of(monkeypatch), []
     monkeypatch.setattr(device_choice, "times", lambda: asked.append(1) or (0.0, 1.0))
@@ -239,7 +239,9 @@ def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, coarse_shad
 
 
 def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watched, coarse_shadows, monkeypatch):
-    """A stroke uploads one texture of twelve bytes per point of the guides and reads six numbers back."""
+    """A stroke uploads one texture of twelve bytes per point of the guides, reads six numbers back and allocates
+    nothing.
+    """
     bpy.ops.object.light_add(type="SUN")
 
     def scene_now():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keep Hair Outside: strands between guides that a ball passes are outside of it in what renders read."""
+"""Keep Hair Outside: renders read strands that are outside of a ball that passes between their guides."""
 
 import bpy
 import numpy as np
@@ -18,7 +18,7 @@ RADIUS, LAST = 0.15, 8
 
 @pytest.fixture
 def baked(hair, tmp_path):
-    """(guides, hair) that sag, baked, with a ball that comes into the hair between them until frame 8."""
+    """Return (guides, hair) that sag, baked, with a ball that moves into the hair between them until frame 8."""
     guides = bpy.data.objects["Guides"]
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=RADIUS)
     ball = bpy.context.object
@@ -43,7 +43,7 @@ def world_points(hair):
 
 
 def deepest(hair):
-    """How far the deepest point of the hair that renders read is inside the ball [m], below its facets."""
+    """Return how far the deepest point of rendered hair is inside the ball [m], below its facets."""
     ball = bpy.data.objects["Ball"]
     faces = np.array([face.center.length for face in ball.data.polygons])
     middle = np.array(ball.matrix_world.translation)
@@ -76,7 +76,7 @@ def test_no_strand_is_inside_the_ball(baked):
 
 
 def test_a_ball_among_guides_that_do_not_move_is_kept_out_too(baked):
-    """Colliders move without them."""
+    """Strands are kept outside of a ball that moves among resting guides."""
     guides, hair = baked
     guides.data.vellus.dynamics.keeps_hair_outside = True
     scene = bpy.context.scene
@@ -90,7 +90,7 @@ def test_a_ball_among_guides_that_do_not_move_is_kept_out_too(baked):
 
 
 def test_what_cycles_reads_is_outside(baked):
-    """Evaluated strands, after nodes have moved them with their surface."""
+    """Strands evaluated for Cycles are outside after nodes have moved them with their surface."""
     guides, hair = baked
     guides.data.vellus.dynamics.keeps_hair_outside = True
     bpy.context.scene.frame_set(LAST)

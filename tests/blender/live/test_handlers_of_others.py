@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Other add-ons delete hair while Blender reports it as changed."""
+"""Handlers stay correct when other add-ons delete hair while Blender reports it as changed."""
 
 import subprocess
 import sys
@@ -20,7 +20,9 @@ def test_hair_that_another_handler_deletes_does_not_end_blender():
 
 
 def test_reports_are_the_same_whether_others_run_first(hair):
-    """Only existing data are reported; parts of other datablocks only by their type."""
+    """Reports are the same before and after other handlers: existing data, and parts of other datablocks by their
+    type.
+    """
     found = {}
 
     def listen(_scene, depsgraph):

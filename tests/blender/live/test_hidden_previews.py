@@ -18,7 +18,7 @@ from tests.support.reading import evaluated_points
 
 @pytest.fixture
 def posed(watched):
-    """Hair on a surface that a shape key bends, drawn by a window in Solid shading."""
+    """Return hair on a surface that a shape key bends, drawn by a window in Solid shading."""
     bend(watched.data.surface, 0.5)
     bpy.context.view_layer.update()
     moving_surfaces.resume()

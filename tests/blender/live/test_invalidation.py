@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Caches: drawing never uses data older than an event, and nothing remains after another file or disabling."""
+"""Drawing never uses cached data older than an event, and no data remain after opening a file or disabling the
+add-on.
+"""
 
 import importlib
 import inspect
@@ -31,7 +33,7 @@ SIZE = 24
 
 
 def every_cache():
-    """{where it stands: cache} of all modules."""
+    """Return {location: cache} of all modules."""
     names = [".".join(path.relative_to(ADDON).with_suffix("").parts) for path in MODULES]
     modules = [importlib.import_module(f"hair_addon.{name}") for name in names if not name.endswith("__")]
     return {
@@ -49,7 +51,7 @@ def test_the_table_names_every_cache_once():
 
 @pytest.fixture
 def full(hair):
-    """Something in every cache."""
+    """Fill every cache."""
     for cache in every_cache().values():
         cache.keep("something", "kept")
 
@@ -91,12 +93,14 @@ def test_nothing_is_left_when_python_ends(full, monkeypatch):
 
 @pytest.fixture
 def stage(lit, monkeypatch):
-    """Hair on a surface that a modifier may bend, lit by a sun and by a world's image."""
+    """Return hair on a surface that a modifier may bend, lit by a sun and by a world's image."""
     monkeypatch.setattr(hair_picture, "SAMPLE_COUNT", 4)
     restart = hair_picture.HairPicture.restart
 
     def restart_with_the_same_samples(picture, is_moved=False):
-        """After a movement passes go on with other samples, and the picture would differ by their noise."""
+        """Start passes with the same samples again, as other samples after a movement would change the picture by
+        their noise.
+        """
         restart(picture, is_moved)
         picture._first_turn = 0
 
@@ -132,19 +136,19 @@ def seen():
 
 
 def sculpt():
-    """Hair itself, by somebody else than its guides."""
+    """Edit the hair itself, as by a tool other than its guides."""
     sculpted = points(bpy.data.objects["Hair"])
     sculpted[:, -1] += np.float32([0.3, 0.0, 0.2])
     write_points(bpy.data.objects["Hair"], sculpted)
 
 
 def regrow():
-    """Guides, which are drawn before Blender has reported what became of them."""
+    """Change the length of guides, which are drawn before Blender has reported the change."""
     bpy.data.objects["Guides"].data.vellus.guides.length = 0.8
 
 
 def dye():
-    """Strands by a map, which another strand's number changes."""
+    """Color strands by a map of their random numbers."""
     api.set_map(bpy.data.objects["Hair"], "look.melanin", "strand", low=0.0, high=0.2)
 
 
@@ -162,7 +166,7 @@ def repaint():
 
 
 def play_modifiers():
-    """One that viewports have drawn, and another that is keyed."""
+    """Add a modifier that viewports have drawn, and a keyed one."""
     add_asset(bpy.data.objects["Hair"], "Curl Hair Curves")
     keyed = add_asset(bpy.data.objects["Hair"], "Duplicate Hair Curves")
     for frame in (1, 2):
@@ -174,7 +178,7 @@ def play_modifiers():
 
 
 def spoil():
-    """Another hair, surface, light and picture, which viewports have drawn."""
+    """Draw another hair, surface, light and picture in viewports."""
     sculpt()
     move_sun()
     bend()
@@ -222,7 +226,7 @@ def test_each_event_has_a_scenario():
 
 
 def older_than(event, folder):
-    """Names of what is drawn after an event that is not what a first redraw would show, of all that viewports show."""
+    """Return the names of all shown data that differ after an event from those of a first redraw."""
     before = seen()
     SCENARIOS[event](folder)
     bpy.context.view_layer.update()

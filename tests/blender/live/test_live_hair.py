@@ -71,7 +71,9 @@ def test_radii_are_written_where_they_are_others(hair, monkeypatch):
 
 
 def test_strands_edited_before_blender_reports_our_write_are_drawn(hair):
-    """Blender reports the handler's write and a later edit as one change, and the edited strands are drawn."""
+    """Strands that are edited before Blender reports the handler's write are drawn, although Blender reports one
+    change.
+    """
     hair_cache.strands_on_gpu(hair.data)
     hair.data.vellus.hair.seed = 9
     update()  # its handler writes the strands
@@ -83,7 +85,7 @@ def test_strands_edited_before_blender_reports_our_write_are_drawn(hair):
 
 @pytest.mark.usefixtures("made_anew")
 def test_radii_edited_by_hand_are_drawn(hair):
-    """Edited radii are drawn for bound hair too, and while its guides are combed."""
+    """Radii edited by hand are drawn for bound hair too, and while its guides are combed."""
     guides = bpy.data.objects["Guides"]
     hair.data.vellus.hair.seed = 9
     update()
@@ -222,7 +224,7 @@ def test_a_fresh_datablock_has_the_declared_defaults(scene, group, settings_clas
 )
 @pytest.mark.parametrize("end", ["low", "high"])
 def test_a_slider_at_its_end_is_within_the_range(scene, group, settings_class, skip, end):
-    """The end of a range is valid although single precision rounds 15 degrees up."""
+    """A slider at the end of its range is valid, although single precision rounds 15 degrees up."""
     owner = getattr(bpy.data.hair_curves.new("Fresh").vellus, group)
     for name, default, details in declared(settings_class):
         limit = getattr(details, end)
@@ -236,7 +238,7 @@ def hair_node(hair):
 
 
 def assert_material_is(hair, look):
-    """Every socket of the hair's material is what a look asks for."""
+    """Assert that every socket of the hair's material has the value of a look."""
     sockets = hair_node(hair).inputs
     for name, value in appearance.principled_sockets(look).items():
         np.testing.assert_allclose(np.array(sockets[name].default_value), value, rtol=1e-6, err_msg=name)
@@ -302,7 +304,7 @@ def test_a_deleted_surface_is_reported(hair):
 
 
 def test_an_operator_computes_once(sphere, monkeypatch):
-    """Changes by an operator itself do not count as changes of its inputs."""
+    """An operator computes its result once, as its own changes do not count as changes of its inputs."""
     calls = {"distribute_guides": 0, "bind_hair": 0}
 
     def counted(name):

@@ -36,7 +36,7 @@ SENSITIVE = 1e-4
 
 
 def add_styles(hair, *styles):
-    """Style hair, and draw it."""
+    """Add styles to hair, and draw it."""
     for settings in styles:
         style_items.add(hair.data.vellus, settings)
     written(hair)
@@ -45,7 +45,7 @@ def add_styles(hair, *styles):
 
 
 def written(hair):
-    """(S, P, 3) as its Curves have it once an interaction is over."""
+    """Return (S, P, 3), the points of Curves once an interaction has ended."""
     bpy.context.view_layer.update()
     live_hair.write_all()
     bpy.context.view_layer.update()
@@ -56,7 +56,9 @@ def written(hair):
     "styles", [(lean.Settings(amount=0.3),), (clump.Settings(size=0.3, levels=1), curl.Settings())]
 )
 def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, styles):
-    """Only leaning guides are computed on the processor, and the written strands equal the shown ones."""
+    """A stroke on styled hair computes only leaning guides on the processor, and the written strands equal the shown
+    ones.
+    """
     add_styles(watched, *styles)
     with monkeypatch.context() as counted:
         calls = counts_of(counted)
@@ -71,7 +73,9 @@ def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, sty
 
 
 def test_edits_wait_for_no_program(watched, monkeypatch):
-    """Programs are compiled at rest, one at a time; until then Warp makes the strands."""
+    """Edits wait for no program: programs are compiled one at a time at rest, and until then Warp generates the
+    strands.
+    """
     watched.data.vellus.hair.point_count = 19  # as nowhere else
     bpy.context.view_layer.update()
     with monkeypatch.context() as undisturbed:
@@ -170,7 +174,9 @@ def test_a_mask_that_is_painted_uploads_no_strands(watched, monkeypatch):
 
 
 def test_a_style_that_is_switched_off_and_on(watched):
-    """Each set of kinds has a program; styles of guides alone and hair without effective styles need none."""
+    """A style that is switched off and on has a program for each set of kinds; styles of guides alone need no
+    program.
+    """
     add_styles(watched, bend.Settings(), lean.Settings(amount=0.5))
     for place, is_on in ((0, False), (1, False), (0, True), (1, True)):
         slide(watched, place, "is_on", is_on)
@@ -179,7 +185,7 @@ def test_a_style_that_is_switched_off_and_on(watched):
 
 
 def test_wetness_and_the_radii_that_swell_with_it(watched, monkeypatch):
-    """A change uploads one number per strand if strands differ in wetness."""
+    """A change of wetness uploads one number per strand if strands differ in wetness, and the radii swell with it."""
     add_styles(watched, wet.Settings(lock=0.3, amount=0.2))
     calls = counts_of(monkeypatch)
     for amount, vary in ((0.9, 0.0), (0.9, 0.5), (0.5, 0.3), (0.5, 0.0)):

@@ -15,7 +15,7 @@ from tests.support.reading import evaluated_points, points, write_points
 
 
 def drawn():
-    """(S, P, 3) of the hair that a viewport draws."""
+    """Return (S, P, 3), the points of the hair that a viewport draws."""
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     ((strands, *_others),) = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph).hair
@@ -24,7 +24,7 @@ def drawn():
 
 @pytest.fixture
 def modified(watched):
-    """Hair with Blender's own curls, in a window."""
+    """Return hair with Blender's own curls, in a window."""
     add_asset(watched, "Curl Hair Curves")
     return watched
 

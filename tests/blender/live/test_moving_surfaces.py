@@ -27,7 +27,7 @@ def are_hidden():
 
 
 def is_left_out(hair):
-    """Whether Blender's evaluation has nothing but the box of the strands."""
+    """Whether Blender's evaluation contains only the bounding box of the strands."""
     bpy.context.view_layer.update()
     evaluated = hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
     if len(evaluated.data.curves) == len(hair.data.curves):
@@ -38,7 +38,7 @@ def is_left_out(hair):
 
 
 def key(surface, count=8):
-    """Let a surface bend more and more with the frames."""
+    """Animate a surface that bends more in each frame."""
     bend(surface, 0.0)
     block = surface.data.shape_keys.key_blocks["Bent"]
     for frame, amount in ((1, 0.1), (count, 0.9)):
@@ -48,7 +48,7 @@ def key(surface, count=8):
 
 @pytest.fixture
 def bent(watched):
-    """Hair that is drawn on a surface that bends with the frames."""
+    """Return hair drawn on a surface that bends with the frames."""
     key(watched.data.surface)
     bpy.context.scene.frame_set(1)
     drawn(watched)
@@ -190,7 +190,7 @@ def test_a_dragged_slider_hides_hair_until_it_rests(bent):
 
 
 def test_a_drag_reads_no_strands(bent, monkeypatch):
-    """Blender reports Curves with their surface; 100,000 strands take a while to compare."""
+    """A drag reads no strands, which would take a while for 100,000 strands that Blender reports with their surface."""
     bent.data.surface.data.shape_keys.animation_data_clear()
     drag(bent, 0.2, 0.3, 0.4)
     read = []
@@ -239,7 +239,9 @@ def test_strands_that_change_while_the_surface_is_dragged_are_drawn(bent):
 
 
 def test_hand_edited_strands_are_drawn_on_an_edited_mesh_that_is_dragged(watched):
-    """They follow with the same update, although they are hidden from Blender, which reports them with the next."""
+    """Hand-edited strands follow an edited mesh that is dragged in the same update, although Blender hides and
+    reports them later.
+    """
     edited = points(watched)
     edited[:, -1] += np.float32(0.1)
     write_points(watched, edited)
@@ -297,7 +299,7 @@ def test_renders_carry_hair_that_viewports_hide(playing, monkeypatch):
 
 
 def test_all_objects_of_hair_are_hidden_and_carried_again(bent, monkeypatch):
-    """An object that is copied while it is hidden is carried too."""
+    """All objects of hair are hidden and deformed again, also an object copied while it is hidden."""
     other = bent.copy()
     bpy.context.scene.view_layers.new("Other")
     bpy.context.scene.collection.objects.link(other)
@@ -310,7 +312,7 @@ def test_all_objects_of_hair_are_hidden_and_carried_again(bent, monkeypatch):
 
 
 def test_files_that_were_kept_hidden_are_shown_when_opened(playing, tmp_path, monkeypatch):
-    """Blender's auto-save writes such files while an animation plays."""
+    """Files saved with hidden hair, as by auto-save while an animation plays, show it when they are opened."""
     monkeypatch.setattr(handlers, "_show_hidden", lambda: None)
     path = str(tmp_path / "kept.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, compress=False)
@@ -321,7 +323,7 @@ def test_files_that_were_kept_hidden_are_shown_when_opened(playing, tmp_path, mo
 
 
 def test_an_undo_step_of_a_drag_hides_nothing_again(playing):
-    """Blender pushes an undo step when a bone is released, before the surface is at rest: undoing it hides no hair."""
+    """An undo step that Blender pushes when a bone is released hides no hair when it is undone."""
     assert are_hidden()
     bpy.ops.ed.undo_push(message="Hidden")
     moving_surfaces.resume()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides simulated during playback in a window: frames in memory, and events that restart the simulation."""
+"""Guides simulated during playback in a window have frames in memory, and certain events restart the simulation."""
 
 import bpy
 import numpy as np
@@ -25,7 +25,7 @@ from tests.support.reading import points, write_points
 
 @pytest.fixture
 def swung(hair, tmp_path, monkeypatch):
-    """(guides, hair) whose sphere swings, and that simulate, as in a window."""
+    """Return (guides, hair) that simulate on a swinging sphere, as in a window."""
     monkeypatch.setattr(running, "has_window", lambda: True)
     guides = bpy.data.objects["Guides"]
     swing(bpy.data.objects["Sphere"])
@@ -96,7 +96,7 @@ def test_the_present_frame_is_shown_as_it_is_baked_and_as_combed_when_freed(swun
 
 
 def test_a_file_that_was_never_saved_has_no_frames_to_free(swung):
-    """An unsaved file has no cache folder, and panels that ask with every redraw do not fail."""
+    """A file that was never saved has no cache folder and no frames to free, and panels that redraw do not fail."""
     guides, _hair = swung
     assert not bpy.data.filepath
     guides.data.vellus.cache_folder = "//haircache"
@@ -241,7 +241,7 @@ def test_a_surface_without_faces_is_reported(swung):
 
 
 def test_without_a_window_nothing_is_simulated(swung, monkeypatch):
-    """Farms and scripts read baked frames alone."""
+    """Without a window nothing is simulated, so farms and scripts read only baked frames."""
     guides, _hair = swung
     monkeypatch.setattr(running, "has_window", lambda: False)
     play(1, 6)

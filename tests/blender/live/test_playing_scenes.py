@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides that are simulated in scenes of other units, scales and frames, on surfaces that bend, with styles."""
+"""Guides are simulated correctly in scenes of other units, scales and frames, on bending surfaces, and with styles."""
 
 import bpy
 import numpy as np
@@ -18,7 +18,7 @@ from tests.support.reading import evaluated_points, points, write_points
 
 @pytest.fixture
 def window(monkeypatch):
-    """Guides are simulated while frames change, as in a window."""
+    """Act as in a window, so that guides are simulated while frames change."""
     monkeypatch.setattr(running, "has_window", lambda: True)
     yield
     live_hair.cancel_writing()
@@ -27,7 +27,7 @@ def window(monkeypatch):
 
 @pytest.fixture
 def swung(hair, tmp_path, window):
-    """(guides, hair) whose sphere swings, and that simulate."""
+    """Return (guides, hair) that simulate on a swinging sphere."""
     guides = bpy.data.objects["Guides"]
     swing(bpy.data.objects["Sphere"])
     simulate(guides, tmp_path)
@@ -71,7 +71,9 @@ def test_units_of_the_scene_do_not_matter(swung):
 
 
 def test_a_mirrored_surface_moves_hair_as_its_mirror_image(swung):
-    """Friction between hairs is excluded: its grid is not its own mirror image."""
+    """A mirrored surface moves hair as its mirror image, except for friction between hairs, whose grid is not
+    symmetric.
+    """
     guides, _hair = swung
     settings = guides.data.vellus.dynamics
     settings.hair_friction = settings.hair_pressure = 0.0

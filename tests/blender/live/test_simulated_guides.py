@@ -15,7 +15,7 @@ from tests.support.reading import points, write_points
 
 @pytest.fixture(params=[False, True], ids=["background", "window"])
 def followed(hair, request, monkeypatch):
-    """(guides, hair), without a window, and with handlers that act as if there were one."""
+    """Return (guides, hair) without a window, with handlers that act as if there were one."""
     monkeypatch.setattr(running, "has_window", lambda: request.param)
     guides = bpy.data.objects["Guides"]
     guides.data.vellus.simulates = True
@@ -25,7 +25,7 @@ def followed(hair, request, monkeypatch):
 
 
 def swung(guides):
-    """(G, P, 3): the guides bent to one side."""
+    """Return (G, P, 3): the guides bent to one side."""
     moved = points(guides)
     moved[:, 1:, 0] += np.float32(0.1) * np.linspace(0.05, 1.0, moved.shape[1] - 1, dtype=np.float32) ** 2
     return moved

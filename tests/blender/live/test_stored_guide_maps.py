@@ -16,7 +16,7 @@ pytestmark = pytest.mark.usefixtures("made_anew")
 
 
 def named_attribute(tree, name):
-    """A node that reads an attribute into a value that moves points: so the tree is evaluated."""
+    """Return a node that reads an attribute into a value that moves points, so that the tree is evaluated."""
     read, moved = tree.nodes.new("GeometryNodeInputNamedAttribute"), tree.nodes.new("GeometryNodeSetPosition")
     read.data_type = "FLOAT"
     read.inputs["Name"].default_value = name
@@ -28,7 +28,7 @@ def named_attribute(tree, name):
 
 @pytest.fixture
 def modified(hair):
-    """(The hair's object, the empty node group of a modifier on it); nothing reads guide weights."""
+    """Return (hair object, the empty node group of a modifier on it); no node reads guide weights."""
     tree = bpy.data.node_groups.new("Reader", "GeometryNodeTree")
     for in_out in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
@@ -99,7 +99,7 @@ def test_a_material_reads_them(hair):
 
 
 def test_nodes_of_a_file_that_was_opened_find_them(modified, tmp_path):
-    """Hair is not bound yet in such a file, and does not change."""
+    """Nodes of a file that was just opened find guide weights, although its hair is neither bound nor changed."""
     hair, _tree = modified
     expected = [array.copy() for array in bindings.of(hair.data).guide_map]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "groom.blend"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Comb Styled off: viewports show hair without styles during combing; all other uses have the styles."""
+"""With Comb Styled off, viewports show hair without styles while it is combed, and everything else has the styles."""
 
 import bpy
 import numpy as np
@@ -28,7 +28,7 @@ def window(monkeypatch):
 
 @pytest.fixture
 def combed(hair, window):
-    """Curly hair in locks whose guides are in Sculpt Mode, and which is to be shown straight there."""
+    """Return curly hair in locks with guides in Sculpt Mode, to be shown straight."""
     hair.data.vellus.hair.point_count = 60
     for settings in (lean.Settings(amount=0.3), clump.Settings(size=0.2), curl.Settings(radius=0.02, pitch=0.1)):
         style_items.add(hair.data.vellus, settings)
@@ -43,7 +43,7 @@ def combed(hair, window):
 
 
 def shown(hair):
-    """(S, P, 3) in the texture that viewports draw."""
+    """Return (S, P, 3) in the texture that viewports draw."""
     return drawn_strands.places(hair_cache.strands_on_gpu(hair.data))
 
 
@@ -57,7 +57,7 @@ def stroke(combed_guides, steps=3):
 
 
 def made_anew(hair, is_styled):
-    """Return the points (S, P, 3) interpolated from the present guides."""
+    """Return the points (S, P, 3) interpolated from the current guides."""
     state = hair.data.vellus
     depsgraph = bpy.context.evaluated_depsgraph_get()  # which may update, so before anything is marked
     styles, is_stale = style_items.styles_of(state), state.is_stale
@@ -88,9 +88,7 @@ def test_strokes_show_straight_hair_and_style_nothing(combed, monkeypatch, chose
 
 
 def test_curves_are_styled_once_the_stroke_is_over(combed, monkeypatch):
-    """After a stroke the Curves contain styled hair for Blender's exporters, while the viewport still shows straight
-    hair.
-    """
+    """After a stroke the Curves have styled hair for Blender's exporters, while the viewport shows it straight."""
     list(stroke([3, 4]))
     shown(combed)
     calls = counts_of(monkeypatch)

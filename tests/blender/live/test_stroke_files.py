@@ -17,7 +17,7 @@ ALONG = "core/geometry/strands.py"
 
 @pytest.fixture
 def watched(hair, monkeypatch):
-    """Hair shown in a window, one of whose guides was combed before."""
+    """Return hair shown in a window, one of whose guides was combed before."""
     monkeypatch.setattr(running, "has_window", lambda: True)
     hair_cache.strands_on_gpu(hair.data)
     comb(1)
@@ -36,7 +36,9 @@ def comb(count):
 
 @pytest.mark.parametrize("count", [1, 60])
 def test_a_stroke_visits_few_files_and_returns_to_none(watched, count, monkeypatch):
-    """Prints the trace. Results are passed on, not requested again."""
+    """A stroke visits few files and returns to none, because results are passed on and not requested again; prints
+    the trace.
+    """
     comb(count)  # compiles kernels
     hair_cache.strands_on_gpu(watched.data)
     trace, follow_guides = Trace(), live_hair.follow_guides

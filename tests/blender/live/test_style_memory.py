@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changing styles do not accumulate memory."""
+"""Changing styles does not accumulate memory."""
 
 import gc
 import resource
@@ -25,7 +25,7 @@ ROOM = 1.05  # between the memory after few changes, and after a thousand
 
 @pytest.fixture(scope="module", autouse=True)
 def earlier_things_are_left_out():
-    """All that Python held before, a million things by the end of all tests, is not looked through again each time."""
+    """Freeze the objects that Python already holds, so that garbage collection skips them each time."""
     gc.collect()
     gc.freeze()
     yield
@@ -34,12 +34,12 @@ def earlier_things_are_left_out():
 
 @pytest.fixture(autouse=True)
 def placed_anew(functions_remember, monkeypatch):
-    """Keep what the add-on keeps, not the roots of all earlier values that tests remember."""
+    """Use the add-on's own cache of roots, as tests remember all earlier roots."""
     remembered.forget(monkeypatch)
 
 
 def things_alive():
-    """How many of our objects and of Warp's arrays Python holds: what is large hangs on them, but not on settings."""
+    """Return the number of the add-on's objects and of Warp's arrays in Python, which refer to all large data."""
     gc.collect()
     kinds = (type(each) for each in gc.get_objects())
     ours = (k for k in kinds if k is wp.array or str(k.__module__).startswith("hair_addon"))
@@ -47,7 +47,7 @@ def things_alive():
 
 
 def changed(kind, given, step):
-    """Return {name: value} of the numbers of a style, near the given ones and different in each step."""
+    """Return {name: value} of the numbers of a style, near the given numbers and different in each step."""
     values = {}
     for name, default, details in declared(KINDS[kind]):
         if isinstance(default, float):
@@ -59,7 +59,7 @@ def changed(kind, given, step):
 
 
 class Changing:
-    """Hair with few strands and a style whose numbers all change in each step: dragged, keyed or driven."""
+    """Hair with few strands and a style whose numbers all change in each step by dragging, keys or drivers."""
 
     def __init__(self, hair, offer, strand_count):
         self.object, self.hair = hair, hair.data
@@ -78,7 +78,7 @@ class Changing:
         return [name for name in names if self.group.bl_rna.properties[name].is_animatable]
 
     def dragged(self):
-        """A function of the number of a step, which takes it."""
+        """Return a function that sets the numbers of a step."""
 
         def drag(number):
             self._set(number % 100 + number / LONG)
@@ -129,13 +129,13 @@ def test_changes_of_a_style_keep_nothing_of_those_before(hair, offer):
 
 
 def resident():
-    """Memory of this process [bytes]."""
+    """Return the memory of this process [bytes]."""
     gc.collect()
     return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
 
 
 def grown(change):
-    """Return (objects, memory) after a hundredth of `LONG` changes, and after all; change(number): makes a change."""
+    """Return (objects, memory) after a hundredth of `LONG` changes and after all; change(number): makes a change."""
     seen = []
     for number in range(LONG):
         change(number)

@@ -17,7 +17,9 @@ SENTENCE = 'Frame 4 of the guides "Guides" is not baked: bake their dynamics fir
 
 @pytest.fixture
 def scene(hair, tmp_path, monkeypatch):
-    """Frame 4 of hair that simulates; frames 1 to 3 are baked, and Blender was started to render an animation."""
+    """Return a scene in frame 4 with simulated hair; frames 1 to 3 are baked, and Blender was started to render an
+    animation.
+    """
     scene, guides = bpy.context.scene, bpy.data.objects["Guides"]
     guides.data.vellus.simulates, guides.data.vellus.cache_folder = True, str(tmp_path)
     scene.frame_start, scene.frame_end, scene.render.engine = 1, 2, "CYCLES"

@@ -13,7 +13,7 @@ from hair_addon.core.shading.appearance import Appearance
 
 @pytest.fixture
 def card(scene):
-    """A plane that faces the camera, with one color all over and strands that cover it."""
+    """Return a plane that faces the camera, with one color and strands that cover it."""
     images = {}
     for kind, pixel in (("color", (0.3, 0.2, 0.1, 1.0)), ("normal", (0.5, 0.5, 1.0, 1.0))):
         images[kind] = bpy.data.images.new(kind, 4, 4, float_buffer=True)
@@ -25,7 +25,9 @@ def card(scene):
 
 
 def light_through(angle, tmp_path):
-    """Radiance (3,) of the card from below, by a sun above it so many degrees from the line of sight."""
+    """Return the radiance (3,) of the card from below, by a sun at an angle [degrees] from the line of sight above
+    it.
+    """
     blender_scene = bpy.context.scene
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.rotation_euler.x = math.radians(angle)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair in EEVEE: thin, lit approximately as in Cycles; materials of artists are not changed."""
+"""Hair in EEVEE is thin and lit approximately as in Cycles, and materials of artists are not changed."""
 
 import bpy
 import numpy as np
@@ -12,7 +12,7 @@ SIZE = 40
 
 
 def rendered_hair(engine, folder):
-    """(3,) mean light of the hair on a holdout, and the part of the picture that it covers."""
+    """Return (3,) mean light of the hair on a holdout, and the part of the picture that it covers."""
     configure(engine=engine, film_transparent=True, resolution_x=SIZE, resolution_y=SIZE)
     render = bpy.context.scene.render
     render.image_settings.media_type, render.image_settings.file_format = "IMAGE", "OPEN_EXR"
@@ -29,7 +29,9 @@ def rendered_hair(engine, folder):
 
 @even_guides
 def test_it_is_lit_about_as_by_cycles(lit, tmp_path):
-    """Coverage is equal too: strands a pixel wide or wider, as by default in Blender, cover five times as much."""
+    """EEVEE lights and covers hair approximately as Cycles does; strands at least a pixel wide would cover five
+    times as much.
+    """
     scene = bpy.context.scene
     lit.data.vellus.hair.strand_count, lit.data.vellus.appearance.melanin = 3000, 0.15
     bpy.data.objects["Sphere"].is_holdout = True
@@ -77,6 +79,6 @@ def test_random_colors_are_shown_too(hair):
 
 
 def test_strands_are_as_thick_for_light_as_they_are(hair):
-    """EEVEE gets the strands' thickness; with the thickness of the bounds no strand would shade another."""
+    """EEVEE gets the strands' own thickness; with the thickness of the bounding box no strand would shade another."""
     thickness = hair.data.materials[0].node_tree.nodes["EEVEE Output"].inputs["Thickness"]
     assert [link.from_socket.name for link in thickness.links] == ["Thickness"]

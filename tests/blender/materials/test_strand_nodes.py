@@ -26,7 +26,7 @@ LOOKS = {
 
 @pytest.fixture
 def patch(scene):
-    """A Curves object of flat strands with random numbers, its camera, and Cycles."""
+    """Return a Curves object of flat strands with random numbers, its camera, and Cycles."""
     curves = bpy.data.hair_curves.new("Patch")
     curves.add_curves([POINT_COUNT] * STRAND_COUNT)
     curves.set_types(type="POLY")
@@ -52,7 +52,7 @@ def patch(scene):
 
 
 def emission_of(material):
-    """An emission in place of a material's hair; its color socket shows what a socket of the hair would receive."""
+    """Replace a material's hair by an emission, and return the emission's color socket."""
     tree = material.node_tree
     emission = tree.nodes.new("ShaderNodeEmission")
     output = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputMaterial" and node.target == "ALL")
@@ -61,7 +61,7 @@ def emission_of(material):
 
 
 def render(tmp_path):
-    """(HEIGHT, STRAND_COUNT, 3) linear, rows from the roots up."""
+    """Return (HEIGHT, STRAND_COUNT, 3) linear values, rows from the roots up."""
     scene = bpy.context.scene
     scene.render.filepath = str(tmp_path / "patch.exr")
     bpy.ops.render.render(write_still=True)

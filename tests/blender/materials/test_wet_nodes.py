@@ -16,7 +16,7 @@ WATER = ("Roughness", "Coat", "IOR", "Offset")
 
 
 def nodes_of(hair):
-    """(hair node of the driest look, of the wettest, the mix): None for those that there are not."""
+    """Return (hair node of the driest look, of the wettest look, the mix), None where there is no node."""
     nodes = [*hair.data.materials[0].node_tree.nodes]
     of_hair = [node for node in nodes if node.bl_idname == materials.HAIR_NODE]
     driest, *wettest = sorted(of_hair, key=wet_nodes.is_ours)
@@ -136,7 +136,7 @@ def test_the_wet_side_is_darker_in_cycles(lit, tmp_path):
 
 
 def rendered_light(hair, folder, wetness):
-    """(32, 32) light of hair of a wetness (S,) that stays where it is."""
+    """Return (32, 32) light of still hair with wetness (S,)."""
     attributes.write(hair.data, "wetness", "FLOAT", "CURVE", wetness)
     hair.data.update_tag()
     path = str(folder / "wet.exr")

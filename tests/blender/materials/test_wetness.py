@@ -17,7 +17,7 @@ from hair_addon.core.styling import wet
 
 
 def sockets(hair):
-    """{identifier: value} of the material's hair node, for what water changes."""
+    """Return {identifier: value} of the sockets of the material's hair node that water changes."""
     nodes = hair.data.materials[0].node_tree.nodes
     node = next(node for node in nodes if node.bl_idname == materials.HAIR_NODE)
     found = {socket.identifier: socket.default_value for socket in node.inputs}

@@ -14,7 +14,7 @@ from tests.support.exchange.imported import curves_object, lines_on, select, sto
 
 @pytest.fixture
 def scale():
-    """Set the scale of the sphere; also usable as a test's parameter."""
+    """Return the scale of the sphere; also a parameter of tests."""
     return 1.0
 
 

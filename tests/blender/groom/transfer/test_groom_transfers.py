@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transfer of a hair system to another mesh: the same guides and hair, with all their settings."""
+"""A transferred hair system has the same guides, hair and settings on another mesh."""
 
 import bpy
 import numpy as np
@@ -20,7 +20,7 @@ MATRICES = {
 
 @pytest.fixture
 def hair(sphere):
-    """The object of hair on the upper half of a sphere, its guides combed, with a style and a look of its own."""
+    """Return hair on the upper half of a sphere, with combed guides, a style and a look of its own."""
     settings = {"strand_count": STRANDS, "radius": 0.002}
     guides = api.distribute_guides(sphere, guide_count=GUIDES, length=0.3, density_group="top")
     made = api.interpolate_hair(guides, styles=(api.Curl(radius=0.01),), **settings)
@@ -118,7 +118,9 @@ def test_roots_are_on_the_new_surface_and_hair_follows_the_new_guides(hair):
 
 
 def test_masks_that_the_mesh_lacks_are_transferred(hair, sphere, capfd):
-    """Weights that are a function of the position are transferred exactly, and mask the same strands."""
+    """Masks that the mesh lacks are transferred exactly if weights are a function of the position, and mask the same
+    strands.
+    """
     group, weights = sphere.vertex_groups["top"], np.empty(3 * len(sphere.data.vertices))
     sphere.data.vertices.foreach_get("co", weights)
     weights = np.clip(weights[2::3], 0.0, 1.0)
