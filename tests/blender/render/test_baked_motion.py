@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked hair in renders: motion blur in Cycles, and the engine's motion vectors."""
+"""Baked hair has motion blur in Cycles, and motion vectors in Vellus."""
 
 import bpy
 import numpy as np
@@ -22,7 +22,7 @@ SMALL = {"engine": "CYCLES", "resolution_x": 32, "resolution_y": 24}
 
 @pytest.fixture
 def baked(lit, tmp_path):
-    """Thick hair on a sphere that swings in front of a camera, with baked frames, in one of them."""
+    """Return thick hair on a sphere that swings before a camera, with baked frames."""
     swing(bpy.data.objects["Sphere"])
     lit.data.vellus.hair.radius = 0.03
     simulate(bpy.data.objects["Guides"], tmp_path / "frames", substeps=4)
@@ -37,7 +37,7 @@ def at(hair, time):
 
 
 def bake_linear_motion(guides):
-    """Put frames in the place of the simulated ones in which guides bend to the side, as fast at any time."""
+    """Replace the baked frames by frames in which guides bend to the side at constant speed."""
     folder = frame_folders.folder_of(guides.data)
     combed = points(guides)
     bend = np.float32([0.02, 0.006, -0.004]) * np.linspace(0.0, 1.0, combed.shape[1], dtype=np.float32)[:, None] ** 2

@@ -19,7 +19,7 @@ BROKEN, POINT = 7, 17
 
 
 def break_strands(hair, value, strands):
-    """Give a point of some strands another x."""
+    """Give a point of some strands another x coordinate."""
     points = curves.read_points(hair.data).reshape(len(hair.data.curves), -1, 3)
     points[strands, POINT, 0] = value
     hair.data.position_data.foreach_set("vector", points.ravel())
@@ -29,7 +29,7 @@ def break_strands(hair, value, strands):
 
 
 def drawn_hair():
-    """[`StrandsOnGPU`] as viewports have them."""
+    """Return [`StrandsOnGPU`] as viewports have them."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph, None, hair_cache.refuse)
     return [strands for strands, *_ in drawn.hair]
@@ -37,7 +37,7 @@ def drawn_hair():
 
 @pytest.fixture
 def seen(hair, scene):
-    """The hair, before a camera."""
+    """Return the hair before a camera."""
     add_orthographic_camera(scene)
     return hair
 
@@ -70,7 +70,7 @@ def test_the_picture_is_that_of_the_hair_without_the_strand(seen, tmp_path, caps
 
 
 def test_hair_on_a_surface_that_moves_is_carried_without_it(seen, capsys):
-    """Roots of those that are drawn are theirs: the bent surface carries each as if nothing was broken."""
+    """Hair on a moving surface is deformed without its broken strand, and all drawn strands keep their own roots."""
     sphere = seen.data.surface
     bend = sphere.modifiers.new("Bend", "SIMPLE_DEFORM")
     bend.deform_method, bend.angle = "TWIST", 1.0
@@ -83,7 +83,7 @@ def test_hair_on_a_surface_that_moves_is_carried_without_it(seen, capsys):
 
 
 def test_splines_of_unequal_counts_are_not_resampled_with_it(seen):
-    """No kernel sees the broken one: others of any counts are drawn beside it."""
+    """Splines of unequal point counts are drawn beside a broken one, which no kernel reads."""
     data = seen.data
     data.remove_curves()
     data.add_curves([5, 9, 4])

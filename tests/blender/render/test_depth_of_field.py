@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Depth of field: the spread of a small bright square, compared with the thin lens formula and with Cycles."""
+"""Depth of field spreads a small bright square by the thin lens formula and as Cycles does."""
 
 import math
 from types import SimpleNamespace
@@ -23,7 +23,7 @@ FSTOPS = {"PERSP": 0.05, "ORTHO": 2.0}
 
 @pytest.fixture
 def square(scene):
-    """A white square of 6 cm across the view, in front of nothing, and a camera that looks at it."""
+    """Return a white square of 6 cm across the view, before nothing, and a camera that looks at it."""
     bpy.ops.mesh.primitive_plane_add(size=0.06)
     bpy.ops.object.light_add(type="SUN", location=(0.0, 0.0, 3.0))
     bpy.ops.object.camera_add(location=(0.0, 0.0, DISTANCE))
@@ -38,14 +38,14 @@ def use_lens(camera, kind):
 
 
 def spread(picture):
-    """(2, 2) covariance [pixels²] of where the light of a picture is."""
+    """Return the (2, 2) covariance [pixels²] of the light of a picture."""
     light = picture[..., 0].astype(np.float64)
     places = np.stack(np.mgrid[: light.shape[0], : light.shape[1]][::-1], axis=-1).reshape(-1, 2)
     return np.cov(places.T, aweights=light.ravel(), bias=True)
 
 
 def radius_by_formula(camera, width):
-    """[pixels] of the circle of confusion of the square."""
+    """Return the radius [pixels] of the square's circle of confusion by the formula."""
     if camera.data.type == "ORTHO":
         return 0.5 / FSTOPS["ORTHO"] * abs(1.0 - DISTANCE / FOCUS) * width / camera.data.ortho_scale
     focal_length = 1e-3 * camera.data.lens
@@ -55,7 +55,9 @@ def radius_by_formula(camera, width):
 
 @pytest.mark.parametrize("kind", FSTOPS)
 def test_a_point_off_focus_is_a_circle_of_confusion(square, tmp_path, kind):
-    """A disk's variance along an axis is a quarter of its radius'; the square's own is subtracted."""
+    """Out of focus a point is a disk with a variance of a quarter of the squared radius; the square's own is
+    subtracted.
+    """
     square.data.type = kind
     sharp = spread(rendered(tmp_path, film_transparent=True, sample_count=64)["Combined"])
     use_lens(square, kind)
@@ -67,7 +69,7 @@ def test_a_point_off_focus_is_a_circle_of_confusion(square, tmp_path, kind):
 
 @pytest.mark.parametrize("kind", FSTOPS)
 def test_blades_make_the_figure_of_cycles(square, tmp_path, kind):
-    """Three blades that are turned, and an anamorphic ratio: the picture and its covariance."""
+    """Three rotated blades and an anamorphic ratio give Cycles' picture and covariance."""
     use_lens(square, kind)
     lens = square.data.dof
     lens.aperture_blades, lens.aperture_rotation, lens.aperture_ratio = 3, 0.4, 1.6
@@ -84,7 +86,7 @@ def test_blades_make_the_figure_of_cycles(square, tmp_path, kind):
 
 
 def test_an_object_in_focus_is_sharp(square, tmp_path):
-    """The distance of the object is measured along the view, also from aside."""
+    """An object in focus is sharp, also off the view axis, along which its distance is measured."""
     square.location = (1.0, 0.0, DISTANCE)
     square.data.shift_x = -1.0 / DISTANCE * square.data.lens / square.data.sensor_width
     sharp = rendered(tmp_path, film_transparent=True, sample_count=64)["Combined"]
@@ -96,7 +98,7 @@ def test_an_object_in_focus_is_sharp(square, tmp_path):
 
 
 def test_hair_blurs_with_the_surface_below_it(lit, tmp_path):
-    """Out of focus both lose their detail, and neither gains nor loses light; the offscreen picture has the same."""
+    """Out of focus, hair and surface both lose detail and keep their light; the offscreen picture is the same."""
     bpy.context.view_layer.vellus.has_hair_mask = True
     sharp = rendered(tmp_path, film_transparent=True, sample_count=32)
     lens = bpy.context.scene.camera.data.dof
@@ -113,7 +115,7 @@ def test_hair_blurs_with_the_surface_below_it(lit, tmp_path):
 
 @pytest.mark.parametrize("through_camera", [False, True])
 def test_a_rendered_viewport_blurs_only_through_the_camera(lit, tmp_path, monkeypatch, through_camera):
-    """Its blur equals that of a render with as many samples; other views are in focus everywhere."""
+    """A rendered viewport blurs only through the camera, as a render with as many samples does."""
     width, height = 96, 72
     blender_scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
     blender_scene.render.film_transparent = True

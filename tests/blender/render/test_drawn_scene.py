@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Data read again after changes: only hair while it is combed, otherwise the whole scene."""
+"""After a change only hair that is combed is read again, otherwise the whole scene."""
 
 import bpy
 import numpy as np

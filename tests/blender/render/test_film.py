@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The passes of the render engine: parts of the light, depth, and motion vectors."""
+"""The passes of the render engine are parts of the light, depth, and motion vectors."""
 
 import math
 
@@ -18,7 +18,9 @@ MODELS = [("KAJIYA_KAY", "energy"), ("MARSCHNER", "energy"), ("MARSCHNER", "clas
 
 @pytest.mark.parametrize(("model_mode", "is_varied"), pairs(MODELS, [False, True], 2))
 def test_the_lobes_add_up_to_the_light_of_hair(lit, tmp_path, model_mode, is_varied):
-    """Under a sun, a world and on a surface that throws light back: of each model, and where strands differ."""
+    """The lobes add up to the light of hair under a sun, a world and a reflecting surface, for each model and varied
+    strands.
+    """
     light_up()
     state, (model, mode) = lit.data.vellus, model_mode
     state.model, state.appearance.mode, state.marschner.size = model, mode, 64
@@ -84,7 +86,7 @@ def test_depth_is_the_distance_along_the_view(scene, tmp_path):
 
 
 def moving(surface):
-    """Camera and surface on their way through frames 1 to 3, of which 2 is the scene's."""
+    """Return a camera and a surface that move through frames 1 to 3, with frame 2 as the current one."""
     scene = bpy.context.scene
     surface.rotation_mode = "XYZ"
     for frame, place, turn, seen_from in (
@@ -99,7 +101,9 @@ def moving(surface):
 
 
 def seen_points(curves_object, frame, size):
-    """(N, 3) places on strands in a frame's picture [pixels], and their distance along the view's axis."""
+    """Return (N, 3) positions of points on strands in a frame's picture [pixels], and their distances along the
+    view's axis.
+    """
     scene = bpy.context.scene
     scene.frame_set(frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()

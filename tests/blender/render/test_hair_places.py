@@ -24,7 +24,7 @@ def read(space=None, **details):
 
 
 def instancer(name, collection, location=(0.0, 0.0, 0.0), into=None):
-    """An empty that instances a collection."""
+    """Return an empty that instances a collection."""
     empty = bpy.data.objects.new(name, None)
     empty.instance_type, empty.instance_collection, empty.location = "COLLECTION", collection, location
     (into or bpy.context.scene.collection).objects.link(empty)
@@ -33,7 +33,7 @@ def instancer(name, collection, location=(0.0, 0.0, 0.0), into=None):
 
 @pytest.fixture
 def creature(hair):
-    """The collection of the hairy sphere, which the scene itself does not show."""
+    """Return the collection of the hairy sphere, which the scene itself does not show."""
     collection = bpy.data.collections.new("Creature")
     for part in list(bpy.data.objects):
         collection.objects.link(part)
@@ -98,7 +98,7 @@ def test_instances_of_geometry_nodes_are_drawn(creature):
 
 
 def look_at_nothing_but_a_cube(space):
-    """Local view, which has no name of its own to be set by."""
+    """Enter a stand-in for local view of a cube, as local view has no property to set."""
     bpy.ops.mesh.primitive_cube_add()
     screen, area = next((s, a) for s in bpy.data.screens for a in s.areas if a.spaces.active == space)
     region = next(region for region in area.regions if region.type == "WINDOW")
@@ -139,7 +139,7 @@ def test_renders_leave_out_instances_of_an_instancer_that_they_do_not_show(creat
 
 @pytest.mark.parametrize("is_instanced", [False, True])
 def test_renders_leave_out_hair_whose_camera_is_off_and_viewports_show_it(hair, is_instanced):
-    """A picture is a render: it shows what the camera in the list of systems says."""
+    """A render leaves out hair whose camera icon is off in the list of systems, and viewports show it."""
     if is_instanced:
         collection = bpy.data.collections.new("Creature")
         collection.objects.link(hair)
@@ -193,7 +193,9 @@ def camera_in_front(distance):
 
 
 def test_an_instance_is_the_same_picture_as_the_hair_itself(hair):
-    """The pictures are equal except for rounding in the choice of the nearest strand."""
+    """An instance gives the same picture as the hair itself, except for rounding in the choice of the nearest
+    strand.
+    """
     camera_in_front(8.0)
     picture = {"itself": api.draw(width=96, height=96, is_transparent=True)}
     collection = bpy.data.collections.new("Creature")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light that hair reflects to a surface beside it."""
+"""Hair reflects light to a surface beside it."""
 
 import bpy
 import numpy as np
@@ -15,7 +15,7 @@ ELEVATION = np.radians(40.0)  # of a sun on the side of +X
 
 
 def add_wall(scene, plane, rng, look):
-    """Strands along Y, twenty deep; returns the part of light that they send back, as hair without end."""
+    """Add a wall of strands along Y, twenty deep; returns the part of light that infinite hair reflects."""
     x, z = rng.uniform(-THICKNESS, 0.0, STRAND_COUNT), rng.uniform(0.0, HEIGHT, STRAND_COUNT)
     points = np.stack(np.broadcast_arrays(x[:, None], LENGTH * np.linspace(-0.5, 0.5, 3), z[:, None]), axis=-1)
     curves = bpy.data.hair_curves.new("Hair")
@@ -33,7 +33,9 @@ def add_wall(scene, plane, rng, look):
 
 
 def light_off_matt_wall(x, reflectance):
-    """Radiance of a white plane at distances (N,) [m] from a matt wall that the sun lights, by summing its area."""
+    """Return the radiance of a white plane at distances (N,) [m] from a matte wall that the sun lights, by a sum
+    over its area.
+    """
     y, z = np.meshgrid(np.linspace(-0.5 * LENGTH, 0.5 * LENGTH, 401), HEIGHT * (np.arange(60) + 0.5) / 60.0)
     squared = x[:, None, None] ** 2 + y**2 + z**2
     area = LENGTH / 401.0 * HEIGHT / 60.0
@@ -42,7 +44,9 @@ def light_off_matt_wall(x, reflectance):
 
 
 def test_a_plane_takes_light_off_a_wall_of_hair(scene, rng):
-    """It equals light off a matt wall of the same albedo; behind the hair there is none."""
+    """A plane receives as much light from a wall of hair as from a matte wall of the same albedo, and none behind
+    the hair.
+    """
     reflectance = add_wall(scene, plane_and_sun(scene, ELEVATION), rng, "BLOND")
     light = light_along_x(pass_count=8)
     x = (np.arange(len(light)) + 0.5) / len(light) * 6.0 * PERIOD - 3.0 * PERIOD

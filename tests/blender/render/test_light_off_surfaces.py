@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light that a surface reflects to hair above it, compared with an integral, and light that it blocks."""
+"""A surface reflects light to hair above it as an integral gives, and blocks light."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ BLACK = replace(presets.PRESETS["BLACK"][1], random_color=0.0, roughness=0.3)
 
 
 def strands_over_a_plane(scene, tangent, color, height=0.06):
-    """A few black strands of 8 cm far from each other, their middles this high above a plane; returns their Curves."""
+    """Add a few black strands of 8 cm, far apart, their middles at a height above a plane; returns their Curves."""
     bpy.ops.mesh.primitive_grid_add(size=4.0)
     plane = bpy.context.object
     plane.is_holdout = True
@@ -50,7 +50,7 @@ def look(scene, towards):
 
 
 def set_light(scene, source):
-    """A sun straight above, or a white world."""
+    """Light the scene by a sun straight above or by a white world."""
     if source == "sun":
         light = bpy.data.lights.new("Sun", "SUN")
         light.energy, light.angle = SUN, 0.0
@@ -62,7 +62,7 @@ def set_light(scene, source):
 
 
 def received(source):
-    """Radiance of a white plane in that light."""
+    """Return the radiance of a white plane in that light."""
     return SUN / np.pi if source == "sun" else 1.0
 
 
@@ -73,7 +73,7 @@ def mean_color():
 
 
 def light_from_below(tangent, towards):
-    """(3,) radiance of a fiber in even light of radiance one that comes from below: the integral of its BSDF."""
+    """Return (3,) radiance of a fiber in even light of radiance one from below, by the integral of its BSDF."""
     tables = lookup_tables.bake(appearance.table_settings(BLACK))
     z, turn = (np.arange(60) + 0.5) / 60, 2.0 * np.pi * (np.arange(120) + 0.5) / 120
     z, turn = (grid.ravel() for grid in np.meshgrid(-z, turn))
@@ -98,7 +98,9 @@ def test_a_plane_lights_a_strand_as_much_as_its_directions_say(scene, tilt, sour
 
 
 def test_a_sun_from_the_side_is_reflected_to_strands_close_to_a_plane(scene):
-    """A plane seen obliquely from the sun, which is partly in front of the strands above it, reflects light to them."""
+    """A plane that the sun lights obliquely reflects light to strands close to it, where strands partly block the
+    sun.
+    """
     tangent, towards, height = (1.0, 0.0, 0.0), (0.0, -0.6, 0.8), 1.0
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.angle = SUN, 0.0
@@ -114,7 +116,7 @@ def test_a_sun_from_the_side_is_reflected_to_strands_close_to_a_plane(scene):
 
 
 def test_a_wide_plane_lights_strands_at_any_height(scene):
-    """Uniform light has no distance: strands at any height see as much of a wide plane as those on it."""
+    """A wide plane gives strands at any height the same light, as uniform light has no distance."""
     tangent, towards = (np.cos(0.5), 0.0, np.sin(0.5)), (0.0, -0.6, 0.8)
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.angle = SUN, 0.0
@@ -130,7 +132,9 @@ def test_a_wide_plane_lights_strands_at_any_height(scene):
 
 @pytest.mark.parametrize("source", ["sun", "world"])
 def test_light_off_a_surface_has_the_color_that_is_there(scene, source):
-    """Strands that grow on a black surface elsewhere, above a plane whose faces have two materials of another color."""
+    """Light reflected by a surface has the color of the place below strands, not that of the surface where they
+    grow.
+    """
     tangent, towards = (1.0, 0.0, 0.0), (0.0, -0.6, 0.8)
     set_light(scene, source)
     look(scene, towards)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Path-traced light among strands: pictures with known colors."""
+"""Path-traced light among strands gives pictures with known colors."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ BROWN = replace(presets.PRESETS["BROWN"][1], random_color=0.0, roughness=0.3)
 
 
 def hair_of(scene, middles, look, length=0.5, radius=0.004, model="MARSCHNER", mode="energy"):
-    """Upright strands around middles (S, 3)."""
+    """Add upright strands around middles (S, 3)."""
     points = middles[:, None] + np.linspace(-0.5, 0.5, 9)[:, None] * np.array([0.0, 0.0, length])
     curves = bpy.data.hair_curves.new("Hair")
     curves.add_curves([9] * len(points))
@@ -65,7 +65,7 @@ def mean_color(drawn):
 
 
 def test_scenes_without_a_setting_take_the_light_grid(scene, rng):
-    """Scenes in files get the same default, and stored values keep their meaning."""
+    """Scenes without the setting use the light grid, and stored values keep their meaning."""
     hair_of(scene, rng.uniform(-0.5, 0.5, (50, 3)), BROWN)
     light(scene, world=0.3, sun=2.0)
     dual, wanted = (picture(scene, scattering) for scattering in ("DUAL", "GRID"))
@@ -87,7 +87,7 @@ def test_white_hair_in_a_white_world_is_white(scene, rng):
 
 
 def test_strands_far_from_each_other_are_as_with_dual_scattering(scene):
-    """They light each other little: what a lamp sends to each is drawn alike."""
+    """Strands far from each other are as bright as with dual scattering."""
     x = np.linspace(-0.6, 0.6, 5)
     hair_of(scene, np.stack([x, 0.0 * x, 0.0 * x], axis=-1), BROWN)
     light(scene, sun=3.0)
@@ -110,7 +110,9 @@ def test_hair_without_any_area_takes_dual_scattering(scene, rng):
 
 
 def test_hair_that_is_too_large_for_its_width_takes_dual_scattering(scene, monkeypatch):
-    """No path is followed where the rounding of places is a thousand times the width of hair."""
+    """Hair that is too large for its width uses dual scattering, as places are rounded by a thousand times its
+    width.
+    """
     monkeypatch.setattr(gather, "gather", None)
     middles = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 1e8, 0.0]])
     hair_of(scene, middles, BROWN)
@@ -119,7 +121,7 @@ def test_hair_that_is_too_large_for_its_width_takes_dual_scattering(scene, monke
 
 
 def test_a_thick_ring_covers_its_area(scene):
-    """The covered area is right also where the ring turns from rows to columns; its ends are half disks."""
+    """A thick ring covers its area with half disks at its ends, also where it turns from rows to columns."""
     turn = np.linspace(0.3, 2.0 * np.pi - 0.3, 65)
     points = np.stack([0.5 * np.cos(turn), 0.0 * turn, 0.5 * np.sin(turn)], axis=-1)
     curves = bpy.data.hair_curves.new("Ring")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light on a surface below hair and from large lights: transmitted light is spread, and large lights fade gradually."""
+"""Hair spreads the light that it transmits to a surface below, and large lights fade gradually at the horizon."""
 
 import bpy
 import numpy as np
@@ -17,7 +17,7 @@ SIZE = 96, 24  # pixels: six periods
 
 
 def plane_and_sun(scene, elevation=0.5 * np.pi, angle=0.0):
-    """A white matt plane below a camera, in a sun at an elevation above it [rad]; returns the plane."""
+    """Return a white matte plane below a camera, in a sun at an elevation [rad]."""
     bpy.ops.mesh.primitive_grid_add(size=4.0)
     plane = bpy.context.object
     material = bpy.data.materials.new("Plane")
@@ -39,7 +39,9 @@ def plane_and_sun(scene, elevation=0.5 * np.pi, angle=0.0):
 
 
 def add_sheet(scene, plane, rng, strand_count=STRAND_COUNT):
-    """Blond strands along Y: of each period along X half are three deep, half twelve; returns their object."""
+    """Add blond strands along Y, in each period along X half of them three deep and half twelve; returns their
+    object.
+    """
     x = rng.uniform(-6.0, 6.0, strand_count) * PERIOD
     x = x[(x % PERIOD < 0.5 * PERIOD) | (rng.random(len(x)) < 0.25)]
     points = np.stack(np.broadcast_arrays(x[:, None], np.linspace(-0.4, 0.4, 3), 0.0), axis=-1)
@@ -59,7 +61,7 @@ def add_sheet(scene, plane, rng, strand_count=STRAND_COUNT):
 
 
 def light_along_x(pass_count=4):
-    """(W, 3) light of the plane, hair left out of the picture: the mean of some passes and of all rows."""
+    """Return (W, 3) light of the plane without hair in the picture: the mean of some passes and of all rows."""
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
@@ -74,7 +76,7 @@ def light_along_x(pass_count=4):
 
 
 def test_light_that_strands_pass_on_is_spread_by_their_height(scene, rng):
-    """The shadow of a sheet two periods above has no stripes, and transmits as much as from close by."""
+    """The shadow of a sheet two periods above has no stripes, and transmits as much light as from close by."""
     sheet = add_sheet(scene, plane_and_sun(scene), rng)
     found = []
     for height in (0.05 * PERIOD, 2.0 * PERIOD):
@@ -88,7 +90,7 @@ def test_light_that_strands_pass_on_is_spread_by_their_height(scene, rng):
 
 @pytest.mark.parametrize("elevation", [-0.15, 0.0, 0.2, 0.6])
 def test_a_wide_light_sets_slowly(elevation, scene):
-    """A plane receives the mean cosine of the directions to a disk, as far as they are above it."""
+    """A plane receives the mean cosine of the directions to the part of a wide light that is above it."""
     half_angle = 0.35
     plane_and_sun(scene, elevation, 2.0 * half_angle)
     angle, turn = (grid.ravel() for grid in np.meshgrid((np.arange(200) + 0.5) / 200, np.arange(400) * np.pi / 200))
@@ -100,7 +102,9 @@ def test_a_wide_light_sets_slowly(elevation, scene):
 
 
 def test_a_plane_that_light_grazes_does_not_shade_itself(scene, rng):
-    """A plane stays as bright beside strands too thin to cast shadows, although the sun then has a shadow map."""
+    """A plane in grazing light stays as bright beside strands too thin for shadows, although the sun then has a
+    shadow map.
+    """
     plane = plane_and_sun(scene, 0.25, 0.4)
     alone = light_along_x(1)
     radii = add_sheet(scene, plane, rng, strand_count=1000).data.attributes["radius"].data

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light linking: hair and its surface are each lit by the lights linked to them."""
+"""Hair and its surface are each lit by the lights that are linked to them."""
 
 import math
 
@@ -17,7 +17,7 @@ NAMES = ("Hair", "Sphere")
 
 @pytest.fixture
 def suns(lit):
-    """{object's name: a sun of a color of its own, beside the camera}, and the object is white."""
+    """Return {object's name: a sun with its own color beside the camera}, with a white object."""
     bpy.data.objects["Sun"].hide_render = True
     found = {}
     for name, color in zip(NAMES, ((1.0, 0.2, 0.2), (0.2, 0.2, 1.0)), strict=True):
@@ -41,7 +41,7 @@ def link(light, name, state="INCLUDE", role="receiver"):
 
 
 def alone(suns, name):
-    """The picture in the light of one of the suns."""
+    """Return the picture in the light of one of the suns."""
     for other, sun in suns.items():
         sun.hide_render = other != name
     found = picture()
@@ -52,7 +52,7 @@ def alone(suns, name):
 
 @pytest.mark.parametrize("state", ["INCLUDE", "EXCLUDE"])
 def test_each_is_lit_by_its_own_lights(suns, tmp_path, state):
-    """Each sample shows hair in the light of the one sun or the surface in that of the other."""
+    """Each sample shows hair in the light of one sun or the surface in that of the other."""
     expected = {name: alone(suns, name) for name in NAMES}
     for name, other in zip(NAMES, NAMES[::-1], strict=True):
         link(suns[name], name if state == "INCLUDE" else other, state)
@@ -67,7 +67,7 @@ def test_each_is_lit_by_its_own_lights(suns, tmp_path, state):
 
 
 def test_hair_that_is_no_blocker_casts_no_shadow(suns, fine_shadows):
-    """The surface is lit as if the hair were not there."""
+    """Hair that is no blocker casts no shadow, so the surface is lit as if the hair were absent."""
     shadowed = picture()
     for sun in suns.values():
         link(sun, "Hair", "EXCLUDE", "blocker")
@@ -80,7 +80,7 @@ def test_hair_that_is_no_blocker_casts_no_shadow(suns, fine_shadows):
 
 
 def test_ambient_light_of_lights_without_room_is_linked_too(suns, monkeypatch):
-    """With room for one light, the other light is ambient light of its linked hair alone."""
+    """With one drawn light, the other light is ambient light of its linked hair alone."""
     monkeypatch.setattr(uniforms, "LIGHT_CAPACITY", 1)
     suns["Sphere"].data.energy = 0.5
     link(suns["Sphere"], "Hair")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""More lights than are drawn individually: no light is lost."""
+"""More lights than are drawn individually lose no light."""
 
 import math
 
@@ -16,7 +16,7 @@ COUNT = 24
 
 @pytest.fixture
 def lamps(lit):
-    """Lamps all around the hair, of five brightnesses; the sun is off."""
+    """Return lamps of five brightnesses all around the hair; the sun is off."""
     bpy.data.objects["Sun"].hide_render = True
     found = []
     for index in range(COUNT):
@@ -31,7 +31,7 @@ def lamps(lit):
 
 
 def light():
-    """(height, width, 3)."""
+    """Return (height, width, 3) light."""
     bpy.context.view_layer.update()
     return offscreen.draw_picture(PictureSettings(48, 36, 2, is_transparent=True))[..., :3].astype(float)
 
@@ -52,7 +52,7 @@ def test_many_lights_are_the_sum_of_all(lamps):
 
 
 def test_those_are_drawn_that_reach_the_hair(lamps):
-    """A lamp far brighter than all others that does not light the hair takes nobody's place."""
+    """Only lamps that reach the hair are drawn: a far brighter lamp that does not light the hair takes no place."""
     before = light_of(lamps, lamps[:16])
     for turned in lamps[16:]:
         turned.data.type = "SPOT"

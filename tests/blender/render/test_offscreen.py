@@ -31,13 +31,13 @@ from tests.support.reading import points
 
 
 def picture(**settings):
-    """(H, W, 4) linear pixels, first row at the bottom."""
+    """Return (H, W, 4) linear pixels, first row at the bottom."""
     settings = {"width": 96, "height": 96, "samples_per_side": 2, "is_transparent": True} | settings
     return offscreen.draw_picture(PictureSettings(**settings))
 
 
 def thicken(hair):
-    """Strands as thick as a sample: of thinner ones only a part of the samples that they cross shows them."""
+    """Make strands as thick as a sample, as only a part of the samples shows thinner strands."""
     hair.data.vellus.hair.radius, hair.data.vellus.hair.tip_taper = 0.04, 1.0
     bpy.context.view_layer.update()
 
@@ -70,7 +70,7 @@ def test_a_surface_hides_the_hair_behind_it(lit, fine_shadows):
 
 
 def test_no_light_arrives_behind_a_surface(lit):
-    """A plane between sun and hair, out of the camera's sight: what is left is the world's light, here none."""
+    """No light of the sun arrives behind a surface that the camera does not see."""
     bright = picture()[..., :3].max()
     bpy.ops.mesh.primitive_plane_add(size=8.0, location=(0.0, -3.6, 2.1), rotation=(math.pi / 3, 0.0, 0.0))
     bpy.context.object.visible_camera = True
@@ -113,7 +113,9 @@ def test_more_samples_than_the_driver_supports_are_refused(lit):
 
 
 def curtain(distance, count=400, width=1.0, radius=0.001):
-    """`count` vertical strands side by side over `width` meters, at a distance along +Y: (S, 3, 3) points, radii."""
+    """Return `count` vertical strands side by side over `width` meters, at a distance along +Y: (S, 3, 3) points,
+    radii.
+    """
     x = (np.arange(count) + 0.5) / count * width - 0.5 * width
     z = np.linspace(-0.5 * width, 0.5 * width, 3)
     strands = np.stack(np.broadcast_arrays(x[:, None], distance, z[None, :]), axis=-1).astype(np.float32)
@@ -122,7 +124,9 @@ def curtain(distance, count=400, width=1.0, radius=0.001):
 
 @pytest.mark.parametrize("sheets", [0, 1, 3])
 def test_light_through_curtains_falls_exponentially(scene, sheets):
-    """Each curtain covers n = count × 2 radius / width on average; behind them exp(-n (1 - a)) of the light is left."""
+    """Light behind curtains falls as exp(-n (1 - a)), where each curtain covers n = count × 2 radius / width on
+    average.
+    """
     coverage = 400 * 0.002 / 1.0
     settings = kajiya_kay.Settings(specular_color=(0.0, 0.0, 0.0), diffuse_color=(0.8, 0.4, 0.1))
     shading = hair_shading.kajiya_kay_shading(settings)
@@ -147,7 +151,7 @@ def test_light_through_curtains_falls_exponentially(scene, sheets):
 
 
 def seen_from_behind(drawn):
-    """Mean radiance of a curtain's middle, looked at along the light's way back."""
+    """Return the mean radiance of a curtain's middle, seen against the light's direction."""
 
     world_to_view = np.array([[-1, 0, 0, 0], [0, 0, 1, 0], [0, 1, 0, -2.0], [0, 0, 0, 1.0]])
     view_to_clip = np.array([[4.0, 0, 0, 0], [0, 4.0, 0, 0], [0, 0, -0.2, 0], [0, 0, 0, 1.0]])
@@ -161,7 +165,7 @@ def seen_from_behind(drawn):
 
 
 def test_each_look_is_drawn_from_tables_of_its_own_baked_where_the_user_wants(lit, monkeypatch):
-    """Uniform hair uses tables of one absorption, varied hair slices of tables; both are baked on the chosen device."""
+    """Each look is drawn from its own tables, baked on the chosen device; varied hair uses slices of tables."""
     baked = []
     for module in (lookup_tables, strand_tables):
         real = module.bake
@@ -181,7 +185,7 @@ def test_each_look_is_drawn_from_tables_of_its_own_baked_where_the_user_wants(li
 
 @pytest.mark.parametrize(("model", "mode"), pairs(["KAJIYA_KAY", "MARSCHNER"], ["energy", "classic"], 2))
 def test_dyed_tips_are_drawn_in_their_colour(lit, model, mode):
-    """Under light from everywhere and from the sun: a red dye at the tips, and nothing else, reddens the tips."""
+    """A red dye at the tips reddens the tips and nothing else, under light from everywhere and from the sun."""
     thicken(lit)
     state = lit.data.vellus
     state.model, state.appearance.mode = model, mode
@@ -202,7 +206,7 @@ def test_dyed_tips_are_drawn_in_their_colour(lit, model, mode):
 
 @pytest.mark.parametrize("model", ["KAJIYA_KAY", "MARSCHNER"])
 def test_a_strand_has_the_colour_of_its_random_number(lit, model):
-    """Strands with random numbers for little pigment, on the left, are brighter than those for much pigment, on the
+    """Strands with random numbers of little pigment, on the left, are brighter than those of much pigment, on the
     right.
     """
     state = lit.data.vellus

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face of the sample head: eyes behind their lids that look at a point, brows and lashes on the skin."""
+"""On the sample head, eyes behind their lids look at a point, and brows and lashes are on the skin."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ TARGET = np.array([0.3, -1.0, 0.74])
 
 @pytest.fixture(scope="module")
 def samples():
-    """(the head, dressed; its places before)."""
+    """Return (the dressed head, its earlier vertex positions)."""
     built = head.build()
     before = places(built)
     portrait.dress(built, TARGET)
@@ -22,14 +22,14 @@ def samples():
 
 
 def places(mesh_object):
-    """(V, 3) of a mesh object's own vertices."""
+    """Return (V, 3), a mesh object's own vertices."""
     positions = np.empty((len(mesh_object.data.vertices), 3), np.float32)
     mesh_object.data.vertices.foreach_get("co", positions.ravel())
     return positions
 
 
 def halves(positions):
-    """Those on the left and those on the right."""
+    """Return the left and the right objects."""
     return positions[positions[:, 0] > 0.0], positions[positions[:, 0] < 0.0]
 
 
@@ -62,7 +62,7 @@ def test_lids_reach_from_their_edge_to_the_eyeball(samples):
 
 
 def gaze_of(ball):
-    """The direction from an eyeball's back pole to its pupil."""
+    """Return the direction from an eyeball's back pole to its pupil."""
     gaze = ball[:64].mean(axis=0) - ball[-64:].mean(axis=0)
     return gaze / np.linalg.norm(gaze)
 

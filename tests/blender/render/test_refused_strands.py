@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that do not fit the graphics driver's memory: one message, also in the panel, and no retry."""
+"""Strands that do not fit the graphics driver's memory cause one message, also in the panel, and no retry."""
 
 import bpy
 import gpu
@@ -49,6 +49,6 @@ def test_a_driver_that_refuses_a_texture_is_one_sentence(hair, raised, monkeypat
 
 
 def test_textures_beyond_what_any_driver_takes_are_refused(hair):
-    """Blender itself refuses these textures, with errors of several classes."""
+    """Textures beyond any driver's limits are refused with our message, as Blender raises errors of several classes."""
     with pytest.raises(HairError, match="cannot allocate 4000000 MB"):
         driver_textures.new_texture((1_000_000, 1_000_000), "R32F")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces in renders and their shadows, by visibility, materials, instances and view layers."""
+"""Surfaces are in renders and in shadows by their visibility, materials, instances and view layers."""
 
 import math
 
@@ -17,19 +17,19 @@ MIDDLE = slice(SIZE // 2 - 2, SIZE // 2 + 2)
 
 
 def picture(is_transparent=True):
-    """(H, W, 4) linear pixels of the scene by Vellus, first row at the bottom."""
+    """Return (H, W, 4) linear pixels of the scene by Vellus, first row at the bottom."""
     bpy.context.view_layer.update()
     settings = PictureSettings(width=SIZE, height=SIZE, samples_per_side=4, is_transparent=is_transparent)
     return offscreen.draw_picture(settings)
 
 
 def seen_color(drawn):
-    """Mean (3,) of a picture's middle."""
+    """Return the mean color (3,) of a picture's middle."""
     return drawn[MIDDLE, MIDDLE, :3].mean(axis=(0, 1))
 
 
 def material(shader, **inputs):
-    """A new material of one shader, with some values."""
+    """Return a new material of one shader, with some values."""
     made = bpy.data.materials.new(shader)
     tree = made.node_tree
     tree.nodes.clear()
@@ -45,7 +45,7 @@ def matt(*color):
 
 
 def plane(made, size=1.0, depth=0.0, name="Plane"):
-    """A plane that faces the camera, as far before the middle of the scene as `depth` [m] says."""
+    """Return a plane that faces the camera, `depth` [m] before the middle of the scene."""
     bpy.ops.mesh.primitive_plane_add(size=size, rotation=(math.pi / 2, 0.0, 0.0), location=(0.0, -depth, 0.0))
     placed = bpy.context.object
     placed.name = name
@@ -54,7 +54,7 @@ def plane(made, size=1.0, depth=0.0, name="Plane"):
 
 
 def sun(tilt, strength=math.pi):
-    """A sun that shines along Y, `tilt` [rad] from above."""
+    """Return a sun that shines along Y, `tilt` [rad] from above."""
     lamp = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     lamp.data.angle, lamp.data.energy, lamp.rotation_euler = 0.0, strength, (math.pi / 2 - tilt, 0.0, 0.0)
     bpy.context.scene.collection.objects.link(lamp)
@@ -68,7 +68,7 @@ def hair_on(surface, **settings):
 
 @pytest.fixture
 def stage(scene):
-    """A blue wall in the sun, and an orthographic camera that looks along Y at two meters."""
+    """Return a blue wall in the sun, and an orthographic camera that looks along Y at two meters."""
     add_orthographic_camera(scene)
     sun(0.0)
     plane(matt(0.1, 0.2, 0.8), size=4.0, name="Wall")
@@ -94,7 +94,7 @@ def test_what_reflects_nothing_and_is_seen_through_is_not_there(made, stage):
 
 
 def test_a_viewport_without_materials_shows_what_is_transparent_as_solid(stage):
-    """Solid shading draws it, so it hides hair there; in renders it does not."""
+    """Solid shading draws transparent surfaces as solid, so they hide hair there and not in renders."""
     hair_on(bpy.data.objects["Wall"])
     plane(material("ShaderNodeBsdfTransparent"), depth=0.5)
     bpy.context.view_layer.update()
@@ -117,7 +117,7 @@ def test_a_diffuse_shader_has_its_color(stage):
 
 
 def test_the_clear_part_of_a_mesh_shows_what_is_behind_it(stage):
-    """An eye in one mesh: the cornea does not hide the iris."""
+    """The clear part of a mesh shows what is behind it: the cornea of an eye does not hide the iris."""
     bpy.data.objects["Sun"].rotation_euler.x -= math.radians(60.0)
     eye = plane(matt(0.8, 0.2, 0.2), depth=0.5)
     plane(material("ShaderNodeBsdfPrincipled", Transmission_Weight=1.0, Roughness=0.1), size=0.6, depth=0.7)
@@ -146,7 +146,7 @@ def test_an_image_ends_where_it_is_clipped(is_clipped, stage):
 
 @pytest.mark.parametrize(("alpha_mode", "seen"), [("STRAIGHT", 0.4), ("CHANNEL_PACKED", 1.0)])
 def test_straight_alpha_lays_an_image_over_black_unless_it_is_read(alpha_mode, seen, stage):
-    """The result is that of Cycles and EEVEE."""
+    """A material with straight alpha has the color of Cycles and EEVEE: its image over black, unless alpha is read."""
     made = matt(0.0, 0.0, 0.0)
     tree = made.node_tree
     image = tree.nodes.new("ShaderNodeTexImage")
@@ -162,7 +162,7 @@ def test_straight_alpha_lays_an_image_over_black_unless_it_is_read(alpha_mode, s
 
 
 def test_what_the_camera_does_not_see_still_casts_its_shadow(stage):
-    """A blocker between wall and camera, whose shadow falls beside it as the sun is tilted."""
+    """A surface that the camera does not see, between wall and camera, still casts its shadow."""
     bpy.data.objects["Sun"].rotation_euler.x -= math.radians(30.0)
     blocker = plane(matt(0.8, 0.1, 0.1), size=0.6, depth=0.5)
     hair_on(bpy.data.objects["Wall"], length=0.05, radius=2e-4)  # there are shadows where hair is
@@ -203,7 +203,7 @@ def test_hair_behind_what_the_camera_does_not_see_is_lit(scattering, stage):
 
 
 def scattered(source):
-    """An object whose nodes place an instance of another one where that is."""
+    """Return an object whose nodes place an instance of another object at that object's position."""
     group = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     info, output = group.nodes.new("GeometryNodeObjectInfo"), group.nodes.new("NodeGroupOutput")
@@ -236,7 +236,7 @@ def test_instances_of_lights_that_are_disabled_in_renders_shine(stage):
 
 
 def collection_instance(member):
-    """An empty that instances a collection of one object, which is nowhere else."""
+    """Return an empty that instances a collection of one object, which is in no other collection."""
     collection = bpy.data.collections.new("Instanced")
     collection.objects.link(member)
     bpy.context.scene.collection.objects.unlink(member)
@@ -276,7 +276,7 @@ def test_a_view_layer_overrides_material_and_world(stage):
 
 @pytest.mark.parametrize("kind", ["ORTHO", "PERSP"])
 def test_a_mirrored_camera_has_a_mirrored_picture(kind, stage):
-    """A box and hair in light from the side are lit and shaded alike in both pictures."""
+    """A mirrored camera gives a mirrored picture of a box and hair in light from the side."""
     stage.camera.data.type = kind
     bpy.data.objects["Sun"].rotation_euler = (math.radians(60.0), 0.0, math.radians(40.0))
     bpy.ops.mesh.primitive_cube_add(size=0.5, location=(-0.5, -0.5, 0.2), rotation=(0.3, 0.2, 0.5))
@@ -291,7 +291,7 @@ def test_a_mirrored_camera_has_a_mirrored_picture(kind, stage):
 
 
 def test_the_shadow_of_a_wide_sun_has_no_line_where_maps_end(stage):
-    """A floor that goes on far behind a ball with hair, lit aslant: its light away from the ball is even."""
+    """The shadow of a wide sun has no line where maps end: a floor far behind a hairy ball is evenly lit."""
     bpy.data.objects.remove(bpy.data.objects["Wall"])
     bpy.ops.mesh.primitive_plane_add(size=12.0)
     bpy.context.object.data.materials.append(matt(0.5, 0.5, 0.5))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shutter curve: how much of a frame's light comes from each part of the exposure."""
+"""The shutter curve weighs the light of each part of the exposure."""
 
 import bpy
 import numpy as np
@@ -10,7 +10,7 @@ from tests.support.pictures.rendering import rendered
 
 
 def moving_square(scene):
-    """A white square that crosses the picture during frames 1 and 2, from left to right."""
+    """Return a white square that crosses the picture during frames 1 and 2, from left to right."""
     bpy.ops.mesh.primitive_plane_add(size=0.3)
     square = bpy.context.object
     for frame, x in ((1, -1.0), (2, 1.0)):
@@ -27,7 +27,7 @@ def moving_square(scene):
 
 
 def columns(picture):
-    """How the light of a picture is spread over 24 groups of its columns."""
+    """Return the distribution of a picture's light over 24 groups of its columns."""
     light = picture[..., 0].sum(axis=0).reshape(24, -1).sum(axis=1)
     return light / light.sum()
 

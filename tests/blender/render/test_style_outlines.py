@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Presets on the sample head, as pictures: coily hair is narrower than curly, frizz wider than straight, wet darker."""
+"""On the sample head, coily hair is narrower than curly, frizzy hair wider than straight, and wet hair darker."""
 
 import bpy
 import pytest
@@ -16,9 +16,9 @@ WIDTH, HEIGHT = 96, 112
 
 @pytest.fixture(scope="module")
 def pictures():
-    """{preset: (HEIGHT, WIDTH, 4) linear pixels} of the hair alone, with the light and camera of the gallery.
+    """Return {preset: (HEIGHT, WIDTH, 4) linear pixels} of the hair alone, with the gallery's light and camera.
 
-    With dual scattering: the light grid would take more than half of the time, and changes no outline.
+    Dual scattering is used, as the light grid would take more than half of the time and changes no outline.
     """
     hair = styles.build(strand_count=2000)
     bpy.context.scene.vellus.multiple_scattering = "DUAL"
@@ -36,13 +36,13 @@ def drawn(hair, preset):
 
 
 def width(picture):
-    """Pixels from the first to the last column that shows hair, without single strands that stray."""
+    """Return the number of pixels from the first to the last column with hair, without single stray strands."""
     shown = (picture[..., 3] > 0.1).sum(axis=0) > 2
     return shown.nonzero()[0][-1] - shown.nonzero()[0][0]
 
 
 def luminance(picture):
-    """Mean over what hair covers."""
+    """Return the mean luminance of pixels with hair."""
     return picture[..., :3].sum() / picture[..., 3].sum()
 
 

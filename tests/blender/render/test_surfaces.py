@@ -20,7 +20,7 @@ SIZE = 48
 
 
 def picture():
-    """(H, W, 4) linear pixels of the scene by Vellus, first row at the bottom."""
+    """Return (H, W, 4) linear pixels of the scene by Vellus, first row at the bottom."""
     return offscreen.draw_picture(PictureSettings(width=SIZE, height=SIZE, samples_per_side=4, is_transparent=True))
 
 
@@ -43,7 +43,7 @@ def by_cycles(tmp_path):
 
 
 def material_of(surface, **inputs):
-    """A new material of a mesh object: values of its Principled BSDF, whose node is returned."""
+    """Return the Principled BSDF node, with values, of a new material of a mesh object."""
     material = bpy.data.materials.new("Surface")
     surface.data.materials.append(material)
     principled = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
@@ -54,13 +54,13 @@ def material_of(surface, **inputs):
 
 @pytest.fixture
 def stage(scene):
-    """A scene with an orthographic camera that looks along Y at two meters, without lights; nothing in it."""
+    """Return an empty, unlit scene with an orthographic camera that looks along Y at two meters."""
     add_orthographic_camera(scene)
     return scene
 
 
 def test_a_surface_without_a_material_is_as_with_a_new_one(stage):
-    """As in EEVEE and Cycles."""
+    """A surface without a material looks like one with a new material, as in EEVEE and Cycles."""
     sun(math.radians(70.0), 0.0, 0.0)
     placed = ball()
     with_one = picture()
@@ -69,7 +69,7 @@ def test_a_surface_without_a_material_is_as_with_a_new_one(stage):
 
 
 def test_triangles_know_their_materials(stage):
-    """Paths of light get color, roughness, metallic and reflectance of each triangle."""
+    """Paths of light read color, roughness, metallic and reflectance of each triangle."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=2, y_subdivisions=1)
     placed = bpy.context.object
     material_of(placed, Base_Color=(0.2, 0.4, 0.6, 1.0), Roughness=0.3, IOR=1.5)
@@ -94,7 +94,7 @@ def ball(**inputs):
 
 
 def image_of(pixels, name="Image", is_data=False):
-    """An image of (H, W, 3) values as they are stored."""
+    """Return an image of (H, W, 3) stored values."""
     height, width, _rgb = pixels.shape
     image = bpy.data.images.new(name, width, height, is_data=is_data)
     image.pixels.foreach_set(np.dstack([pixels, np.ones((height, width))]).astype(np.float32).ravel())
@@ -132,13 +132,13 @@ def test_a_sphere_in_a_grey_world_is_as_bright_as_in_cycles(stage, tmp_path):
 
 
 def plane(size=2.0):
-    """A plane that faces the camera, with a UV map, active."""
+    """Return a plane that faces the camera, with a UV map; it is active."""
     bpy.ops.mesh.primitive_plane_add(size=size, rotation=(math.pi / 2, 0.0, 0.0))
     return bpy.context.object
 
 
 def compare(tmp_path, rtol=0.03):
-    """Hold a picture against that of Cycles, in the mean of the whole and of 4 × 4 parts."""
+    """Compare a picture with that of Cycles by the means of the whole and of 4 × 4 parts."""
     ours, theirs = (
         p.reshape(4, SIZE // 4, 4, SIZE // 4, 4).mean(axis=(1, 3)) for p in (picture(), by_cycles(tmp_path))
     )
@@ -239,7 +239,7 @@ def test_what_is_behind_a_clear_surface_is_seen_through_its_highlight(stage):
 
 
 def test_surfaces_that_hair_hides_in_part_are_shaded_where_they_are_seen(stage, monkeypatch):
-    """A surface with hair before it, and a clear one: beside hair as they are alone, and behind hair not at all."""
+    """Surfaces partly hidden by hair are shaded as without hair beside it, and not at all behind it."""
     material_of(plane(), Base_Color=(0.5, 0.4, 0.3, 1.0))
     clear = plane(0.5)
     clear.location.y = -0.5
@@ -263,7 +263,9 @@ def test_surfaces_that_hair_hides_in_part_are_shaded_where_they_are_seen(stage, 
 
 
 def test_a_surface_far_behind_hair_is_not_in_its_own_shadow(stage):
-    """A few strands before a wall, many times their size away: their map of the sun holds a part of the wall."""
+    """A surface far behind hair does not shade itself, although the hair's shadow map of the sun contains a part of
+    it.
+    """
     material_of(plane(4.0), Base_Color=(0.5, 0.5, 0.5, 1.0), Specular_IOR_Level=0.0)
     sun(math.radians(90.0), 0.0, 0.0, strength=math.pi)
     bare = picture()[..., :3]
@@ -275,7 +277,7 @@ def test_a_surface_far_behind_hair_is_not_in_its_own_shadow(stage):
 
 
 def test_a_surface_that_goes_on_behind_the_viewer_is_seen_where_it_is(stage):
-    """A floor of two triangles to both sides of a perspective camera: each sample has the color of its place."""
+    """Each sample of a floor that continues behind a perspective camera has the color of its place."""
     camera = stage.camera
     camera.data.type, camera.data.angle = "PERSP", math.radians(60.0)
     camera.location, camera.rotation_euler = (0.0, 0.0, 1.0), (math.radians(60.0), 0.0, 0.0)
@@ -297,14 +299,14 @@ def test_a_surface_that_goes_on_behind_the_viewer_is_seen_where_it_is(stage):
 
 
 def samples_of(drawn, view, is_coarse, width=4 * SIZE):
-    """(W, W, 4) samples of a `DrawnScene`, with its surfaces shaded in blocks or not."""
+    """Return (W, W, 4) samples of a `DrawnScene`, with its surfaces shaded in blocks or not."""
     buffer = visibility_buffer.VisibilityBuffer(width, width, is_coarse=is_coarse)
     scene_drawing.draw(drawn, view, buffer, is_transparent=True)
     return np.array(buffer.color.read(), np.float32).reshape(width, width, 4)
 
 
 def test_samples_share_light_of_their_own_surface_alone(stage):
-    """A box before a plane, in even light: its sides, the plane and nothing at all have no light of each other."""
+    """Samples share light only within one surface: a box, a plane and the background have no light of each other."""
     material_of(plane(1.6), Base_Color=(0.1, 0.2, 0.9, 1.0), Specular_IOR_Level=0.0)
     bpy.ops.mesh.primitive_cube_add(size=0.6, location=(0.0, -1.0, 0.0), rotation=(0.5, 0.2, 0.7))
     material_of(bpy.context.object, Base_Color=(0.9, 0.4, 0.1, 1.0), Specular_IOR_Level=0.0)
@@ -319,7 +321,7 @@ def test_samples_share_light_of_their_own_surface_alone(stage):
 
 
 def test_slots_of_like_materials_change_nothing(stage):
-    """The law holds on a curved surface, where samples that share light differ by little."""
+    """Slots of like materials change nothing, also on a curved surface whose samples share light."""
     bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8, radius=0.8)
     ball = bpy.context.object
     ball.data.shade_smooth()
@@ -340,7 +342,7 @@ def test_slots_of_like_materials_change_nothing(stage):
 
 
 def test_light_that_samples_share_is_as_bright_below_hair(stage):
-    """Places sampled at random in search of hair: those that find none do not stand for the others."""
+    """Shared light of samples below hair is as bright as light of each sample."""
     material_of(plane(), Base_Color=(0.6, 0.5, 0.4, 1.0))
     bpy.ops.mesh.primitive_plane_add(size=0.5, rotation=(math.pi / 2, 0.0, 0.0), location=(0.0, -0.3, 0.0))
     bpy.ops.vellus.add_hair(guide_count=20, strand_count=60, length=0.2, radius=0.004)
@@ -362,7 +364,9 @@ def test_light_that_samples_share_is_as_bright_below_hair(stage):
 
 @pytest.mark.parametrize(("kind", "has_hair"), pairs(["SUN", "POINT", "SPOT", "AREA"], [False, True], 2))
 def test_surfaces_cast_shadows_as_in_cycles(kind, has_hair, stage, tmp_path):
-    """A box on a floor, as far from hair as can be seen, in the light of one lamp: each block of 4 × 4 pixels."""
+    """A box casts a shadow on a floor as in Cycles, in each block of 4 × 4 pixels, far from hair in the light of one
+    lamp.
+    """
     stage.camera.data.ortho_scale = 6.0
     stage.camera.location, stage.camera.rotation_euler = (0.0, -6.0, 6.0), (math.radians(45.0), 0.0, 0.0)
     bpy.ops.mesh.primitive_plane_add(size=20.0)

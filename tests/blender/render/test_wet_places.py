@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Partly wet hair: each strand is drawn by its own wetness."""
+"""Each strand of partly wet hair is drawn by its own wetness."""
 
 import bpy
 import numpy as np
@@ -29,7 +29,7 @@ MODELS = [
 
 
 def picture():
-    """(SIZE, SIZE, 4) linear."""
+    """Return the picture (SIZE, SIZE, 4), linear."""
     settings = PictureSettings(width=SIZE, height=SIZE, samples_per_side=2, is_transparent=True)
     return offscreen.draw_picture(settings).astype(np.float64)
 
@@ -41,7 +41,7 @@ def wetten(hair, **changes):
 
 
 def soak(hair, wetness):
-    """A wetness (S,) of strands that stay where they are; None for the same of all. Returns the picture."""
+    """Set a wetness (S,) of still strands, or one of all by None; returns the picture."""
     if wetness is None:
         hair.data.attributes.remove(hair.data.attributes["wetness"])
     else:
@@ -53,7 +53,7 @@ def soak(hair, wetness):
 
 
 def group(name, weights):
-    """A vertex group of the sphere, of weights by vertex."""
+    """Return a vertex group of the sphere with the given weights."""
     made = bpy.data.objects["Sphere"].vertex_groups.new(name=name)
     for index, weight in enumerate(weights):
         made.add([index], float(weight), "REPLACE")
@@ -67,7 +67,7 @@ def small(lit):
 
 
 def test_a_mask_of_one_is_wet_and_of_zero_is_dry(small):
-    """The law holds for partial wetness. Interpolated weights are one up to rounding, which moves strands as little."""
+    """A mask of one is drawn as wet and a mask of zero as dry hair, up to rounding of interpolated weights."""
     count = len(bpy.data.objects["Sphere"].data.vertices)
     group("all", np.ones(count))
     group("none", np.zeros(count))
@@ -85,9 +85,9 @@ def test_a_mask_of_one_is_wet_and_of_zero_is_dry(small):
 @even_guides
 @pytest.mark.parametrize("look", share_of(MODELS, 2))
 def test_half_of_the_hair_is_wet(small, look, monkeypatch):
-    """Away from the border each half is as in the picture of all dry and of all wet hair.
+    """Away from the border, each half looks as in the picture of all dry and of all wet hair.
 
-    With surfaces that are shaded in each sample: by noise, and so by the hair, they share light from sample to sample.
+    Surfaces are shaded in each sample: shared light would pass noise, and so the hair, from sample to sample.
     """
     monkeypatch.setattr(film, "VisibilityBuffer", lambda *size, **_options: visibility_buffer.VisibilityBuffer(*size))
     state = small.data.vellus
@@ -110,7 +110,7 @@ def test_half_of_the_hair_is_wet(small, look, monkeypatch):
 
 
 def test_a_wet_look_leaves_no_strand_dry(small):
-    """Strands are as wet as the look, or as their style, which is more."""
+    """With a wet look, no strand is drier than the look, and strands are as wet as their style if that is more."""
     group("any", np.ones(len(bpy.data.objects["Sphere"].data.vertices)))
     wetten(small, mask="any")
     ones = np.ones(len(small.data.curves), np.float32)
@@ -121,7 +121,7 @@ def test_a_wet_look_leaves_no_strand_dry(small):
 
 
 def test_passes_of_the_light_add_up(small, tmp_path):
-    """Each pass of a render mixes both looks as the picture does."""
+    """Each pass of a render mixes both looks as the picture does, so that passes add up."""
     light_up()
     wetten(small, vary=1.0)
     bpy.data.objects["Sphere"].is_holdout = True

@@ -18,7 +18,7 @@ from tests.support.reading import points
 
 @pytest.fixture
 def keyed_hair(hair):
-    """100 black strands in frame 1, 300 light ones in frame 11."""
+    """Return 100 black strands in frame 1 and 300 light strands in frame 11."""
     state = hair.data.vellus
     for frame, count, melanin in ((1, 100, 0.9), (11, 300, 0.1)):
         state.hair.strand_count, state.appearance.melanin = count, melanin
@@ -78,7 +78,7 @@ def test_unanimated_hair_is_not_regenerated(keyed_hair, monkeypatch):
 
 
 def test_an_animation_renders_as_its_frames_do(keyed_hair, tmp_path):
-    """A render has a dependency graph of its own, and leaves the file's own values alone."""
+    """An animation renders as its frames do, with a dependency graph of its own, and leaves the file's values alone."""
     scene = bpy.context.scene
     scene.render.engine, scene.cycles.samples = "CYCLES", 1
     scene.render.resolution_x = scene.render.resolution_y = 48
@@ -106,7 +106,7 @@ def pixels(path):
 
 
 def drive(hair, path, expression="0.01 * x"):
-    """Drive a setting by a property of the surface, which is 2."""
+    """Drive a setting by a property of the surface whose value is 2."""
     surface = bpy.data.objects["Sphere"]
     surface["x"] = 2.0
     surface.update_tag()
@@ -143,7 +143,7 @@ def test_so_does_that_of_a_style_s_driver(hair, path):
 
 @pytest.fixture
 def rendered():
-    """A function that renders a frame: (N, 3) points of the hair that the render is given, and their radii."""
+    """Return a function that renders a frame: (N, 3) points of the hair that the render reads, and their radii."""
     seen = []
 
     class Look(bpy.types.RenderEngine):
@@ -169,7 +169,9 @@ def rendered():
 
 
 def test_what_a_script_keys_and_drives_is_in_its_first_render(hair, rendered):
-    """No update is needed: Blender changes to the frame before it renders."""
+    """What a script keys and drives is in its first render without an update, as Blender changes the frame before it
+    renders.
+    """
     drive(hair, "vellus.hair.radius")
     for frame, length in ((1, 0.2), (11, 0.4)):
         bpy.data.objects["Guides"].data.vellus.guides.length = length
@@ -190,7 +192,9 @@ def test_a_driver_that_a_file_has_computes_nothing_again_when_it_is_opened(hair,
 
 
 def test_what_a_script_sets_before_a_window_shows_its_file_is_in_the_hair(hair, monkeypatch):
-    """The first update of a file in a window reports all of it."""
+    """What a script sets before a window shows its file is in the hair, as the first update in a window reports
+    everything.
+    """
     monkeypatch.setattr(handlers, "_is_opening", True)
     hair.data.vellus.hair.radius = 0.025
     drive(hair, "vellus.appearance.melanin", "0.1 * x")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dynamics as properties: values are stored exactly, mark the guides, follow keyframes, and regenerate nothing."""
+"""Dynamics are properties: values are stored exactly, mark the guides, follow keyframes, and regenerate nothing."""
 
 import math
 import subprocess
@@ -26,12 +26,12 @@ UNKEYED = ("vertex_count", "preroll", "start_frame", "size")
 
 @pytest.fixture
 def state(hair):
-    """The settings of guides that hair follows, as they were saved."""
+    """Return the settings of guides that hair follows, as they were saved."""
     return bpy.data.objects["Guides"].data.vellus
 
 
 def others_of(default, details):
-    """Values of a setting besides its default: the ends of its range."""
+    """Return values of a setting other than its default: the ends of its range."""
     if isinstance(default, bool | str):
         return [not default] if isinstance(default, bool) else ["Body", "Köpfe"]
     least = [math.nextafter(details.above, math.inf)] if math.isfinite(details.above) else []
@@ -40,7 +40,7 @@ def others_of(default, details):
 
 @pytest.mark.parametrize("settings_class", [DynamicsSettings, ColliderSettings])
 def test_the_ends_of_all_ranges_come_back(state, settings_class):
-    """Rounded to single precision they are within the range still, also what is zero in it."""
+    """Ends of ranges are restored: rounded to single precision they are still within the range, including zero."""
     group = state.dynamics if settings_class is DynamicsSettings else bpy.data.objects["Sphere"].vellus
     assert setting_properties.to_settings(group, settings_class) == settings_class()
     for name, default, details in declared(settings_class):
@@ -90,7 +90,9 @@ def test_a_setting_that_is_not_a_number_is_refused_in_a_sentence(state):
 
 
 def test_keys_and_drivers_are_followed(state, hair):
-    """Blender animates without calling `update`: guides are marked in frames where a value changes, and only there."""
+    """Keys and drivers mark the guides exactly in frames where a value changes, although Blender does not call
+    `update`.
+    """
     guides = bpy.data.objects["Guides"]
     for frame, hold in ((1, 0.0), (11, 100.0)):
         state.dynamics.hold = hold
@@ -133,7 +135,7 @@ def test_what_would_start_the_simulation_again_takes_no_keys(state):
 
 
 def test_a_collider_marks_the_guides_that_collide_with_it(state):
-    """Their surface, and the meshes of their collection and those in it."""
+    """A change of a collider marks the guides that collide with it: with their surface, a collection or its meshes."""
     sphere = bpy.data.objects["Sphere"]
     bpy.ops.mesh.primitive_cube_add()
     body, scene = bpy.context.object, bpy.context.scene

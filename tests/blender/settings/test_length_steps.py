@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lengths are dragged in steps that fit the surface: steps measured in a window of Blender 5.2, and the rows shown."""
+"""Lengths are dragged in steps that fit the surface, by steps measured in a window of Blender 5.2 and the shown
+rows.
+"""
 
 import bpy
 import pytest
@@ -37,7 +39,9 @@ def test_a_pixel_goes_as_far_as_in_a_window(scene, units, step, moved):
     ],
 )
 def test_rows_show_a_length_in_steps_that_fit(hair, units, size, is_coarse):
-    """A head and an animal in meters, in centimeters and without units, and a giant; at most two steps of ten off."""
+    """Rows show lengths in fitting steps for a head, an animal and a giant in several units, at most two steps of
+    ten off.
+    """
     use(bpy.context.scene, *units)
     sphere = bpy.data.objects["Sphere"]
     sphere.scale = (0.5 * size,) * 3

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Preferences are shown, which Blender leaves to the add-on."""
+"""The add-on draws its preferences, as Blender leaves that to it."""
 
 from types import SimpleNamespace
 

@@ -19,7 +19,7 @@ def guide_curves(hair):
 
 
 def wet(hair, amount):
-    """A Wet style of an amount, in few locks."""
+    """Return a Wet style of an amount, with few locks."""
     api.add_style(hair, api.Wet(amount=amount, lock=0.5))
     return hair.data.vellus.styles[-1].wet
 
@@ -81,7 +81,7 @@ def test_a_change_is_noticed_by_both(hair, guide_curves):
 
 
 def test_the_panel_shows_the_slider_that_wets_the_hair(hair, guide_curves):
-    """It is the property that the Styles panel shows, in one slider."""
+    """The panel shows the slider in effect, which is the property that the Styles panel shows, once."""
     state = guide_curves.vellus
     bpy.context.view_layer.objects.active = hair
     assert shared_wetness.slider_of(state) == (state.dynamics, "wetness")
@@ -93,7 +93,7 @@ def test_the_panel_shows_the_slider_that_wets_the_hair(hair, guide_curves):
 
 
 def test_keyed_rain_wets_look_shape_and_baked_motion(hair, guide_curves, tmp_path):
-    """A storm in five frames: the wetness of the style is keyed, and moves all that water changes."""
+    """A keyed wetness of the style, as a storm in five frames, changes look, shape and baked motion."""
     scene, state = bpy.context.scene, guide_curves.vellus
     state.simulates, state.cache_folder = True, str(tmp_path)
     state.dynamics.sag_free, state.dynamics.bend_stiffness = False, 1.0

@@ -19,13 +19,13 @@ CURL, FRIZZ, CLUMP = curl.Settings(radius=0.004), frizz.Settings(amplitude=0.002
 
 @pytest.fixture
 def state(hair):
-    """A hair's settings, without styles; its strands are not followed."""
+    """Return the settings of hair without styles, whose strands are not updated."""
     hair.data.vellus.is_live = False
     return hair.data.vellus
 
 
 def keyed(state, path, values):
-    """Key a setting, a value in every tenth frame."""
+    """Key a setting with a value in every tenth frame."""
     for place, value in enumerate(values):
         owner, name = path.rsplit(".", 1)
         setattr(state.path_resolve(owner), name, value)
@@ -33,7 +33,7 @@ def keyed(state, path, values):
 
 
 def paths(curves):
-    """Data paths of all keys of Curves, NLA strips too."""
+    """Return the data paths of all keys of Curves, including NLA strips."""
     animation = curves.animation_data
     users = [animation, *(strip for track in animation.nla_tracks for strip in track.strips)]
     bags = [
@@ -47,7 +47,7 @@ def paths(curves):
 
 
 def animated_values(state, frame):
-    """{(kind, name): values} of all styles in a frame."""
+    """Return {(kind, name): values} of all styles in a frame."""
     bpy.context.scene.frame_set(frame)
     return {(item.kind, item.name): style_items.values_of(item) for item in state.styles}
 
@@ -65,7 +65,7 @@ def test_all_offers_come_back_as_they_went(state):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_ends_of_all_ranges_come_back(state, kind):
-    """Rounded to single precision they are within the range still."""
+    """Ends of ranges are restored: rounded to single precision they are still within the range."""
     for name, default, details in declared(KINDS[kind]):
         ends = [choice[0] for choice in details.choices]
         if not isinstance(default, str | bool):
@@ -143,7 +143,7 @@ def test_structural_settings_and_seeds_cannot_be_keyed(state, kind):
 
 @pytest.fixture
 def keyed_styles(state):
-    """Three styles; the radius of the curl and the amplitude of the frizz have keys, and a strip of the NLA too."""
+    """Return three styles; the radius of the curl and the amplitude of the frizz have keys, also in an NLA strip."""
     style_items.assign(state, [CLUMP, CURL, FRIZZ])
     keyed(state, "styles[1].curl.radius", [0.001, 0.009])
     keyed(state, "styles[2].frizz.amplitude", [0.002, 0.008])
@@ -216,7 +216,7 @@ def test_paths_by_name_are_renamed(keyed_styles):
 
 
 def test_keys_of_other_hair_and_other_settings_stay(keyed_styles):
-    """Keys of other hair stay, also if it shares the action."""
+    """Keys of other hair and of other settings stay, also if the hair shares the action."""
     state, curves = keyed_styles, keyed_styles.id_data
     curves.keyframe_insert("vellus.appearance.melanin", frame=1)
     other = curves.copy()
@@ -230,7 +230,7 @@ def test_keys_of_other_hair_and_other_settings_stay(keyed_styles):
 
 
 def test_an_action_that_waits_follows(keyed_styles):
-    """An unused action with the slot of this hair follows too."""
+    """An unused action with the slot of this hair follows its styles too."""
     state, animation = keyed_styles, keyed_styles.id_data.animation_data
     waiting = animation.action
     animation.action = None
@@ -258,7 +258,7 @@ STEPS = st.lists(st.tuples(st.sampled_from(["move", "remove", "add", "rename"]),
 @given(steps=STEPS)
 @settings(max_examples=60)
 def test_any_order_of_changes_leaves_each_key_with_its_style(steps):
-    """Each style is keyed with a value of its own, which it has after any changes."""
+    """After any changes of the order, each style has the keys with its own value."""
     curves = bpy.data.hair_curves.new("Any")
     state = curves.vellus
     style_items.assign(state, [bend.Settings(angle=0.1 * place) for place in range(5)])

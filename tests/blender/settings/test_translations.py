@@ -51,7 +51,9 @@ def test_translations_keep_placeholders(locale):
 
 
 def test_labels_have_the_translation_context_of_vellus():
-    """In Blender's own dictionaries guides are lines that help to draw."""
+    """Labels have the translation context of Vellus, as guides in Blender's dictionaries are lines that help to
+    draw.
+    """
     for cls in interface_strings.blender.CLASSES:
         if issubclass(cls, (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu)):
             assert cls.bl_translation_context == translations.CONTEXT, cls
@@ -71,7 +73,7 @@ def test_an_error_keeps_its_sentence_apart_from_its_values(monkeypatch):
 
 @pytest.fixture
 def german(monkeypatch):
-    """{msgid: msgstr}, while Blender translates by them: in background mode its interface has no language."""
+    """Return {msgid: msgstr} while Blender translates by it, as its interface has no language in background mode."""
     texts = LANGUAGES["de_DE"]
     for name in ("pgettext_iface", "pgettext_rpt"):
         monkeypatch.setattr(translations, name, lambda sentence, _context: texts.get(sentence, sentence))
@@ -79,7 +81,7 @@ def german(monkeypatch):
 
 
 def test_a_stored_sentence_is_translated_as_it_was_raised(german):
-    """Hair stores its errors in English with their values, so files do not depend on the language."""
+    """A stored error is translated like a raised one: hair stores it in English with its values."""
     reported = {}  # sentence → translations: some sentences differ in the names of their values alone
     for msgid, msgstr in german.items():
         values = {name: 7 if form else f"Head {i}" for i, (name, form) in enumerate(fields(msgid))}
@@ -92,7 +94,9 @@ def test_a_stored_sentence_of_nobody_is_shown_as_it_is(german):
 
 
 def test_values_are_as_long_as_they_may_be(german):
-    """The same as of a greedy regular expression, which takes hours of a hostile status."""
+    """Values in messages are found to be as long as by a greedy regular expression, which would take hours for a
+    hostile status.
+    """
     texts = ("a", "b", ": ", '"', " ", "of ", "x")
     sentences = [sentence for sentence, _words, _names in translations._patterns()][:40]
     generator = random.Random(5)

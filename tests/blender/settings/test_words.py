@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The words of the interface: US spelling, and labels that fit a sidebar of its default width."""
+"""The interface uses US spelling, and its labels fit a sidebar of default width."""
 
 import re
 
@@ -61,7 +61,7 @@ def shown_in(locale, text):
 
 
 def names_in_the_sidebar():
-    """{label of a property that has its row in the sidebar: where it stands}."""
+    """Return {label of a property with a row in the sidebar: location}."""
     groups = [cls for cls in interface_strings.blender.CLASSES if issubclass(cls, bpy.types.PropertyGroup)]
     of_renders = {"VellusRenderSettings", "VellusPassSettings"}  # in the Properties editor, which is wider
     return {
@@ -101,7 +101,7 @@ def test_buttons_fit_the_sidebar(hair, active, locale):
 
 @pytest.mark.parametrize("locale", ["en_US", *translations.dictionaries()])
 def test_choices_fit_their_menus(locale):
-    """The text of a menu button has the value's side, but for its arrow."""
+    """Choices fit their menus: the text of a menu button has the width of the value minus the arrow."""
     room = ROW_WIDTH * (1.0 - setting_rows.NAME_SHARE) - ICON_WIDTH - MARGIN
     groups = [cls for cls in interface_strings.blender.CLASSES if issubclass(cls, bpy.types.PropertyGroup)]
     choices = {

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces by Cycles or EEVEE and hair by Vellus in one picture; turning it off restores the scene."""
+"""Composite Hair shows surfaces by Cycles or EEVEE and hair by Vellus in one picture, and can be turned off
+completely.
+"""
 
 import bpy
 import numpy as np
@@ -14,7 +16,7 @@ RAYS = [f"visible_{ray}" for ray in curves_objects._RAYS]
 
 @pytest.fixture
 def cycles(lit):
-    """The hairy sphere, rendered by Cycles in a moment."""
+    """Return the hairy sphere with fast settings of Cycles."""
     scene = bpy.context.scene
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 4000, 0.01
     configure(engine="CYCLES", resolution_x=64, resolution_y=48)
@@ -26,7 +28,7 @@ def cycles(lit):
 
 
 def picture(folder, name="picture", **settings):
-    """(height, width, 4) linear, premultiplied, of the scene as its compositor leaves it."""
+    """Return (height, width, 4), linear and premultiplied, of the scene after its compositor."""
     render = bpy.context.scene.render
     for key, value in settings.items():
         setattr(render, key, value)
@@ -56,7 +58,7 @@ def state():
 
 
 def set_shutter(mapping, places):
-    """Open the shutter by points (time, opening)."""
+    """Set the shutter curve by points (time, opening)."""
     points = mapping.curves[0].points
     while len(points) > 2:
         points.remove(points[1])
@@ -176,7 +178,7 @@ def test_an_artist_s_compositor_works_on_hair_too(cycles, tmp_path):
 
 
 def test_the_hair_s_scene_follows(cycles):
-    """Camera, size, exposure, samples, how the shutter opens; and hair that is added later."""
+    """The scene of the hair follows camera, size, exposure, samples and shutter curve, and hair that is added later."""
     scene = bpy.context.scene
     bpy.ops.vellus.toggle_composite()
     other = bpy.data.objects.new("Other", bpy.data.cameras.new("Other"))
@@ -205,7 +207,7 @@ def test_the_hair_s_scene_follows(cycles):
 
 
 def test_each_frame_of_an_animation_has_its_hair(arm, tmp_path):
-    """Hair follows the deformed surface, and the camera a marker, in the composite too."""
+    """Each frame of an animation has its hair on the deformed surface, and the camera of its marker."""
     scene = bpy.context.scene
     bpy.context.view_layer.objects.active = arm
     bpy.ops.vellus.add_hair(guide_count=60, strand_count=600, length=0.3, radius=0.01)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Composite Hair where its scenes are copied and deleted, its hair is linked, and the add-on is disabled."""
+"""Composite Hair holds if its scenes are copied or deleted, its hair is linked, or the add-on is disabled."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ from tests.support.pictures.rendering import configure
 
 @pytest.fixture
 def composited(lit):
-    """The hairy sphere in a scene of Cycles, with Composite Hair on."""
+    """Return the hairy sphere in a scene of Cycles, with Composite Hair on."""
     bpy.context.scene.render.engine = "CYCLES"
     bpy.ops.vellus.toggle_composite()
     return lit
@@ -64,7 +64,7 @@ def test_deleting_the_hair_s_scene_turns_it_off(composited):
 
 
 def test_a_file_hides_linked_hair_as_soon_as_it_is_open(composited, tmp_path):
-    """The ray visibility of linked hair is not stored in this file."""
+    """Linked hair is hidden as soon as a file is opened, because the file does not store its ray visibility."""
     bpy.ops.vellus.toggle_composite()
     bpy.data.libraries.write(str(tmp_path / "library.blend"), {composited})
     with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_there, here):
@@ -91,7 +91,7 @@ def test_without_the_add_on_engines_render_their_own_hair(composited):
 
 
 def test_hair_is_laid_over_the_view_layer_that_it_is_rendered_with(composited):
-    """Hair is composited over the first view layer, which is the one that Blender renders of a background scene."""
+    """Hair is composited over the first view layer, which is what Blender renders of a background scene."""
     bpy.ops.vellus.toggle_composite()
     scene = bpy.context.scene
     first = scene.view_layers[0].name
@@ -122,7 +122,9 @@ def test_the_first_view_layer_that_is_rendered_has_the_surfaces(composited):
 
 
 def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composited, tmp_path, capfd):
-    """A window shows the message after the render, since Blender shows none."""
+    """Frames that are not baked are refused in the hair's scene as well; a window shows the message after the
+    render.
+    """
     scene = bpy.context.scene
     bpy.data.objects["Guides"].data.vellus.simulates = True
     configure(engine="CYCLES", resolution_x=8, resolution_y=6, film_transparent=True, use_compositing=True)
@@ -141,7 +143,7 @@ def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composite
 
 
 def test_a_scene_of_an_artist_is_never_deleted_or_changed(composited):
-    """A scene is the add-on's if it bears its mark, whatever the setting points to."""
+    """A scene without the add-on's mark is never deleted or changed, whatever the setting points to."""
     scene = bpy.context.scene
     own = bpy.data.scenes.new("Own")
     own.background_set, own.frame_start = scene, 3

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cryptomatte passes: a matte per object, hair system, material and asset, which other programs read."""
+"""Cryptomatte passes have a matte per object, hair system, material and asset, which other programs read."""
 
 import bpy
 import numpy as np
@@ -15,7 +15,7 @@ KINDS = ("object", "material", "asset")
 
 @pytest.fixture
 def three(lit):
-    """A sphere with three hair systems, parented to an empty, in front of nothing."""
+    """Return a sphere with three hair systems, parented to an empty, in front of nothing."""
     sphere = bpy.data.objects["Sphere"]
     root = bpy.data.objects.new("Root", None)
     bpy.context.scene.collection.objects.link(root)
@@ -80,7 +80,7 @@ def test_coverages_are_those_of_the_samples(three, tmp_path, monkeypatch, how):
 
 
 def test_materials_and_assets_group_objects(three, tmp_path):
-    """A material has the objects that use it, an asset those below its topmost parent."""
+    """The matte of a material has the objects that use it, the matte of an asset those below its topmost parent."""
     _passes, objects = read(tmp_path)
     materials, assets = (mattes(tmp_path / "rendered.exr", f"ViewLayer.Crypto{kind}") for kind in ("Material", "Asset"))
     np.testing.assert_allclose(materials["Skin"], objects["Sphere"], atol=1e-6)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Passes of data: position, mist, normal and colors without light, compared with Cycles; data for denoising."""
+"""Passes of data have Cycles' values of position, mist, normal and colors without light, and data for denoising."""
 
 import math
 
@@ -34,7 +34,9 @@ def straighten(hair, starts, ends, radius):
 
 @pytest.fixture
 def described(lit):
-    """Three straight strands a few pixels wide in front of a slanted plane of colored metal, seen askew, in mist."""
+    """Return three straight strands a few pixels wide before a slanted plane of colored metal, seen obliquely, in
+    mist.
+    """
     scene, layer = bpy.context.scene, bpy.context.view_layer
     bpy.data.objects["Sphere"].hide_render = True
     starts = np.array([(-0.7, 0.0, -0.9), (0.0, -0.2, 0.6), (1.0, -0.4, -0.5)])
@@ -58,7 +60,7 @@ def described(lit):
 
 
 def by_cycles(folder, hair, **settings):
-    """The passes of Cycles; hair is matte, as the normals of hair shaders point to the side of strands."""
+    """Return the passes of Cycles; hair is matte, as the normals of hair shaders point to the side of strands."""
     scene = bpy.context.scene
     scene.cycles.samples, scene.cycles.device, scene.cycles.pixel_filter_type = 64, "CPU", "BOX"
     scene.cycles.use_denoising, scene.cycles.max_bounces = False, 0
@@ -74,13 +76,13 @@ def by_cycles(folder, hair, **settings):
 
 
 def inside(mask):
-    """Whether a pixel and its neighbors have a mask."""
+    """Whether a pixel and its neighbors are in a mask."""
     return np.logical_and.reduce([np.roll(mask, by, (0, 1)) for by in ((0, 0), (0, 1), (0, -1), (1, 0), (-1, 0))])
 
 
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO", "mirrored"])
 def test_values_are_those_of_cycles(described, tmp_path, kind):
-    """On a surface and on strands all passes are Cycles', and outside position and normal are 0 and mist is 1."""
+    """On a surface and on strands all passes equal Cycles'; outside, position and normal are 0 and mist is 1."""
     camera = bpy.context.scene.camera
     camera.data.type = "PERSP" if kind == "mirrored" else kind
     camera.scale.x = -1.0 if kind == "mirrored" else 1.0
@@ -105,7 +107,7 @@ def test_values_are_those_of_cycles(described, tmp_path, kind):
 
 
 def distances(name, places):
-    """Distances of positions along the view axis, or from a panoramic camera; `FAR` where the position is 0."""
+    """Return distances of positions along the view axis or from a panoramic camera, `FAR` where the position is 0."""
     scene = bpy.context.scene
     to_view, _ = read_camera(scene, bpy.context.evaluated_depsgraph_get(), 48, 36)
     seen = places @ to_view[:3, :3].T + to_view[:3, 3]
@@ -175,7 +177,7 @@ def test_files_have_the_channels_of_cycles(described, tmp_path, depth):
 
 
 def test_all_passes_of_a_written_frame_include_them(lit, tmp_path):
-    """As with `render --passes`: each pass is a layer of the file, and the settings of the view layer stay."""
+    """With `render --passes`, each pass is a layer of the file, and the settings of the view layer stay."""
     layer = bpy.context.view_layer
     api.render(tmp_path / "passes.exr", has_passes=True, width=16, height=12, sample_count=1)
     (written,) = read_layers(tmp_path / "passes.exr").values()
@@ -184,7 +186,7 @@ def test_all_passes_of_a_written_frame_include_them(lit, tmp_path):
 
 
 def test_the_denoise_node_removes_noise(thin, tmp_path):
-    """Blender's node, with our data, is closer to a picture of many samples than the noisy image is."""
+    """Blender's Denoise node brings the noisy image closer to a picture of many samples."""
     scene = bpy.context.scene
     bpy.context.view_layer.vellus.has_denoising_data = True
     configure(**SIZE)
@@ -204,7 +206,7 @@ def test_the_denoise_node_removes_noise(thin, tmp_path):
 
 
 def test_a_flat_picture_of_mist_is_that_of_the_distance(described, tmp_path):
-    """Mist is the power of the distance beyond its start, relative to its depth, by the falloff of the world."""
+    """Mist is a power, by the falloff of the world, of the distance beyond its start relative to its depth."""
     settings = bpy.context.scene.world.mist_settings
     for falloff, exponent in (("LINEAR", 1.0), ("INVERSE_QUADRATIC", 0.5)):
         settings.falloff = falloff

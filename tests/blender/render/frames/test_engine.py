@@ -75,7 +75,9 @@ def test_a_picture_larger_than_any_texture_is_rendered(lit, tmp_path, monkeypatc
 
 
 def test_a_border_between_pixels_is_rounded_as_blender_does(lit, tmp_path):
-    """In single precision 430 of 760 parts of 3040 pixels are 1720, in double precision 1719."""
+    """A border between pixels is rounded in single precision as by Blender: 430 of 760 parts of 3040 pixels are
+    1720, not 1719.
+    """
     part = rendered(
         tmp_path,
         resolution_x=3040,
@@ -108,7 +110,7 @@ def test_a_border_is_rendered_as_in_the_whole_picture(lit, fine_shadows, tmp_pat
 @pytest.mark.parametrize("filter_size", [0.0, 1.5])
 @pytest.mark.parametrize("light", [0.0, 1.0])
 def test_over_black_and_over_white_it_is_what_is_rendered_there(lit, tmp_path, light, filter_size):
-    """The straight composite of an empty background, within 1/255, where hair has edges too."""
+    """Over black and over white, the picture equals the one rendered there within 1/255, also at edges of hair."""
     light_up((light,) * 3)
     settings = {"sample_count": 16, "filter_size": filter_size}
     empty = rendered(tmp_path, film_transparent=True, **settings)["Combined"]
@@ -121,7 +123,7 @@ def test_over_black_and_over_white_it_is_what_is_rendered_there(lit, tmp_path, l
 
 @pytest.mark.parametrize("backdrop", [0.0, 1.0])
 def test_a_png_composites_as_the_exr_does(lit, tmp_path, backdrop):
-    """PNG holds straight colors of 8 bits: over a backdrop within 1/255 of the picture it was written of."""
+    """A straight PNG of 8 bits composites over a backdrop within 1/255 of the picture that it was written from."""
     scene = bpy.context.scene
     light_up()
     exr = rendered(tmp_path, film_transparent=True, sample_count=16)["Combined"]
@@ -139,7 +141,7 @@ def test_a_png_composites_as_the_exr_does(lit, tmp_path, backdrop):
 
 
 def pixels_of(path):
-    """(height, width, 4) of a picture file as it is stored."""
+    """Return (height, width, 4) stored values of a picture file."""
     image = bpy.data.images.load(str(path))
     image.colorspace_settings.name, image.alpha_mode = "Non-Color", "CHANNEL_PACKED"
     pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
@@ -150,7 +152,7 @@ def pixels_of(path):
 
 
 def test_motion_blur_is_the_mean_of_still_pictures(lit, tmp_path, monkeypatch):
-    """The law holds for moving hair, surface and camera; all pictures use the same sample positions."""
+    """Motion blur is the mean of still pictures with the same samples, for moving hair, surface and camera."""
     real = drawing.pass_record
     monkeypatch.setattr(drawing, "pass_record", lambda *args: real(*args[:3], 0, *args[4:]))
     scene = bpy.context.scene
@@ -236,7 +238,9 @@ def test_unsupported_renders_are_reported_in_one_sentence(lit, tmp_path):
     ],
 )
 def test_an_interrupted_render_writes_no_picture(lit, tmp_path, monkeypatch, error, reported):
-    """A bug, Ctrl-C or a `HairError` ends the render with a message in this frame, without continuing with the next."""
+    """A render ended by a bug, Ctrl-C or `HairError` writes no picture, reports a message and starts no further
+    frame.
+    """
     calls = []
 
     def broken(*_args):
@@ -277,7 +281,7 @@ def test_blender_s_panels_are_shown_for_it_while_it_is_there(scene):
 
 
 def test_a_scene_without_anything_is_its_background(scene, tmp_path):
-    """No hair, no surface, no light: the world's color, or nothing at all."""
+    """A scene without hair, surfaces and lights shows the world's color, or nothing if transparent."""
     bpy.ops.object.camera_add()
     scene.camera = bpy.context.object
     light_up((0.25, 0.5, 0.75))
@@ -290,7 +294,7 @@ def test_a_scene_without_anything_is_its_background(scene, tmp_path):
 
 
 def test_objects_disabled_in_renders_are_skipped(lit, tmp_path):
-    """An object's own switch disables it; guides are always skipped, as in Cycles and EEVEE."""
+    """Objects disabled in renders are skipped, and guides always, as in Cycles and EEVEE."""
     bpy.context.view_layer.vellus.has_hair_mask = True
     bpy.data.objects["Sphere"].hide_render = True
     seen = rendered(tmp_path, film_transparent=True)
@@ -314,7 +318,7 @@ def test_hair_that_is_instanced_is_rendered_at_each_place(lit, tmp_path):
 
 
 def test_hair_s_own_modifiers_are_rendered(lit, tmp_path):
-    """Strands that a node group shortens are rendered short, as by Cycles."""
+    """Strands that the hair's own modifiers shorten are rendered short, as by Cycles."""
     bpy.context.view_layer.vellus.has_hair_mask = True
     before = rendered(tmp_path, film_transparent=True)["Hair Mask"]
     tree = bpy.data.node_groups.new("Short", "GeometryNodeTree")
@@ -330,7 +334,7 @@ def test_hair_s_own_modifiers_are_rendered(lit, tmp_path):
 
 @pytest.mark.parametrize("sample_count", [64, 61])
 def test_an_edge_is_as_soft_as_the_filter_is_wide(scene, tmp_path, sample_count):
-    """The cover of pixels beside a straight edge is the part of the filter that lies over it."""
+    """The coverage of pixels beside a straight edge is the part of the filter that lies over it."""
     bpy.ops.object.camera_add(location=(0.0, 0.0, 5.0))
     scene.camera = bpy.context.object
     scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 96.0  # a unit a pixel
@@ -348,7 +352,7 @@ def test_an_edge_is_as_soft_as_the_filter_is_wide(scene, tmp_path, sample_count)
 
 
 def test_a_script_that_renders_exits_normally():
-    """Programs and textures are freed before Blender's graphics are: after them it crashes."""
+    """A script that renders exits normally, because programs and textures are freed before Blender's graphics."""
     script = (
         "import bpy, hair_addon\n"
         "hair_addon.register()\n"

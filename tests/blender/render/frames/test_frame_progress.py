@@ -31,7 +31,7 @@ class Recorder:
 
 @pytest.fixture
 def told(lit, monkeypatch):
-    """The `Recorder` of renders of the hairy sphere, with light among strands."""
+    """Return the `Recorder` of renders of the hairy sphere, with light among strands."""
     recorder = Recorder()
 
     def recorded(its_engine, *given):
@@ -49,7 +49,7 @@ def render(folder, **settings):
 
 
 def steps_of(texts):
-    """The steps without the moments, each once, in their order."""
+    """Return the names of steps without repetitions and without their moments, in order."""
     return list(dict.fromkeys(text.split(" | ")[-1] for text in texts))
 
 
@@ -58,7 +58,7 @@ STEPS = ["Evaluating the scene", *READING, "Following light", *(f"Pass {number} 
 
 
 def assert_rises(parts, most):
-    """most: the largest step."""
+    """Assert that progress rises; most: the largest step."""
     steps = np.diff([0.0, *parts])
     assert (steps >= 0.0).all() and steps.max() <= most
     assert parts[-1] == pytest.approx(1.0) and len({*parts}) > 8

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Passes of light groups: parts of the picture by the lights of each group, as in Cycles."""
+"""Passes of light groups are the parts of the picture by the lights of each group, as in Cycles."""
 
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -15,7 +15,7 @@ SIZE = {"resolution_x": 32, "resolution_y": 24, "sample_count": 4}
 
 @pytest.fixture
 def grouped(lit):
-    """A sun and a world in groups of their own, and a lamp in another; the last group has no light."""
+    """Return a scene with a sun, a world and a lamp in groups of their own; the last group has no light."""
     scene, layer = bpy.context.scene, bpy.context.view_layer
     scene.camera.data.lens = 100.0
     light_up((0.1, 0.15, 0.3))
@@ -34,7 +34,9 @@ def groups_of(passes):
 
 @pytest.mark.parametrize("how", ["DUAL", "GRID", "motion blur", "panorama"])
 def test_groups_sum_to_the_picture(grouped, tmp_path, how):
-    """The passes sum to the picture within 1e-4, which is the same as without groups, background included."""
+    """The passes sum to the picture within 1e-4, including the background, and the picture equals that without
+    groups.
+    """
     scene = bpy.context.scene
     scene.vellus.multiple_scattering = how if how in {"DUAL", "GRID"} else "DUAL"
     if how == "panorama":
@@ -51,7 +53,7 @@ def test_groups_sum_to_the_picture(grouped, tmp_path, how):
 
 @pytest.mark.parametrize("kind", ["DUAL", "GRID"])
 def test_a_group_is_a_picture_by_its_lights_alone(grouped, tmp_path, kind):
-    """With other lights off, the picture is that group's pass, of hair and of surfaces, except for noise."""
+    """The pass of a group equals the picture with all other lights off, of hair and of surfaces, except for noise."""
     scene = bpy.context.scene
     scene.vellus.multiple_scattering = kind
     groups = groups_of(rendered(tmp_path, film_transparent=True, **SIZE))
@@ -66,7 +68,7 @@ def test_a_group_is_a_picture_by_its_lights_alone(grouped, tmp_path, kind):
 
 
 def test_light_of_no_group_is_only_in_the_picture(grouped, tmp_path):
-    """A lamp whose group is not in the view layer leaves the other passes as they are."""
+    """A lamp whose group is not in the view layer is in no pass of a group."""
     bpy.context.scene.vellus.multiple_scattering = "DUAL"
     before = rendered(tmp_path, **SIZE)
     bpy.data.objects["Lamp"].lightgroup = "Elsewhere"
@@ -79,7 +81,7 @@ def test_light_of_no_group_is_only_in_the_picture(grouped, tmp_path):
 
 
 def test_channels_and_light_are_those_of_cycles(grouped, tmp_path):
-    """Each pass has the name of Cycles', and on a matte surface its light."""
+    """Each pass has the name that Cycles gives it, and the same light on a matte surface."""
     scene = bpy.context.scene
     grouped.hide_render = True
     matte = bpy.data.materials.new("Matte")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panoramic cameras: silhouettes and distances compared with Cycles, also for regions and in stereo."""
+"""Panoramic cameras show the silhouettes and distances of Cycles, also for regions and in stereo."""
 
 import math
 
@@ -26,7 +26,7 @@ KINDS = {
 
 @pytest.fixture
 def inside(lit):
-    """A camera near to the hairy sphere, askew, with cubes all around it."""
+    """Return a camera near the hairy sphere, seen obliquely, with cubes all around."""
     scene = bpy.context.scene
     lit.data.vellus.hair.radius = 0.02
     scene.camera.location, scene.camera.rotation_euler = (0.3, -1.9, 0.2), (math.pi / 2, 0.2, 0.7)
@@ -85,7 +85,7 @@ def test_the_world_is_the_background_without_seams(inside, tmp_path):
 
 
 def test_other_passes_are_resampled_too(inside, tmp_path):
-    """The passes of hair's light add up to it, and hair covers no more than there is."""
+    """Other passes are resampled too: the lobes add up to the hair's light, and coverage is at most one."""
     choose(inside, "FISHEYE_EQUIDISTANT")
     layer = bpy.context.view_layer.vellus
     layer.has_hair_mask = layer.has_hair_shadow = layer.has_lobes = True
@@ -102,7 +102,7 @@ def test_other_passes_are_resampled_too(inside, tmp_path):
 
 
 def test_hair_only_leaves_the_outside_to_the_other_picture(inside, tmp_path):
-    """Around the circle of a fisheye lens, too."""
+    """Hair Only leaves the outside of a fisheye's circle to the other picture."""
     choose(inside, "FISHEYE_EQUIDISTANT")
     found = passes(tmp_path, is_hair_only=True)
     assert found["Combined"][0, 0, 3] == 0.0 and found["Combined"][..., 3].max() > 0.9

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stereo pictures: both eyes as in Cycles, in the files that Blender writes."""
+"""Stereo pictures show both eyes as Cycles does, in the files that Blender writes."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ WIDTH, HEIGHT = 96, 72
 
 @pytest.fixture
 def pair(lit):
-    """The hairy sphere near to two eyes far apart."""
+    """Return the hairy sphere near to two eyes far apart."""
     scene = bpy.context.scene
     scene.camera.location.y = -5.0
     stereo = scene.camera.data.stereo
@@ -27,7 +27,7 @@ def pair(lit):
 
 
 def views(folder, suffixes=("_L", "_R"), **settings):
-    """[(height, width, 4)] of each view, of individual files."""
+    """Return [(height, width, 4)] of each view, from individual files."""
     configure(**{"resolution_x": WIDTH, "resolution_y": HEIGHT, "sample_count": 16} | settings)
     render = bpy.context.scene.render
     render.image_settings.media_type, render.image_settings.file_format = "IMAGE", "OPEN_EXR"
@@ -45,7 +45,7 @@ def pixels_of(path):
 
 
 def overlap(one, other):
-    """Of silhouettes: the part of their union that they share."""
+    """Return the shared part of the union of two silhouettes."""
     one, other = (pixels[..., 3] > 0.5 for pixels in (one, other))
     return (one & other).sum() / (one | other).sum()
 
@@ -113,7 +113,7 @@ def test_blender_writes_both_beside_each_other(pair, tmp_path):
 
 
 def test_hair_is_composited_into_each_view(pair, tmp_path):
-    """Over surfaces by Cycles: the silhouettes are those of a render of both by Vellus."""
+    """Hair is composited into each view over surfaces by Cycles, with the silhouettes of a render of both by Vellus."""
     ours = views(tmp_path)
     configure(engine="CYCLES")
     composite.turn_on(pair)
@@ -123,7 +123,7 @@ def test_hair_is_composited_into_each_view(pair, tmp_path):
 
 
 def test_composited_views_are_those_of_the_scene(pair, tmp_path):
-    """A view that is off, one of the artist's own, and its camera."""
+    """Composited views are those of the scene: without a view that is off, and with an artist's view and its camera."""
     bpy.data.objects["Camera"].name = "Camera_L"
     top = bpy.data.objects.new("Camera_top", pair.camera.data)
     top.location = 0.0, 0.0, 6.0

@@ -28,7 +28,7 @@ def matrices():
 
 
 def columns_of_plane():
-    """(first, last) columns between which the plane of `RIGHT` crosses the hair, from its near to its far side."""
+    """Return (first, last) columns between which the plane of `RIGHT` crosses the hair."""
     to_clip = matrices()[1] @ matrices()[0]
     clip = np.array([[0.1, y, 0.0, 1.0] for y in (-1.6, 1.6)]) @ to_clip.T
     return sorted(SIZE * (0.5 * clip[:, 0] / clip[:, 3] + 0.5))
@@ -36,7 +36,7 @@ def columns_of_plane():
 
 @pytest.fixture
 def region(lit):
-    """Stand-ins for a region and its view, with the place of the scene's camera."""
+    """Return stand-ins for a region and its view at the scene's camera."""
     view = SimpleNamespace(**dict(zip(("view_matrix", "window_matrix"), matrices(), strict=True)))
     yield SimpleNamespace(width=SIZE, height=SIZE, as_pointer=lambda: 3), view
     region_pictures.picture_cache.clear()
@@ -101,7 +101,7 @@ def test_guides_are_cut_off(lit):
 
 @pytest.fixture
 def space(lit):
-    """A 3-D viewport with a Clipping Region."""
+    """Return a 3-D viewport with a Clipping Region."""
     area = next(a for a in bpy.context.window_manager.windows[0].screen.areas if a.type == "VIEW_3D")
     space = area.spaces.active
     space.region_3d.clip_planes, space.region_3d.use_clip_planes = RIGHT, True
@@ -112,7 +112,7 @@ def space(lit):
 
 @pytest.mark.parametrize("shading", ["WIREFRAME", "SOLID", "MATERIAL", "RENDERED"])
 def test_it_cuts_off_where_blender_does(space, shading):
-    """Strands are cut off where Blender cuts off, in two shading modes."""
+    """Strands are cut off where Blender cuts off surfaces, in two shading modes."""
     space.shading.type = shading
     context = SimpleNamespace(space_data=space, region_data=space.region_3d)
     is_clipped = shading in {"WIREFRAME", "SOLID"}

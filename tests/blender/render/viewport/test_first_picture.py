@@ -69,7 +69,7 @@ def camera():
 
 
 def displayed(light, management, background=BACKGROUND):
-    """(H, W, 3) display values of premultiplied light over a gray background."""
+    """Return (H, W, 3) display values of premultiplied light over a gray background."""
     transform = display_transform.DisplayTransform.of(bpy.context.scene, management)
     alpha = np.clip(light[..., 3:], 0.0, 1.0)
     colors = (light[..., :3] / np.maximum(light[..., 3:], 1e-6)).reshape(-1, 3).astype(np.float32)
@@ -78,7 +78,7 @@ def displayed(light, management, background=BACKGROUND):
 
 
 def drawn_in(mode):
-    """(`DrawnScene`, camera, color management) of the hair in a shading mode."""
+    """Return (`DrawnScene`, camera, color management) of the hair in a shading mode."""
     space, context, view = view3d(), bpy.context, camera()
     for name, value in MODES[mode].items():
         setattr(space.shading, name, value)
@@ -88,7 +88,7 @@ def drawn_in(mode):
 
 
 def light_of(drawn, view, per_side, pass_count):
-    """Premultiplied light of a view after some passes."""
+    """Return premultiplied light of a view after some passes."""
     picture = hair_picture.HairPicture(SIZE, per_side)
     for _ in range(pass_count):
         picture.add_pass(drawn, *view)

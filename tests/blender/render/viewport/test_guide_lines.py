@@ -16,7 +16,7 @@ LEVEL = 2.0  # of the background
 
 
 def read(guides, distance=1.0):
-    """(SIZE, SIZE, 3) over an even background."""
+    """Return (SIZE, SIZE, 3) values over an even background."""
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     world_to_view, view_to_clip = scene.read_camera(bpy.context.scene, depsgraph, SIZE, SIZE)
@@ -40,7 +40,7 @@ def guides(lit):
 
 @pytest.fixture
 def upright(guides):
-    """One guide, straight up beside the camera's axis."""
+    """Return one upright guide beside the camera's axis."""
     points = np.zeros((len(guides.data.points), 3), np.float32)
     count = len(guides.data.points) // len(guides.data.curves)
     points[:count, 2] = np.linspace(-0.4, 0.4, count)
@@ -57,7 +57,9 @@ def row(picture):
 
 @pytest.mark.parametrize("distance", [1.0, 2.0])
 def test_a_line_is_as_wide_at_any_distance(upright, distance):
-    """Its opacity, summed across, is its width and that of the dark edges; the width is that of the settings."""
+    """A line has the width of the settings at any distance: its opacity, summed across, is its width with the dark
+    edges.
+    """
     upright.data.vellus.guide_opacity = 1.0
     found = read(upright, distance)[SIZE // 2]
     line = guide_lines.strip_width() - guide_lines._FRINGE
@@ -78,7 +80,7 @@ def test_opacity_scales_all_of_it(upright):
 
 
 def hues(picture):
-    """The distinct directions of color of pixels that differ from the background."""
+    """Return the distinct directions of color of pixels that differ from the background."""
     seen = picture[np.ptp(picture, axis=-1) > 0.02]
     return np.unique(np.round(seen / np.linalg.norm(seen, axis=-1, keepdims=True), 1), axis=0)
 

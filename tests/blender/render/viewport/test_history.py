@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Viewports with motion: steady pictures without ghosts."""
+"""Viewports show moving hair steadily and without ghosts."""
 
 import bpy
 import numpy as np
@@ -35,7 +35,7 @@ def new_picture(kind, size=SIZE):
 
 
 def move(picture, drawn, view):
-    """Return what a viewport shows of the first pass after something moved."""
+    """Return what a viewport shows of the first pass after a movement."""
     picture.restart(is_moved=True)
     picture.add_pass(drawn, *view)
     return picture.read_shown()
@@ -70,7 +70,7 @@ def comb(guides, way):
 
 
 def biggest_change(frames):
-    """The 99th percentile of how far a pixel with hair changes from frame to frame, as a display shows it on gray."""
+    """Return the 99th percentile of the change of pixels with hair from frame to frame, as displayed over gray."""
     frames = np.array(frames)
     shown = (frames[..., :3] + 0.05 * (1.0 - frames[..., 3:])) ** (1.0 / 2.2)
     is_hair = (frames[..., 3] > 0.02).any(axis=0)
@@ -165,7 +165,7 @@ def test_another_look_is_shown_at_once(lit):
 
 
 def seen(drawn, view):
-    """(record of a pass over a scene, buffer that hair was found for)."""
+    """Return (record of a pass over a scene, buffer that hair was found for)."""
     buffer, record = VisibilityBuffer(SIZE, SIZE), drawing.pass_record(*view, (SIZE, SIZE))
     with buffer.surfaces():
         scene_drawing.draw_hiding(drawn, record)
@@ -201,7 +201,7 @@ def test_combed_strands_know_where_they_were(lit, monkeypatch):
 
 
 def test_surfaces_that_are_read_again_have_not_moved(lit):
-    """A moving light makes the scene read again, but surfaces with the same corners have not moved."""
+    """Surfaces that are read again because a light moves count as unmoved if their corners are the same."""
     view = camera()
     before = motion_vectors.places(read_drawn(), *view)
     bpy.data.objects["Sun"].rotation_euler.x += 0.1
@@ -225,7 +225,7 @@ def comb_aside(frame):
 
 @pytest.mark.parametrize("push", [push_surface, comb_aside])
 def test_hair_is_carried_where_it_moves(lit, push):
-    """Strands of which the points move, not the object: without their motion the picture would lag behind them."""
+    """Moving points of strands carry hair along in the picture; without motion vectors the picture would lag."""
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
     picture = new_picture("HAIR")
     for frame in range(4):
@@ -240,7 +240,9 @@ def test_hair_is_carried_where_it_moves(lit, push):
 
 @even_guides
 def test_the_first_pass_is_as_bright_as_the_last(thin):
-    """Thin strands with one sample per pixel have the same mean brightness, and that of each part up to noise."""
+    """The first pass of thin strands with one sample per pixel has the mean brightness of the last, in each part, up
+    to noise.
+    """
     picture, drawn, view = new_picture("HAIR", 3 * SIZE), read_drawn(), camera()
     picture.add_pass(drawn, *view)
     first, last = picture.read(), rest(picture, drawn, view)

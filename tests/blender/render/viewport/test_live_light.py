@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light Grid in viewports: light as in renders, which stays while the view turns and falls with its causes."""
+"""Viewports with Light Grid have the light of renders, keep it while the view turns, and reduce it when its causes
+change.
+"""
 
 import itertools
 from dataclasses import replace
@@ -23,7 +25,7 @@ TIMES = itertools.count(0.0, 10.0)  # [s] of redraws, each long after the last
 
 @pytest.fixture
 def view(scene, rng):
-    """(camera, function that reads the scene as a viewport does) of blond hair in a lamp and a world."""
+    """Return (camera, function that reads the scene as a viewport does) of blond hair in a lamp and a world."""
     hair_of(scene, rng.uniform(-0.3, 0.3, (600, 3)), BLOND, radius=0.006)
     light(scene, world=0.1, sun=4.0)
 
@@ -37,7 +39,7 @@ def view(scene, rng):
 
 
 def at_rest(live, drawn, camera):
-    """The scene once all paths are followed."""
+    """Return the scene once all paths are traced."""
     for _share in range(100):
         found = redrawn(live, drawn, camera)
         live.wait()
@@ -58,7 +60,7 @@ def picture_of(drawn, camera):
 
 
 def part_of(drawn):
-    """The part of dual scattering that paths replace in a scene."""
+    """Return the part of dual scattering that paths replace in a scene."""
     return float(drawn.lights["grid_corner"][3])
 
 
@@ -67,7 +69,7 @@ def blocks(picture):
 
 
 def turned(camera, degrees):
-    """A camera that has turned around the hair."""
+    """Return a camera that has turned around the hair."""
     angle = np.radians(degrees)
     turn = np.eye(4)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
@@ -91,7 +93,7 @@ def test_at_rest_the_light_is_that_of_renders(view):
 
 
 def test_the_picture_goes_over_to_paths_in_steps(view):
-    """The part of the light that paths have replaced grows by at most a quarter from redraw to redraw."""
+    """The part of the light that paths replace grows by at most a quarter per redraw."""
     camera, read = view
     drawn, live = read(), live_light.LiveLight()
     parts = [0.0]
@@ -102,7 +104,7 @@ def test_the_picture_goes_over_to_paths_in_steps(view):
 
 
 def test_a_view_that_turns_keeps_the_light(view):
-    """The first redraw of another view shows paths, and paths from there need not start anew."""
+    """The first redraw of another view shows the light of paths, and more paths are added to it."""
     camera, read = view
     drawn, live = read(), live_light.LiveLight()
     found = at_rest(live, drawn, camera)
@@ -142,7 +144,7 @@ def test_light_moves_with_its_hair(view):
 
 @pytest.fixture
 def region(view, monkeypatch):
-    """A context with a region that Blender draws; timers that only count."""
+    """Return a context with a region that Blender draws, and with timers that only count."""
     timers = set()
     monkeypatch.setattr(live_light.running, "has_window", lambda: True)
     timing = SimpleNamespace(
@@ -158,7 +160,9 @@ def region(view, monkeypatch):
 
 
 def test_nothing_is_followed_for_a_region_that_is_not_drawn(view, region, monkeypatch):
-    """Each share needs a redraw, and a region that is never drawn is asked for a while only."""
+    """No paths are traced for a region that is not drawn: each share needs a redraw, which is requested for a while
+    only.
+    """
     camera, read = view
     context, _timers = region
     followed = []
@@ -175,7 +179,7 @@ def test_nothing_is_followed_for_a_region_that_is_not_drawn(view, region, monkey
 
 
 def test_a_share_waits_while_viewports_are_redrawn(view, region, monkeypatch):
-    """It goes on once a check finds that none was redrawn since the last check."""
+    """A share waits while viewports are redrawn, and continues once no viewport was redrawn between two checks."""
     camera, read = view
     context, _timers = region
     waits = []
@@ -204,7 +208,7 @@ def test_a_share_waits_while_viewports_are_redrawn(view, region, monkeypatch):
 
 
 def test_a_region_that_waits_for_another_is_not_redrawn(view, region, monkeypatch):
-    """A redraw would interrupt the share that it waits for."""
+    """A region that waits for another region's share is not redrawn, as a redraw would interrupt the share."""
     camera, read = view
     context, _timers = region
     asked = []
@@ -227,7 +231,7 @@ def test_a_region_that_waits_for_another_is_not_redrawn(view, region, monkeypatc
 
 
 def test_a_picture_is_refined_once_its_light_is_known(view, region, monkeypatch):
-    """Until then it starts again with each share, and has few passes."""
+    """A picture is refined once its light is known; until then it restarts with each share and has few passes."""
     camera, read = view
     context, _timers = region
     monkeypatch.setattr(live_light, "_SHARES", 2)
@@ -268,7 +272,7 @@ def test_no_timer_and_no_light_are_left_after_unregistering(view, region):
 
 
 def test_a_setting_without_effect_says_so(view, region, monkeypatch):
-    """Light Grid in viewports is off in the preferences, or the hair has another model; not with Dual Scattering."""
+    """A message says why Light Grid has no effect: it is off in the preferences, or the hair has another model."""
     camera, read = view
     context, _timers = region
     live_light.lit(context, read(), camera)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The outline of selected hair: its position, color, visibility and cost."""
+"""The outline of selected hair has the right position, color, visibility and cost."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -30,7 +30,7 @@ def matrices():
 
 
 def shown(show):
-    """(SIZE, SIZE, 4) display colors that are laid over a black viewport."""
+    """Return (SIZE, SIZE, 4) display colors that are laid over a black viewport."""
     texture = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
     target = gpu.types.GPUFrameBuffer(color_slots=texture)
     with target.bind():
@@ -42,7 +42,7 @@ def shown(show):
 
 
 def outlined(drawn, channels, style=STYLE):
-    """(picture of the outline, (SIZE, SIZE) whether any sample of a pixel shows hair) after enough passes."""
+    """Return (picture of the outline, (SIZE, SIZE) whether any sample of a pixel shows hair) after enough passes."""
     picture, outline = hair_picture.HairPicture((SIZE, SIZE), 2), HairOutline((SIZE, SIZE))
     outline.restart(channels, style)
     while not outline.is_fine:
@@ -52,7 +52,7 @@ def outlined(drawn, channels, style=STYLE):
 
 @pytest.fixture
 def bare(lit):
-    """The hair without its surface, which would hide some of it."""
+    """Return the hair without its surface, which would hide some of it."""
     lit.select_set(True)
     return replace(read(), surfaces=[], surface_owners=())
 
@@ -94,7 +94,7 @@ def test_hair_that_is_not_selected_has_no_line(lit):
 
 
 def test_where_something_hides_the_hair_the_line_is_faint(bare):
-    """A wall in front of its left half; as opaque as elsewhere in X-ray views."""
+    """The outline is faint where a wall hides the hair, and opaque there in X-ray views."""
     line, _is_hair = outlined(bare, {0: 0})
     bpy.ops.mesh.primitive_cube_add(size=4.0, location=(-2.0, -5.0, 0.0), scale=(1.0, 0.01, 1.0))
     walled, _is_hair = outlined(read(), {0: 0})
@@ -110,7 +110,7 @@ def test_where_something_hides_the_hair_the_line_is_faint(bare):
 
 
 class Context:
-    """The present context with a viewport."""
+    """The present context, with a viewport."""
 
     def __init__(self, **overlay):
         overlay = {"show_overlays": True, "show_outline_selected": True} | overlay
@@ -139,7 +139,7 @@ def test_it_is_drawn_of_what_is_selected_where_the_viewport_outlines_it(lit):
 
 @pytest.fixture
 def region(lit):
-    """Stand-ins for a region and its view, with the place of the scene's camera."""
+    """Return stand-ins for a region and its view at the scene's camera."""
     view = SimpleNamespace(**dict(zip(("view_matrix", "window_matrix"), matrices(), strict=True)))
     yield SimpleNamespace(width=SIZE, height=SIZE, as_pointer=lambda: 2), view
     region_pictures.picture_cache.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair in the color types Attribute and Texture: in the colors of its surface at the roots."""
+"""With the color types Attribute and Texture, hair has the colors of its surface at the roots."""
 
 import bpy
 import numpy as np
@@ -18,13 +18,13 @@ def surface():
 
 
 def root_positions():
-    """(S, 3) positions of the strands' first points, in the surface's coordinates."""
+    """Return (S, 3) first points of strands, in the surface's coordinates."""
     strands = hair_cache.strands_on_gpu(bpy.data.objects["Hair"].data)
     return strands.points[:, 0]
 
 
 def color_attribute(domain, kind="FLOAT_COLOR"):
-    """Above the middle of the surface in one color, below in another."""
+    """Return a color attribute with one color above the middle of the surface and another below."""
     mesh = surface().data
     attribute = mesh.color_attributes.new("Color", kind, domain)
     vertices = (
@@ -38,7 +38,7 @@ def color_attribute(domain, kind="FLOAT_COLOR"):
 
 
 def image_material(size=(8, 8), extension="REPEAT"):
-    """A material whose active image is red to the right of the middle and blue to the left."""
+    """Return a material whose active image is red to the right of the middle and blue to the left."""
     image = bpy.data.images.new("Image", *size, float_buffer=True)
     pixels = np.ones((size[1], size[0], 4), np.float32)
     pixels[..., :3] = BELOW
@@ -75,7 +75,9 @@ def test_a_color_attribute_is_interpolated_at_roots(ball, domain, kind):  # noqa
 
 
 def test_an_image_is_looked_up_at_the_uv_of_roots(ball):  # noqa: F811
-    """Linear between texels, and of the closest texel with Closest."""
+    """Hair has an image's color at the UV coordinates of roots, interpolated linearly, or of the closest texel with
+    Closest.
+    """
     _image, _material, node = image_material()
     node.interpolation = "Closest"
     bpy.context.view_layer.update()
@@ -90,7 +92,9 @@ def test_an_image_is_looked_up_at_the_uv_of_roots(ball):  # noqa: F811
 
 
 def test_a_changed_node_is_followed_without_a_change_of_its_image(ball):  # noqa: F811
-    """Roots between texels get other colors when the interpolation of the node changes."""
+    """A changed interpolation of the image node changes the colors of roots between texels, although the image is
+    the same.
+    """
     _image, _material, node = image_material()
     colors = []
     for interpolation in ("Linear", "Closest", "Linear"):

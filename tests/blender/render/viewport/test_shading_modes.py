@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair in Blender's shading modes: as bright as surfaces in the same lights, separately for each viewport."""
+"""Hair is as bright as surfaces in the same lights in Blender's shading modes, separately for each viewport."""
 
 import math
 from dataclasses import replace
@@ -22,14 +22,16 @@ STUDIO_LIGHTS = ("Default", "basic.sl", "outdoor.sl", "paint.sl", "rim.sl", "stu
 
 
 def turned(angle):
-    """(3, 3): a rotation about Z."""
+    """Return the rotation (3, 3) about Z."""
     return np.array(
         [[math.cos(angle), -math.sin(angle), 0.0], [math.sin(angle), math.cos(angle), 0.0], [0.0, 0.0, 1.0]]
     )
 
 
 def facing(angle=0.0, is_above=False):
-    """(world to view, view to clip) of a parallel view of the ball, from the front, from beside it or from above."""
+    """Return (world to view, view to clip) of a parallel view of the ball, from the front, from the side or from
+    above.
+    """
     to_view = np.eye(4)
     if not is_above:
         to_view[:3, :3] = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) @ turned(-angle)
@@ -40,7 +42,7 @@ def facing(angle=0.0, is_above=False):
 
 @pytest.fixture
 def ball(hair, coarse_shadows):
-    """A ball of short, dense hair without lamps: the space in which it is shown."""
+    """Return the 3-D view of a ball of short, dense hair without lamps."""
     hair.data.vellus.hair.strand_count, hair.data.vellus.hair.radius = 1500, 0.016
     bpy.data.hair_curves["Guides"].vellus.guides.length = 0.25
     bpy.context.view_layer.update()
@@ -54,7 +56,7 @@ def solid(space, **settings):
 
 
 def read(space, camera, shown=None):
-    """(`DrawnScene`, `ViewportShading`) of the ball in a view."""
+    """Return (`DrawnScene`, `ViewportShading`) of the ball in a view."""
     context = bpy.context
     shown = shown or viewport_shading.read(space, context.scene, camera[0])
     depsgraph = context.evaluated_depsgraph_get()
@@ -62,7 +64,7 @@ def read(space, camera, shown=None):
 
 
 def picture_of(drawn, camera):
-    """(H, W, 4) light."""
+    """Return (H, W, 4) light."""
     picture = hair_picture.HairPicture((SIZE, SIZE), 1)
     for _ in range(2):
         picture.add_pass(drawn, *camera)
@@ -79,13 +81,13 @@ def mean_of(light):
 
 
 def albedo_of(drawn):
-    """(3,) of the ball: its radiance in even light."""
+    """Return the albedo (3,) of the ball: its radiance in even light."""
     even = viewport_shading.ViewportLight(viewport_shading.STUDIO, ambient=(1.0, 1.0, 1.0))
     return mean_of(picture_of(relit(drawn, even), facing()))
 
 
 def workbench_ball(light, albedo, samples=60):
-    """(3,) mean radiance of a ball that Workbench draws from the front, with its default roughness."""
+    """Return the (3,) mean radiance of a ball that Workbench draws from the front, with its default roughness."""
     x, z = np.meshgrid(*[np.linspace(-1.0, 1.0, samples)] * 2)
     inside = x**2 + z**2 < 1.0
     normal = np.stack([x, -np.sqrt(np.maximum(1.0 - x**2 - z**2, 0.0)), z], axis=-1)[inside]
@@ -152,7 +154,7 @@ def test_lights_that_are_edited_replace_the_studio_light():
 
 @pytest.mark.parametrize("wrap", [0.0, 0.3, 0.5, 0.8, 1.0])
 def test_a_lamp_has_the_light_and_the_mean_direction_that_wrapping_gives(wrap):
-    """A surface facing the lamp receives pi times its color, and the first moment of the wrapped cosine."""
+    """A surface that faces the lamp receives pi times its color, and the first moment of the wrapped cosine."""
     light = viewport_shading.StudioLight((0.0, 0.0, 1.0), (0.5, 0.5, 0.5), (0.25, 0.25, 0.25), wrap)
     (lamp,), ambient = studio_lights.lamps_of([light], has_highlights=True)
     cosine = np.linspace(-1.0, 1.0, 20_001)
@@ -168,7 +170,9 @@ def test_a_lamp_has_the_light_and_the_mean_direction_that_wrapping_gives(wrap):
 
 
 def test_an_hdri_may_follow_the_view():
-    """Its +Y is ahead and its +Z up on the screen, turned by its rotation; without a follow it stays in the world."""
+    """An HDRI may follow the view, with its +Y ahead and its +Z up on the screen after its rotation; otherwise it is
+    in the world.
+    """
     space, rotation = view3d(), 0.3
     space.shading.type, space.shading.studio_light, space.shading.studiolight_rotate_z = (
         "MATERIAL",
@@ -199,7 +203,7 @@ def test_an_hdri_may_follow_the_view():
 
 
 def test_workbench_as_render_engine_shows_the_settings_of_the_scene(scene):
-    """Light, color and X-ray are those of the scene, with all of its color management."""
+    """With Workbench as render engine, light, color, X-ray and color management are those of the scene."""
     space = view3d()
     scene.render.engine, space.shading.type = "BLENDER_WORKBENCH", "RENDERED"
     settings = scene.display.shading
@@ -238,7 +242,7 @@ def test_hair_is_about_as_bright_as_a_ball_that_workbench_draws(ball):
 
 
 def matcap_ball(layers, albedo):
-    """(3,) mean of a ball that Workbench draws by the (H, W, 3) layers of a matcap."""
+    """Return the (3,) mean of a ball that Workbench draws by the (H, W, 3) layers of a matcap."""
     diffuse, specular = layers["diffuse"], layers["specular"]
     x, y = np.meshgrid(*[np.linspace(-1.0, 1.0, 100)] * 2)
     inside = x**2 + y**2 < 1.0
@@ -249,7 +253,9 @@ def matcap_ball(layers, albedo):
 
 
 def test_matcaps_and_flat_shading_are_about_as_bright_as_on_a_ball(ball):
-    """Every third of the matcaps, and those that are bright at the rim or in stripes."""
+    """Hair by MatCap and Flat is about as bright as a ball, for every third matcap and those with bright rims or
+    stripes.
+    """
     camera = facing()
     solid(ball, light="FLAT")
     drawn, _shown = read(ball, camera)
@@ -271,7 +277,9 @@ def test_matcaps_and_flat_shading_are_about_as_bright_as_on_a_ball(ball):
 
 
 def test_matcaps_are_seen_from_the_viewer(ball):
-    """The normal's directions on the screen are those of the image: red to the right, green up."""
+    """Matcaps follow the viewer: the normal's directions on the screen are those of the image, red right and green
+    up.
+    """
     camera = facing()
     solid(ball, light="MATCAP", studio_light="check_normal+y.exr")
     light = picture_of(read(ball, camera)[0], camera)
@@ -373,7 +381,7 @@ def test_hair_darkens_the_surface_that_it_grows_on(ball, light):
 
 
 def test_hair_turns_with_its_lights(ball, fine_world):
-    """The bright side of the ball, from above."""
+    """The bright side of the ball turns with its lights, seen from above."""
     camera = facing(is_above=True)
     solid(ball, light="STUDIO", studio_light="studio.sl", use_world_space_lighting=True)
     drawn, _shown = read(ball, camera)
@@ -391,7 +399,7 @@ def test_hair_turns_with_its_lights(ball, fine_world):
 
 
 def test_viewports_of_other_shading_leave_each_other_alone(ball, monkeypatch):
-    """Redraws without a change read nothing and draw no map, in any order; regions of a quad view have own lights."""
+    """Viewports of different shading do not affect each other: redraws read nothing and draw no map, in any order."""
     other = next(
         a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D" and a.spaces.active != ball
     )
@@ -439,7 +447,7 @@ def test_viewports_of_other_shading_leave_each_other_alone(ball, monkeypatch):
 
 
 def test_white_hair_is_lit_by_lights_without_a_size(ball):
-    """Light from a point that white hair sends back may have no spread left, which was divided by."""
+    """White hair is lit by lights without a size, from a point whose reflected light has no spread to divide by."""
     bpy.data.objects["Hair"].data.vellus.appearance.melanin = 0.0
     camera = facing()
     solid(ball, light="STUDIO")
@@ -483,7 +491,7 @@ def test_the_scene_lights_hair_as_far_as_the_viewport_asks(ball, kind):
 
 
 def test_an_hdri_that_follows_the_view_lights_the_same_side_of_the_screen(ball):
-    """The ball's light side on the screen, from the front and from beside it; in a fixed one it is another."""
+    """An HDRI that follows the view lights the same side of the screen from all views; a fixed HDRI does not."""
     ball.shading.type, ball.shading.studio_light = "MATERIAL", "sunset.exr"
     sides, drawn = {}, None
     for is_fixed in (True, False):
@@ -500,7 +508,7 @@ def test_an_hdri_that_follows_the_view_lights_the_same_side_of_the_screen(ball):
 
 
 def total_of(drawn):
-    """Irradiance of a small ball from all sides."""
+    """Return the irradiance of a small ball from all sides."""
     record = drawn.lights
     return record["light"]["power"][: record["count"], :3].sum(axis=0) + 4 * np.pi * record["world"][:, :3].mean(axis=0)
 

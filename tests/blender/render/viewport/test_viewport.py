@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair in viewports: the scene's color management, brightness of thin strands, and no unnecessary work."""
+"""Hair in viewports has the scene's color management, thin strands keep their brightness, and no work is
+unnecessary.
+"""
 
 import re
 import shutil
@@ -34,7 +36,7 @@ SIZE = 96
 
 @pytest.fixture
 def colors(rng):
-    """(20000, 3) scene-linear float32, from deep shadow to glints, gray to saturated."""
+    """Return (20000, 3) scene-linear float32, from deep shadow to glints and from gray to saturated."""
     return (2.0 ** rng.uniform(-9.0, 5.0, (20_000, 1)) * rng.random((20_000, 3)) ** 2).astype(np.float32)
 
 
@@ -99,7 +101,7 @@ def test_without_opencolorio_colours_are_the_standard_view(blender_scene, colors
 
 
 def test_hair_is_laid_over_a_viewport_in_its_colours(lit):
-    """Over white: shown is the mix of white and the light's display color, to the power that Blender undoes."""
+    """Hair over white shows the mix of white and the light's display color, to the power that Blender undoes."""
     picture = pictured(lit, 2, per_side=2)
     transform = display_transform.DisplayTransform.of(bpy.context.scene)
     table = hair_picture.table_texture(transform.table())
@@ -121,7 +123,7 @@ def test_hair_is_laid_over_a_viewport_in_its_colours(lit):
 
 
 def sample_offsets(columns, middles, turn):
-    """Offsets of the samples beside axes of strands; arguments of one shape, but for the pass."""
+    """Return the offsets of samples beside axes of strands; arguments of one shape, except the pass."""
     columns, middles = np.broadcast_arrays(columns, middles)
     text = glsl.source("visibility/coverage.glsl")
     x, y = columns.ravel().astype(np.int32), middles.ravel()
@@ -131,7 +133,9 @@ def sample_offsets(columns, middles, turn):
 
 @pytest.mark.parametrize("width", [0.03, 0.25, 0.7])
 def test_samples_hit_just_the_part_that_a_thin_strand_covers(width):
-    """Along lines of any slope, in one pass; along sixteen samples about as evenly as by chance."""
+    """Samples hit the part that a thin strand covers, at any slope, and with sixteen samples about as evenly as by
+    chance.
+    """
     columns, squares = np.arange(48), []
     for slope in (-1.0, -0.6, -0.25, 0.0, 0.15, 0.31, 0.75, 1.0):
         lines = 32.0 + slope * (columns - 23.5) + np.arange(-7.0, 7.0, 0.37)[:, None]
@@ -159,14 +163,14 @@ def pictured(hair, passes, per_side, size=SIZE):
 
 
 def sparkles(light):
-    """How many pixels are half as bright again as the brightest of their eight neighbors."""
+    """Return how many pixels are 1.5 times as bright as the brightest of their eight neighbors."""
     luminance = light[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
     around = [np.roll(luminance, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y]
     return np.count_nonzero((luminance > 1.5 * np.max(around, axis=0)) & (luminance > 0.1 * luminance.max()))
 
 
 def test_thin_hair_keeps_its_brightness_and_does_not_sparkle(thin):
-    """The first pass, and what becomes of it, against many samples: in a picture large enough that chance is small."""
+    """Thin hair has the brightness of many samples in the first pass and later, and does not sparkle."""
     size = 2 * SIZE
     reference = pictured(thin, 16, 2, size).read()
     for per_side in (1, 2):
@@ -178,7 +182,7 @@ def test_thin_hair_keeps_its_brightness_and_does_not_sparkle(thin):
 
 
 def test_surfaces_hide_hair_in_every_sample(lit):
-    """The half of the strands that is behind the sphere shows only where surfaces are seen through."""
+    """Surfaces hide hair in every sample: the half of the strands behind the sphere shows only in X-ray views."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
     bare = replace(drawn, surfaces=[], surface_owners=())
@@ -193,7 +197,9 @@ def test_surfaces_hide_hair_in_every_sample(lit):
 
 
 def test_a_viewport_s_surfaces_are_darkened_by_what_hair_stops(lit, fine_shadows, tmp_path):
-    """Black over them, with the rest of the pass Hair Shadow as alpha; hair itself is as without, and nearest too."""
+    """Hair darkens the viewport's surfaces by the rest of the pass Hair Shadow as alpha of black; hair itself is
+    unchanged.
+    """
     bpy.ops.mesh.primitive_plane_add(size=12.0, location=(0.0, 0.0, -1.6))
     camera = bpy.context.scene.camera
     camera.location, camera.rotation_euler = (0.0, -7.0, 4.0), (1.1, 0.0, 0.0)
@@ -225,7 +231,7 @@ def test_a_viewport_s_surfaces_are_darkened_by_what_hair_stops(lit, fine_shadows
 
 @pytest.fixture
 def region(lit):
-    """Stand-ins for a region and its view, with the place of the scene's camera."""
+    """Return stand-ins for a region and its view at the scene's camera."""
     matrices = scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), SIZE, SIZE)
     names = ("view_matrix", "window_matrix")
     view = SimpleNamespace(**dict(zip(names, matrices, strict=True)))

@@ -16,7 +16,7 @@ SIZE = (320, 240)
 
 @pytest.fixture
 def locks(lit):
-    """Locks of strands that are thinner than a pixel, and hide each other."""
+    """Return locks of strands that are thinner than a pixel and hide each other."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.002
     api.set_styles(lit.data, [api.Clump(size=0.15, amount=1.0)])
@@ -25,7 +25,9 @@ def locks(lit):
 
 
 def seen_from(distances):
-    """(world to view, view to clip) of a camera without perspective; hair is as small as from so many distances."""
+    """Return (world to view, view to clip) of an orthographic camera that shows hair as small as from a multiple of
+    the distance.
+    """
     camera = bpy.context.scene.camera
     camera.data.type, camera.data.ortho_scale = "ORTHO", 4.0 * distances
     bpy.context.view_layer.update()
@@ -33,12 +35,12 @@ def seen_from(distances):
 
 
 def summed(light):
-    """Red, green, blue and coverage of all pixels."""
+    """Return red, green, blue and coverage, summed over all pixels."""
     return light.sum(axis=(0, 1))
 
 
 def fine(picture, drawn, camera):
-    """Sums of all passes of a picture, and of its first one: the mean of sixteen, as one is a matter of chance."""
+    """Return the sums of all passes of a picture, and of the first pass as the mean of sixteen random ones."""
     picture.restart()
     firsts = []
     for _ in range(16):
@@ -52,7 +54,9 @@ def fine(picture, drawn, camera):
 
 @even_guides
 def test_small_hair_is_as_bright_and_covers_as_much(locks):
-    """The law holds near and far, in the first and the last pass, with one sample per pixel."""
+    """Small hair is as bright and covers as much as near hair, in the first and in the last pass, with one sample
+    per pixel.
+    """
     picture, near = hair_picture.HairPicture(SIZE, 1), None
     for distances in (1.0, 7.5):
         last, first = fine(picture, locks, seen_from(distances))
@@ -62,7 +66,9 @@ def test_small_hair_is_as_bright_and_covers_as_much(locks):
 
 
 def test_a_finer_part_of_a_picture_shows_what_the_whole_does(locks, monkeypatch):
-    """The part also shows the same hair system at each pixel, and nothing beside it."""
+    """A finer part of a picture shows the same hair system at each pixel as the whole picture, and nothing beside
+    it.
+    """
     camera = seen_from(5.0)
     finer = hair_picture.HairPicture(SIZE, 1)
     fine(finer, locks, camera)
