@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fixtures that every suite shares."""
+"""Fixtures of all tests."""
 
 import atexit
 import gc
@@ -20,7 +20,8 @@ LONG_FILES = {
 
 
 def pytest_configure():
-    """Load the kernels that `make build` has compiled of these sources, if it has, instead of compiling them again.
+    """Load the kernels that `make build` has compiled from these sources, if there are any, also in processes of
+    tests.
 
     So do the processes that tests start.
     """
@@ -32,10 +33,9 @@ def pytest_configure():
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():
-    """Collect tests without looking for garbage meanwhile, of which there is little; nor later in all that it makes.
+    """Collect tests without garbage collection, which would visit a million objects a dozen times.
 
-    A million objects, through which Python would look a dozen times, and pytest five times at its end. At the end they
-    are released: a Blender in which tests ran would say that it was not freed.
+    The objects are frozen, and released at the end, as Blender would otherwise report that it was not freed.
     """
     gc.disable()
     try:
@@ -56,10 +56,10 @@ class Backwards(pytest.Dir):
 
 @pytest.hookimpl
 def pytest_collect_directory(path, parent):
-    """Let every other process collect files backwards.
+    """Let every second process collect files in reverse order.
 
-    Pytest rewrites the assertions of a file that has changed and writes the result for other processes: so each of two
-    processes rewrites half of the files, in place of all.
+    Pytest rewrites the assertions of changed files and stores the result for other processes, so each of two processes
+    rewrites half of the files.
     """
     if int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % 2:
         return Backwards.from_parent(parent, path=path)
@@ -68,17 +68,17 @@ def pytest_collect_directory(path, parent):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Begin with the files that take longest; the order is the same in all processes."""
+    """Run the files that take longest first, in the same order in all processes."""
     items.sort(key=lambda item: (item.path.name not in LONG_FILES, item.path))
 
 
 @pytest.fixture
 def rng():
-    """A fresh generator of known random numbers."""
+    """Return a new generator with a fixed seed."""
     return np.random.Generator(np.random.PCG64(20260101))
 
 
 @pytest.fixture
 def device():
-    """The Warp device that the tests compute on."""
+    """Return the Warp device of the tests."""
     return DEVICE

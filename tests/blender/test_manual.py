@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""F1 and *Online Manual*: every property and operator leads to an existing heading of the manual."""
+"""F1 and *Online Manual* lead from every property and operator to an existing heading of the manual."""
 
 import re
 import urllib.parse
@@ -21,7 +21,7 @@ PAGES = sorted(manual_pages.SOURCE.glob("*.md"))
 
 
 def documented():
-    """{doc_id: label} as Blender names what is under the mouse pointer: of all that an artist sees of ours."""
+    """Return {doc_id: label} of everything of the add-on that Blender finds under the mouse pointer."""
     found = {}
     for cls in interface_strings.blender.CLASSES:
         entries = [e for e in interface_strings.properties_of(cls) if not e.is_hidden and e.name != e.identifier]
@@ -46,7 +46,7 @@ def headings(page):
 
 
 def heading_at(found):
-    """The heading that an address leads to, None where there is none."""
+    """Return the heading that an address leads to, or None."""
     file, _, fragment = (found or "").partition("#")
     page = Path(urllib.parse.unquote(urllib.parse.urlsplit(file).path))
     if page.suffix != ".md" or not page.is_file():
@@ -55,7 +55,7 @@ def heading_at(found):
 
 
 def test_every_property_and_operator_leads_to_its_heading():
-    """A property that has none must get its page in blender/manual.py, and its heading there."""
+    """Every property and operator leads to its heading by a line in blender/manual.py."""
     wanted = documented()
     assert len(wanted) > 100
     assert {doc_id: heading_at(address(doc_id)) for doc_id in wanted} == wanted
@@ -111,7 +111,7 @@ def test_the_installed_pages_have_the_same_anchors_and_their_links_lead_somewher
 
 
 def test_every_picture_has_one_script_that_draws_it():
-    """A picture that no script of `make pictures` draws would show an earlier version forever."""
+    """Every picture has one script of `make pictures` that draws it, so that no picture shows an earlier version."""
     docs = manual_pages.SOURCE.parent
     drawn = {name: tuple(found.values()) for name, found in all_pictures.COPIED.items()} | all_pictures.OTHERS
     drawn["elsewhere"] = all_pictures.ELSEWHERE

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""cards and tubes: hair of a .blend as meshes in files; errors are one message."""
+"""`cards` and `tubes` write hair of a .blend as meshes in files; errors are one message."""
 
 import json
 import struct
@@ -43,7 +43,7 @@ def test_textures_lie_beside_files_that_have_none(shot):
 
 
 def test_relative_paths_lead_to_all_levels_and_their_textures(shot, monkeypatch):
-    """Paths relative to the .blend work: USD names textures relative to its own folder."""
+    """Paths relative to the .blend lead to all levels and textures; USD names textures relative to its own folder."""
     bpy.utils.expose_bundled_modules()
     from pxr import Usd, UsdGeom, UsdShade
 

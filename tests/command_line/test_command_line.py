@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: input and output files, results as text or JSON, one message per error."""
+"""The command line has input and output files, results as text or JSON, and one message per error."""
 
 import itertools
 import json
@@ -32,7 +32,7 @@ def mesh(tmp_path):
 
 @pytest.fixture
 def shot(lit, tmp_path):
-    """A .blend with hair that turns, a camera and a light; frames 1 to 3, pictures of 40 × 30."""
+    """Return a .blend with hair that turns, a camera and a light; frames 1 to 3, pictures of 40 × 30."""
     scene, sphere = bpy.context.scene, bpy.data.objects["Sphere"]
     for frame, angle in ((1, 0.0), (3, 1.0)):
         sphere.rotation_euler = (0.0, angle, angle)
@@ -46,7 +46,7 @@ def shot(lit, tmp_path):
 
 
 def picture(path):
-    """(height, width, 4)."""
+    """Return (height, width, 4)."""
     image = bpy.data.images.load(str(path))
     width, height = image.size
     pixels = np.array(image.pixels[:]).reshape(height, width, 4)
@@ -72,7 +72,7 @@ def test_a_head_is_groomed_into_arrays(tmp_path):
 
 
 def grown(path):
-    """The `GroomSettings` of the hair in a .blend, and the points of guides and of hair."""
+    """Return the `GroomSettings` of the hair in a .blend, and the points of guides and of hair."""
     bpy.ops.wm.open_mainfile(filepath=str(path))
     guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
     return api.settings_of(hair), api.points(guides), api.points(hair)
@@ -115,7 +115,7 @@ def test_options_come_before_the_file_of_settings(scene, mesh, tmp_path):
 
 
 def test_existing_objects_of_a_file_are_kept(lit, tmp_path):
-    """A .blend keeps all that it held, beside new hair, and finds what it names by a path relative to itself."""
+    """Existing objects of a .blend are kept beside new hair, and a path relative to it finds what it names."""
     (tmp_path / "from").mkdir()
     picture_path = tmp_path / "from" / "dots.png"
     image = bpy.data.images.new("dots", 2, 2)
@@ -388,7 +388,7 @@ def test_every_verb_explains_itself(capsys):
 
 
 def test_json_output_contains_only_results(mesh, tmp_path):
-    """Importers, exporters and Warp print on standard output as they like."""
+    """JSON output contains only results, whatever importers, exporters and Warp print on standard output."""
     groom = ("groom", mesh, *SMALL, "--out", tmp_path / "a.usdc", "--json")
     ended = run(*groom)
     assert (ended.status, ended.errors) == (0, "")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dynamics on the command line: one option for all settings, without conflicts with other options."""
+"""One option of the command line has all settings of dynamics, without conflicts with other options."""
 
 import argparse
 import json
@@ -19,7 +19,7 @@ from tests.support.commands import run_here
 
 
 def dynamics_of(*options):
-    """The section that `settings` prints."""
+    """Return the section of dynamics that `settings` prints."""
     ended = run_here("settings", *options)
     assert ended.status == 0
     return json.loads(ended.out)["dynamics"]
@@ -35,7 +35,7 @@ def test_the_last_word_counts_after_the_preset_and_the_file(tmp_path):
 
 
 def test_settings_that_share_a_name_are_apart():
-    """Gravity, wetness and size are of guides, of the look and of tables too."""
+    """Gravity, wetness and size of guides, look and tables are separate settings with one name."""
     alone = dynamics_of("--gravity", 0.25, "--size", 32, "--wetness", 0.5)
     assert alone == asdict(DynamicsSettings())
     ended = run_here("settings", "--gravity", 0.25, "--dynamics", "gravity=0.5,wetness=1,sag-free=no,vertex_count=12")

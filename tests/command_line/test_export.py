@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""export: hair of a .blend in files for other programs; errors are one message."""
+"""`export` writes hair of a .blend to files for other programs; errors are one message."""
 
 import bpy
 import pytest
@@ -10,7 +10,7 @@ from tests.support.exchange import alembic_reader
 
 @pytest.fixture
 def shot(hair, tmp_path):
-    """A .blend with two kinds of hair on a sphere."""
+    """Return a .blend with two kinds of hair on a sphere."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
     bpy.ops.vellus.add_hair(guide_count=10, strand_count=30, length=0.2)
     bpy.context.object.data.name = "Fluff"
@@ -21,7 +21,7 @@ def shot(hair, tmp_path):
 
 
 def exported(path):
-    """Names of the objects with curves."""
+    """Return the names of the objects with curves."""
     return {p.rpartition("/")[2] for p in alembic_reader.objects(alembic_reader.read(path)) if p.endswith("Shape")}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The job type for Flamenco: its refusals, its tasks, and the frames of their commands."""
+"""The job type for Flamenco refuses invalid settings, and its tasks have commands that render the right frames."""
 
 import argparse
 import shutil
@@ -26,17 +26,17 @@ NAMES += ["f#.exr/", "f#.exr/.", "a#/f.exr", "f\\#.exr", "{a}#.exr"]
 
 
 def submitted(**settings):
-    """The job that the manager makes of settings, or what it refuses them with."""
+    """Return the job that the manager makes of settings, or its message of refusal."""
     return compiled(SETTINGS | settings)[0]
 
 
 def sentence_of(job):
-    """Return the message that refuses a job, None for one that is accepted."""
+    """Return the message that refuses a job, None for an accepted one."""
     return None if job["status"] == 200 else job["message"].rpartition(" at refuse")[0]
 
 
 def words_of(job):
-    """{name of a task: the words of each of its commands, after `blender --command vellus`}."""
+    """Return {name of a task: the words of each of its commands, after `blender --command vellus`}."""
     tasks = {}
     for task in job["tasks"]:
         assert task["type"] == "blender"
@@ -48,12 +48,12 @@ def words_of(job):
 
 
 def frames_of(commands):
-    """The frames that some commands render, as their own parser reads them."""
+    """Return the frames that commands render, by the parser of the commands."""
     return [number for words in commands for number in parsed(words).frames]
 
 
 def parsed(words):
-    """The options of a command of a task."""
+    """Return the options of a command of a task."""
     return PARSER.parse_args(words)
 
 
@@ -150,7 +150,7 @@ def test_scripts_run_where_they_are_enabled():
 
 
 def test_the_add_on_of_blender_evaluates_the_pattern(tmp_path):
-    """Blender evaluates the pattern with Python's eval and these names, as for a setting that is not editable."""
+    """Blender's add-on evaluates the pattern as a setting that is not editable, by Python's eval with these names."""
     settings = {setting["key"]: setting for setting in submitted()["type"]["settings"]}
     assert all(
         setting["type"] in {"string", "int32", "bool"} and setting["description"] for setting in settings.values()
@@ -167,7 +167,7 @@ def test_the_add_on_of_blender_evaluates_the_pattern(tmp_path):
 
 
 def made_by(job):
-    """The frames that a job's commands render, in this process, command by command."""
+    """Run a job's commands in this process one after another, and return the frames that they render."""
     made = []
     for words in [words for task in words_of(job).values() for words in task]:
         ended = run_here(*words, "--json")

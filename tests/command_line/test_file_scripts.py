@@ -15,7 +15,7 @@ VERBS = {
 
 @pytest.fixture
 def stranger(lit, tmp_path):
-    """A .blend with a script that registers itself and a driver, each of which writes a file beside it."""
+    """Return a .blend with a script that registers itself and with a driver, each of which writes a file beside it."""
     script = bpy.data.texts.new("script.py")
     script.use_module = True
     script.write(f"open({str(tmp_path / 'from_script')!r}, 'w').close()\n")
@@ -35,7 +35,7 @@ def written(folder):
 
 @pytest.mark.parametrize(("verb", "run"), [*((verb, run_here) for verb in VERBS), ("info", run)])
 def test_nothing_of_its_own_runs(stranger, tmp_path, verb, run):
-    """No scripts run in a separate process, in which no test has set a permission."""
+    """No script or driver of a file runs in a separate process, where no test has given permission."""
     ended = run(*VERBS[verb](stranger, tmp_path))
     assert ended.status == 0, ended.errors
     assert written(tmp_path) == set()
@@ -44,7 +44,7 @@ def test_nothing_of_its_own_runs(stranger, tmp_path, verb, run):
 
 
 def test_all_of_it_runs_when_the_user_asks(stranger, tmp_path):
-    """All scripts run in a new process; Blender remembers in a process whether scripts were allowed."""
+    """All scripts and drivers run in a new process if the user allows it, which Blender remembers per process."""
     ended = run(*VERBS["groom"](stranger, tmp_path), "--enable-scripts")
     assert (ended.status, ended.errors) == (0, "")
     assert written(tmp_path) == {"from_script", "from_driver"}

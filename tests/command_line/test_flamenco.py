@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The job type in a real Flamenco, whose programs are in the folder VELLUS_FLAMENCO: a manager and two workers."""
+"""The job type works in a real Flamenco, in the folder VELLUS_FLAMENCO, with a manager and two workers."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ JOBS = [
 
 @pytest.fixture(scope="module")
 def manager(tmp_path_factory):
-    """A manager that workers of this module sign on to."""
+    """Return a manager for the workers of this module."""
     folder = tmp_path_factory.mktemp("manager")
     with flamenco.manager(folder, farm.write_blender(folder)) as asked:
         yield asked
@@ -96,12 +96,12 @@ def requeue_goes_on(manager, job):
 
 
 def folder_of(job):
-    """The folder of a job's images."""
+    """Return the folder of a job's images."""
     return Path(job["settings"]["pattern"]).parent
 
 
 def found_in_mid_frame(home):
-    """(process, picture) of a render of a worker, stopped while it is at a frame."""
+    """Return (process, picture) of a worker's render, stopped during a frame."""
     for process in farm.processes_with("FLAMENCO_HOME", home):
         if "render" in farm.arguments_of(process) and (frame := farm.stopped_in_mid_frame(process)):
             return process, frame

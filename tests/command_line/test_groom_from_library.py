@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: a saved groom on a mesh of a file."""
+"""The command line puts a saved groom on a mesh of a file."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,9 @@ from tests.support.commands import load, run_here, write_obj
 
 @pytest.fixture
 def groom(guides, tmp_path):
-    """(the file of a saved groom of 60 guides and 80 strands, an .obj of its surface twice as large, the guides)."""
+    """Return (the file of a saved groom of 60 guides and 80 strands, an .obj of its surface twice as large, the
+    guides).
+    """
     hair = api.interpolate_hair(guides, strand_count=80)
     picture = np.ones((8, 8, 4), np.float32)
     path = api.save_groom(hair, tmp_path, name="Bob", catalog="", picture=picture)

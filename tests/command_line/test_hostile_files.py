@@ -18,7 +18,7 @@ SMALL = ("--guides", 5, "--strands", 20)
 
 @pytest.fixture
 def mesh(scene, tmp_path):
-    """A function that makes a file with the tetrahedron of any kind, of one object or of several."""
+    """Return a function that writes the tetrahedron in a file of any kind, as one object or several."""
 
     def make(name, count=1):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -46,7 +46,7 @@ def mesh(scene, tmp_path):
 
 
 def refuse(path, reported, *options, verb="groom"):
-    """A command must refuse a file in one sentence, and leave nothing."""
+    """Check that a command refuses a file in one sentence and leaves nothing behind."""
     folder = path.parent
     before = {p: p.read_bytes() for p in folder.iterdir() if p.is_file()}
     words = (verb, path, *SMALL, "--out", folder / "out.npz") if verb == "groom" else (verb, path)
@@ -73,7 +73,7 @@ ENDINGS = [".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".usdc", ".usda", 
 
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_a_whole_file_is_read(mesh, ending):
-    """Undamaged files are read; otherwise the refusals below would prove nothing."""
+    """Undamaged files are read, so that the refusals of damaged files prove something."""
     path = mesh(f"whole{ending}")
     assert run_here("groom", path, *SMALL, "--out", path.parent / "out.npz").status == 0
 
@@ -161,7 +161,7 @@ def test_damaged_files_of_vellus_are_refused(tmp_path, name, content):
 
 
 def test_an_array_is_told_of_without_being_read(tmp_path):
-    """A header may claim anything."""
+    """An array whose header claims an excessive size is reported without being read."""
     np.savez(tmp_path / "a.npz", roots=np.zeros((7, 3), np.float32))
     ended = run_here("info", tmp_path / "a.npz", "--json")
     assert ended.results[0]["arrays"] == {"roots": {"shape": [7, 3], "type": "float32", "bytes": 84}}
@@ -187,7 +187,7 @@ LIMITS = {".json": 500, ".png": 8_000, "Cycles": 8_000, "tables": 4_000}
 
 @pytest.fixture
 def words(lit, tmp_path_factory):
-    """A function that gives the words of a command with an output of each kind."""
+    """Return a function that gives the arguments of a command with an output of each kind."""
     shot = tmp_path_factory.mktemp("shot") / "shot.blend"
     bpy.context.scene.cycles.samples = 1
     bpy.ops.wm.save_as_mainfile(filepath=str(shot))
@@ -208,7 +208,9 @@ SLOW = pytest.mark.long  # of formats that go the way of another one
     "kind", [pytest.param(kind, marks=SLOW if kind in {".usda", ".usdz"} else ()) for kind in OUTPUTS]
 )
 def test_a_full_disk_leaves_nothing_half_written(words, tmp_path, monkeypatch, kind):
-    """A limit on the size of files stands for it: both end a write in the middle."""
+    """A full disk leaves no incomplete file; a limit on the size of files, which also ends writing halfway, stands
+    in for it.
+    """
     monkeypatch.chdir(tmp_path)
     options = words(kind)
     with largest_file(LIMITS.get(kind, 60_000)):
@@ -227,7 +229,7 @@ needs_mounts = pytest.mark.skipif(not CAN_MOUNT, reason="only root may mount")
 
 
 def run_mounted(mounting, words, folder):
-    """Run a command that alone sees what is mounted."""
+    """Run a command in a mount namespace of its own."""
     script = f'{mounting}; cd "$0"; "$@"; status=$?; ls -A "$0" > "$0.left"; exit $status'
     environment = os.environ | {"PYTHONPATH": PYTHONPATH}
     words = ["unshare", "--mount", "sh", "-c", script, str(folder), *command(*words)]

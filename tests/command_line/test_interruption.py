@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ctrl-C and SIGTERM during work: one message, a status of its own, and only complete files."""
+"""Ctrl-C and SIGTERM during work end it with one message, its own exit status, and only complete files."""
 
 import os
 import pty
@@ -21,21 +21,21 @@ ENVIRONMENT = os.environ | {"PYTHONPATH": PYTHONPATH}
 
 
 class Terminal:
-    """A terminal that a command's standard error goes to."""
+    """A terminal for a command's standard error."""
 
     def __init__(self):
         self.reading, self.writing = pty.openpty()
         self.reported = ""
 
     def wait_for(self, words, seconds=60.0):
-        """Read until some words were printed."""
+        """Read until given words were printed."""
         end = time.monotonic() + seconds
         while words not in self.reported:
             assert time.monotonic() < end, self.reported
             self.reported += os.read(self.reading, 4096).decode()
 
     def rest(self):
-        """Return all that was printed, once the command has ended."""
+        """Return everything printed, once the command has ended."""
         os.close(self.writing)
         try:
             while part := os.read(self.reading, 4096).decode():
@@ -47,13 +47,13 @@ class Terminal:
 
 
 class AtWords:
-    """A stream that calls a function once some words are written."""
+    """A stream that calls a function when given words are written."""
 
     def __init__(self, stream, words, call):
         self._stream, self._words, self._call = stream, words, call
 
     def write(self, text):
-        """Write, then call."""
+        """Write the text, then call the function."""
         written = self._stream.write(text)
         if self._words in text and self._call:
             call, self._call = self._call, None
@@ -69,12 +69,12 @@ STOPPED = "vellus: stopped: unfinished results were not written.\r\n"
 
 
 def left_on(terminal):
-    """What remains to be read on a terminal when the command has ended."""
+    """Return the unread output on a terminal after the command has ended."""
     return terminal.rest().rpartition("\r\x1b[K")[2]
 
 
 def test_long_work_ends_at_its_next_step(tmp_path):
-    """Ctrl-C ends the process with a status of its own, and with one sentence on the terminal."""
+    """Ctrl-C ends long work at its next step, with exit status and one sentence on the terminal."""
     terminal, out = Terminal(), tmp_path / "new" / "out.npz"
     process = subprocess.Popen(
         command(*LONG, "--out", out), stdout=subprocess.PIPE, stderr=terminal.writing, env=ENVIRONMENT, cwd=tmp_path
@@ -88,7 +88,7 @@ def test_long_work_ends_at_its_next_step(tmp_path):
 
 
 def test_a_request_to_end_has_a_status_of_its_own(tmp_path):
-    """SIGTERM ends work as Ctrl-C does, with status 143; here in the process of the tests."""
+    """SIGTERM ends work as Ctrl-C does, with status 143; the test runs the command in its own process."""
     terminal = Terminal()
     with open(terminal.writing, "w", closefd=False) as writing:
         asking = AtWords(writing, "Spreading guides: ", lambda: signal.raise_signal(signal.SIGTERM))
@@ -123,7 +123,7 @@ def test_frames_of_a_killed_worker_are_rendered_by_the_other(lit, tmp_path, monk
         return processes[-1]
 
     def told(values):
-        """Kill the worker when the first frame is there: in the middle of another frame, or before it has one."""
+        """Kill the worker when the first frame is there, and return its output."""
         processes[0].kill()
         return sentence_of(values)
 
@@ -156,7 +156,7 @@ def test_a_second_ctrl_c_does_not_wait():
 
 
 def test_a_progress_callback_can_stop_a_script(sphere):
-    """A stopped function of the API leaves nothing in the scene."""
+    """A progress callback can stop a function of the API, which then leaves nothing in the scene."""
 
     def stop(_step, part):
         if part > 0.3:

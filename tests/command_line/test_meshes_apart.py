@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes imported by a separate process: the same scene, and one message if that process crashes."""
+"""A separate process imports meshes with the same resulting scene, and a crash of it is one message."""
 
 import signal
 import sys
@@ -19,7 +19,7 @@ GROOM = ("--guides", 5, "--strands", 20, "--out")
 
 @pytest.fixture
 def files(scene, tmp_path):
-    """Paths of a sphere, moved and painted, in a file of each kind."""
+    """Return paths of a moved and painted sphere, in a file of each kind."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=0.1, location=(0.3, 0.2, 0.1), rotation=(0.4, 0, 0))
     sphere = bpy.context.object
@@ -78,7 +78,7 @@ def test_an_importer_that_ends_its_process_is_one_sentence(files, tmp_path, monk
 
 
 def test_curves_are_tried_apart(files, tmp_path, monkeypatch):
-    """A damaged file may keep USD's reader for ever."""
+    """Curves are first read in a separate process, as a damaged file may keep USD's reader busy forever."""
     script = "import time; time.sleep(600)"
     monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", script])
     monkeypatch.setattr(import_mesh, "_PATIENCE", 0.2)
@@ -97,7 +97,7 @@ def test_messages_of_the_other_process_are_reported(files):
 
 
 def test_faces_of_vertices_that_are_not_there_are_refused(scene):
-    """Importers make such faces of some damaged files."""
+    """Faces with missing vertices, which importers create from some damaged files, are refused."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
     mesh_checks.require_imported("a.abc")
     for corner, vertex in ((3, 42), (5, -1)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames with missing libraries, images or caches are refused with a message, and form another sequence."""
+"""Frames with missing libraries, images or caches are refused with a message, or form another sequence if allowed."""
 
 import os
 import subprocess
@@ -19,7 +19,7 @@ SKY, OTHER_SKY = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)
 
 
 def write_image(path, color=SKY):
-    """A small .exr of one color."""
+    """Write a small .exr of one color."""
     path.parent.mkdir(exist_ok=True)
     image = bpy.data.images.new("made", 8, 4, float_buffer=True)
     image.generated_color, image.filepath_raw, image.file_format = color, str(path), "OPEN_EXR"
@@ -42,7 +42,7 @@ def image_node(tree, image, kind="ShaderNodeTexImage"):
 
 @pytest.fixture
 def sky(lit):
-    """A scene whose world has an image, which is not there; the node of it."""
+    """Return the node of a world's missing image."""
     world = bpy.data.worlds.new("World")
     bpy.context.scene.world = world
     node = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
@@ -109,7 +109,7 @@ def test_scripts_and_the_engine_refuse_too(sky, tmp_path):
 
 
 def test_only_what_a_render_reads_is_asked_for(sky, tmp_path):
-    """No image that nobody uses, that is packed or generated, that leads nowhere, or that only viewports show."""
+    """Only what a render reads is required: no unused, packed or generated image, and none that only viewports show."""
     tree, gone = bpy.context.scene.world.node_tree, tmp_path / "gone.png"
     new_image(gone).use_fake_user = True
     image_node(tree, new_image(gone))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The steps of docs/farm for Open Job Description [OpenJobDescription23]: the template is run by its own command."""
+"""The steps of docs/farm for OpenJobDescription [OpenJobDescription23] work by its own command."""
 
 import os
 import re

@@ -18,7 +18,7 @@ FOLDER = "vellus_beside"  # which must not appear at the root of the disk
 
 @pytest.fixture
 def shot(turning, tmp_path):  # noqa: F811
-    """A .blend with hair in a folder of its own."""
+    """Return a .blend with hair in a folder of its own."""
     yield Path(shutil.copy(turning, tmp_path / "shot.blend"))
     assert not Path("/", FOLDER).exists()
 
@@ -34,7 +34,9 @@ def test_frames_are_written_beside_the_blend(shot):
 
 
 def test_several_processes_write_there_too(shot, monkeypatch):
-    """Their command has the whole path, and all that was asked for."""
+    """Several processes write to a path relative to the .blend, as their commands have the whole path and all
+    options.
+    """
     from hair_addon.command_line import helpers, parser
 
     reported = []

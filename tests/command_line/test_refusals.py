@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Early refusals of the command line and scripts, with one message: names, faces, frames, output."""
+"""The command line and scripts refuse invalid names, faces, frames and output early, with one message."""
 
 import math
 import os
@@ -21,7 +21,7 @@ LONG = "x" * 300
 
 
 def sentence(*words):
-    """Return the message of a command that fails: one sentence, and it leaves no files."""
+    """Return the message of a command that fails with one sentence and leaves no files."""
     ended = run_here(*words)
     assert ended.status == 1 and ended.out == "" and len(ended.errors.splitlines()) == 1, ended.errors
     return ended.errors
@@ -51,7 +51,7 @@ def test_a_damaged_usd_is_one_sentence(mesh, verb, old, new):  # noqa: F811
 
 
 def disk_file(scene, folder, corner_count):
-    """A .blend with a mesh of one face."""
+    """Return a .blend with a mesh of one face."""
     turns = np.linspace(0.0, 2.0 * math.pi, corner_count, endpoint=False)
     data = bpy.data.meshes.new("Disk")
     data.from_pydata(np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1), [], [range(corner_count)])
@@ -135,7 +135,7 @@ def test_arguments_that_are_not_utf8_are_refused(capfd, words):
 
 @pytest.mark.parametrize("folder", ["a b", "毛 ä", "a#b", "50 %", "{blend_name}", "{", "a}}b{{c"])
 def test_frames_go_where_they_are_asked_for(lit, tmp_path, folder):
-    """Blender takes words in braces for variables."""
+    """Frames go to the requested path, also if it has words in braces, which Blender takes for variables."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     out = tmp_path / folder / "f{frame}_#.png"
     ended = run_here("render", tmp_path / "shot.blend", "--frames", 1, "--width", 16, "--samples", 1, "--out", out)
@@ -152,7 +152,7 @@ def test_a_backslash_in_a_folder_name_is_refused(lit, tmp_path):
 
 @pytest.mark.parametrize("ending", ["blend", "obj", "json", "npz", "exr"])
 def test_a_pipe_is_not_accepted_as_a_file(tmp_path, ending):
-    """Reading it would never end."""
+    """A pipe is not accepted as an input file, as reading it would never end."""
     os.mkfifo(tmp_path / f"pipe.{ending}")
     sentence("info", tmp_path / f"pipe.{ending}")
 
@@ -167,7 +167,7 @@ def test_a_pipe_is_not_accepted_as_a_file(tmp_path, ending):
     ids=lambda words: words[0],
 )
 def test_a_pipe_or_device_keeps_its_place(lit, tmp_path, monkeypatch, words):
-    """Taking that of /dev/null would spoil the machine."""
+    """A pipe or a device as output is refused and not replaced, as replacing /dev/null would damage the system."""
     monkeypatch.chdir(tmp_path)
     write_obj(tmp_path / "mesh.obj", *TETRAHEDRON)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
@@ -203,7 +203,7 @@ def test_a_script_s_frame_outside_blenders_range_is_refused(lit, tmp_path, frame
 
 @pytest.mark.parametrize("engine", ["vellus", "cycles"])
 def test_a_scene_without_a_view_layer_is_not_rendered(lit, tmp_path, engine):
-    """Blender would end."""
+    """A scene without a view layer is refused, as rendering it would end Blender."""
     for layer in bpy.context.scene.view_layers:
         layer.use = False
     with pytest.raises(HairError, match="No view layer"):

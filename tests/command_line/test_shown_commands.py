@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands in the documentation are valid, and those of docs/command_line.md work."""
+"""Commands in the documentation are valid, and those of docs/command_line.md run."""
 
 import re
 import shlex
@@ -14,7 +14,9 @@ PAGE = ROOT / "docs" / "command_line.md"
 
 
 def test_the_page_shows_commands_that_work(lit, tmp_path, monkeypatch):
-    """Commands with smaller numbers run one after another in a folder with the files that they name."""
+    """The commands of the page run one after another, with smaller numbers, in a folder with the files that they
+    name.
+    """
     monkeypatch.chdir(tmp_path)
     (tmp_path / "head.obj").write_bytes(HEAD.read_bytes())
     bpy.context.scene.render.resolution_percentage, bpy.context.scene.vellus.sample_count = 3, 1
@@ -31,7 +33,7 @@ def test_the_page_shows_commands_that_work(lit, tmp_path, monkeypatch):
 
 
 def commands_of(page):
-    """Words of the command lines that a page shows, in blocks of code and within sentences."""
+    """Return the words of the command lines that a page shows, in blocks of code and within sentences."""
     text = page.read_text(encoding="utf-8")
     blocks = re.findall(r"^```\w*\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     spans = re.findall(r"(?<!`)`([^`]+)`(?!`)", text)
@@ -53,7 +55,7 @@ def test_pages_show_commands_that_are_understood(capfd):
 
 
 def test_the_page_has_every_option_that_is_no_setting():
-    """Options of settings are listed by --help alone: their help begins with the label. `import` is called by groom."""
+    """The page has every option that is no setting; options of settings are listed by --help alone."""
     text = PAGE.read_text(encoding="utf-8")
     verbs = next(action for action in command_line.parser("vellus")._actions if action.choices).choices
     missing = []

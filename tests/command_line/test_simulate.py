@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""simulate: frames baked on the command line, resumed and rendered; errors are one message."""
+"""`simulate` bakes frames that can be resumed and rendered; errors are one message."""
 
 import itertools
 import subprocess
@@ -27,7 +27,7 @@ def guides_of():
 
 @pytest.fixture
 def shot(lit, tmp_path):
-    """A .blend of hair on a sphere that swings, whose guides simulate."""
+    """Return a .blend with hair on a swinging sphere, whose guides simulate."""
     swing(bpy.data.objects["Sphere"])
     simulate(bpy.data.objects["Guides"], "//frames")
     bpy.context.scene.frame_end = 6
@@ -84,7 +84,9 @@ def test_frames_are_given_as_for_render(shot):
 
 
 def test_the_time_of_all_guides_is_reported(shot, monkeypatch):
-    """The clock advances a second per reading; reading, simulation and half of each frame change are counted."""
+    """The reported time counts reading, simulation and half of each frame change, by a clock of one second per
+    reading.
+    """
     other = bpy.data.objects["Guides"].copy()
     other.data = other.data.copy()
     bpy.context.scene.collection.objects.link(other)
@@ -129,7 +131,9 @@ def test_frames_that_are_not_baked_are_not_rendered(shot, tmp_path):
 
 
 def test_a_frame_that_cannot_be_read_is_refused_as_a_missing_one(shot, tmp_path):
-    """Sequences, single frames, exports and pictures refuse an unreadable frame; only baking again repairs it."""
+    """An unreadable frame is refused like a missing one by renders, exports and pictures, and only baking repairs
+    it.
+    """
     run_here("simulate", shot)
     whole = {path.name: path.read_bytes() for path in frame_folders.folder_of(guides_of()).glob("*.npz")}
     damaged = frame_folders.folder_of(guides_of()) / "+00000005.npz"
@@ -169,7 +173,7 @@ def test_a_frame_that_cannot_be_read_is_refused_as_a_missing_one(shot, tmp_path)
 
 
 def test_frames_that_an_exposure_reads_are_whole_too(shot):
-    """Motion blur shows the frames beside a picture's."""
+    """Frames that motion blur reads beside a picture's frame are checked too."""
     run_here("simulate", shot)
     folder, scene = frame_folders.folder_of(guides_of()), bpy.context.scene
     (folder / "+00000005.npz").write_bytes(b"damaged")
@@ -197,7 +201,7 @@ def test_files_without_simulated_guides_are_refused(shot):
 
 
 def test_only_what_is_rendered_is_simulated_if_needed(shot):
-    """Guides that start after the last rendered frame, and guides of delivered hair, need no frames."""
+    """With --if-needed only rendered guides are simulated: none that start later, and none whose hair is delivered."""
     assert run_here("simulate", shot, "--if-needed", "--last-frame", "1", "--json").results == []
     frame_folders.require_baked([1], bpy.context.scene)
     assert [line["frame"] for line in run_here("simulate", shot, "--if-needed", "--json").results] == [*range(2, 8)]
@@ -266,7 +270,7 @@ def test_free_memory_is_what_the_system_says():
 
 
 def test_without_the_colliders_that_guides_name_nothing_is_baked(shot, tmp_path):
-    """A collection that was renamed is followed; one that is gone is missed."""
+    """Nothing is baked if a collection of colliders is missing; a renamed collection is followed."""
     guides = bpy.data.objects["Guides"].data
     body = bpy.data.collections.new("Body")
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=1, radius=0.3, location=(1.2, 0.0, 0.0))

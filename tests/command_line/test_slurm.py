@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The steps of docs/farm on Slurm: an array job on two nodes, of which one is lost in the middle of a frame."""
+"""The steps of docs/farm work on Slurm: an array job on two nodes, one of which is lost during a frame."""
 
 import os
 import re
@@ -42,7 +42,7 @@ def test_a_lost_node_costs_one_frame(lit, tmp_path):
 
 
 def told(folder):
-    """Return what the commands of the baking job, and of each task of the rendering job, have printed."""
+    """Return the output of the baking job and of each task of the rendering job."""
     return [output.read_text() for output in sorted(folder.glob("slurm-*.out"))]
 
 
@@ -52,7 +52,7 @@ def queued(folder, variables, *options):
 
 
 def found_in_mid_frame(shot):
-    """(process, picture) of a render on the node to lose, stopped while it is at a frame."""
+    """Return (process, picture) of a render on the node to lose, stopped during a frame."""
     for process in farm.processes_with("SLURMD_NODENAME", LOST):
         if f"{shot}" in farm.arguments_of(process)[1:] and (frame := farm.stopped_in_mid_frame(process)):
             return process, frame

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles on the command line: errors are one message, before anything is read."""
+"""Errors of styles on the command line are one message, before anything is read."""
 
 import argparse
 import json
@@ -21,7 +21,7 @@ from tests.support.commands import HEAD, load, run_here
 
 
 def words(identifier, settings, names):
-    """A style as an option says it."""
+    """Return a style as the value of an option."""
     return f"{identifier.lower()}:" + ",".join(f"{name}={getattr(settings, name)}" for name in names)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""transfer, and groom --hair-from: hair on another mesh; errors are one message."""
+"""`transfer` and `groom --hair-from` put hair on another mesh; errors are one message."""
 
 import bpy
 import numpy as np
@@ -11,7 +11,7 @@ from tests.support.exchange.imported import curves_object, lines_on
 
 @pytest.fixture
 def shot(hair, tmp_path):
-    """A .blend with hair on a sphere, and a sphere twice as large without."""
+    """Return a .blend with hair on a sphere, and a bare sphere twice as large."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=2.0)
     bpy.context.object.name = "Other"
     path = tmp_path / "shot.blend"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Dynamics panel: a row for each setting in effect, and notes on the effect of settings."""
+"""The Dynamics panel has a row for each setting in effect, and notes on the effect of settings."""
 
 import bpy
 import numpy as np
@@ -63,7 +63,7 @@ def test_colliders_are_picked_among_collections(state):
 
 
 def test_the_panel_draws_where_no_folder_can_hold_frames(state):
-    """A new file was never saved, so its cache folder leads nowhere."""
+    """The panel is drawn in a new file, which has no folder for frames."""
     assert not bpy.data.filepath and state.cache_folder.startswith("//")
     state.simulates = True
     assert frame_folders.frames_of(bpy.data.objects["Guides"].data) is None
@@ -75,7 +75,7 @@ def test_only_guides_have_dynamics(sphere):
 
 
 def test_meshes_have_a_panel_where_there_are_guides(sphere):
-    """Its overrides are shown where they are used."""
+    """Meshes have a panel of overrides where guides use it."""
     panel, collider = bpy.types.VELLUS_PT_collider, sphere.vellus
     assert draw(panel) is None
     bpy.ops.vellus.distribute_guides(guide_count=10)
@@ -147,7 +147,7 @@ def test_guides_too_long_for_hair_are_told_to_be_scaled(state):
 
 
 def test_hand_made_guides_have_a_length_of_their_own(imported):
-    """No setting says how long they are."""
+    """Hand-made guides have their own length, which no setting gives."""
     imported.select_set(True)
     bpy.context.view_layer.objects.active = imported
     bpy.ops.vellus.use_as_guides()
@@ -159,7 +159,7 @@ def test_hand_made_guides_have_a_length_of_their_own(imported):
 
 
 def test_combed_guides_bend_by_the_length_that_they_have(state):
-    """Panels state before a slider is moved that it has no effect, and how long guides are."""
+    """The panel states how far combed guides bend by their actual length, before a slider is moved."""
     guides = bpy.data.objects["Guides"]
     bpy.context.view_layer.objects.active = guides
     before = draw(bpy.types.VELLUS_PT_guides)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""*Comb Guides* with hidden guides: they are shown first; if that is impossible, a message says why."""
+"""*Comb Guides* shows hidden guides first; if that is impossible, a message says why."""
 
 import bpy
 import pytest
 
 
 def collection_of_guides(guides, parent=None):
-    """The layer collection of a new collection that holds the guides alone."""
+    """Return the layer collection of a new collection that holds the guides alone."""
     parent = parent or bpy.context.scene.collection
     collection = bpy.data.collections.new("Hidden")
     parent.children.link(collection)
@@ -52,7 +52,7 @@ WAYS = [hide, hide_in_viewports, hide_collection, hide_collection_in_viewports, 
 
 
 def comb(guides):
-    """From the surface; the guides, in Object Mode again."""
+    """Press *Comb Guides* on the surface, and return the guides in Object Mode."""
     bpy.context.view_layer.objects.active = guides.data.surface
     done = bpy.ops.vellus.comb_guides()
     assert (done, guides.mode, bpy.context.object) == ({"FINISHED"}, "SCULPT_CURVES", guides)

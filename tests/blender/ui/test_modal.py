@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work in a window: events during it, Esc and any other end leave no partial results."""
+"""Long work in a window ends without partial results by events, by Esc or in any other way."""
 
 import threading
 from types import SimpleNamespace
@@ -135,7 +135,9 @@ def camera(hair):
 
 @pytest.mark.parametrize(("has_lens", "stages"), [(False, 2), (True, 5)])
 def test_a_picture_in_stages_is_that_of_one_go_and_esc_ends_it_in_each(camera, window, has_lens, stages):
-    """Shadows, then a picture; or one for each point of the lens."""
+    """A picture drawn in stages equals that drawn at once, and Esc ends it in each stage, of shadows or of points of
+    the lens.
+    """
     bpy.context.scene.camera.data.dof.use_dof = has_lens
     settings = PictureSettings(width=24, height=16, samples_per_side=2)
     made = []
@@ -157,7 +159,7 @@ def test_a_picture_in_stages_is_that_of_one_go_and_esc_ends_it_in_each(camera, w
 
 
 def in_a_thread(work):
-    """Do work as a window does: compute in a thread, write in this one."""
+    """Do work as a window does: compute in another thread and write in this one."""
     compute = next(work)
     try:
         while True:
@@ -177,7 +179,7 @@ def test_hair_of_a_window_is_that_of_a_script(sphere):
 
 @pytest.mark.parametrize("what", ["Sphere", "Guides", "Hair"])
 def test_deletion_during_an_operation_is_reported_and_leaves_nothing(hair, what):
-    """Input is held back, but a script or another window may still do it."""
+    """Deletion by a script or another window during an operation is reported and leaves no partial result."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     settings = setting_properties.to_settings(hair.data.vellus.hair, HairSettings)
     work = pipeline.interpolating_hair(bpy.data.objects["Guides"].data, settings, depsgraph, hair.data)

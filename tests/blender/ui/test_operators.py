@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every operator: its result, its undo, and refusals without changes."""
+"""Every operator has its result and its undo, and refuses without changes."""
 
 import math
 
@@ -21,7 +21,7 @@ from tests.support.reading import points, snapshot
 
 
 def refusal(operator, **arguments):
-    """The sentence with which an operator refuses; it must leave the file as it was."""
+    """Return the sentence with which an operator refuses, and check that the file is unchanged."""
     before = snapshot()
     with pytest.raises(RuntimeError) as caught:
         operator(**arguments)
@@ -31,7 +31,7 @@ def refusal(operator, **arguments):
 
 @pytest.fixture
 def camera(scene):
-    """The scene's camera, four meters in front of the origin."""
+    """Return the scene's camera, four meters in front of the origin."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = (0.0, -6.0, 0.0), (math.pi / 2, 0.0, 0.0)
     scene.collection.objects.link(camera)
@@ -73,7 +73,9 @@ REMEMBERED = {"filepath", "directory", "folder", "filter_glob", "library", "cata
 
 
 def test_what_names_data_is_not_remembered():
-    """Blender calls an operator with its last values again, where data of these names may be missing."""
+    """Properties that name data are not remembered, as Blender would call the operator with names that may be
+    missing.
+    """
     remembered = {
         (name, rna.identifier)
         for name in dir(bpy.ops.vellus)
@@ -177,7 +179,7 @@ def test_nan_is_refused_for_hair(guides):
 )
 @pytest.mark.parametrize("count", [0, -5])
 def test_a_count_below_one_cannot_be_given(guides, operator, name, count):
-    """Blender holds an operator's properties to their range: one hair is the least."""
+    """A count below one cannot be given, as Blender keeps an operator's properties in their range."""
     getattr(bpy.ops.vellus, operator)(**{name: count})
     made = max(bpy.data.hair_curves, key=lambda c: c.session_uid) if operator == "interpolate_hair" else guides.data
     assert len(made.curves) == 1
@@ -233,7 +235,7 @@ def sockets(hair):
 
 @pytest.mark.parametrize("preset", presets.PRESETS)
 def test_every_preset_is_applied_whole(hair, preset):
-    """Settings and material become the preset's whatever they were; how hair is drawn stays the artist's choice."""
+    """Every preset sets all of its settings and the material, and keeps how hair is drawn."""
     look = presets.PRESETS[preset][1]
     state = hair.data.vellus
     unlike = Appearance(mode="classic", parametrization="ABSORPTION", tint=(0.1, 0.2, 0.3), random_color=1.0, coat=1.0)
@@ -281,7 +283,7 @@ def test_a_path_beside_an_unsaved_file_is_refused(hair):
 
 @pytest.fixture
 def user_folder(tmp_path, monkeypatch):
-    """Blender's folder of this user, empty, and the add-on as if it were an installed extension."""
+    """Return an empty user folder of Blender, with the add-on as if it were an installed extension."""
     monkeypatch.setattr(hair_cache.preferences, "ADDON_MODULE", "bl_ext.user_default.vellus")
     made = tmp_path / "user"
 
@@ -351,7 +353,7 @@ def test_a_damaged_table_is_refused_by_the_picture(hair, camera, tmp_path):
 
 
 def test_tables_of_other_settings_are_not_used(hair, camera, tmp_path):
-    """A folder of blond tables must not turn brown hair blond: the picture is that of the hair's own settings."""
+    """Tables of other settings are not used: a folder of blond tables does not turn brown hair blond."""
 
     def picture(name):
         path = tmp_path / name

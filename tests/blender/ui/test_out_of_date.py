@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Notes in panels on outdated hair, and on baked frames of guides that were combed since."""
+"""Panels have notes on outdated hair, and on baked frames of guides that were combed since."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An artist's own modifiers on hair: the panel names those that viewports do not show."""
+"""The Shading panel names an artist's own modifiers on hair that viewports do not show."""
 
 import bpy
 import pytest
@@ -17,7 +17,7 @@ def notes(active="Hair"):
 
 
 def add_asset(hair, name):
-    """A modifier with one of Blender's own hair node groups."""
+    """Add a modifier with one of Blender's own hair node groups."""
     with bpy.data.libraries.load(NODE_ASSETS, link=False, assets_only=True) as (_, wanted):
         wanted.node_groups = [name]
     modifier = hair.modifiers.new(name, "NODES")

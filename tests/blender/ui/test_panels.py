@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every panel draws for every kind of active object, with a row for each setting and no work."""
+"""Every panel is drawn for every kind of active object, with a row for each setting and without other work."""
 
 import math
 import os
@@ -63,7 +63,7 @@ def test_every_setting_has_a_row(hair, settings_class, active):
 @pytest.mark.parametrize("parametrization", appearance.COLOR_FIELDS)
 @pytest.mark.parametrize("model", ["KAJIYA_KAY", "MARSCHNER"])
 def test_shading_offers_what_changes_the_picture(hair, model, parametrization):
-    """One kind of color, and all else of the appearance once."""
+    """The Shading panel shows one kind of color and each other setting that changes the picture once."""
     state = hair.data.vellus
     state.model, state.appearance.parametrization = model, parametrization
     drawn = draw_all([panel for panel in TAB if panel.bl_idname.startswith("VELLUS_PT_shading")])
@@ -118,7 +118,7 @@ def test_the_cost_that_is_shown_is_what_curves_take(guides, strand_count, guide_
 
 
 def delete(sphere):
-    """Delete an object as the X key does: hair keeps it in the file."""
+    """Delete an object as the X key does, which keeps its hair's data in the file."""
     with bpy.context.temp_override(selected_objects=[sphere]):
         bpy.ops.object.delete()
 
@@ -170,7 +170,9 @@ def test_problems_are_shown_with_the_button_that_fixes_them(hair, case):
 
 @pytest.mark.parametrize("apart", [move_hair, clear_parent])
 def test_hair_apart_from_its_surface_is_attached_again(hair, apart):
-    """Combed guides too, without a word of their settings; hair that its surface takes along is not apart."""
+    """Hair apart from its surface can be attached again, combed guides too; hair that moves with its surface is not
+    apart.
+    """
     sphere, guides = bpy.data.objects["Sphere"], bpy.data.objects["Guides"]
     sphere.matrix_world = Matrix.Translation((1.0, 2.0, 300.0)) @ Matrix.Rotation(1.0, 4, "X")
     write_points(guides, points(guides) * np.float32(1.1))
@@ -189,7 +191,7 @@ def test_hair_apart_from_its_surface_is_attached_again(hair, apart):
 
 
 def test_a_surface_that_no_scene_shows_is_not_missing(hair):
-    """An excluded collection or another scene has it: it was not deleted."""
+    """A surface in an excluded collection or in another scene does not count as missing."""
     sphere = bpy.data.objects["Sphere"]
     other = bpy.data.collections.new("Characters")
     other.objects.link(sphere)
@@ -247,7 +249,7 @@ def test_memory_grows_with_the_count():
 
 
 def test_long_work_is_announced_and_short_work_is_not(hair):
-    """The evaluated surface and the requested amount decide."""
+    """Long work is announced, and short work is not, by the evaluated surface and the requested amount."""
     sphere, guides = bpy.data.objects["Sphere"], bpy.data.objects["Guides"]
 
     def announced():
@@ -287,7 +289,7 @@ REDO = {
 
 
 def redo(operator):
-    """The `Layout` of an operator's redo panel."""
+    """Return the `Layout` of an operator's redo panel."""
     rna = getattr(bpy.ops.vellus, operator).get_rna_type()
     values = {name: entry.default for name, entry in rna.properties.items() if hasattr(entry, "default")}
     layout = Layout()
@@ -309,7 +311,7 @@ def test_the_redo_panel_draws_every_property_once(hair, operator):
 
 @pytest.mark.parametrize("operator", REDO)
 def test_names_of_data_are_picked_in_the_redo_panel(hair, operator):
-    """They are not typed: vertex groups of the surface, images, objects and attributes."""
+    """Names of vertex groups, images, objects and attributes are picked from lists in the redo panel."""
     sphere = bpy.data.objects["Sphere"]
     make_active(REDO[operator][0])
     own = set(getattr(bpy.types, f"VELLUS_OT_{operator}").__annotations__)
@@ -335,7 +337,7 @@ def test_the_redo_panel_follows_the_order_of_the_panels(hair, operator, owner):
 
 
 def test_looks_have_pictures_of_their_own(hair):
-    """A picture for each built-in look, all different; nothing is loaded before they are drawn."""
+    """Each built-in look has its own picture, which is loaded when it is first drawn."""
     look_previews.unregister()
     assert look_previews._previews is None
     assert draw(named("shading")).drawn["pictures of look"] == 1
@@ -350,7 +352,9 @@ def test_looks_have_pictures_of_their_own(hair):
 
 
 def test_a_click_on_a_picture_gives_its_look(hair, tmp_path, monkeypatch):
-    """The click runs an operator that can be undone; the shown picture is that of the present look."""
+    """A click on a picture applies its look by an operator with undo, and the shown picture is that of the current
+    look.
+    """
     monkeypatch.setattr(saved_looks.FILES, "folder", lambda create: tmp_path)
     mine = Appearance(parametrization="COLOR", color=(0.5, 0.01, 0.01))
     saved_looks.write("Mine", mine)
@@ -368,7 +372,7 @@ def test_a_click_on_a_picture_gives_its_look(hair, tmp_path, monkeypatch):
 
 
 def test_a_saved_look_has_a_swatch_of_its_color(hair, tmp_path, monkeypatch):
-    """It follows the file, and a file that cannot be read has none. Icons have no numbers without a window."""
+    """A saved look has a swatch of its color, which follows the file; without a window icons have no numbers."""
     monkeypatch.setattr(saved_looks.FILES, "folder", lambda create: tmp_path)
     look_previews.unregister()
     red, blue = (Appearance(parametrization="COLOR", color=color) for color in ((0.5, 0.01, 0.01), (0.01, 0.01, 0.5)))

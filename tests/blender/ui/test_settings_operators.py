@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings saved from the panel and loaded again, on the same hair, on other hair, on a mesh without any."""
+"""Settings saved from the panel can be loaded on the same hair, on other hair, and on a mesh without hair."""
 
 from dataclasses import asdict
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles by operators: added, moved, removed, duplicated, keyed, undone, saved, appended; presets; the panel."""
+"""Style operators add, move, remove, duplicate, key, undo, save and append styles and presets, and the panel shows
+them.
+"""
 
 import math
 from types import SimpleNamespace
@@ -29,7 +31,7 @@ SPHERE_FACTOR = groom_defaults.FUR_LENGTH * math.sqrt(4.0 * math.pi) / 0.12  # o
 
 
 def state():
-    """The settings of the hair, wherever undo has moved them."""
+    """Return the settings of the hair, also after undo has moved them in memory."""
     return bpy.data.hair_curves["Hair"].vellus
 
 
@@ -47,7 +49,7 @@ def undo():
 
 @pytest.fixture
 def styled(hair):
-    """Hair with three styles, the second active."""
+    """Return hair with three styles, the second active."""
     for style in ("CLUMP", "CURL", "FRIZZ"):
         operate(bpy.ops.vellus.add_style, style=style)
     state().active_style = 1
@@ -57,7 +59,7 @@ def styled(hair):
 
 @pytest.fixture
 def still(hair):
-    """Hair that is not made anew by what is changed: locks for a head would be tens of thousands."""
+    """Stop updates of the hair, whose locks for a head would be tens of thousands."""
     state().is_live = False
     return hair
 

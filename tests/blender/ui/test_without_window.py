@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Without a window there is no active object: nothing raises an exception."""
+"""Without a window there is no active object, and no function raises an exception."""
 
 import bpy
 import pytest
@@ -11,7 +11,7 @@ from tests.support.reading import points
 
 @pytest.fixture
 def no_window(hair):
-    """A context without a window, with hair in the scene."""
+    """Return a context without a window, with hair in the scene."""
     with bpy.context.temp_override(window=None):
         assert not hasattr(bpy.context, "object")
         yield

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clumps of hair on a sphere, and what is made of them."""
+"""Clumps of hair on a sphere, and their cards."""
 
 from types import SimpleNamespace
 
@@ -14,7 +14,7 @@ COUNT, SEGMENTS, SIZE = 40, 6, 512
 
 
 def sphere(radius=0.1, rings=16):
-    """A `TriMesh` around the origin, wound outwards."""
+    """Return a `TriMesh` around the origin with outward faces."""
     lat, lon = np.linspace(0.02, np.pi - 0.02, rings), np.linspace(0.0, 2.0 * np.pi, 2 * rings, endpoint=False)
     grid = np.stack(
         [np.sin(lat)[:, None] * np.cos(lon), np.sin(lat)[:, None] * np.sin(lon), np.cos(lat)[:, None] + 0.0 * lon], -1
@@ -29,7 +29,7 @@ def sphere(radius=0.1, rings=16):
 
 
 def wavy_hair(rng, count=1200, point_count=25):
-    """(S, P, 3) float32 strands of several lengths that rise from a sphere, bend downwards and wave."""
+    """Return (S, P, 3) float32 strands of several lengths that rise from a sphere, bend down and wave."""
     roots = rng.normal(size=(count, 3))
     roots[:, 2] = np.abs(roots[:, 2]) + 0.2
     outward = roots / np.linalg.norm(roots, axis=1, keepdims=True)
@@ -41,7 +41,7 @@ def wavy_hair(rng, count=1200, point_count=25):
 
 @pytest.fixture(scope="session")
 def carded():
-    """Hair, its clumps, the ribbons' axes and outlines, flattened strands, atlas and mesh."""
+    """Return hair, its clumps, the ribbons' axes and outlines, flattened strands, atlas and mesh."""
     rng = np.random.default_rng(3)
     surface, points = sphere(), wavy_hair(rng)
     radii = np.full(points.shape[:2], 5e-4, np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Atlas of card pictures: no overlaps, one scale, and UV coordinates inside the pictures."""
+"""Card pictures in an atlas do not overlap and have one scale, and UV coordinates are inside the pictures."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def boxes(places):
 
 
 def require_apart(places, size):
-    """Pictures lie in the texture, two texels from its border and four from each other."""
+    """Assert that pictures are in the texture, two texels from its border and four from each other."""
     low, high = boxes(places)[:, :2], boxes(places)[:, 2:]
     assert low.min() >= 2.0 / size - 1e-9 and high.max() <= 1.0 - 2.0 / size + 1e-9
     gaps = np.maximum(low[:, None] - high[None], low[None] - high[:, None]).max(axis=-1)

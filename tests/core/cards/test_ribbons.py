@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ribbons: frames, orientation, and strands that stay inside the ribbon onto which they are laid flat."""
+"""Ribbons have steady, oriented frames, and the strands that are laid flat onto a ribbon stay inside."""
 
 import itertools
 
@@ -16,7 +16,7 @@ def helix(turns, count=60):
 
 
 def test_frames_are_right_handed_and_do_not_twist():
-    """The angle that a steady frame has turned around a closed plane curve, or along any plane one, is zero."""
+    """A steady frame does not twist around a closed plane curve or along any plane curve, and is right-handed."""
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     circle = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=-1)[None]
     normals = curve_frames.steady_normals(circle, np.array([[0.6, 0.0, 0.8]]))
@@ -29,7 +29,9 @@ def test_frames_are_right_handed_and_do_not_twist():
 
 
 def test_a_helix_turns_a_steady_frame_by_its_torsion():
-    """Around a helix of pitch 2 pi c and radius 1, by the length times c / (1 + c²), against its principal normal."""
+    """A steady frame around a helix of pitch 2 pi c and radius 1 turns by length × c / (1 + c²) against the
+    principal normal.
+    """
     curve = helix(1.0, 2000)
     normals = curve_frames.steady_normals(curve)
     inward = np.concatenate([-curve[0, :, :2], np.zeros((2000, 1))], axis=1)
@@ -61,7 +63,7 @@ def test_ribbons_face_away_from_the_surface(carded):
 
 
 def test_a_clump_that_is_flat_gives_a_ribbon_in_its_plane(rng):
-    """Strands that rise straight from the surface get the plane of their spread."""
+    """A flat clump of straight upright strands gives a ribbon in the plane of its spread."""
     x = rng.uniform(-0.02, 0.02, (50, 1))
     s = np.linspace(0.0, 0.1, 9)
     direction = np.array([np.cos(0.7), np.sin(0.7), 0.0])
@@ -76,7 +78,7 @@ def test_a_clump_that_is_flat_gives_a_ribbon_in_its_plane(rng):
 
 
 def test_flattened_strands_are_where_they_were(carded):
-    """Across, along and above, from the ribbon's middle line at that place, lead back to each point."""
+    """Flattened strands have each point's distances across, along and above the ribbon's middle line."""
     distances = carded.axes.distances[carded.labels]
     along = carded.flat[..., 1].astype(np.float64)
     segment = (along[..., None] >= distances[:, None, 1:-1]).sum(axis=-1)
@@ -95,7 +97,7 @@ def test_flattened_strands_are_where_they_were(carded):
 
 
 def test_ribbons_contain_their_strands(carded):
-    """Points, and places between them, with the radius of the strand on both sides."""
+    """Ribbons contain their strands' points, and places between them, with the strand's radius on both sides."""
     found, steps = carded.outlines, np.linspace(0.0, 1.0, 6)[:, None]
     for strand, card in enumerate(carded.labels):
         flat = carded.flat[strand]
@@ -108,7 +110,7 @@ def test_ribbons_contain_their_strands(carded):
 
 
 def test_ribbons_are_lifted_to_the_strands_that_are_there():
-    """Hair that is combed along a surface and rises from it: behind the mean root the ribbon stays on the surface."""
+    """Ribbons are lifted to their strands: hair combed along a surface rises from it behind the mean root."""
     roots, s = np.linspace(-0.02, 0.02, 40)[:, None], np.linspace(0.0, 0.1, 30)[None]
     points = np.stack([roots + s, 0.0 * (roots + s), 0.1 + 0.01 * (1.0 - np.exp(-s / 0.02)) + 0.0 * roots], axis=-1)
     points, labels = points.astype(np.float32), np.zeros(40, np.int32)

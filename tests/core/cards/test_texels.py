@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Textures of cards: color, normal, depth and others from samples; empty texels are filled from neighbors."""
+"""Card textures have the color, normal, depth and other values of samples, and empty texels those of neighbors."""
 
 import numpy as np
 import pytest
@@ -12,14 +12,14 @@ SIZE = 32
 
 @pytest.fixture
 def strip():
-    """One strand that runs up the middle, 8 texels wide, from height 0 to 1, and from red to green."""
+    """Return a strand up the middle, 8 texels wide, from height 0 to 1 and from red to green."""
     places = np.array([[[0.5, 0.0, 0.0], [0.5, 0.5, 0.5], [0.5, 1.0, 1.0]]], np.float32)
     colors = np.array([[[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0]]], np.float32)
     return PlacedStrands(places, np.full((1, 3), 4.0 / SIZE), colors, np.array([0.25]), (0.0, 1.0))
 
 
 def seen(strip, per_side=2):
-    """Which segment each sample shows."""
+    """Return the segment that each sample shows."""
     side = SIZE * per_side
     y, x = (np.indices((side, side)) + 0.5) / side
     return np.where(np.abs(x - 0.5) < strip.radii[0, 0], (y >= 0.5).astype(int), NO_STRAND)

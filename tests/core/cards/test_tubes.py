@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tubes: closed, oriented outwards, with the announced polygons and the volume of their strands."""
+"""Tubes are closed and oriented outward, with the announced polygons and the volume of their strands."""
 
 import itertools
 from collections import Counter
@@ -26,7 +26,7 @@ def polygons(mesh):
 
 
 def volumes(mesh, count):
-    """(count,) by the divergence theorem, of tubes with equally many vertices."""
+    """Return the volumes (count,) of tubes with equally many vertices, by the divergence theorem."""
     found, per_tube = np.zeros(count), len(mesh.vertices) // count
     for polygon in polygons(mesh):
         corners = mesh.vertices[polygon].astype(np.float64) - mesh.vertices[polygon[0] // per_tube * per_tube]

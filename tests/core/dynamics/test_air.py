@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Force fields: the strength and falloff of Blender's, air velocity, and smooth noise."""
+"""Force fields have the strength and falloff of Blender's, air has a velocity, and noise is smooth."""
 
 import math
 
@@ -15,7 +15,7 @@ ORIGIN = np.array([0.3, -0.2, 0.1])
 
 
 def blown(device, fields, points, velocities=None, time=0.0):
-    """(airs (N, 3), accelerations (N, 3), drags (N,), warnings) at points (N, 3)."""
+    """Return (airs (N, 3), accelerations (N, 3), drags (N,), warnings) at points (N, 3)."""
     points = np.asarray(points, np.float32)
     velocities = np.zeros_like(points) if velocities is None else np.asarray(velocities, np.float32)
     air = Air((1, 1, len(points)), device)
@@ -93,7 +93,7 @@ def test_forces_point_away_and_pull_hair_to_their_flow(device, rng):
 
 
 def test_vortices_turn_about_their_axis(device, rng):
-    """A point that moves with a plane vortex has just the acceleration of its circle."""
+    """A point that moves with a plane vortex has the acceleration of its circle."""
     points = points_around(rng)
     offset = points - ORIGIN
     around = offset - (offset @ AXIS)[:, None] * AXIS

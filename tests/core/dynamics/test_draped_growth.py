@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draped growth of guides: outside the surface, lower, with the same length, independent of size."""
+"""Draped new guides are outside the surface, lower, as long as before, and independent of size."""
 
 from dataclasses import replace
 
@@ -44,7 +44,9 @@ def test_guides_hang_lower_and_lie_closer(draped):
 
 
 def test_guides_fall_away_from_the_summit(draped):
-    """However they are tilted, from where the surface slopes by eight degrees: hair does not cross the whorl."""
+    """Guides of any tilt fall away from the summit where the surface slopes by eight degrees, and do not cross the
+    whorl.
+    """
     guides = draped.numpy()
     roots, falls = guides[:, 0, :2], guides[:, -1, :2] - guides[:, 0, :2]
     slopes = np.linalg.norm(roots, axis=1) / RADIUS
@@ -72,7 +74,7 @@ def test_without_draping_guides_grow_as_they_did():
 
 
 def test_hair_of_a_giant_hangs_alike(draped):
-    """Hair falls alike at scales of powers of two, where the arithmetic is the same."""
+    """Hair falls alike at sizes that differ by powers of two, for which arithmetic is the same."""
     factor = 64.0
     giant = grown(replace(SETTINGS, length=factor * LENGTH), TriMesh(factor * BALL.vertices, BALL.triangles))
     np.testing.assert_allclose(giant.numpy() / factor, draped.numpy(), atol=1e-5 * LENGTH)
@@ -91,7 +93,7 @@ def test_symmetric_guides_stay_symmetric():
 
 
 def test_faces_out_of_reach_do_not_matter(draped):
-    """A body of other faces far away: the guides are the same, and are draped on as few faces."""
+    """Faces out of reach change neither the guides nor the number of faces on which they are draped."""
     far = TriMesh(
         np.concatenate([BALL.vertices, BALL.vertices - np.float32((0.0, 0.0, 1.0))]),
         np.concatenate([BALL.triangles, BALL.triangles + len(BALL.vertices)]),

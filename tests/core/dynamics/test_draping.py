@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draped guides: outside the surface, lower than before, with the same length, and at rest."""
+"""Draped guides are outside the surface, lower than before, as long as before, and at rest."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ BALL = subdivided_sphere(4, RADIUS)
 
 @pytest.fixture(scope="module")
 def grown():
-    """(40, 41, 3): straight guides that stand on the upper half of a ball."""
+    """Return (40, 41, 3): straight guides that stand on the upper half of a ball."""
     rng = np.random.default_rng(3)
     normals = rng.normal(size=(40, 3))
     normals[:, 2] = abs(normals[:, 2])
@@ -45,7 +45,7 @@ def test_roots_and_lengths_are_kept(grown, fallen):
 
 
 def test_what_is_draped_stays(fallen):
-    """Draping once more hardly moves guides: they are at rest, though they have another shape without forces now."""
+    """Draping guides again hardly moves them, although their shape without forces is another one."""
     hold = replace(DynamicsSettings(bend_stiffness=1.0), gravity=0.0)
     again = draped(fallen, BALL, hold, GRAVITY, 1.0, DEVICE)
     assert np.linalg.norm(again - fallen, axis=2).max() < 0.002

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Influences on strands besides weight: air, hold, pinned points, rotating roots, resets; and refusals."""
+"""Air, hold, pinned points, rotating roots and resets act on strands, and invalid values are refused."""
 
 from dataclasses import replace
 
@@ -20,13 +20,15 @@ WEIGHTLESS = (0.0, 0.0, 0.0)
 
 
 def everywhere(simulation, vector):
-    """An array of `Surroundings` with the same numbers at each point."""
+    """Return an array of `Surroundings` with the same numbers at each point."""
     shape = simulation.rods.strand_count, simulation.rods.segment_count + 1, len(vector)
     return in_lanes(np.broadcast_to(vector, shape))
 
 
 def drag_of_cylinder(speed, radius, length):
-    """White's fit for cylinders across a flow, and slender-body theory where it is slower [N s/m²]."""
+    """Return the drag [N s/m²] of cylinders across a flow by White's fit, and by slender-body theory where it is
+    slower.
+    """
     reynolds = 2.0 * radius * speed * 1.2 / 1.81e-5
     fit = 0.5 * 1.2 * 2.0 * radius * speed * (1.0 + 10.0 * reynolds ** (-2.0 / 3.0))
     return max(fit, 4.0 * np.pi * 1.81e-5 / (np.log(2.0 * length / radius) + 0.5))
@@ -36,7 +38,7 @@ def drag_of_cylinder(speed, radius, length):
 @pytest.mark.parametrize("substeps", [2, 8])
 @pytest.mark.parametrize("speed", [0.05, 0.5, 3.0])
 def test_a_limp_strand_hangs_straight_in_the_wind(speed, substeps):
-    """For any substeps the strand hangs at the angle θ at which c_n u cos θ = ρA g sin θ."""
+    """A limp strand hangs straight in wind at the angle θ with c_n u cos θ = ρA g sin θ, for any number of substeps."""
     length, radius = 0.1, FIBRE.fibre_radius
     line_mass = FIBRE.density * np.pi * radius**2
 
@@ -72,7 +74,9 @@ def test_the_factor_of_drag_multiplies_it():
 
 
 def test_hold_is_a_spring_to_the_groom_whatever_the_substeps_are():
-    """A limp strand falls by g / k everywhere that the root does not hold it."""
+    """Hold is a spring to the groom for any number of substeps: a limp strand falls by g / k where its root does not
+    hold it.
+    """
     settings = replace(FIBRE, hold=500.0, bend_stiffness=1e-3, stretch_stiffness=1e-5, air_drag=5.0)
     ends = []
     for substeps in (2, 16):
@@ -107,7 +111,7 @@ def test_pinned_points_follow_the_surface(part):
 
 
 def test_a_groom_turns_with_its_surface():
-    """A weightless strand comes to rest in its combed shape, turned with the surface."""
+    """A groom turns with its surface: a weightless strand comes to rest in its turned combed shape."""
     groom = np.concatenate([line(0.1, 25), curl(0.1, 25)])
     turn = Rotation.from_rotvec([0.9, -0.4, 0.5])
     simulation = Simulation(groom, DynamicsSettings(damping=0.02, air_drag=3.0), gravity=WEIGHTLESS)
@@ -135,7 +139,7 @@ def test_wet_hair_is_heavier_and_softer():
 
 
 def test_another_step_size_goes_on_smoothly():
-    """Substeps of another size begin where the last ended: a strand at rest stays there."""
+    """Substeps of another size continue smoothly, so a strand at rest stays at rest."""
     simulation = Simulation(line(0.1, 25), replace(FIBRE, air_drag=10.0, damping=0.05)).advance(144)
     resting = simulation.points
     for count in (8, 1, 16, 4):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limp hair that has fallen comes to rest: pressure and cohesion between strands give it no energy."""
+"""Limp hair that has fallen comes to rest, as pressure and cohesion between strands add no energy."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ FALL, SETTLING = 1, 3  # [s]
 
 
 def fallen(rng, device, **settings):
-    """(S,) mean squared speeds [m²/s²] of points in the frames of level hair that falls and settles."""
+    """Return mean squared speeds (S,) [m²/s²] of points in the frames of level hair that falls and settles."""
     places = SPACING * np.stack(np.meshgrid(*2 * [np.arange(ALONG)], indexing="ij"), axis=-1).reshape(-1, 2)
     roots = np.pad(places, ((0, 0), (0, 1)))
     directions = np.array([1.0, 0.0, -0.2]) + 0.1 * rng.normal(size=(len(roots), 1, 3))

@@ -13,20 +13,20 @@ STEP = 0.01  # [s]
 
 
 def lay(strands, device):
-    """(S, N, K) numbers of points → lane groups (groups, N K, LANES)."""
+    """Convert numbers (S, N, K) of points to lane groups (groups, N K, LANES)."""
     count = strands.shape[1] * strands.shape[2]
     groups = strands.reshape(-1, LANES, count).transpose(0, 2, 1)
     return wp.array(np.ascontiguousarray(groups, np.float32), dtype=float, device=device)
 
 
 def taken(array, point_count):
-    """Lane groups → (S, N, K) float64."""
+    """Convert lane groups to (S, N, K) float64."""
     values = array.numpy().astype(np.float64)
     return values.transpose(0, 2, 1).reshape(-1, point_count, values.shape[1] // point_count)
 
 
 class Hair:
-    """Strands of equal points, the first of each without a mass, so that all of those that count may move."""
+    """Strands of equal points, of which each first one has no mass, so that all points that count may move."""
 
     def __init__(self, rng, device, strand_count=64, point_count=9, size=0.05):
         self.device, self.count = device, point_count
@@ -42,7 +42,7 @@ class Hair:
         return volume
 
     def rubbed(self, volume, friction=30.0, pressure=0.0, wetness=0.0, points=None):
-        """wetness: of all strands, or (S,) of each."""
+        """Return velocities after friction; wetness: of all strands, or (S,) of each."""
         velocities = lay(self.velocities, self.device)
         points = lay(self.points if points is None else points, self.device)
         wetness = np.broadcast_to(wetness, len(self.points))
@@ -74,7 +74,7 @@ def test_friction_keeps_momentum_and_takes_energy(hair, friction):
 
 
 def test_friction_leaves_what_moves_as_one(hair):
-    """A translation stays as it is; two streams that run against each other are slowed."""
+    """Friction leaves a translation unchanged and slows two streams that run against each other."""
     volume = hair.volume()
     hair.velocities[:] = [1.0, -2.0, 0.5]
     np.testing.assert_allclose(hair.rubbed(volume, 1e6), hair.velocities, atol=2e-5)
@@ -195,7 +195,7 @@ def test_what_does_not_fit_is_refused(hair, device):
 
 @pytest.mark.parametrize("spacing", [0.002, 0.006, 0.013])
 def test_a_straight_strand_alone_is_not_pushed(rng, device, spacing):
-    """Whatever its place and direction in the grid, with cells longer or shorter than its segments."""
+    """A straight strand alone is not pushed, at any place and direction in the grid, for any size of cells."""
     for _ in range(40):
         along = rng.normal(size=3)
         line = rng.uniform(0.0, 0.02, 3) + spacing * np.arange(12)[:, None] * along / np.linalg.norm(along)

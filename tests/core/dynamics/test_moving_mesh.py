@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides of plain arrays on a mesh that moves."""
+"""Guides of plain arrays follow a moving mesh."""
 
 from dataclasses import replace
 
@@ -53,7 +53,7 @@ def test_without_inertia_guides_move_with_the_mesh(guides):
 
 
 def test_a_model_of_another_size_moves_as_its_original_does(guides):
-    """Vertices are in units of which `size` are a meter."""
+    """A model of another size moves as its original does; `size` is the number of its units in a meter."""
     poses = [np.float32(turned(0.0, (0.01 * frame, 0.0, 0.0)).moved(BALL.vertices)) for frame in range(1, 6)]
     settings = DynamicsSettings(cell_size=0.02)
     large = replace(settings, size=0.125, collision_distance=8.0 * settings.collision_distance, cell_size=0.16)
@@ -71,7 +71,7 @@ def test_a_model_of_another_size_moves_as_its_original_does(guides):
 
 
 def test_guides_do_not_feel_those_of_another_region(guides):
-    """The combing of another region's guides has no effect, but for rounding in sums of mean masses."""
+    """The combing of another region's guides has no effect, except for rounding in sums of mean masses."""
     is_left = guides.numpy()[:, 0, 0] < 0.0
     bent = guides.numpy().copy()
     bent[~is_left] += np.float32([0.0, 0.0, -0.02]) * np.linspace(0.0, 1.0, 41, dtype=np.float32)[:, None]
@@ -79,7 +79,7 @@ def test_guides_do_not_feel_those_of_another_region(guides):
     poses = [np.float32(motion.moved(BALL.vertices.astype(np.float64))) for motion in motions]
 
     def ends(regions):
-        """How far guides of the left end from where they do with the others combed otherwise."""
+        """Return how far guides of the left end differ when the other guides are combed differently."""
         changes = {"regions": regions, "hair_friction": 50.0, "cell_size": 0.2, "vertex_count": 9}
         one, other = (
             [*api.simulate([BALL.vertices, *poses], BALL.triangles, combed, **changes)][-1]

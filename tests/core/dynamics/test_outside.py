@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands kept outside of colliders: none of their points is inside, roots stay, lengths nearly do."""
+"""Strands kept outside of colliders have no point inside, unmoved roots, and nearly the same lengths."""
 
 import numpy as np
 import pytest
@@ -14,14 +14,14 @@ RADIUS, DISTANCE = 0.02, 1e-3
 
 @pytest.fixture
 def ball():
-    """An `Obstacle` of 2 cm, 10 cm up."""
+    """Return an `Obstacle` of 2 cm, 10 cm above the ground."""
     mesh = subdivided_sphere(4, RADIUS)
     return Obstacle("Ball", mesh.vertices + np.array([0.0, 0.0, 0.1]), mesh.triangles, distance=DISTANCE)
 
 
 @pytest.fixture
 def strands(rng):
-    """(400, 41, 3): from a plane upwards, 20 cm, curled, a third of them through the ball."""
+    """Return (400, 41, 3): curled strands of 20 cm upward from a plane, a third of them through the ball."""
     along = np.linspace(0.0, 0.2, 41)
     curl = 0.004 * np.stack([np.sin(150.0 * along), np.cos(150.0 * along) - 1.0, 0.0 * along], axis=1)
     roots = np.concatenate([rng.uniform(-0.05, 0.05, (400, 2)), np.zeros((400, 1))], axis=1)
@@ -77,7 +77,7 @@ def test_points_that_are_not_finite_are_refused(ball, strands, device):
 
 
 def test_segments_keep_their_lengths_in_notches(rng, device):
-    """Strands that start anywhere on a head and turn into it, among eye sockets and ears."""
+    """Segments keep their lengths in notches, for strands that turn into a head among eye sockets and ears."""
     head = read_obj(HEAD)
     corners = head.corners[rng.choice(np.flatnonzero(head.corners[:, :, 2].min(axis=1) > 0.66), 300)]
     roots = corners.mean(axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigid motion of roots: found, divided and undone."""
+"""Rigid motions of roots are found, divided and undone."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_a_rigid_motion_is_found(rng, count):
 
 
 def test_parts_of_a_motion_add_up(rng):
-    """A half, and a half about the place where that leads, is the whole."""
+    """A half of a motion, followed by a half about the resulting place, is the whole motion."""
     motion, points = random_motion(rng), rng.normal(size=(9, 3))
     half = motion.part(0.5)
     second = RigidMotion(half.rotation, half.moved(half.center), half.way)
@@ -70,7 +70,7 @@ def test_coordinates_that_are_no_numbers_are_refused(name):
 
 @pytest.mark.parametrize("has_start", [False, True])
 def test_kernels_turn_roots_as_numpy_does(rng, has_start):
-    """Rotations from the groom or another rotation have NumPy's bits; a frame begins where the last one ended."""
+    """Kernels turn roots with NumPy's bits, from the groom or another rotation, and frames continue each other."""
     simulation = Simulation(line(0.1, 4) + rng.normal(size=(35, 1, 3)))
     rods, (start, turns) = simulation.rods, rotations.unit(rng.normal(size=(2, 35, 4)))
     if has_start:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Brows and lashes: short stiff hair lying on its surface does not break, in any orientation."""
+"""Short stiff hair that lies on its surface, such as brows and lashes, does not break in any orientation."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ FREE = DynamicsSettings(hair_friction=0.0, hair_pressure=0.0)
 
 
 def brow(rng, count=16):
-    """(G, 9, 3) guides that leave the front of a ball and lie down along it."""
+    """Return (G, 9, 3) guides that leave the front of a ball and lie down along it."""
     t = np.linspace(0.0, 1.0, 9)
     at = np.stack([rng.uniform(-0.5, 0.5, count), -np.ones(count), rng.uniform(0.1, 0.3, count)], axis=1)
     normals = rotations.unit(at)
@@ -33,7 +33,9 @@ def brow(rng, count=16):
 
 
 def shaken(frame):
-    """40° to either side three times a second, and a nod: faster than a head may be."""
+    """Return the motion of a head that turns 40° to either side three times a second and nods, faster than real
+    heads.
+    """
     angle = np.radians(40.0) * np.sin(6.0 * np.pi * frame * FRAME)
     nod = 0.2 * np.sin(4.0 * np.pi * frame * FRAME)
     turn = np.array([0.0, 0.0, np.sin(0.5 * angle), np.cos(0.5 * angle)])

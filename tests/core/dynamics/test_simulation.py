@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulation over frames: its initial state, ignored motion, stored state, and inputs."""
+"""A simulation over frames has an initial state, ignores certain motion, stores its state, and checks its input."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ NONE = World(gravity=(0.0, 0.0, 0.0))
 
 
 def fur(rng, count=24, point_count=41):
-    """(groom, pose): wavy guides that stand on a ball."""
+    """Return (groom, pose): wavy guides that stand on a ball."""
     normals = rng.normal(size=(count, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     t = np.linspace(0.0, 1.0, point_count)
@@ -36,7 +36,7 @@ def ball(motion=None):
 
 
 def shake(frame, size=0.05):
-    """The motion of the ball at a frame: 3 Hz to the side, and a turn."""
+    """Return the motion of the ball at a frame: 3 Hz to the side, and a turn."""
     angle = 0.2 * np.sin(frame)
     rotation = np.array([0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)])
     return RigidMotion(rotation, np.zeros(3), np.array([size * np.sin(2.0 * np.pi * 3.0 * frame * FRAME), 0.0, 0.0]))
@@ -76,14 +76,14 @@ def test_without_inertia_hair_moves_with_its_surface(rng):
 
 
 def test_hair_that_is_pinned_to_the_tip_moves_with_its_surface(rng):
-    """The law holds with a collider, although no strand has a free point."""
+    """Hair that is pinned to its tip moves with its surface, also with a collider."""
     groom, pose = fur(rng)
     simulation = Simulation(groom, DynamicsSettings(pinned=1.0), pose, World(obstacles=(ball(),)), DEVICE)
     np.testing.assert_allclose(play(simulation, pose, range(1, 5)), shake(4).moved(groom), atol=1e-6)
 
 
 def test_a_jump_takes_hair_along_as_it_is(rng):
-    """Shape and speed are those before, seen from the surface, however far it went."""
+    """A jump of any distance takes hair along with its shape and speed relative to the surface."""
     groom, pose = fur(rng)
     settings = DynamicsSettings(hair_friction=0.0, hair_pressure=0.0)  # whose grid does not turn with the hair
     jump = RigidMotion(rotations.unit(np.array([0.0, 0.0, 0.9, 0.1])), np.zeros(3), np.array([30.0, -4.0, 7.0]))
@@ -97,7 +97,7 @@ def test_a_jump_takes_hair_along_as_it_is(rng):
 
 
 def test_a_place_far_away_is_as_good(rng):
-    """A kilometer away single precision would be a tenth of a millimeter, were it not counted from near the hair."""
+    """A simulation a kilometer away is as exact, as positions are relative to the hair."""
     groom, pose = fur(rng)
     ends = []
     for far in (np.zeros(3), np.array([1000.0, -512.0, 250.125])):
@@ -190,7 +190,7 @@ def test_guides_without_length_follow_rigidly(rng):
 
 
 def test_a_strand_that_breaks_in_ten_frames_running_stays_in_its_groom(rng):
-    """The surface carries the broken strand to the end, and the others move as without it."""
+    """A strand that breaks in ten successive frames stays in its groom to the end, and others move as without it."""
     groom, pose = fur(rng)
     simulation, sound = (Simulation(groom, DynamicsSettings(), pose, World(), DEVICE) for _ in range(2))
     for frame in range(1, 12):
@@ -238,7 +238,7 @@ def test_wind_blows_hair_over_as_far_as_it_is_strong(rng):
 
 
 def test_friction_between_hairs_makes_them_move_together(rng):
-    """Guides that swing apart in a thick coat come to rest sooner, and nothing moves a groom that is at rest."""
+    """Friction brings guides that swing apart in a thick coat to rest sooner, and moves no groom at rest."""
     groom, pose = fur(rng, 200)
     kicks = rng.normal(0.0, 0.01, pose.positions.shape)
     speeds = []
@@ -258,7 +258,7 @@ def test_friction_between_hairs_makes_them_move_together(rng):
 
 @pytest.mark.gate(id="V20")
 def test_hair_of_another_region_is_not_felt(rng):
-    """Two coats in one place: with regions each moves as it would alone, as no momentum passes between them."""
+    """Two coats in one place with different regions move as each would alone."""
     groom, pose = fur(rng, 200)
     is_kicked = np.arange(200) % 2 == 0
     kicks = np.where(is_kicked[:, None], rng.normal(0.0, 0.01, (200, 3)), 0.0)
@@ -293,7 +293,7 @@ def test_pinned_points_only_follow_the_surface(rng, pinned):
 
 
 def test_a_number_of_substeps_that_is_set_is_taken_and_more_are_asked_for(rng):
-    """Automatic substeps are the requested number in fast frames."""
+    """A set number of substeps is used, and automatic substeps add to it in fast frames."""
     groom, pose = fur(rng)
     fixed, automatic = (
         Simulation(groom, DynamicsSettings(automatic_substeps=is_automatic), pose, World(), DEVICE)
@@ -308,7 +308,7 @@ def test_a_number_of_substeps_that_is_set_is_taken_and_more_are_asked_for(rng):
 
 
 def test_each_guide_is_as_wet_as_it_is_said(rng):
-    """Guides that do not touch each other, half of them wet: bit by bit as if all were as they are."""
+    """Half of the guides are wet: each moves bit by bit as if all guides were as wet as it is."""
     groom, pose = fur(rng)
     alone = DynamicsSettings(hair_friction=0.0, hair_pressure=0.0, sag_free=False)
     is_wet = rng.random(len(groom)) < 0.5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copy Guide Shape in Blender: from a selection or a group, to a group, a selection or all others."""
+"""Copy Guide Shape copies from a selection or a group to a group, a selection or all other guides."""
 
 import bpy
 import numpy as np
@@ -13,7 +13,9 @@ from tests.support.scenes import even_guides
 
 @pytest.fixture
 def groom(hair):  # `hair` makes the guides
-    """The guides of the +X cap hang down and are short; all others stand straight. Groups: right, left."""
+    """Return guides of which those on the +X cap hang down and are short, the others stand straight. Groups: right,
+    left.
+    """
     surface, guides = bpy.data.objects["Sphere"], bpy.data.objects["Guides"]
     places = vertex_positions(surface)
     for name, sign in (("right", 1.0), ("left", -1.0)):

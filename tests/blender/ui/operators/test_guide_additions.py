@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Adding, removing and mirroring guides in Blender: other guides keep all their bits and attributes."""
+"""Adding, removing and mirroring guides keeps all bits and attributes of the other guides."""
 
 import bpy
 import numpy as np
@@ -16,7 +16,7 @@ from tests.support.scenes import even_guides
 
 @pytest.fixture
 def groom(hair):
-    """Hair between combed guides that carry an attribute of the artist's own."""
+    """Return hair between combed guides with an attribute of the artist's own."""
     guides = bpy.data.objects["Guides"]
     wave(guides)
     named = guides.data.attributes.new("clump", "INT", "CURVE")
@@ -29,12 +29,12 @@ def groom(hair):
 
 @pytest.fixture
 def combed(groom):
-    """The object of the guides."""
+    """Return the object of the guides."""
     return bpy.data.objects["Guides"]
 
 
 def rows(guides):
-    """The clump of each guide: by which test and artist know it."""
+    """Return the clump of each guide, by which tests and artists identify it."""
     return attribute(guides, "clump")
 
 
@@ -72,7 +72,7 @@ def test_new_guides_are_rooted_and_known(combed, groom):
 
 @even_guides
 def test_new_guides_are_shaped_like_those_around(combed):
-    """On a groom that leans one way, new guides lean as the others and have their length."""
+    """New guides on a groom that leans one way lean like the others and have their length."""
     straight = points(combed)
     along = np.linspace(0.0, 0.5, 41)[None, :, None]
     straight = straight[:, :1] + along * (straight[:, :1] * 0.6 + np.array([0.0, 0.8, 0.0]))
@@ -101,7 +101,7 @@ def test_more_inside_a_mask(combed):
 
 
 def test_more_only_where_guides_were_placed(sphere):
-    """Guides of a masked half stay a half."""
+    """Guides are added only where guides were placed: those of a masked half remain in that half."""
     bpy.ops.vellus.distribute_guides(guide_count=40, length=0.3, density_group="top")
     guides = bpy.data.objects["Guides"]
     bpy.context.view_layer.objects.active = guides
@@ -152,7 +152,9 @@ def test_the_same_count_changes_nothing(combed):
 
 
 def test_new_guides_keep_to_their_side_of_a_part_line(groom, combed):
-    """Guides lean away from the line; between them no new one stands upright."""
+    """New guides keep to their side of a part line from which guides lean away, and none stands upright between
+    them.
+    """
     line = bpy.data.curves.new("Parting", "CURVE")
     line.dimensions = "3D"
     spline = line.splines.new("POLY")
@@ -243,7 +245,7 @@ def test_there_must_be_guides_on_the_side(combed):
 
 @pytest.mark.parametrize("tool", ["change_guide_count", "mirror_guides"])
 def test_guides_rooted_off_the_surface_keep_their_roots(imported, tool):
-    """New guides begin on the surface, images as far from it as their originals; none is rooted anew later."""
+    """Guides rooted off the surface keep their roots, and mirrored guides are as far from it as their originals."""
     bpy.context.view_layer.objects.active = imported
     bpy.ops.vellus.use_as_guides(surface="Sphere", grows_hair=False)
     off = curves.read_points(imported.data) + np.float32([0.0, 0.0, 0.01])

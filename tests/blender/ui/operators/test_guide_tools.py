@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guide tools in Blender: combing is kept, hair follows, and selection, masks, undo and redo work."""
+"""Guide tools keep combing, let hair follow, and support selection, masks, undo and redo."""
 
 import bpy
 import numpy as np
@@ -161,7 +161,7 @@ def test_the_panel_and_the_menu_offer_each_tool_once(waved, active):
 
 @pytest.mark.parametrize("name", sorted(SHAPING.keys() - {"copy_guide_shape"}))  # which looks for the nearest guides
 def test_hair_follows_as_it_follows_a_brush(waved, monkeypatch, name):
-    """No search among guides: what is bound stays bound."""
+    """Hair follows a tool as it follows a brush, without a search among guides and without binding again."""
     calls = counts_of(monkeypatch)
     use_tool(name)
     assert (calls["searches"], calls["writes"]) == (0, 1)
@@ -169,7 +169,7 @@ def test_hair_follows_as_it_follows_a_brush(waved, monkeypatch, name):
 
 @pytest.mark.parametrize("name", TOOLS)
 def test_undo_in_a_window_keeps_hair_and_guides_together(waved, monkeypatch, name):
-    """In a window the hair's Curves are written when an interaction ends, after the undo step was pushed."""
+    """Undo in a window keeps hair and guides together, although hair is written after the undo step was pushed."""
     monkeypatch.setattr(running, "has_window", lambda: True)
     before = points(bpy.data.objects["Guides"]), points(waved)
     use_tool(name)
@@ -215,7 +215,7 @@ def test_the_redo_panel_of_copies_picks_groups(waved):
 
 
 def test_no_attraction_says_why_nothing_changes(waved, capfd):
-    """At an amount of 0, with which the redo panel may begin, a message says why."""
+    """At an amount of 0, with which the redo panel may begin, a message says why nothing changes."""
     before = points(bpy.data.objects["Guides"])
     use_tool("attract_guides", amount=0.0)
     assert np.array_equal(points(bpy.data.objects["Guides"]), before)

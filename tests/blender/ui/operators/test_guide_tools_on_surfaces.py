@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guide tools on scaled, rotated or deformed surfaces, on curves of any kind, and their refusals."""
+"""Guide tools work on scaled, rotated or deformed surfaces and on curves of any type, or refuse with a message."""
 
 import bpy
 import numpy as np
@@ -23,7 +23,7 @@ from tests.support.reading import attribute, points, snapshot
 
 @pytest.fixture
 def turned(waved):
-    """The hair on a turned, moved object of twice the size."""
+    """Return the hair on a turned, moved object of twice the size."""
     surface = bpy.data.objects["Sphere"]
     surface.location, surface.rotation_euler, surface.scale = (1.0, 2.0, 3.0), (0.3, 0.2, 0.5), (2.0, 2.0, 2.0)
     cutter = bpy.data.objects["Cutter"]
@@ -77,7 +77,7 @@ def test_an_empty_cuts_off_what_is_on_its_z_side(turned):
 
 
 def test_a_deformed_surface_is_cut_where_it_is_seen(waved):
-    """The sphere is stretched by a modifier: what Blender renders ends at the plane, roots still follow."""
+    """A surface stretched by a modifier is cut where it is seen: rendered hair ends at the plane, and roots follow."""
     surface = bpy.data.objects["Sphere"]
     modifier = surface.modifiers.new("Stretch", "SIMPLE_DEFORM")
     modifier.deform_method, modifier.factor, modifier.deform_axis = "STRETCH", 0.6, "Z"
@@ -145,7 +145,7 @@ def test_no_guides_left(waved):
 
 @pytest.fixture
 def ragged(imported):
-    """Curves of 2 to 12 points used as guides, some smooth, with hair."""
+    """Return curves of 2 to 12 points used as guides, some of them smooth, with hair."""
     bpy.context.view_layer.objects.active = imported
     bpy.ops.vellus.use_as_guides(surface="Sphere", strand_count=300)
     imported.data.set_types(type="CATMULL_ROM", indices=list(range(0, len(imported.data.curves), 2)))
@@ -177,7 +177,7 @@ def test_guides_of_any_point_counts(ragged, name):
 
 
 def test_any_tools_in_any_order(waved, rng):
-    """Tools with any values, undone now and then: guides stay finite, and hair is what they make it."""
+    """Tools with any values in any order, some undone, keep guides finite and hair interpolated from the guides."""
     names = sorted(TOOLS)
     for _ in range(40):
         name = names[rng.integers(len(names))]

@@ -28,7 +28,7 @@ def test_polygons_are_named_before_they_are_made(hair):
 
 
 class Asked(AskedOperator):
-    """Stands in for a registered operator, which only Blender can make."""
+    """A mock of a registered operator, which only Blender can create."""
 
     bl_idname = "VELLUS_OT_hair_tubes"  # as Blender names operators that are running
 
@@ -51,7 +51,7 @@ def test_it_asks_unless_it_is_given_a_setting(hair, window, monkeypatch, is_aski
 
 @pytest.mark.parametrize("is_asking", [True, False])
 def test_what_was_asked_for_is_made_once(hair, monkeypatch, is_asking):
-    """The dialog runs an operator that Blender can undo; a repetition, as by the redo panel, runs this one."""
+    """The dialog runs an undoable operator once, and a repetition by the redo panel runs the same operator."""
     at_once = []
     monkeypatch.setattr(LongOperator, "execute", lambda self, context: at_once.append(self) or {"FINISHED"})
     operator = Asked()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Import Groom: files by our own readers, with unit, axis and all objects, onto the active mesh."""
+"""Import Groom reads files by our own readers, with unit, axis and all objects, onto the active mesh."""
 
 import bpy
 import numpy as np
@@ -18,14 +18,14 @@ from tests.support.reading import points
 
 @pytest.fixture
 def lines(sphere, rng):
-    """12 lines of 5 points out of a sphere that is elsewhere, in the world."""
+    """Return 12 lines of 5 points on a sphere that is elsewhere, in the world."""
     sphere.location, sphere.scale = (0.4, -0.3, 1.5), (0.1, 0.1, 0.1)
     update()
     return np.float32(list(lines_on(sphere, rng, 12, 5, 5)))
 
 
 def run(path, **given):
-    """(guides, hair) objects that are new; None for no hair."""
+    """Import, and return the new (guides, hair) objects, None for no hair."""
     before = set(bpy.data.objects)
     bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
     assert bpy.ops.vellus.import_groom(filepath=str(path), **given) == {"FINISHED"}
@@ -40,7 +40,9 @@ def in_world(shown):
 
 
 def test_curves_of_another_program_are_hair_where_they_belong(scene, sphere, lines, tmp_path):
-    """One object per curve, centimeters, Y up: detected or as given; errors leave nothing behind."""
+    """Curves of another program become hair at the right place, by unit and axis given or detected; errors leave
+    nothing behind.
+    """
     path = tmp_path / "curves.abc"
     of_maya(path, lines)
     for reported in ({}, {"unit": "cm", "up": "Y"}):
@@ -69,7 +71,7 @@ def test_curves_of_another_program_are_hair_where_they_belong(scene, sphere, lin
 
 @pytest.mark.parametrize("ending", [".usdc", ".abc", ".npz"])
 def test_our_own_grooms_come_back(hair, tmp_path, ending):
-    """Guides as guides and hair as hair, which brings its guides, to the last micrometer."""
+    """Grooms of ours are read back to the last micrometer: guides as guides, and hair as hair with its guides."""
     path = tmp_path / f"groom{ending}"
     guides = bpy.data.objects["Guides"]
     bpy.data.objects["Sphere"].location = (1.0, 2.0, 3.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stiffen: the lowest bend stiffness at which guides hold their shape, and the panel's note on guides that do not."""
+"""Stiffen sets the lowest bend stiffness at which guides hold their shape, and the panel counts guides that do not."""
 
 import bpy
 import numpy as np
@@ -16,13 +16,13 @@ from tests.support.reading import points
 
 @pytest.fixture
 def state(guides):
-    """Guides that stand up, half a meter long, where 0.19 m can at a stiffness of 8."""
+    """Return upright guides half a meter long, where a stiffness of 8 holds only 0.19 m."""
     guides.data.vellus.dynamics.bend_stiffness = 8.0
     return guides.data.vellus
 
 
 def comb_straight(height):
-    """Comb all guides to go straight up, or down."""
+    """Comb all guides straight up or down."""
     combed = np.repeat(points(bpy.data.objects["Guides"])[:, :1], 41, axis=1)
     combed[..., 2] += np.linspace(0.0, height, 41)
     positions = bpy.data.objects["Guides"].data.attributes["position"].data

@@ -10,7 +10,9 @@ from tests.support.reading import snapshot
 
 @pytest.mark.parametrize("name", ["use_as_guides", "use_as_hair"])
 def test_the_redo_panel_is_there_after_a_run(imported, name):
-    """Blender asks `poll` with what the run has made, before it undoes that to run with other settings."""
+    """The redo panel of Use as Guides is shown after a run, as `poll` accepts the result that Blender undoes to run
+    again.
+    """
     bpy.context.view_layer.objects.active = imported
     operator = getattr(bpy.ops.vellus, name)
     assert operator("EXEC_DEFAULT", True) == {"FINISHED"}

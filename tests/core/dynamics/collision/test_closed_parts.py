@@ -76,7 +76,7 @@ def test_rims_are_the_edges_with_one_triangle(head):
 
 
 def test_open_parts_are_turned_to_where_their_hair_is():
-    """Each open part is turned by itself; closed parts and parts without hair stay."""
+    """Each open part is turned by itself to the side of its hair; closed parts and parts without hair stay."""
     up, down = flat_grid(3), turned(moved(flat_grid(3), (0.0, 0.0, 1.0)))
     mesh = joined(up, down, moved(turned(flat_grid(2)), (0.0, 0.0, 2.0)), moved(BALL, (5.0, 0.0, 0.0)))
     parts = open_parts(mesh)

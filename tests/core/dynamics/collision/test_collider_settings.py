@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colliders: the settings of the hair, unless an object has its own."""
+"""Colliders have the settings of the hair unless an object overrides them."""
 
 from hypothesis import given
 from hypothesis import strategies as st

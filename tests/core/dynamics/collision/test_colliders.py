@@ -26,7 +26,7 @@ def notes_of(colliders):
 
 
 def finds(colliders, place):
-    """Whether a point at a place finds a plane."""
+    """Whether a point at a place finds a contact plane."""
     strand = np.repeat(np.tile(np.array(place, np.float32), 2).reshape(1, 6, 1), WIDTH, axis=2)
     positions = wp.array(strand, dtype=float, device=colliders.device)
     far = wp.array(strand + np.float32(9.0), dtype=float, device=colliders.device)
@@ -152,7 +152,7 @@ def test_a_collider_that_was_away_comes_back_without_a_motion(device):
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @given(data=st.data())
 def test_any_arrays_collide_or_are_named(data):
-    """Another collider beside the arrays is found in any case."""
+    """Arrays of any content are used as colliders or named as unusable, and other colliders remain in use."""
     coordinates = st.sampled_from([0.0, 0.1, 1.0, -1.0, 1e-30, 1e5, 1e7, 1e30, np.nan, np.inf])
     vertices = data.draw(st.lists(st.tuples(coordinates, coordinates, coordinates), max_size=5))
     triangles = data.draw(st.lists(st.tuples(*[st.integers(-1, 5)] * 3), max_size=6))
@@ -165,7 +165,9 @@ def test_any_arrays_collide_or_are_named(data):
 
 
 def test_vertices_drift_no_farther_than_is_known(device, rng):
-    """Seen from where they have turned and moved to as a whole, in each substep; a turn alone adds nothing for good."""
+    """Vertices drift no farther from the collider's rigid motion than the stored bound in each substep, which turns
+    do not raise.
+    """
     mesh = bumpy(rng)
     colliders = Colliders(device)
     colliders.read([Collider("a", mesh)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact with planes, spheres and cylinders: release, Coulomb friction, and points kept outside."""
+"""Contact with planes, spheres and cylinders lets strands go, obeys Coulomb friction, and keeps points outside."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ KEEP = 5e-4  # [m]
 
 
 def released(substeps, surface):
-    """Heights (frames,) of the tip of a strand that was pressed flat, while its rest shape rises by 30°."""
+    """Return heights (frames,) of the tip of a strand that was pressed flat, while its rest shape rises by 30°."""
     groom = line(0.05, 11, (np.cos(np.pi / 6.0), 0.0, np.sin(np.pi / 6.0))) + np.array([0.0, 0.0, KEEP])
     flat = line(0.05, 11) + np.array([0.0, 0.0, KEEP])
     simulation = Simulation(groom, FIBRE, substeps).place(flat)
@@ -33,7 +33,9 @@ def released(substeps, surface):
 @pytest.mark.gate(id="V15")
 @pytest.mark.parametrize("substeps", [4, 8])
 def test_a_pressed_strand_is_let_go(substeps):
-    """Off the plane within two frames; after a second where it is without the plane, to 0.1 % of its length."""
+    """A strand that was pressed flat leaves the plane within two frames, and reaches its free shape within a second
+    to 0.1 %.
+    """
     with_plane, without = released(substeps, Plane()), released(substeps, None)
     assert with_plane[1] > 2.0 * KEEP
     assert abs(with_plane[-1] - without[-1]) < 1e-3 * 0.05
@@ -76,7 +78,9 @@ FRICTIONS = np.array([0.0, 0.1, 0.3, 0.6])
 
 
 def tension_ratios(substeps):
-    """Of strands pulled over a quarter of a cylinder with a weight at their tips, by that without friction."""
+    """Return tension ratios of strands pulled over a quarter of a cylinder by weights, relative to the frictionless
+    one.
+    """
     radius, length, weight = 0.02, 0.2, 1e-4
     along = np.linspace(0.0, length, 61)
     level, arc = 0.08, (radius + KEEP) * np.pi / 2.0
@@ -123,7 +127,9 @@ INCLINE = Plane((0.5, 0.0, np.cos(np.pi / 6.0)))
 @pytest.mark.gate(id="V16")
 @pytest.mark.parametrize(("vertex_count", "substeps"), pairs([11, 41], [2, 4, 8], 2))
 def test_strands_that_fall_on_something_stay_outside_and_whole(vertex_count, substeps):
-    """Three shapes, friction 0 to 2, stiffness over six decades, on a plane, an incline and a ball: 648 strands."""
+    """648 strands of any shape, stiffness and friction that fall on a plane, an incline or a ball stay outside and
+    whole.
+    """
     angle = np.linspace(0.0, 1.5, vertex_count)
     rising = 0.1 * np.stack([np.sin(angle), 0.0 * angle, 0.5 - 0.5 * np.cos(angle)], axis=-1)[None]
     shapes = np.concatenate(
@@ -159,7 +165,7 @@ def test_strands_that_fall_on_something_stay_outside_and_whole(vertex_count, sub
 
 
 def hair_on_a_ball(count, vertex_count=25):
-    """Strands of 20 cm from the upper half of a ball of 9 cm, (S, N, 3), and its `Ball`."""
+    """Return strands of 20 cm from the upper half of a ball of 9 cm, (S, N, 3), and its `Ball`."""
     rng = np.random.default_rng(3)
     out = rng.normal(size=(count, 3))
     out[:, 2] = abs(out[:, 2]) + 0.3
@@ -202,7 +208,7 @@ def test_a_shaken_and_turned_head_keeps_its_hair_outside(substeps):
 
 @pytest.mark.gate(id="V12")
 def test_a_ball_goes_through_hanging_hair_which_closes_behind_it():
-    """A ball of 4 cm pushed through at 20 cm/s and out: a second later all hang as they did."""
+    """Hanging hair that a ball of 4 cm is pushed through at 20 cm/s hangs a second later as before."""
     groom = np.concatenate(
         [line(0.2, 25, (0.0, 0.0, -1.0)) + np.array([x, 0.0, 0.0]) for x in np.linspace(-0.05, 0.05, 21)]
     )
@@ -224,7 +230,7 @@ def test_a_ball_goes_through_hanging_hair_which_closes_behind_it():
 
 @pytest.mark.gate(id="V12")
 def test_a_tip_in_a_notch_comes_in_front_of_both_of_its_sides(rng):
-    """It is inside one, whose plane the solve had, and inside the other, whose plane was found since."""
+    """A tip that is inside both sides of a notch is moved in front of both, also of the side found after the solve."""
     count = 32
     simulation = Simulation(np.repeat(line(0.05, 6), count, axis=0), substeps=8)
     step = replace(simulation.step, gravity=(0.0, 0.0, 0.0))

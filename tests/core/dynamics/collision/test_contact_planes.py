@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Planes of contact: those of the nearest surface by brute force, at the distance that the groom allows."""
+"""Contact planes are those of the nearest surface by brute force, at the distance that the groom allows."""
 
 import numpy as np
 import pytest
@@ -111,7 +111,9 @@ def test_points_near_the_surface_in_the_groom_keep_their_distance(device):
 
 
 def test_a_segment_keeps_its_middle_outside(device):
-    """Both ends take the plane of a ridge between them, and with it the middle comes to the distance; roots do not."""
+    """Both ends of a segment take the plane of a ridge between them, which keeps the middle outside; roots do not
+    move.
+    """
     ridge = np.array(
         [[-1, -0.02, -0.02], [1, -0.02, -0.02], [-1, 0, 0], [1, 0, 0], [-1, 0.02, -0.02], [1, 0.02, -0.02]]
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands touching a moving mesh: the fused substep equals separate stages, on any number of threads."""
+"""The fused substep of strands that touch a moving mesh equals its stages, on any number of threads."""
 
 import os
 
@@ -21,7 +21,8 @@ COUNT, FRAME = 300, 1.0 / 24.0  # more than one share of two threads; [s]
 
 
 def shaken(frames=4, turning=3, durations=(FRAME,), **changes):
-    """The state of strands on a bumpy ball after some frames, the first of which it turns; how many points touch.
+    """Return the state of strands on a bumpy ball after some frames, and how many points touch; the ball turns in
+    the first.
 
     durations: of frames by turns [s]; changes: of settings. From the fifth frame on the ball is less smooth.
     """
@@ -67,7 +68,7 @@ def test_a_group_at_once_moves_as_stage_by_stage(monkeypatch):
 
 
 class Recorder:
-    """Commands that Warp records in place of launches, and refits of meshes, as a CUDA graph has them."""
+    """Commands that Warp records instead of launches, and refits of meshes, as in a CUDA graph."""
 
     def __init__(self, monkeypatch):
         self._commands, self.replay_count = None, 0
@@ -111,7 +112,7 @@ CHANGES = {
 
 @pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES.keys())
 def test_what_is_recorded_moves_strands_in_all_later_frames(monkeypatch, changes):
-    """Nothing that a frame brings is in what was recorded in the frame before: on a processor as a GPU does it."""
+    """Recorded commands move strands correctly in all later frames, on the processor as on a GPU."""
     state, _ = shaken(10, 6, **changes)
     if wp.get_device(DEVICE).is_cpu:
         monkeypatch.setattr(os, "process_cpu_count", lambda: 1)

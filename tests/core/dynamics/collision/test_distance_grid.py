@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Least distances on a grid: never more than by brute force, and not much less."""
+"""The least distances on a grid are at most those by brute force, and not much less."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def _ask(grid: DistanceGrid, points: wp.array[wp.vec3], out_distances: wp.array[
 
 
 def asked(grid, points, device):
-    """Least distances of points (N, 3)."""
+    """Return the least distances of points (N, 3)."""
     found = wp.zeros(len(points), dtype=float, device=device)
     given = wp.array(points.astype(np.float32), dtype=wp.vec3, device=device)
     wp.launch(_ask, len(points), inputs=[grid, given], outputs=[found], device=device)

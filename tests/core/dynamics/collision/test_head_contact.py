@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""V12 on the sample head with its ears: shaken hair stays outside and keeps its length."""
+"""V12: on the shaken sample head with its ears, hair stays outside and keeps its length."""
 
 import numpy as np
 import pytest
@@ -19,12 +19,12 @@ KEEP = 1e-3  # [m]
 
 @pytest.fixture(scope="module")
 def head():
-    """34,080 triangles."""
+    """Return the head with 34,080 triangles."""
     return split_in_four(read_obj(HEAD))
 
 
 def distances(mesh, points):
-    """(S, N - 1) [m]: of strands' points (S, N, 3) but their roots."""
+    """Return (S, N - 1) distances [m] of strands' points (S, N, 3) without roots."""
     places = points[:, 1:].reshape(-1, 3)
     found = SurfaceQuery(mesh).nearest(places)
     nearest = np.einsum("nk,nki->ni", found.barycentric, mesh.corners[found.triangle])
@@ -32,7 +32,7 @@ def distances(mesh, points):
 
 
 def shaken(head, guides):
-    """A second of guides on the head that is shaken: the simulation and how far points are, less what they keep."""
+    """Return the simulation of a second on the shaken head, and the distances of points minus those that they keep."""
     vertices = head.vertices.astype(np.float64)
     at_rest = RootPose(guides[:, 0], np.tile(rotations.IDENTITY, (len(guides), 1)))
     settings = DynamicsSettings(
@@ -53,7 +53,7 @@ def shaken(head, guides):
 
 @pytest.mark.gate(id="V12")
 def test_hair_on_a_shaken_head_stays_outside_and_whole(head):
-    """No vertex nearer than its distance by a micrometer, no segment 3 % longer, and none put back."""
+    """No vertex is too near by a micrometer, no segment is 3 % longer, and no strand is reset."""
     touching = 0
     for simulation, apart in shaken(head, grown(head)):
         assert apart.min() > -1e-6
@@ -64,9 +64,9 @@ def test_hair_on_a_shaken_head_stays_outside_and_whole(head):
 
 @pytest.mark.gate(id="V12")
 def test_hair_that_the_ears_pinch_stays_whole(head):
-    """Those of 4,960 whose ends come between two sides of an ear, or behind it: none is torn there, nor put back.
+    """No strand is torn or reset whose end comes between two sides of an ear or behind it.
 
-    They may be a little inside meanwhile.
+    There are 4,960 such strands. They may be a little inside meanwhile.
     """
     some = grown(head, 960)[[113, 219, 272, 278, 389, 545]]
     others = grown(head, 4000)[[91, 976, 1404, 1917, 2247, 2981, 3042]]

@@ -29,7 +29,9 @@ from tests.support.meshes import flat_grid, subdivided_sphere
 
 @pytest.mark.parametrize("substeps", [1, 4])
 def test_the_displacement_is_the_surfaces(device, rng, substeps):
-    """Exact for a rigid motion: of the point of the surface that is touched, in each substep a part of the frame's."""
+    """The displacement at a contact is exact for a rigid motion: that of the touched point, divided among the
+    substeps.
+    """
     mesh, turn, shift = bumpy(rng), Rotation.from_rotvec([0.02, -0.05, 0.04]), np.array([0.003, 0.001, -0.004])
     after = TriMesh((turn.apply(mesh.vertices) + shift).astype(np.float32), mesh.triangles)
     colliders = Colliders(device)
@@ -55,7 +57,9 @@ def test_the_displacement_is_the_surfaces(device, rng, substeps):
 
 
 def test_a_point_that_is_not_asked_has_no_plane_to_miss(device, rng):
-    """Strands that drift about a mesh that turns and swells: the same planes, spared or not, bit by bit."""
+    """A point that is not queried misses no plane: strands that drift about a turning, swelling mesh have the same
+    planes.
+    """
     mesh = bumpy(rng)
     colliders = Colliders(device)
     colliders.read([Collider("a", mesh, is_double_sided=True), Collider("b", flat_grid(2, 0.05), is_double_sided=True)])
@@ -132,7 +136,7 @@ def test_fast_points_do_not_pass_through(device, rng, kind, who_moves):
 
 
 def test_a_collider_that_swells_over_still_points_takes_them_along(device):
-    """A sheet rises in the middle by far more than what points keep, and sinks around it: as a whole it stays."""
+    """A collider that swells over resting points by far more than they keep takes the points along."""
     grid = flat_grid(6, 0.2)
     points = grid.vertices + np.float32([0.0, 0.0, 0.004])
     rise = 0.05 * (np.exp(-(((points[:, :2] - 0.1) / 0.05) ** 2).sum(axis=1)) - 0.2)
@@ -149,7 +153,7 @@ def test_a_collider_that_swells_over_still_points_takes_them_along(device):
 
 
 def test_a_double_sided_collider_keeps_the_side_of_a_point(device, rng):
-    """Pressed slowly to the other side, it is asked back to its own, however long that takes; and it may go around."""
+    """A point that is pressed slowly through a double-sided collider is returned to its own side, at any time."""
     colliders = Colliders(device)
     colliders.read([Collider("a", flat_grid(4, 0.1), distance=1e-3, is_double_sided=True)])
     points = np.concatenate([rng.uniform(0.01, 0.09, (32, 2)), np.repeat([[0.0005], [-0.0005]], 16, axis=0)], axis=1)
@@ -202,7 +206,7 @@ def test_a_state_gives_the_same_planes(device, rng):
 
 
 def test_points_pushed_along_their_planes_stay_outside_of_a_shaken_mesh(device, rng):
-    """660°/s about one axis, 3 Hz along another: what the planes leave inside is below a micrometer."""
+    """Points pushed along their planes are inside a mesh shaken at 660°/s and 3 Hz by less than a micrometer."""
     ball = subdivided_sphere(3)
     ball = TriMesh(ball.vertices * np.float32([0.08, 0.095, 0.12]), ball.triangles)
     colliders = Colliders(device)

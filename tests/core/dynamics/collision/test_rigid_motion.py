@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigid rotations leave no residual motion, and the residual of other motion is bounded."""
+"""A rigid motion has no residual, and the residual of other motion is bounded."""
 
 from itertools import pairwise
 

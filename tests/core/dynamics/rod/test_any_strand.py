@@ -16,7 +16,7 @@ STRANDS = 24  # of an example
 
 
 def mixed(materials):
-    """One `Material` of strands that have one each; what all share is of the first."""
+    """Return one `Material` for strands with one material each; shared values are those of the first."""
     arrays = {
         name: np.concatenate([getattr(material, name) for material in materials])
         for name, value in vars(materials[0]).items()
@@ -84,7 +84,7 @@ def test_any_strand_settles(vertex_count, substeps, gravity, damping, drag, kick
 @pytest.mark.gate(id="V14")
 @pytest.mark.parametrize("thickness", [1000.0, 3000.0, 10_000.0])
 def test_strands_in_thick_air_stay_as_they_are(thickness):
-    """Fibres of 2 µm at rest, in air that makes points so many times heavier within a substep: nothing moves them.
+    """Fibers of 2 µm stay at rest in air that makes their points much heavier within a substep.
 
     There frames turn much more easily than points move, and |d| = 1 in the matrix where d is a rounded direction would
     cost it its definiteness: most of these strands would break. G Gᵀ = 1 - e_v e_vᵀ would do no harm: its rounding,

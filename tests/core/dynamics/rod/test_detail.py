@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Combed guides as simulated vertices, and back."""
+"""Combed guides are converted to simulated vertices and back."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ TURN = Rotation.from_rotvec([0.3, -0.8, 0.4])
 
 
 def combed(turns):
-    """(41, 3): an arc with coils about it."""
+    """Return (41, 3): an arc with coils about it."""
     s = np.linspace(0.0, 1.0, 41)
     angle = 2.0 * np.pi * turns * s
     coil = [LENGTH * s, 0.006 * np.sin(angle) + 0.03 * s**2, 0.006 * (1.0 - np.cos(angle)) - 0.05 * s**2]
@@ -34,7 +34,7 @@ def guides(request):
 
 
 def put(rods, vertices, frames):
-    """Rods where they are told, without simulation."""
+    """Place rods without simulation."""
     state = rods.save()
     state["positions"] = vertices.reshape(len(vertices), -1).astype(np.float32)
     state["frames"] = frames.reshape(len(vertices), -1).astype(np.float32)
@@ -69,7 +69,7 @@ def test_rigid_motion_is_exact(guides):
 
 @pytest.mark.gate(id="V18")
 def test_bent_curls_keep_their_length(guides):
-    """A rod that bends by a right angle along its length takes its coils with it."""
+    """Curls keep their length on a rod that bends by a right angle."""
     points, vertices, rods, left = guides
     if vertices.shape[1] < 25:
         return  # six coils need more

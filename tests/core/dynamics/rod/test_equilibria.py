@@ -14,7 +14,7 @@ IN_THICK_AIR = replace(FIBRE, air_drag=10.0, damping=0.05)
 
 
 def largest_error(simulation, reference, length):
-    """In parts of the length; the strand must rest."""
+    """Return the largest error as a fraction of the length; the strand must be at rest."""
     assert simulation.speed.max() < 1e-3
     assert not simulation.rods.reset_counts().any()
     return np.linalg.norm(simulation.points[0] - reference, axis=1).max() / length
@@ -27,14 +27,14 @@ def settled(groom, seconds=6):
 @pytest.mark.gate(id="V1")
 @pytest.mark.parametrize(("length", "gate"), [(0.05, 0.0005), (0.1, 0.002), (0.2, 0.0045)])
 def test_a_level_strand_becomes_the_heavy_elastica(length, gate):
-    """Drag has no effect: drag that is not implicit with gravity would hold a part of the weight."""
+    """A level strand becomes the heavy elastica, and drag carries no part of the weight."""
     simulation = settled(line(length, 25))
     assert largest_error(simulation, heavy_elastica(BENDING, WEIGHT, length, 25), length) < gate
     assert abs(simulation.rods.stretch()).max() < 1e-4
 
 
 def order(errors, counts):
-    """Of convergence in the number of segments, between the first and the last."""
+    """Return the order of convergence in the number of segments, between the first and the last."""
     return np.log(errors[0] / errors[-1]) / np.log((counts[-1] - 1) / (counts[0] - 1))
 
 
@@ -57,7 +57,7 @@ LEVEL = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # the thi
 @pytest.mark.gate(id="V5")
 @pytest.mark.parametrize(("radius", "turns", "moment", "gate"), ARCS)
 def test_a_level_arc_bends_and_twists_as_kirchhoff_says(radius, turns, moment, gate):
-    """Its moments are those of a rod without weight at the tip, so the reference is one that has found its clamp."""
+    """A level arc bends and twists as Kirchhoff's equations say, by moments of a rod that is weightless at its tip."""
     length = 2.0 * np.pi * turns * radius
     errors, counts = [], (11, 25, 41)
     for count in counts:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moving strands: periods, damping, momentum, energy, length, and the order of errors in time."""
+"""Moving strands have the right periods, damping, momentum, energy and length, and first-order errors in time."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ LIMP = replace(FREE, bend_stiffness=1e-3, youngs_modulus=4e-2, stretch_stiffness
 
 
 def periods(signal, size):
-    """Of falls through zero of a signal, sampled from one step of some size [s] on."""
+    """Return the periods between falling zeros of a signal that is sampled in steps of a size [s]."""
     falls = np.flatnonzero((signal[:-1] > 0.0) & (signal[1:] <= 0.0))
     return np.diff(size * (falls + signal[falls] / (signal[falls] - signal[falls + 1])))
 
@@ -23,7 +23,7 @@ def periods(signal, size):
 @pytest.mark.gate(id="V2")
 @pytest.mark.parametrize("substeps", [2, 8])
 def test_a_hanging_chain_swings_in_its_first_mode(substeps):
-    """x = J₀(2.4048 √(z / L)), ω = 1.2024 √(g / L); implicit Euler's amplitude falls as exp(-ω² h t / 2)."""
+    """A hanging chain swings in its mode x = J₀(2.4048 √(z / L)), ω = 1.2024 √(g / L), damped by exp(-ω² h t / 2)."""
     length = 0.2
     groom = line(length, 25, (0.0, 0.0, -1.0))
     swung = groom.copy()
@@ -71,7 +71,7 @@ def test_a_cantilever_vibrates_in_its_first_mode():
 
 
 def momenta(simulation, masses):
-    """Linear [kg m/s], and angular with the frames' own [kg m²/s]."""
+    """Return the linear [kg m/s] and the angular momentum [kg m²/s], including that of frames."""
     rods = simulation.rods
     velocities = rods.velocities()[0, 1:].astype(float)
     spins = rods.read("spins").reshape(1, -1, 3)[0, 1:].astype(float)
@@ -81,7 +81,7 @@ def momenta(simulation, masses):
 
 
 def free_rod(substeps, seconds):
-    """Momenta before and after of a rod whose first segment holds nothing; the origin follows it, as it does hair."""
+    """Return the momenta before and after of a free rod; the origin follows the rod as it follows hair."""
     groom = curl(0.1, 25, 1)
     material = Simulation(groom, FREE).material
     bending, stretching = material.bend_compliances.copy(), material.stretch_compliances.copy()
@@ -122,7 +122,7 @@ def test_the_error_of_angular_momentum_is_of_first_order_in_time():
 
 @pytest.mark.gate(id="V8")
 def test_a_strand_keeps_its_length():
-    """Length is constant at rest, shaken by ten times gravity at 5 Hz, and after a jump of the root by 1/3 m."""
+    """A strand keeps its length at rest, shaken at 5 Hz by ten times gravity, and after a jump of the root by 1/3 m."""
     groom = np.concatenate([curl(0.15, 25), line(0.15, 25), line(0.15, 25, (0.0, 0.3, -1.0))])
     simulation = Simulation(groom).advance(48)
     assert abs(simulation.rods.stretch()).max() < 1e-4
@@ -145,7 +145,7 @@ def test_a_strand_keeps_its_length():
     ("length", "vertex_count", "modulus"), [(0.01, 65, 4.0), (0.02, 65, 4000.0), (0.0512, 33, 4.0), (2.0, 65, 400.0)]
 )
 def test_short_and_stiff_segments_keep_their_length(length, vertex_count, modulus):
-    """LEAST_INERTIA keeps rounding from making their matrix indefinite."""
+    """Short and stiff segments keep their length, as LEAST_INERTIA keeps their matrix definite despite rounding."""
     settings = replace(FIBRE, youngs_modulus=min(modulus, 1e3), bend_stiffness=max(modulus / 1e3, 1.0))
     groom = np.concatenate([line(length, vertex_count), curl(length, vertex_count, 2, 0.05 * length)])
     simulation = Simulation(groom, settings)
@@ -156,7 +156,7 @@ def test_short_and_stiff_segments_keep_their_length(length, vertex_count, modulu
 
 
 def energy(simulation, stiffness):
-    """(S,) [J] of motion, height and bending."""
+    """Return the energies (S,) [J] of motion, height and bending."""
     rods, material = simulation.rods, simulation.material
     velocities = rods.velocities().astype(float)
     spins = rods.read("spins").reshape(*material.inertias.shape, 3).astype(float)
@@ -192,7 +192,7 @@ def test_energy_never_grows_without_drive():
 
 @pytest.mark.gate(id="V9")
 def test_what_is_let_fall_comes_to_rest():
-    """Three shapes of three numbers of vertices, six stiffnesses over six decades, four numbers of substeps."""
+    """Strands of any shape, number of vertices, stiffness and number of substeps come to rest after they fall."""
     settled = [
         is_settled
         for vertex_count in (6, 13, 25)
@@ -222,7 +222,7 @@ def settled_strands(vertex_count, substeps):
 
 @pytest.mark.gate(id="V10")
 def test_the_error_is_of_first_order_in_time():
-    """A level strand of 20 cm that falls for a quarter of a second."""
+    """The error is of first order in time for a level strand of 20 cm that falls for a quarter of a second."""
     tips = []
     for substeps in (4, 8, 16, 32, 256):
         simulation = Simulation(line(0.2, 25), replace(FIBRE, bend_stiffness=8.0), substeps, GRAVITY)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Presets of dynamics: settings that they set, settings that they keep, and comparisons."""
+"""Presets of dynamics set their settings, keep all others, and are compared with the current settings."""
 
 from dataclasses import asdict, replace
 from itertools import pairwise

@@ -25,7 +25,7 @@ def groom(rng):
 
 
 def shaken(groom, frames=FRAMES, simulation=None, first_frame=0, **details):
-    """The state after some frames, near a floor."""
+    """Return the state after some frames near a floor."""
     simulation = Simulation(groom) if simulation is None else simulation
     for frame in range(first_frame, frames):
         simulation.roots = groom[:, 0] + 0.02 * np.sin([frame, 2.0 * frame, 0.5 * frame])
@@ -34,7 +34,7 @@ def shaken(groom, frames=FRAMES, simulation=None, first_frame=0, **details):
 
 
 def floor(groom):
-    """A plane of contact below the middle of all roots, of strands that start on the far side none."""
+    """Return a contact plane below the middle of all roots; strands on its far side have none."""
     planes = np.zeros((len(groom), VERTICES, rod_solver.PLANE_ROWS))
     planes[groom[:, 0, 1] < 0.03] = [0.0, 0.0, 1.0, -0.02, 0.0, 0.0, 0.0, 0.3]
     return rod_solver.Surroundings(planes=in_lanes(planes))
@@ -63,7 +63,7 @@ def test_resumed_from_any_frame(groom, frame):
 
 @pytest.mark.gate(id="V13")
 def test_in_another_order(groom, rng):
-    """No strand depends on those whose lanes are beside its own; also not on how many there are."""
+    """Strands have the same bits in another order, whatever strands are in the lanes beside them and however many."""
     order = rng.permutation(COUNT)[: COUNT - 11]
     state, other = shaken(groom), shaken(groom[order])
     for name in state.keys() - {"step_size"}:
@@ -93,7 +93,7 @@ def test_stage_by_stage_and_substep_by_substep(groom):
 
 @pytest.mark.gate(id="V19")
 def test_at_other_frame_rates(groom):
-    """24, 30 and 60 frames a second, in substeps of one size: a third of a second above still roots."""
+    """Substeps of one size in 24, 30 and 60 frames per second give the same motion above resting roots."""
     ends = []
     for count in (10, 8, 4):
         simulation = Simulation(groom)
@@ -104,7 +104,7 @@ def test_at_other_frame_rates(groom):
 
 
 def test_carried_strands_go_on_as_before(groom):
-    """Gravity, roots and motion turn with the jump, so all is as if it had not been; others do not notice."""
+    """Strands carried by a jump continue as before, as gravity, roots and motion turn with the jump."""
     turn = Rotation.from_rotvec([0.5, -1.0, 0.3])
     here, there = Simulation(groom).advance(3), Simulation(groom).advance(3)
     chosen = np.arange(COUNT) % 3 == 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sag-free rest shapes: a groom that gravity does not change."""
+"""Sag-free rest shapes keep a groom unchanged under gravity."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ NATURAL = DynamicsSettings()
 
 
 def shapes(length, vertex_count=25):
-    """A level line, an arc that rises, a curl and an upright strand."""
+    """Return a level line, an arc that rises, a curl and an upright strand."""
     angle = np.linspace(0.0, 1.5, vertex_count)
     rising = length / 1.5 * np.stack([np.sin(angle), 0.0 * angle, 1.0 - np.cos(angle)], axis=-1)[None]
     upright = line(length, vertex_count, (0.05, 0.0, 1.0))
@@ -69,7 +69,7 @@ def test_joints_that_would_turn_too_far_are_clipped_and_counted():
 
 @pytest.mark.parametrize("length", [0.1, 0.2])
 def test_an_upright_strand_stands_from_greenhills_stiffness_on(length):
-    """Given a push, it stays near its groom at 1.1 times the least stiffness, and falls at 0.9 times."""
+    """A pushed upright strand stays near its groom at 1.1 times Greenhill's least stiffness, and falls at 0.9 times."""
     groom = line(length, 25, (0.0, 0.0, 1.0))
     unit = material_of(replace(NATURAL, bend_stiffness=1.0), combed_shape(groom).lengths)
     least = least_stiffness(groom, unit, GRAVITY)

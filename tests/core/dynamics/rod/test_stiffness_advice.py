@@ -16,7 +16,7 @@ GRAVITY = 9.81
 
 
 def elastica(ratio, tip=1.0):
-    """How far the tip sinks, by collocation of (p θ')' = −Γ (1 − s) cos θ with p = 1 + (tip − 1) s."""
+    """Return how far the tip sinks, by collocation of (p θ')' = −Γ (1 − s) cos θ with p = 1 + (tip − 1) s."""
 
     def slopes(s, y):
         return np.stack([y[1] / (1.0 + (tip - 1.0) * s), -ratio * (1.0 - s) * np.cos(y[0]), np.sin(y[0])])
@@ -42,7 +42,7 @@ def test_a_stiff_cantilever_sinks_by_an_eighth_of_its_weight_ratio(ratio):
 
 @pytest.mark.parametrize("tip", [0.0, 0.25, 4.0])
 def test_a_stiff_cantilever_with_another_tip_sinks_as_a_beam_does(tip):
-    """The tip sinks by ½ Γ ∫ (1 − s)³ / p ds, from the unit load method."""
+    """The tip of a stiff cantilever with another tip stiffness sinks by ½ Γ ∫ (1 − s)³ / p ds, as a beam does."""
     wanted, _error = quad(lambda s: 0.5 * (1.0 - s) ** 3 / (1.0 + (tip - 1.0) * s), 0.0, 1.0)
     assert tip_sink(1e-5, tip) / 1e-5 == pytest.approx(wanted, rel=5e-3)
 
@@ -61,7 +61,9 @@ def test_heavier_guides_sink_farther_and_never_more_than_they_are_long(ratio, fa
 
 @given(st.floats(0.1, 10.0), st.floats(0.01, 1.0))
 def test_the_weight_ratio_depends_on_what_it_is_made_of(factor, length):
-    """Γ = 4 ρ g L³ / (k E r²): longer by f and thicker by f^1.5, or heavier and stiffer by f, hair bends alike."""
+    """Hair bends alike with equal Γ = 4 ρ g L³ / (k E r²): longer by f and thicker by f^1.5, or heavier and stiffer
+    by f.
+    """
     settings = DynamicsSettings()
     ratio = weight_ratio(settings, length, GRAVITY)
     assert ratio == pytest.approx(4.0 * 1300.0 * GRAVITY * length**3 / (8.0 * 4e9 * 4e-5**2))
