@@ -22,8 +22,6 @@ LONG_FILES = {
 def pytest_configure():
     """Load the kernels that `make build` has compiled from these sources, if there are any, also in processes of
     tests.
-
-    So do the processes that tests start.
     """
     folder = build_extension.kernel_folder(is_for_tests=True)
     if compile_kernels.are_up_to_date(folder):

@@ -123,7 +123,7 @@ def test_frames_of_a_killed_worker_are_rendered_by_the_other(lit, tmp_path, monk
         return processes[-1]
 
     def told(values):
-        """Kill the worker when the first frame is there, and return its output."""
+        """Kill the worker when the first frame is there, whether it renders another frame or not."""
         processes[0].kill()
         return sentence_of(values)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Alembic files: an independent reader finds what was written, with any number of parts and samples."""
+"""An independent reader finds what was written to Alembic files, with any number of parts and samples."""
 
 import io
 

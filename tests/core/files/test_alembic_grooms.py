@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of Alembic files: transforms, metadata, and damaged or hostile files."""
+"""Curves of Alembic files are read with transforms and metadata, and damaged or hostile files are refused."""
 
 import struct
 
@@ -23,7 +23,9 @@ def path(tmp_path):
 
 
 def test_transforms_place_curves_and_scale_their_widths(path, rng):
-    """Operations of every kind, the last one first; a transform that does not inherit begins anew."""
+    """Transforms place curves and scale their widths by operations of every kind, the last one first, with or
+    without inheritance.
+    """
     file, points = File(), rng.normal(size=(5, 3)).astype(np.float32)
     widths = file.writer.array("width", "float32", np.float32([0.1, 0.2]))
     curves = file.curves("shape", points, [2, 3], extra=[widths])
@@ -66,7 +68,9 @@ def test_curves_and_transforms_move_between_samples(path, rng):
 
 
 def test_splines_are_what_is_drawn(path):
-    """A uniform B-spline begins a third of the way beside its second point; Bézier and Hermite curves at their ends."""
+    """Splines are read as drawn: a B-spline begins a third of the way beside its second point, other curves at their
+    ends.
+    """
     file, line = File(), np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     smooth = np.concatenate([line[:1], line, line[-1:]])
     knots = file.writer.array(".knots", "float32", np.float32([0, 0, 0, 0, 1, 1, 1, 1]))
@@ -133,7 +137,9 @@ def test_curves_of_one_object_are_told_apart_by_kind_and_group(path, rng):
 
 
 def test_groups_have_names_and_curves_have_colors(path, rng):
-    """Of each curve, of each point, or of all; colors of another number are reported, and left out."""
+    """Groups have names, and curves have colors of each curve, of each point or of all; colors of another number are
+    left out.
+    """
     file, points, rgb = File(), rng.normal(size=(7, 3)), rng.random((7, 3)).astype(np.float32)
     write, counts = file.writer, [3, 2, 2]
 
@@ -191,7 +197,7 @@ def test_what_is_no_archive_is_refused_in_a_sentence(path, content, reported):
 
 
 def small_file():
-    """The bytes of a small archive with all that is read."""
+    """Return the bytes of a small archive with everything that is read."""
     file = File()
     write, line = file.writer, np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     parameters = [
@@ -212,7 +218,7 @@ def small_file():
 
 
 def test_mutants_of_a_file_give_curves_or_a_sentence(path, rng):
-    """Bytes, numbers and ends that are changed: what is read is finite in number, and nothing else is raised."""
+    """Files with changed bytes, numbers or ends give curves or one sentence, with a finite number of values."""
     whole = small_file()
     path.write_bytes(whole)
     assert [len(one) for one in alembic.grooms.read(path).sets] == [1, 1, 1]
@@ -239,7 +245,7 @@ def test_mutants_of_a_file_give_curves_or_a_sentence(path, rng):
 
 
 def test_a_small_file_cannot_fill_the_memory(path):
-    """A hundred objects that share one sample."""
+    """A small file cannot fill the memory by a hundred objects that share one sample."""
     file, points = File(), np.zeros((20_000, 3), np.float32)
     shared = [file.curves(f"c{n}", points, [20_000]) for n in range(100)]
     with pytest.raises(HairError, match="damaged"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays are restored bit by bit, other .npz readers can read them, and other files are refused."""
+"""Arrays in a file are restored bit by bit, other .npz readers can read them, and other files are refused."""
 
 import io
 import math

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Unit and axis of curves: given, from the file, or by the distance of roots from the surface; refusals."""
+"""The unit and axis of curves are given, in the file, or found by the distance of roots from the surface; or
+refused.
+"""
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ def head(sphere):
 
 
 def curves_in(head, meters, up, count=30):
-    """Curves that stand on a head, as a file of some unit and axis has them."""
+    """Return curves that stand on a head, as a file in some unit and axis has them."""
     roots = head.vertices[:: len(head.vertices) // count].astype(np.float64)
     lines = np.stack([roots, CENTRE + 1.5 * (roots - CENTRE)], axis=1).reshape(-1, 3)
     lines = lines @ TO_Z_UP[up] / meters  # the inverse of a rotation
@@ -62,7 +64,7 @@ def test_roots_beyond_the_size_of_the_surface_are_refused_with_what_fits(head):
 
 
 def test_curves_that_shrink_into_the_surface_do_not_count_as_on_it(sphere):
-    """Curves read as centimeters would be a speck inside the head, whose roots are near the surface and wrong."""
+    """Curves read as centimeters that would be a speck inside the head do not count as on its surface."""
     head = TriMesh((0.5 * SIZE * sphere.vertices + [0.0, 0.0, 0.5 * SIZE]).astype(np.float32), sphere.triangles)
     roots = head.vertices[::30].astype(np.float64)
     lines = np.stack([roots, 1.3 * roots], axis=1).reshape(-1, 3) @ TO_Z_UP["Y"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files created by several processes: each is created once, and killed processes block no others."""
+"""Each file that several processes create is created once, and killed processes block no others."""
 
 import errno
 import os
@@ -99,7 +99,7 @@ def test_a_folder_that_is_not_there_is_an_error(tmp_path):
 
 @pytest.mark.parametrize("is_link", [True, False])
 def test_what_others_have_put_in_place_of_a_claim_is_left_alone(tmp_path, is_link):
-    """A link, behind which no file is made, or a pipe, for which nobody waits."""
+    """A link or a pipe in the place of a claim is left alone: no file is made behind it, and nobody waits for it."""
     beside = claim_of(tmp_path / "frame")
     if is_link:
         os.symlink(tmp_path / "victim", beside)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of files: readable, allowed by all systems, and different for different things."""
+"""Names of files are readable, allowed by all systems, and different for different things."""
 
 import pytest
 

@@ -32,7 +32,7 @@ from tests.support.cached_frames import (
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with the frames -2 to 3."""
+    """Return a folder with the frames -2 to 3."""
     bake(tmp_path / "cache", range(-2, 4))
     return tmp_path / "cache"
 
@@ -56,7 +56,9 @@ def test_the_manifest_comes_back(tmp_path):
 
 
 def test_a_key_follows_from_every_part():
-    """Arrays by type, shape and bits; a part's name counts, their order does not."""
+    """A key depends on every part: on types, shapes and bits of arrays and on names of parts, but not on their
+    order.
+    """
     zeros = [np.zeros(4, "f4"), np.zeros((2, 2), "f4"), np.zeros(2, "f8"), np.zeros(4, "i4"), -np.zeros(4, "f4")]
     parts = [{"a": 1}, {"b": 1}, {"a": "1"}, {"a": [1]}, {"a": 1, "b": None}, *({"a": array} for array in zeros)]
     keys = [frame_manifest.key_of(frame_manifest.digests_of(part)) for part in parts]
@@ -123,7 +125,9 @@ def test_a_frame_that_is_not_the_manifests_is_refused(folder):
 
 
 def test_disk_full_at_fifty_places(folder):
-    """A limit on the size of files stands for it: both end a write in the middle."""
+    """A disk that becomes full at any of fifty places keeps the frames; a limit on the size of files stands in for
+    it.
+    """
     _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     largest = max(path.stat().st_size for path in folder.iterdir()) + 66_000
     refused = 0
@@ -223,7 +227,7 @@ def test_one_process_bakes_while_others_read(folder):
 
 
 def test_a_file_that_another_program_holds_is_tried_three_times(folder, monkeypatch):
-    """Windows refuses access to files that a virus scanner reads."""
+    """A file that another program holds is read three times, as virus scanners on Windows block access briefly."""
     monkeypatch.setattr(time, "sleep", lambda _seconds: None)
     tries = []
 
@@ -310,7 +314,9 @@ PREPARED = [linked, with_files, with_claim_link, with_marker_link, with_other_ma
 
 @pytest.mark.parametrize("prepare", PREPARED, ids=lambda prepare: prepare.__name__)
 def test_nothing_is_written_to_a_folder_that_others_have_prepared(tmp_path, prepare):
-    """The folder of a web application, with its own manifest.json and numbered files, stays unchanged."""
+    """Nothing is written to a folder of others, such as a web application with its own manifest.json and numbered
+    files.
+    """
     victim, folder = tmp_path / "application", tmp_path / "cache"
     victim.mkdir()
     (victim / "manifest.json").write_text('{"name": "application"}')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Data for other programs: three guides of each strand, names of groups, limits."""
+"""Data for other programs have three guides of each strand, names of groups, and limits."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def test_names_of_groups_differ_and_keep_to_the_letters_that_all_programs_take()
 
 
 def test_no_two_objects_of_a_file_are_called_the_same():
-    """Guides are called after their group, as another group may be."""
+    """No two objects of a file have the same name, although guides are named after their group."""
     for names in (["Hair", "Hair_guides", "materials"], ["Hair_guides", "Hair", "materials"]):
         made = groom_curves.group_names(names, {"materials"})
         objects = [*made, *map(groom_curves.guides_name, made), "materials"]

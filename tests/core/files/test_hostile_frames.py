@@ -20,7 +20,7 @@ from tests.support.mutants.changes import mutated
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with the frames -2 to 3."""
+    """Return a folder with the frames -2 to 3."""
     bake(tmp_path / "cache", range(-2, 4))
     return tmp_path / "cache"
 
@@ -42,7 +42,7 @@ def test_a_frame_cut_at_any_byte_is_missing(folder):
 
 
 def check_mutants(count, seed):
-    """No mutant is read as another frame, or ends otherwise than by being refused."""
+    """Assert that a mutant is refused and never read as another frame."""
     source = random.Random(seed)
     data, layout = frame_bytes(), manifest().frame_layout
     manifest_data = json.dumps(
@@ -71,7 +71,7 @@ def test_a_million_mutants_are_refused():
 
 
 def foreign(kind, path):
-    """Put something else in the place of a frame."""
+    """Replace a frame by another file."""
     data = path.read_bytes()
     path.unlink()
     if kind == "folder":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images of studio lights: layers, bottom row first; other files are refused with a message."""
+"""Images of studio lights are read as layers, bottom row first; other files are refused with a message."""
 
 import numpy as np
 import OpenEXR

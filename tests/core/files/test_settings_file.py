@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Groom settings in files: exact round trip, and one message for each error in a file."""
+"""Groom settings are the same after writing and reading, and each error in a file is one message."""
 
 import json
 import math
@@ -23,7 +23,7 @@ from hair_addon.core.styling.kinds import KINDS
 
 
 def values_of(default, details):
-    """Values that a setting may have."""
+    """Generate values that a setting may have."""
     if isinstance(default, bool):
         return st.booleans()
     if isinstance(default, str):
@@ -53,7 +53,7 @@ STYLES = st.lists(st.one_of(*map(any_style, KINDS)), max_size=5)
 
 @st.composite
 def grooms(draw):
-    """Any settings; some styles have names."""
+    """Generate any settings; some styles have names."""
     styles = draw(STYLES)
     text = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=20)
     names = draw(st.one_of(st.just([]), st.lists(text, min_size=len(styles), max_size=len(styles))))
@@ -70,7 +70,7 @@ def write(path, values):
 
 
 def head(**sections):
-    """A file's values, with some sections."""
+    """Return a file's values, with some sections."""
     return {"format": settings_file.FORMAT, "version": settings_file.VERSION, **sections}
 
 
@@ -89,7 +89,7 @@ def test_what_is_written_keeps_to_the_schema(wanted):
 
 
 def check(value, schema):
-    """Assert that a value keeps to a JSON Schema, of the words that ours is written in."""
+    """Assert that a value satisfies a JSON Schema, limited to the keywords of ours."""
     known = {"$schema", "title", "description", "default", "type", "required", "additionalProperties", "properties"}
     known |= {"const", "enum", "items", "minItems", "maxItems", "minimum", "exclusiveMinimum", "maximum", "anyOf"}
     assert set(schema) <= known

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strand files of other programs: exact positions, diameters as diameters, and one sentence for damaged files."""
+"""Strand files of other programs are read with exact positions and diameters, and damaged files are one sentence."""
 
 import io
 import struct
@@ -68,7 +68,9 @@ def test_tressfx_brings_positions_and_uv_coordinates(tmp_path):
 
 @pytest.mark.parametrize(("default", "radius"), [(1.0, None), (0.0, None), (0.5, 0.25), (float("nan"), None)])
 def test_the_default_thickness_of_a_hair_file_counts_if_somebody_chose_it(tmp_path, default, radius):
-    """1 is what the format's library writes for files without thickness."""
+    """The default thickness of a .hair file counts unless it is 1, which its library writes for files without
+    thickness.
+    """
     (tmp_path / "a.hair").write_bytes(strand_files.hair(LINES, default=default))
     (found,) = hair.read(tmp_path / "a.hair").sets
     assert (found.radii is None) if radius is None else (found.radii == radius).all()
@@ -117,7 +119,9 @@ def test_arrays_that_may_both_be_strands_are_an_error_that_names_them(tmp_path):
 
 
 def test_edges_in_any_order_form_their_lines():
-    """A line begins at its end with the smaller index; a loop repeats its first point."""
+    """Edges in any order form their lines: each begins at its end with the smaller index, and a loop repeats its
+    first point.
+    """
     edges = np.array([(3, 2), (5, 6), (1, 2), (6, 4), (4, 5), (9, 8)])
     indices, counts = chains.polylines(edges, 10)
     assert indices.tolist() == [1, 2, 3, 8, 9, 4, 6, 5, 4] or indices.tolist() == [1, 2, 3, 8, 9, 4, 5, 6, 4]
@@ -162,7 +166,7 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_a_damaged_file_is_one_sentence(tmp_path, name):
-    """No memory is allocated for counts that exceed the file, and no other exception ends the reading."""
+    """A damaged file is one sentence, without memory for excessive counts and without any other exception."""
     read, data = DAMAGED[name]
     path = tmp_path / "a.any"
     path.write_bytes(data)

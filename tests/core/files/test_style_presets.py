@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Style presets: each has its file, stores only necessary settings, and fits surfaces of any size."""
+"""Each style preset has its file, stores only necessary settings, and fits surfaces of any size."""
 
 import json
 
@@ -15,7 +15,7 @@ from hair_addon.core.styling.kinds import LABELS, kind_of
 
 
 def lengths(preset):
-    """{where: value} of all lengths in a preset."""
+    """Return {location: value} of all lengths in a preset."""
     found = {
         (place, name): getattr(style, name)
         for place, style in enumerate(preset.styles)
@@ -103,7 +103,7 @@ def test_an_unknown_preset_is_one_sentence():
 
 @pytest.mark.parametrize("identifier", style_presets.PRESETS)
 def test_presets_name_only_what_departs_from_defaults(identifier):
-    """Improved defaults thus reach presets."""
+    """Presets name only settings that differ from the defaults, so that improved defaults reach them."""
     found = json.loads((style_presets.FOLDER / f"{identifier.lower()}.json").read_text(encoding="utf-8"))
     for values, style in zip(found["styles"], style_presets.read(identifier).styles, strict=True):
         defaults = type(style)()

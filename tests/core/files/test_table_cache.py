@@ -14,7 +14,7 @@ SETTINGS = lookup_tables.Settings(mode="energy", size=16)
 
 @pytest.fixture
 def bakes(monkeypatch):
-    """The settings of every bake, in order."""
+    """Return a list of the settings of every bake, in order."""
     baked, bake = [], lookup_tables.bake
     monkeypatch.setattr(lookup_tables, "bake", lambda settings, device: (baked.append(settings), bake(settings))[1])
     return baked

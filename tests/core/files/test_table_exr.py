@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables on disk: reading returns what was written, and other files are refused."""
+"""Tables on disk are read as they were written, and other files are refused."""
 
 import io
 import json
@@ -39,14 +39,14 @@ def image():
 
 
 def file_of(channels, **header):
-    """The bytes of an EXR file as another program might write it."""
+    """Return the bytes of an EXR file as another program might write it."""
     stream = io.BytesIO()
     OpenEXR.File({"type": OpenEXR.scanlineimage, **header}, channels).write(stream)
     return stream.getvalue()
 
 
 def refused(call, *arguments):
-    """The one sentence or two of a refusal."""
+    """Return the message of a refusal, of one or two sentences."""
     with pytest.raises(HairError) as refusal:
         call(*arguments)
     message = str(refusal.value)
@@ -56,12 +56,12 @@ def refused(call, *arguments):
 
 
 def write_table(path, array, channels, header):
-    """One table of any channels and header, as the add-on writes those of a set."""
+    """Write one table of any channels and header, as the add-on writes those of a set."""
     path.write_bytes(table_exr._encode(lookup_tables.to_half(array), channels, header))
 
 
 def read_table(path, channels, size=None):
-    """The float32 (H, W, C) array of one table, checked as those of a set are, and its header."""
+    """Return the float32 (H, W, C) array of one table, checked like those of a set, and its header."""
     image = table_exr._Image(path, channels)
     image.demand_size(size)
     return image.pixels().astype(np.float32), image.header
@@ -197,7 +197,7 @@ def test_missing_files_and_folders_are_refused(folder):
 
 
 def test_tables_of_the_other_mode_are_not_mixed_in(folder, tmp_path_factory):
-    """A folder that has held both modes is one bake or a refusal, never a mixture."""
+    """A folder that has held tables of both modes is read as one bake or refused, and never mixed."""
     other = tmp_path_factory.mktemp("other")
     table_exr.write_tables(other, lookup_tables.bake(replace(SETTINGS, mode="energy")), "1.2.3")
     for name in ("m", "n_trt", "n_res"):
@@ -297,7 +297,7 @@ def test_tables_of_another_bake_beside_these_are_refused(folder, tmp_path_factor
 
 
 def rewrite(path, **changes):
-    """Change header attributes of a table and nothing else."""
+    """Change only header attributes of a table."""
     file = OpenEXR.File(str(path), separate_channels=True)
     planes = {name: channel.pixels for name, channel in file.channels().items()}
     kept = {name: value for name, value in file.header().items() if name.startswith("vellus.")}

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms for Unreal: properties have the names, types, scopes and extents of the specification; arrays come back."""
+"""Grooms for Unreal have properties with the names, types, scopes and extents of the specification, and are read
+back.
+"""
 
 import tracemalloc
 from dataclasses import replace
@@ -34,7 +36,7 @@ SPECIFICATION = {
 
 
 def groom(rng, strand_count=40, guide_count=6, point_count=5):
-    """(guides, strands, {name: array}) of a group."""
+    """Return (guides, strands, {name: array}) of a group."""
     ids, weights = groom_curves.closest_guides(
         rng.integers(-1, guide_count, (strand_count, 4)), rng.random((strand_count, 4)), 100
     )
@@ -72,7 +74,7 @@ def groom(rng, strand_count=40, guide_count=6, point_count=5):
 
 
 def write(path, added, rate=None, first_frame=0):
-    """Write [(curves, samples)]; returns the notes."""
+    """Write [(curves, samples)], and return the notes."""
     with unreal_groom.writing(path, "Vellus 1.0", '{"length": 0.3}', rate, first_frame) as writer:
         numbers = [writer.add(curves, len(samples) > 1) for curves, samples in added]
         for number, (_curves, samples) in zip(numbers, added, strict=True):
@@ -86,7 +88,7 @@ def geometry(archive, path):
 
 
 def parameters(archive):
-    """{(path, name): Property} of all geometry parameters."""
+    """Return {(path, name): Property} of all geometry parameters."""
     found = {}
     for path, made in alembic_reader.objects(archive).items():
         (schema,) = made.properties.values()
@@ -97,7 +99,7 @@ def parameters(archive):
 
 @pytest.fixture
 def written(rng, tmp_path):
-    """(archive, arrays, guides, strands)."""
+    """Return (archive, arrays, guides, strands)."""
     guides, strands, arrays = groom(rng)
     assert write(tmp_path / "groom.abc", [(guides, [arrays["guides"]]), (strands, [arrays["strands"]])]) == []
     return alembic_reader.read(tmp_path / "groom.abc"), arrays, guides, strands
@@ -152,7 +154,7 @@ def test_every_array_comes_back(written):
 
 
 def test_our_reader_returns_what_was_written(written, tmp_path):
-    """Guides and strands with their group, IDs, weights, widths, UV coordinates and colors, bit by bit."""
+    """Our reader returns guides and strands with group, IDs, weights, widths, UV coordinates and colors, bit by bit."""
     _archive, arrays, guides, strands = written
     found = alembic.grooms.read(tmp_path / "groom.abc")
     read = {one.is_guide: one for one in found.sets}

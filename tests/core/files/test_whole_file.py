@@ -45,7 +45,9 @@ def test_a_file_that_nobody_wrote_or_that_is_empty_is_refused(paths):
 
 
 def test_the_file_is_named_as_its_format_demands(tmp_path):
-    """Exporters go by the ending; paths inside a file may be relative to it."""
+    """A file has the name extension of its format while it is written, in the folder to which its paths may be
+    relative.
+    """
     with atomic_file(tmp_path / "new" / "hair.usdc") as partial:
         assert partial.suffix == ".usdc" and partial.parent == tmp_path / "new"
         partial.write_text("after")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cubic bases, Hermite curves and NURBS as Bézier segments, against SciPy's, and polylines against their curves."""
+"""Cubic bases, Hermite curves and NURBS equal SciPy's as Bézier segments, and polylines follow their curves."""
 
 from itertools import pairwise
 
@@ -19,12 +19,12 @@ def counts_of(basis, wrap):
 
 
 def wandering(rng, count):
-    """Points that go on, as those of hair do."""
+    """Return points that progress as those of hair do."""
     return np.cumsum(rng.normal(size=(count, 3)) * 0.02 + [0.0, 0.0, 0.03], axis=0)
 
 
 def at(segments, parts):
-    """(K, T, D) values of segments by de Casteljau's construction."""
+    """Return (K, T, D) values of segments by de Casteljau's construction."""
     part = np.asarray(parts)[None, :, None]
     weights = segments.weights if segments.weights is not None else np.ones(segments.controls.shape[:2])
     level = np.dstack([segments.controls * weights[..., None], weights])[:, None] + np.zeros((1, len(parts), 1, 1))
@@ -34,7 +34,7 @@ def at(segments, parts):
 
 
 def expected(points, basis, wrap, parts):
-    """(K, T, 3) the same of one cubic curve, from the definitions."""
+    """Return (K, T, 3) values of one cubic curve by its definition."""
     n = len(points)
     if basis == "bezier":
         count = n // 3 if wrap == "periodic" else (n - 4) // 3 + 1
@@ -99,7 +99,7 @@ def test_hermite_curves_are_those_of_scipy(rng):
 
 
 def nurbs_of(rng):
-    """Curves of several orders, knots that repeat, and weights."""
+    """Return curves of several orders, with repeated knots and weights."""
     counts, orders = np.array([4, 7, 3, 2, 9]), np.array([4, 3, 3, 2, 6])
     knots = []
     for count, order in zip(counts, orders, strict=True):
@@ -169,7 +169,7 @@ def test_polylines_are_as_long_as_their_curves_and_as_near(rng, basis):
 
 
 def distances(points, line):
-    """Of points from a polyline."""
+    """Return the distances of points from a polyline."""
     start, leg = line[:-1], np.diff(line, axis=0)
     part = np.einsum("pld,ld->pl", points[:, None] - start, leg) / np.maximum((leg**2).sum(axis=1), 1e-30)
     nearest = start + np.clip(part, 0.0, 1.0)[..., None] * leg
@@ -195,7 +195,9 @@ def test_non_finite_points_harm_no_other_curve(rng):
 
 
 def test_curves_without_segments_are_no_polylines():
-    """All curves of a file may be so, if they have too few points for its basis."""
+    """Curves with too few points for their basis have no segments and give no polyline, even if all curves of a file
+    are so.
+    """
     none = bezier_segments.Segments(np.zeros((0, 4, 3)), np.zeros(2, np.int64), np.zeros((0, 2)))
     values, counts, places = bezier_segments.polylines(none, np.zeros(0, np.int64))
     assert values.shape == (0, 3) and counts.tolist() == [0, 0] and places.shape == (0,)

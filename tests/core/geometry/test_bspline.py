@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of B-splines, and the three ways to evaluate them against each other and against scipy."""
+"""B-splines satisfy their laws, and the three ways to evaluate them agree with each other and with scipy."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_a_curve_starts_and_ends_at_its_controls(rng, degree):
 
 
 def test_a_curve_moves_with_its_controls(rng):
-    """Affine invariance: transforming controls or points is the same."""
+    """A curve moves with its controls: transforming controls or points is the same."""
     controls, matrix, shift = rng.normal(size=(4, 6, 3)), rng.normal(size=(3, 3)), rng.normal(size=3)
     t = np.linspace(0.0, 1.0, 41)
     moved = bspline.evaluate_recursive(controls @ matrix + shift, t)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The nearest point of a surface, compared with brute force."""
+"""The nearest point of a surface is that of brute force."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from hair_addon.core.geometry.mesh import TriMesh, positions
 
 
 def brute_force_distance(mesh, triangles, place):
-    """Distance [m] from a place to the nearest of some triangles: to their planes inside, else to their edges."""
+    """Return the distance [m] from a place to the nearest triangle, to its plane inside and else to its edges."""
     best = np.inf
     for corners in mesh.vertices[mesh.triangles[triangles]].astype(float):
         a, b, c = corners
@@ -25,7 +25,7 @@ def brute_force_distance(mesh, triangles, place):
 
 @pytest.fixture
 def soup(rng):
-    """40 triangles anywhere, every fourth of them without an area."""
+    """Return 40 random triangles, every fourth without an area."""
     vertices = rng.random((120, 3)).astype(np.float32)
     triangles = np.arange(120, dtype=np.int32).reshape(40, 3)
     triangles[::4, 2] = triangles[::4, 1]

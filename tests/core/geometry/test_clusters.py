@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clusters: none is empty, each row is in the nearest one, and separate groups are found."""
+"""No cluster is empty, each row is in the nearest cluster, and separate groups are found."""
 
 import numpy as np
 import pytest
@@ -52,6 +52,8 @@ def test_more_clusters_than_rows_are_refused():
 
 
 def test_rows_far_from_the_origin_are_divided_as_near_it(rng):
-    """Numbers that single precision holds exactly in both places."""
+    """Rows far from the origin are divided as near it, for numbers that single precision holds exactly in both
+    places.
+    """
     features = rng.integers(0, 1024, (200, 12)).astype(np.float32) / 1024.0
     np.testing.assert_array_equal(clusters.clusters(features + 4096.0, 20), clusters.clusters(features, 20))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Orders found by counting are those of a stable sort."""
+"""Orders found by counting equal those of a stable sort."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_groups_come_in_order_and_items_of_each_by_their_index(seed, count, grou
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 3000), levels=st.sampled_from([0, 1, 7]))
 def test_numbers_rise_and_equal_ones_come_by_their_index(seed, count, levels):
-    """Random numbers, and such as are equal to many others."""
+    """Numbers are in ascending order, and equal ones in the order of their indices."""
     numbers = np.random.default_rng(seed).random(count)
     numbers = np.floor(numbers * levels) / levels if levels else numbers
     np.testing.assert_array_equal(counting_sort.rising(numbers), np.argsort(numbers, kind="stable"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mean curvature of shapes whose curvature is known."""
+"""The mean curvature of known shapes is their curvature."""
 
 import numpy as np
 import pytest

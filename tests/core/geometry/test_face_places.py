@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Places in polygons are kept under another triangulation, and found again after renumbering of vertices."""
+"""Places in polygons stay under another triangulation, and are found again after renumbering of vertices."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def mesh(cut):
 
 
 def rooted(rng, cut, count):
-    """(polygons, vertices, weights) of random places in a mesh."""
+    """Return (polygons, vertices, weights) of random places in a mesh."""
     triangles = rng.integers(0, 5, count)
     return (
         face_places.owners(FACES)[triangles],
@@ -60,7 +60,7 @@ QUAD = Faces(np.array([0, 1, 2, 3], np.int32), np.array([0, 4], np.int32))
 
 
 def moved_in_quad(rng, corners, count=300):
-    """Places in one cut of a quad, and where they are in the other: (N, 3) each, and the `TriMesh` of that."""
+    """Return places in one triangulation of a quad and in the other, (N, 3) each, and the `TriMesh` of the latter."""
     corners = np.array(corners, np.float32)
     cuts = [TriMesh(corners, np.array(cut[:2], np.int32)) for cut in CUTS]
     vertices, weights = cuts[0].triangles[rng.integers(0, 2, count)], rng.dirichlet((1, 1, 1), count)
@@ -70,7 +70,9 @@ def moved_in_quad(rng, corners, count=300):
 
 
 def test_a_place_in_a_bent_quad_moves_straight_up_or_down(rng):
-    """Neighbors thus stay apart, and no place moves further than the diagonals are apart, whatever the shape."""
+    """A place in a bent quad moves straight up or down, by at most the distance of the diagonals, so neighbors stay
+    apart.
+    """
     before, after, _mesh = moved_in_quad(rng, [(0, 0, 0), (1.2, 0.1, 0.3), (1.4, 1.2, 0), (0.1, 0.5, 0.3)])
     np.testing.assert_allclose(after[:, :2], before[:, :2], atol=1e-6)
     assert 0.05 < abs(after - before).max() <= 0.3

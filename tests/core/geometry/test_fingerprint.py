@@ -24,7 +24,7 @@ def test_the_same_points_leave_the_same_fingerprint(points, monkeypatch):
 
 @pytest.mark.parametrize("count", [0, 1, 33, 120, 500])
 def test_copied_points_are_the_points(points, count):
-    """The fingerprint is that of the points, and nothing beside the copy is written."""
+    """The fingerprint of copied points is that of the points, and nothing beside the copy is written."""
     there = np.full(3 * 41 * 500 + 7, np.nan, np.float32)
     copies = there[3 : 3 + 3 * 41 * count]
     assert fingerprint(points[:count], copies) == fingerprint(points[:count])
@@ -54,7 +54,7 @@ def test_any_change_is_seen(points, change, chosen):
 
 
 def test_every_word_counts(points):
-    """A bit, high or low, anywhere: no two fingerprints are the same."""
+    """Every word changes the fingerprint, by a low or a high bit at any place."""
     words = points[:120].copy().view(np.uint32).reshape(-1)
     found = {fingerprint(points[:120])}
     for place in range(0, len(words), 97):

@@ -19,7 +19,9 @@ def found(points, queries, distance, limit, device=DEVICE):
 
 
 def assert_equal_to_brute_force(points, queries, distance, limit):
-    """The rows are the nearest points within the distance, or the very nearest; equal to rounding, in order."""
+    """Assert that rows are the nearest points within the distance, or the nearest points of all, in order, up to
+    rounding.
+    """
     indices, distances = found(points, queries, distance, limit)
     apart = np.linalg.norm(np.float32(queries)[:, None] - np.float32(points)[None], axis=-1)
     nearest = np.pad(np.sort(apart, axis=1), [(0, 0), (0, limit)], constant_values=np.inf)[:, :limit]
@@ -39,7 +41,7 @@ def assert_equal_to_brute_force(points, queries, distance, limit):
     scale=st.integers(-6, 6),
 )
 def test_neighbours_equal_brute_force(seed, point_count, limit, reach, scale):
-    """The law holds for distances from 0.001 to 100 times the extent, and extents from micrometers to megameters."""
+    """Neighbors equal brute force, for distances from 0.001 to 100 times the extent, from micrometers to megameters."""
     generator = np.random.default_rng(seed)
     points = 10.0**scale * generator.random((point_count, 3))
     queries = 10.0**scale * (1.4 * generator.random((30, 3)) - 0.2)
@@ -50,7 +52,9 @@ def test_neighbours_equal_brute_force(seed, point_count, limit, reach, scale):
 
 
 def test_evenly_spread_points_on_a_surface(rng):
-    """The usual case, large enough for buckets to be shared by cells that lie apart."""
+    """Evenly spread points on a surface, the usual case, have the right neighbors although separate cells share
+    buckets.
+    """
     points, queries = (rng.normal(size=(count, 3)) for count in (4000, 1000))
     points, queries = (a / np.linalg.norm(a, axis=1, keepdims=True) for a in (points, queries))
     assert_equal_to_brute_force(points, queries, 0.09, 8)
@@ -75,7 +79,7 @@ def test_points_in_one_place_come_in_their_order(place):
 
 
 def test_mirrored_points_come_in_their_order():
-    """Equal distances on all sides: the order is that of the indices, on every machine."""
+    """Mirrored points with equal distances are in the order of their indices, on every machine."""
     points = [(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
     indices, _ = found(points, [(0, 0, 0)], 2.0, 4)
     np.testing.assert_array_equal(indices, [range(4)])

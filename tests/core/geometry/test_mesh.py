@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of meshes and of points on them."""
+"""Meshes and points on meshes satisfy their laws."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ CUBE_QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 
 
 
 def cube(diagonals):
-    """The cube, each face split along one diagonal or the other."""
+    """Return the cube with each face split along a random diagonal."""
     triangles = []
     for (a, b, c, d), other in zip(CUBE_QUADS, diagonals, strict=True):
         triangles += [(a, b, c), (a, c, d)] if other else [(b, c, d), (b, d, a)]
@@ -45,7 +45,9 @@ def test_smooth_normals_of_a_sphere_point_outwards(sphere):
 
 
 def test_normals_are_unit_where_smooth_ones_cancel():
-    """Two sides of one sheet: vertices know no direction, triangles do."""
+    """Normals have unit length where smooth ones cancel, as on a sheet of two sides: vertices have none, triangles
+    do.
+    """
     sheet = TriMesh(np.eye(3, dtype=np.float32), np.array([(0, 1, 2), (2, 1, 0)], np.int32))
     points = SurfacePoints(np.array([0, 1], np.int32), np.full((2, 3), 1.0 / 3.0, np.float32))
     normals = mesh_math.normals(sheet, points)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Nearest rotations are U V^T of the singular value decomposition, of singular matrices and mirrors too."""
+"""Nearest rotations are U V^T of the singular value decomposition, also of singular matrices and mirrors."""
 
 import numpy as np
 

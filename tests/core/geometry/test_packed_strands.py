@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of packed strands: rounding of points for strands of any size, and bits that textures preserve."""
+"""Packed strands round points relative to each strand, and their bits survive in textures."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def packed(points):
 
 
 def strands(seed, size, place, flat, counts=(50, 9)):
-    """(S, P, 3) of a size [m] at a distance from the origin, of no extent along some axes."""
+    """Return (S, P, 3) strands of a size [m] at a distance from the origin, without extent along some axes."""
     generator = np.random.default_rng(seed)
     roots = place * generator.normal(size=(counts[0], 1, 3))
     steps = size * generator.normal(size=(*counts, 3)) * ~np.array(flat)
@@ -36,7 +36,7 @@ SIZES = st.sampled_from([0.0, 1e-12, 2e-5, 0.01, 1.0, 1e6, 1e20])
     flat=st.tuples(*[st.booleans()] * 3),
 )
 def test_points_are_within_a_part_of_their_strand(seed, size, place, flat):
-    """2^-20 of its greatest offset, whatever other strands are like."""
+    """Points are within 2^-20 of their strand's greatest offset, whatever other strands are packed."""
     points = strands(seed, size, place, flat)
     points[0, 1:] = points[0, :1]  # without length
     points[1, 1:] = points[1, :1] + 1000.0 * (points[1, 1:] - points[1, :1])
@@ -47,14 +47,14 @@ def test_points_are_within_a_part_of_their_strand(seed, size, place, flat):
 
 
 def test_what_is_packed_again_stays():
-    """A strand that is read and written does not wander."""
+    """A strand that is unpacked and packed again has the same bits."""
     points = packed_strands.unpack(packed(strands(1, 0.01, 0.0, (False,) * 3)))
     again = packed_strands.unpack(packed(points))
     assert np.abs(again - points).max() <= 2.0**-22 * np.abs(points).max()
 
 
 def test_texels_are_normal_numbers():
-    """A texture may lose the bits of others: of numbers near zero, and of those that are none."""
+    """Texels are normal numbers, as textures may lose the bits of denormal and non-finite numbers."""
     texels = packed(strands(2, 0.1, 1.0, (False,) * 3, (2000, 41)))[:, packed_strands.HEAD_TEXELS :]
     assert np.isfinite(texels).all()
     assert (np.abs(texels) >= np.finfo(np.float32).tiny).all()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of resampling: points lie on their curve, equally spaced; a Catmull-Rom spline runs through its points."""
+"""Resampled points lie on their curve, equally spaced, and a Catmull-Rom spline runs through its points."""
 
 import numpy as np
 import pytest

@@ -22,7 +22,9 @@ def test_roots_are_where_numpy_says(head, scale):
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_where_normals_cancel_the_triangle_has_the_say(scale):
-    """Both sides of a sheet share its vertices, whose smooth normals vanish."""
+    """Where smooth normals cancel, as on a sheet whose sides share vertices, roots have the normal of their
+    triangle.
+    """
     vertices = np.float32(scale) * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], np.float32)
     sheet = TriMesh(vertices, np.array([(0, 1, 2), (0, 2, 1)], np.int32))
     points = SurfacePoints(np.array([0, 1], np.int32), np.full((2, 3), 1.0 / 3.0, np.float32))

@@ -14,7 +14,7 @@ ONE_TRIANGLE = TriMesh(np.eye(3, dtype=np.float32), np.array([(0, 1, 2)], np.int
 
 
 def assert_follows(counts, expected):
-    """Pearson's test: a fair sample would be this uneven more often than once in ten thousand times."""
+    """Assert by Pearson's test that a fair sample is this uneven more often than once in ten thousand times."""
     expected = expected * counts.sum() / expected.sum()
     assert chdtrc(len(counts) - 1, ((counts - expected) ** 2 / expected).sum()) > 1e-4
 
@@ -51,7 +51,9 @@ def test_density_is_linear_inside_a_triangle(density):
 
 
 def test_uniform_points_fill_a_triangle_evenly():
-    """A quarter of them in each of the four triangles between the edges' middles."""
+    """Uniform points fill a triangle evenly: a quarter of them is in each of the four triangles between edge
+    midpoints.
+    """
     points = sample_surface(ONE_TRIANGLE, 40_000, seed=5)
     quarters = np.append((points.barycentric > 0.5).sum(axis=0), (points.barycentric <= 0.5).all(axis=1).sum())
     assert_follows(quarters, np.ones(4))
@@ -74,7 +76,7 @@ def test_more_roots_keep_those_that_are_there(head):
 
 
 def test_neighbours_on_the_surface_are_neighbours_in_memory(head, rng):
-    """The order of a mesh's triangles is arbitrary, as in scans and decimated meshes."""
+    """Neighbors on the surface are neighbors in memory, although the order of a mesh's triangles is arbitrary."""
     shuffled = TriMesh(head.vertices, rng.permutation(head.triangles))
     for mesh in (head, shuffled):
         points = mesh_math.positions(mesh, sample_surface(mesh, 20_000, seed=1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The smooth surface of a subdivided cage: compared with bicubic splines, and unchanged surfaces."""
+"""The smooth surface of a subdivided cage equals bicubic splines, and unchanged surfaces stay."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ CELLS = 6  # of a cage along each axis
 
 
 def torus_grid(count):
-    """`Faces` of count × count quads that close along both axes."""
+    """Return `Faces` of count × count quads that close along both axes."""
     row, column = np.divmod(np.arange(count * count), count)
     ahead, above = (column + 1) % count, (row + 1) % count
     corners = np.stack([row * count + column, row * count + ahead, above * count + ahead, above * count + column], 1)
@@ -19,7 +19,9 @@ def torus_grid(count):
 
 
 def spline(degree, controls, divisions):
-    """Values of the periodic B-spline of controls (N, M) along the first axis, at N · divisions parameters."""
+    """Return the values of the periodic B-spline of controls (N, M) along the first axis, at N · divisions
+    parameters.
+    """
     at = np.arange(len(controls) * divisions) / divisions
     away = np.abs((at[:, None] - np.arange(len(controls)) + len(controls) / 2) % len(controls) - len(controls) / 2)
     hat = np.maximum(1.0 - away, 0.0)
@@ -28,7 +30,7 @@ def spline(degree, controls, divisions):
 
 
 def surface(degree, controls, divisions):
-    """(V, 3): the periodic spline surface of controls (CELLS, CELLS, 3)."""
+    """Return (V, 3): the periodic spline surface of controls (CELLS, CELLS, 3)."""
     along = spline(degree, controls.reshape(CELLS, -1), divisions).reshape(-1, CELLS, 3)
     across = spline(degree, np.swapaxes(along, 0, 1).reshape(CELLS, -1), divisions)
     return np.swapaxes(across.reshape(CELLS * divisions, -1, 3), 0, 1).reshape(-1, 3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of strands: offsets add up, resampling keeps the line."""
+"""The offsets of strands add up to their points, and resampling keeps their line."""
 
 import numpy as np
 import pytest

@@ -11,7 +11,7 @@ from tests.support.meshes import flat_grid
 
 
 def faces_of(mesh):
-    """Every triangle a polygon."""
+    """Return faces with every triangle as a polygon."""
     return Faces(mesh.triangles.ravel(), np.arange(0, mesh.triangles.size + 1, 3, dtype=np.int32))
 
 
@@ -21,7 +21,9 @@ def rotation(rng):
 
 
 def strands_on(mesh, count, rng):
-    """(points (count, 9, 3), root vertices, barycentric): crooked strands, the first point on the mesh."""
+    """Return (points (count, 9, 3), root vertices, barycentric) of crooked strands whose first points are on the
+    mesh.
+    """
     roots = sample_surface(mesh, count, seed=1)
     points = interpolate(mesh.vertices, mesh, roots)[:, None] + rng.normal(size=(count, 9, 3)).astype(np.float32)
     points[:, 0] = interpolate(mesh.vertices, mesh, roots)
@@ -29,7 +31,7 @@ def strands_on(mesh, count, rng):
 
 
 def anywhere(strands, rng):
-    """Points that are no sum of a root and something else, which a difference and a sum would give back by chance."""
+    """Return points that are no sum of a root and an offset, which a difference and a sum would restore by chance."""
     points, *roots = strands
     return rng.normal(size=points.shape).astype(np.float32), *roots
 
@@ -83,7 +85,7 @@ def test_some_vertices_turn_as_they_do_among_all(sphere, rng):
 
 
 def deformations(vertices):
-    """A bend, a shear, a twist and a bulge, each far from rigid."""
+    """Return a bend, a shear, a twist and a bulge, each far from rigid."""
     x, y, z = vertices.astype(np.float64).T
     return {
         "bend": np.stack([np.sin(x) * (1.0 + z), y, np.cos(x) * (1.0 + z)], axis=1),
@@ -105,7 +107,7 @@ def test_roots_stay_on_the_surface_and_strands_keep_their_shape(sphere, rng, kin
 
 
 def turns_along_a_line(square, after, count):
-    """Largest turn [rad] between neighbors of strands that stand close together along a line across a square."""
+    """Return the largest turn [rad] between neighbors of strands close together along a line across a square."""
     place = np.linspace(0.05, 0.95, count)
     roots = [(x, 0.5 + 0.2 * (x - 0.5)) for x in place]
     # Cells of a grid of 16: the lower triangle of a cell is (corner, right, above), the upper (right, diagonal, above).
@@ -132,7 +134,7 @@ def turns_along_a_line(square, after, count):
 
 @pytest.mark.parametrize("kind", ["bend", "shear", "twist", "bulge"])
 def test_neighbours_never_jump(square, kind):
-    """Ten times closer together, ten times less apart: continuous, over every edge of the mesh."""
+    """Neighbors never jump: ten times closer together, they turn apart ten times less, over every edge of the mesh."""
     after = deformations(square.vertices - [0.5, 0.5, 0.0])[kind]
     coarse, fine = (turns_along_a_line(square, after, count) for count in (1000, 10000))
     assert fine < 0.15 * coarse + 2e-6
@@ -154,7 +156,7 @@ def test_faces_without_area_have_no_say(rng):
 
 
 def test_a_polygon_moves_like_its_triangles(rng):
-    """A quad that is moved rigidly, though its corners are listed from another one."""
+    """A quad that is moved rigidly moves like its triangles, though its corners are listed from another one."""
     vertices = np.float32([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
     turn = rotation(rng)
     faces = Faces(np.int32([2, 3, 0, 1]), np.int32([0, 4]))

@@ -15,7 +15,7 @@ def test_strands_are_multiplied_by_the_matrix(rng):
 
 
 def test_a_strand_does_not_depend_on_the_others(rng):
-    """Strands computed alone, after a guide is combed, are where they would be among all."""
+    """A strand does not depend on the others: strands computed alone have the same bits as among all."""
     points, matrix = rng.random((9000, 7, 3), np.float32), rng.random((3, 3))
     chosen = rng.integers(0, 9000, 50)
     np.testing.assert_array_equal(transformed(points[chosen], matrix), transformed(points, matrix)[chosen])

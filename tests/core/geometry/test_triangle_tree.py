@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Boxes around triangles: every triangle is in a leaf, and every box holds what is below it."""
+"""Every triangle is in a leaf of the tree, and every box contains the boxes and triangles below it."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_boxes_hold_the_triangles_below_them(rng, count):
 
 
 def test_boxes_shrink_towards_the_leaves(rng):
-    """Triangles of a leaf are neighbors: the surfaces of all leaves' boxes are a few times the triangles' own."""
+    """Boxes shrink towards the leaves: the areas of all leaves' boxes are a few times those of their triangles."""
     corners = (rng.uniform(size=(4096, 1, 3)) + rng.normal(scale=1e-3, size=(4096, 3, 3))).astype(np.float32)
     boxes, leaves = triangle_tree.build(corners)
     sizes = np.ptp(boxes[len(leaves) :], axis=1)

@@ -9,7 +9,7 @@ from hair_addon.core.geometry.mesh import TriMesh
 
 
 def squares(count):
-    """A row of unit squares, two triangles each, and the UVs of one square for each of them: (F, 3, 2)."""
+    """Return a row of unit squares of two triangles, all with the UVs (F, 3, 2) of one square."""
     corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], np.float32)
     vertices = np.concatenate([corners + np.array((2.0 * place, 0, 0)) for place in range(count)]).astype(np.float32)
     faces = np.concatenate([np.array([(0, 1, 2), (0, 2, 3)]) + 4 * place for place in range(count)]).astype(np.int32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides derived from hair: existing strands, fitted by least squares, with correct error estimates."""
+"""Guides derived from hair are existing strands, fitted by least squares, with correct error estimates."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def mesh():
 
 @pytest.fixture(scope="module")
 def hair(mesh):
-    """(S, 41, 3) strands between 25 guides, and their roots: hair that guides can reproduce."""
+    """Return (S, 41, 3) strands between 25 guides, and their roots: hair that guides can reproduce."""
     points, roots, _ = standing(mesh, 25, np.random.Generator(np.random.PCG64(7)), point_count=41)
     settings = complete(mesh, 25)
     binding = groom.bind_hair(mesh, strands.from_numpy(points, roots), settings)
@@ -57,7 +57,7 @@ def test_more_guides_come_closer_and_the_fit_comes_closer_than_the_strands_thems
 
 
 def test_guides_of_hair_that_is_one_strand_everywhere_reproduce_it(mesh):
-    """Straight along the normal, of one length: any guide gives any strand."""
+    """Guides of straight hair of one length along the normals reproduce it."""
     points, roots, _ = standing(mesh, 200, np.random.Generator(np.random.PCG64(3)), spread=0.0, point_count=41)
     derived = derive(mesh, points, roots, complete(mesh, 5), 5)
     assert derived.errors.max() < 2e-3  # frames turn rigidly, normals across flat faces do not

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of flow lines: guides start along them, at an angle to the surface, and vary continuously between them."""
+"""Guides start along flow lines, at an angle to the surface, and vary continuously between lines."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @pytest.fixture(scope="module")
 def plane():
-    """From 0 to 1, facing up."""
+    """Return a plane from 0 to 1 that faces up."""
     mesh = flat_grid(12, 1.0)
     return TriMesh((mesh.vertices - mesh.vertices.min(axis=0)).astype(np.float32), mesh.triangles)
 
@@ -31,18 +31,18 @@ def roots(plane):
 
 
 def line(*points):
-    """(L, 2, 3) segments of a polyline on the plane."""
+    """Return (L, 2, 3) segments of a polyline on the plane."""
     points = np.array([(*point, 0.0) for point in points])
     return np.stack([points[:-1], points[1:]], axis=1)
 
 
 def axes(mesh, places, segments, lift=0.5):
-    """Directions (G, 3) at places on the plane."""
+    """Return the directions (G, 3) of guides at places on the plane."""
     return flow_lines.axes(flow_lines.lay(mesh, segments, DEVICE), places, np.broadcast_to(UP, places.shape), lift)
 
 
 def grown(mesh, roots, segments, **settings):
-    """Points (G, 41, 3) of guides."""
+    """Return the points (G, 41, 3) of guides."""
     straight = {"length": 0.3, "length_variation": 0.0, "tilt": 0.0, "gravity": 0.0, "seed": 1}
     flow = None if segments is None else flow_lines.lay(mesh, segments, DEVICE)
     controls = guide_growth.grow(mesh, roots, **straight | settings, control_point_count=6, flow=flow, device=DEVICE)
@@ -55,7 +55,7 @@ def first_directions(points):
 
 
 def along(count=400):
-    """Places across the plane, from its lower to its upper border."""
+    """Return places across the plane, from its lower to its upper border."""
     return np.stack([np.full(count, 0.5), np.linspace(0.02, 0.98, count), np.zeros(count)], axis=1)
 
 
@@ -88,7 +88,7 @@ def test_more_points_on_a_line_change_nothing(plane):
 
 
 def test_a_bent_line_is_followed_along_its_course(plane):
-    """A quarter of a circle about the origin: beside it guides run along circles too."""
+    """A bent line is followed along its course: beside a quarter of a circle, guides run along concentric circles."""
     turns = np.linspace(0.0, 0.5 * np.pi, 33)
     segments = line(*np.stack([0.6 * np.cos(turns), 0.6 * np.sin(turns)], axis=1))
     for radius, tolerance in ((0.6, 0.05), (0.55, 0.06), (0.68, 0.06)):
@@ -130,7 +130,7 @@ def test_far_from_lines_guides_grow_as_without_them(plane, roots):
 
 
 def test_lines_cover_the_gaps_between_them_and_no_more(plane):
-    """Two lines that are a fifth apart: in between all guides follow, and far beyond none does."""
+    """Two lines that are a fifth apart guide all hair between them, and none far beyond."""
     segments = np.concatenate([line((0.0, 0.4), (1.0, 0.4)), line((0.0, 0.6), (1.0, 0.6))])
     x = axes(plane, along(), segments, 0.0)[:, 0]
     y = along()[:, 1]
@@ -156,7 +156,7 @@ def test_guides_stay_rooted_outside_the_surface_and_as_long_as_asked(plane, root
 
 
 def test_the_flow_turns_with_the_surface(plane, roots, rng):
-    """Equivariance: turned and moved together, without gravity."""
+    """The flow turns with the surface and moves with it, without gravity."""
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     turn *= np.sign(np.linalg.det(turn))
     turned = TriMesh((plane.vertices @ turn.T + 0.3).astype(np.float32), plane.triangles)
@@ -166,7 +166,7 @@ def test_the_flow_turns_with_the_surface(plane, roots, rng):
 
 
 def test_lines_are_drawn_on_the_surface_as_it_is_posed(plane, roots):
-    """A line over the raised plane acts as the same line on the plane at rest."""
+    """A line over a raised, posed plane acts as the same line on the plane at rest."""
     raised = plane.vertices + np.float32([0.0, 0.0, 2.0])
     segments = line((0.1, 0.2), (0.9, 0.6))
     settings = GuideSettings(guide_count=50, length=0.2, gravity=0.3, relax_iterations=0)

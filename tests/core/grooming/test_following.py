@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that follow guides: every stage after the weighted sum applies to all kinds of updates."""
+"""Every stage after the weighted sum applies to strands in all kinds of updates."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from tests.support.devices import DEVICE
 
 @pytest.fixture
 def bound(head, scalp):
-    """(guides, binding) of 2,000 strands."""
+    """Return (guides, binding) of 2,000 strands."""
     guides = groom.distribute_guides(head, groom.GuideSettings(guide_count=100), density=scalp, device=DEVICE)
     settings = groom.HairSettings(strand_count=2000)
     return guides, groom.bind_hair(head, guides, settings, density=scalp, device=DEVICE)
@@ -21,7 +21,7 @@ def bound(head, scalp):
 
 @pytest.fixture
 def styling(head, scalp, bound):
-    """Locks that curl, on the same strands."""
+    """Return the styling of the same strands by locks that curl."""
     guides, binding = bound
     settings = groom.HairSettings(strand_count=2000)
     trees = hair_styles.clump_trees(head, guides.roots, settings, density=scalp, device=DEVICE)

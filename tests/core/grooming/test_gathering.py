@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gathered guides keep roots and lengths, pass their tie in order, and go on along its line."""
+"""Gathered guides keep roots and lengths, pass their tie in order, and continue along its line."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def ball():
 
 
 def guides_on(count, seed=3):
-    """(count, 31, 3): straight guides on the upper half, in mirrored pairs across the X axis."""
+    """Return (count, 31, 3): straight guides on the upper half, in mirrored pairs across the X axis."""
     rng = np.random.default_rng(seed)
     normals = rng.normal(size=(count // 2, 3))
     normals[:, 2] = np.abs(normals[:, 2])
@@ -40,7 +40,7 @@ def segments(points):
 
 
 def from_tie(points, tie=TIE):
-    """(S,) the least distance of each guide's segments from the tie."""
+    """Return (S,) least distances of each guide's segments from the tie."""
     starts, steps = points[:, :-1].astype(np.float64), np.diff(points.astype(np.float64), axis=1)
     part = np.sum((tie - starts) * steps, axis=2) / np.sum(steps * steps, axis=2)
     return np.linalg.norm(starts + np.clip(part, 0.0, 1.0)[..., None] * steps - tie, axis=2).min(axis=1)
@@ -84,7 +84,7 @@ def test_roots_and_lengths_stay_and_guides_pass_the_tie(ball, shape):
 
 
 def test_symmetric_guides_stay_symmetric(ball):
-    """Up to the asymmetry of the mesh's triangles."""
+    """Symmetric guides stay symmetric, up to the asymmetry of the mesh's triangles."""
     after, _all = gathered(ball, guides_on(80), [TAIL], SETTINGS)
     mirrored = after[:40] * np.float32([-1.0, 1.0, 1.0])
     assert np.quantile(np.linalg.norm(mirrored - after[40:], axis=2), 0.95) < 0.01

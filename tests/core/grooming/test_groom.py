@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pipeline as a whole: from a mesh to guides to strands, and what it refuses."""
+"""The pipeline leads from a mesh to guides and strands, and refuses invalid input."""
 
 import subprocess
 import sys
@@ -60,7 +60,9 @@ def test_strands_are_counted_rooted_and_finite(head, scalp, hair):
 
 
 def test_strands_look_like_the_guides_around_them(head, guides, hair):
-    """Their tips are where some guide's tip near by is, give or take the distance between guides."""
+    """Strands look like the guides around them: their tips are near some guide's tip, within the distance between
+    guides.
+    """
     tips, guide_tips = hair.numpy()[:, -1], guides.numpy()[:, -1]
     nearest = np.linalg.norm(tips[:, None] - guide_tips[None], axis=-1).min(axis=1)
     assert np.median(nearest) < 0.02 and nearest.max() < 0.1
@@ -75,7 +77,9 @@ def test_the_same_seed_gives_the_same_hair(head, scalp, guides, hair, hair_setti
 @pytest.mark.skipif(DEVICE == "cpu", reason="needs VELLUS_TEST_DEVICE")
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_every_device_makes_the_same_hair(head, scalp, seed):
-    """Guides as even, though relaxation makes other places of other rounding; strands between the same to rounding."""
+    """Every device gives the same hair to rounding, and guides that are equally even, as relaxation amplifies
+    rounding.
+    """
     settings = GuideSettings(seed=seed)
     guides = distribute_guides(head, settings, density=scalp)
     expected = groom.distribute_guides(head, settings, density=scalp)
@@ -99,7 +103,7 @@ def test_another_seed_gives_other_hair(head, scalp, guides, hair, stage):
 
 
 def test_combing_searches_nothing(head, scalp, guides, hair, hair_settings, monkeypatch):
-    """Moved guides move the strands that follow them; the binding stays."""
+    """Combing searches nothing: moved guides move the strands that follow them by the same binding."""
     binding = bind_hair(head, guides, hair_settings, density=scalp)
     monkeypatch.setattr(hash_grid, "neighbours", None)
     np.testing.assert_array_equal(following.follow_guides(binding, guides).numpy(), hair.numpy())
@@ -111,7 +115,7 @@ def test_combing_searches_nothing(head, scalp, guides, hair, hair_settings, monk
 
 
 def test_strands_in_the_processors_memory(head, scalp, guides, hair, hair_settings):
-    """They are copied from any device: to new or given memory, or some of them only."""
+    """Strands are copied from any device to new or given memory of the processor, all or some."""
     binding = bind_hair(head, guides, hair_settings, density=scalp)
     weights = following.weights_now(binding, guides)
     made, given = following.growing_points(binding, guides, weights).result(), np.full_like(hair.numpy(), np.nan)
@@ -222,7 +226,7 @@ def test_refused_guides(head, guides, hair_settings):
 
 
 def test_settings_do_not_import_warp():
-    """Blender imports this file while it starts, and Warp takes longer than that may."""
+    """Reading the settings' file does not import Warp, as Blender imports the file while it starts."""
     code = "import sys, hair_addon.core.grooming.groom; sys.exit('warp' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 

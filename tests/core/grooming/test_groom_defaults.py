@@ -18,7 +18,7 @@ BOTH = (GuideSettings, HairSettings)
 
 
 def cube(size=1.0, stretch=(1.0, 1.0, 1.0)):
-    """A closed cube of this edge length, centered at the origin."""
+    """Return a closed cube of this edge length, centered at the origin."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32)
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     triangles = [(a, b, c) for a, b, c, _ in faces] + [(a, c, d) for a, _, c, d in faces]
@@ -26,7 +26,7 @@ def cube(size=1.0, stretch=(1.0, 1.0, 1.0)):
 
 
 def grid(count, height, size=1.0):
-    """A square of (count - 1)² quads with UVs over all of it, raised by height(x, y), of x and y in [-1, 1]."""
+    """Return a square of (count - 1)² quads with UVs over all of it, raised by height(x, y) of x and y in [-1, 1]."""
     x, y = (axis.ravel() for axis in np.meshgrid(*[np.linspace(-1.0, 1.0, count)] * 2, indexing="xy"))
     vertices = 0.5 * size * np.stack([x, y, height(x, y)], axis=1)
     lower = np.arange(count * count).reshape(count, count)[:-1, :-1].ravel()
@@ -73,7 +73,7 @@ def test_fewer_strands_are_thicker(head, scalp):
 
 
 def test_few_strands_of_short_hair_stay_slender(head, scalp):
-    """600 in a patch as large as two brows, on skin that is bent as these are."""
+    """600 strands of short hair stay slender in a patch as large as two brows on curved skin."""
     brows = ((np.abs(head.vertices[:, 0]) < 0.05) & (scalp > 0.5) & (head.vertices[:, 1] < -0.1)).astype(np.float32)
     few, many = (groom_defaults.hair_size(head, brows, strand_count=count) for count in (600, 60_000))
     assert 4.0 * many.radius < few.radius <= few.length / 50.0 * 1.01
@@ -81,7 +81,7 @@ def test_few_strands_of_short_hair_stay_slender(head, scalp):
 
 
 def test_a_mask_and_a_mesh_of_the_same_part_grow_the_same(head, scalp):
-    """A scalp that was cut out of the head, and one that is painted on it."""
+    """A scalp that is cut out of the head and a painted one grow the same hair."""
     inside = (scalp[head.triangles] > 0.5).all(axis=1)
     density = np.zeros(len(head.vertices), np.float32)
     density[head.triangles[inside]] = 1.0
@@ -130,7 +130,7 @@ def test_any_size_is_within_the_range_of_the_settings(scale):
 
 
 def test_single_precision_gives_sizes_back(rng):
-    """Blender keeps single precision: what it gives back makes the same strands."""
+    """Sizes that Blender stores in single precision give the same strands."""
     for edge in rng.uniform(0.001, 100.0, 200):
         size = groom_defaults.hair_size(cube(edge))
         for value in (size.length, size.gravity, size.radius, size.influence_distance):

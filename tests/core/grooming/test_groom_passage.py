@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Placement of a saved groom: exactly on a copy, by matching UV maps, or by the nearest surface."""
+"""A saved groom is placed exactly on a copy, by matching UV maps, or by the nearest surface."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ TURN *= np.sign(np.linalg.det(TURN))
 
 @pytest.fixture
 def head(rng):
-    """(the mesh of an uneven egg, 40 roots on it)."""
+    """Return (the mesh of an uneven egg, 40 roots on it)."""
     sphere = subdivided_sphere(3)
     mesh = TriMesh((sphere.vertices * [1.0, 1.3, 1.6]).astype(np.float32), sphere.triangles)
     barycentric = rng.dirichlet(np.ones(3), 40).astype(np.float32)
@@ -28,7 +28,7 @@ def head(rng):
 
 
 def seen_from_above(mesh):
-    """UV coordinates of corners: x and y, which are the same in all meshes of this shape."""
+    """Return UV coordinates of corners from x and y, which are the same in all meshes of this shape."""
     return mesh.vertices[mesh.triangles][..., :2] * 0.2 + 0.5
 
 

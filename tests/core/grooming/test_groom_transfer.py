@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transfer of a groom: exact on copies, nearly reversible on other meshes, and losses are reported."""
+"""A transferred groom is exact on copies and nearly reversible on other meshes, and losses are reported."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ COUNT, POINTS = 60, 13
 
 
 def hill(side_count, height=0.3):
-    """A `TransferSurface` of a square hill of side_count² pairs of triangles; its UVs are the square."""
+    """Return a `TransferSurface` of a square hill of side_count² pairs of triangles, whose UVs are the square."""
     flat = flat_grid(side_count)
     x, y, _ = flat.vertices.T
     vertices = np.stack([x, y, height * np.sin(np.pi * x) * np.sin(2.0 * y + 0.5)], axis=1)
@@ -29,7 +29,7 @@ def hill(side_count, height=0.3):
 
 
 def copy_of(mesh, linear, offset):
-    """A mesh mapped by a similarity, its faces turned outwards; `swapped` corners where that mirrors."""
+    """Return a mesh mapped by a similarity, its faces turned outward; `swapped`: corners where that mirrors."""
     triangles = mesh.triangles if np.linalg.det(linear) > 0.0 else mesh.triangles[:, [0, 2, 1]]
     return TriMesh((mesh.vertices @ linear.T + offset).astype(np.float32), np.ascontiguousarray(triangles))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copied shapes: a copy has the shape of its source relative to its own surface."""
+"""A copied guide has the shape of its source relative to its own surface."""
 
 import numpy as np
 import pytest
@@ -12,14 +12,14 @@ from tests.support.strands.combed import lengths, segment_lengths, wavy
 
 
 def a_patch(rng, normal, middle, count=25):
-    """Roots (N, 3) around a middle, across a normal, and the normal for each."""
+    """Return roots (N, 3) around a middle, across a normal, and the normal of each."""
     spread = rng.normal(0.0, 0.1, (count, 3))
     spread -= np.outer(spread @ normal, normal)
     return spread - spread.mean(axis=0) + middle, np.tile(normal, (count, 1))
 
 
 def test_a_groom_fitted_to_the_same_patch_elsewhere_is_the_same_groom(rng):
-    """The patch is turned about the vertical, moved and twice as large: each guide gets its own counterpart's shape."""
+    """A groom fitted to a turned, moved patch of twice the size is the same: each guide has its counterpart's shape."""
     roots, normals = a_patch(rng, unit(np.array([[0.3, 0.1, 0.4]]))[0], [1.0, 0.0, 0.0])
     angle = 0.7
     turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Added guides take the shape of the guides around them; after removal the rest is even."""
+"""Added guides take the shape of the guides around them, and the guides left after removal are even."""
 
 import numpy as np
 import pytest
@@ -86,7 +86,9 @@ def test_only_those_that_may_go_go(sphere):
 
 
 def test_guides_on_two_sides_of_a_sheet_do_not_crowd_each_other():
-    """Pairs back to back: of each side as many go, and none because of the other."""
+    """Guides on two sides of a sheet do not crowd each other: as many are removed from each side, and none for the
+    other.
+    """
     x, y = np.meshgrid(np.arange(10.0), np.arange(10.0))
     front = np.stack([x.ravel(), y.ravel(), np.zeros(100)], axis=1)
     both = np.concatenate([front, front + np.array([0.0, 0.0, 0.01])])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of grown guides: rooted, with the requested length and maximum tilt, and outside the surface."""
+"""Grown guides are rooted, have the requested length and maximum tilt, and are outside the surface."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ STRAIGHT = {
 
 
 def grown(mesh, roots, **settings):
-    """Points (G, 41, 3) of the curves."""
+    """Return points (G, 41, 3) of the curves."""
     return bspline.evaluate(guide_growth.grow(mesh, roots, **STRAIGHT | settings, device=DEVICE), 41, DEVICE).numpy()
 
 
@@ -85,7 +85,7 @@ def test_lengths_vary_as_asked(sphere, roots):
 
 @pytest.mark.parametrize("gravity", [0.25, 1.0])
 def test_bending_keeps_lengths(sphere, roots, gravity):
-    """The curve cuts the corners of its controls a little: 5 % on one in a hundred, 17 where one turns back."""
+    """Bending keeps lengths up to cut corners: 5 % for one guide in a hundred, 17 % for one that turns back."""
     bent = lengths(grown(sphere, roots, gravity=gravity, tilt=0.3))
     assert np.all(bent <= 0.5 + 1e-4)
     assert bent.mean() > 0.99 * 0.5 and np.quantile(bent, 0.02) > 0.94 * 0.5 and bent.min() > 0.8 * 0.5
@@ -97,7 +97,7 @@ def test_more_gravity_takes_tips_lower(sphere, roots):
 
 
 def test_full_gravity_lets_the_sides_hang(sphere, roots):
-    """Tips point down where nothing is in the way."""
+    """With full gravity, tips at the sides point down where nothing is in their way."""
     sides = np.abs(mesh_math.normals(sphere, roots)[:, 2]) < 0.5
     points = grown(sphere, roots, gravity=1.0, length=0.3)[sides]
     tips = points[:, -1] - points[:, -2]
@@ -125,7 +125,7 @@ def test_guides_lie_on_an_open_surface_and_hang_over_its_border(square):
 
 
 def test_without_tilt_guides_turn_with_the_surface(sphere, roots):
-    """Equivariance: about the vertical, the only direction that is special."""
+    """Without tilt, guides turn with the surface about the vertical, the only special direction."""
     angle = 0.7
     turn = np.array([(np.cos(angle), -np.sin(angle), 0), (np.sin(angle), np.cos(angle), 0), (0, 0, 1)])
     turned = TriMesh((sphere.vertices @ turn.T).astype(np.float32), sphere.triangles)

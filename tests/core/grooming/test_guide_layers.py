@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers of guides give back what was recorded, keep lengths at any weight, and follow their guides."""
+"""Layers of guides restore recorded combing, keep lengths at any weight, and follow their guides."""
 
 from itertools import pairwise
 
@@ -54,7 +54,7 @@ def _grown(sphere, count, seed=1):
 
 @pytest.fixture(scope="module")
 def combed(sphere):
-    """(`GuideLayers`, points) of guides with three layers, and guides of 41, 12 and 1 points."""
+    """Return (`GuideLayers`, points) of guides with three layers, and of guides of 41, 12 and 1 points."""
     rng = np.random.default_rng(5)
     guides = _grown(sphere, 60)
     counts = np.full(60, 41)
@@ -217,7 +217,9 @@ def test_layers_return_from_another_number_of_guides(sphere):
 
 
 def test_layers_do_not_cross_a_parting(sphere):
-    """One side is combed up and the other down: no guide of another set is combed by both."""
+    """Layers do not cross a parting: with one side combed up and the other down, no guide of another set is combed
+    by both.
+    """
     few, many = _grown(sphere, 60), _grown(sphere, 150, seed=2)
     sides = [np.where(positions(sphere, one.roots)[:, 0] > 0.0, 1.0, -1.0) for one in (few, many)]
     steps = np.linspace(0.0, LENGTH, few.numpy().shape[1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lengths of guides: guides get the requested length along their own curves, and roots do not move."""
+"""Guides get the requested length along their own curves, and roots do not move."""
 
 import numpy as np
 import pytest

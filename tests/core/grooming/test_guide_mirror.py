@@ -62,7 +62,7 @@ def test_only_counterparts_of_chosen_guides_are_replaced(sphere, rng):
 
 
 def test_images_on_another_shape_stand_on_it(rng):
-    """The other side is lower: images are rooted there, as long as their originals."""
+    """Images on another shape are rooted on it and as long as their originals, where the other side is lower."""
     floor = flat_grid(20, size=2.0)
     vertices = floor.vertices - np.float32([1.0, 1.0, 0.0])
     vertices[:, 2] = np.where(vertices[:, 0] < 0.0, 0.05 * vertices[:, 0], 0.0)

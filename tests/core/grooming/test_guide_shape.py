@@ -35,12 +35,14 @@ def ball():
 
 
 def angles(directions, targets):
-    """[rad] between unit vectors."""
+    """Return angles [rad] between unit vectors."""
     return np.arccos(np.clip(np.sum(directions * targets, axis=-1), -1.0, 1.0))
 
 
 def heights(mesh, places):
-    """Of places (N, 3) above a mesh: distances to the nearest points of it, with the sign of the sphere's inside."""
+    """Return heights of places (N, 3) above a mesh: signed distances to its nearest points, negative inside the
+    sphere.
+    """
     flat = places.reshape(-1, 3)
     return np.linalg.norm(flat - positions(mesh, SurfaceQuery(mesh).nearest(flat)), axis=1).reshape(places.shape[:-1])
 
@@ -184,7 +186,9 @@ def test_blending_ends_at_both_shapes(rng):
 
 @pytest.mark.parametrize("tool", [smooth, lift])
 def test_turned_moved_and_scaled_guides_are_changed_alike(ball, rng, tool):
-    """Attraction is left out: upright guides fall down, which a turn changes."""
+    """Turned, moved and scaled guides are changed alike, except by attraction: upright guides fall to a side that a
+    turn changes.
+    """
     points, _roots, normals = standing(ball, 40, rng)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))

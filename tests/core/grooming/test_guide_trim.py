@@ -54,7 +54,7 @@ def test_a_mesh_cuts_as_the_plane_it_lies_in(rng):
 
 
 def test_hair_in_a_larger_sphere_ends_on_it(rng):
-    """A sphere within another: all guides that reach the outer one end there, and no guide at its own surface."""
+    """Hair in a larger sphere ends on it, and no guide is cut by its own surface."""
     inner, outer = subdivided_sphere(3), subdivided_sphere(4, radius=1.1)
     points, _roots, _normals = standing(inner, 100, rng)
     changed = trimmed(points, mesh_crossings(points, outer), np.ones(100))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Degenerate meshes: the requested number of guides, distributed by area; or one message."""
+"""Degenerate meshes get the requested number of guides, distributed by area, or one message."""
 
 import warnings
 
@@ -26,7 +26,7 @@ SCALES = (1e-6, 2.0**-7, 1.0, 3.7, 1e6)
 
 
 def turned(vertices, turn):
-    """(V, 3) rotated about the axis (1, 1, 1), which no coordinate plane keeps."""
+    """Return (V, 3) rotated about the axis (1, 1, 1), which preserves no coordinate plane."""
     axis = np.full(3, 3.0**-0.5)
     across = np.cross(axis, vertices)
     return vertices + np.sin(turn) * across + (1.0 - np.cos(turn)) * np.cross(axis, across)
@@ -34,8 +34,9 @@ def turned(vertices, turn):
 
 @st.composite
 def hard_meshes(draw):
-    """Patches of different size apart from each other, with faces twice, turned round and without area, edges of three
-    faces, and vertices without faces."""
+    """Return separate patches of different sizes with duplicate, flipped and degenerate faces, edges of three faces,
+    and vertices without faces.
+    """
     vertices, triangles, start = [], [], 0
     for patch in range(draw(st.integers(1, 4))):
         grid = flat_grid(draw(st.integers(1, 5)), draw(st.floats(0.2, 3.0)))
@@ -149,14 +150,14 @@ def test_any_arrays_grow_guides_or_say_why_not(vertices, triangles, count):
 
 
 def test_vertices_without_faces_have_no_say(square):
-    """However far away: what is in use keeps its digits."""
+    """Vertices without faces have no effect, however far away: used vertices keep their digits."""
     loose = np.append(square.vertices, np.float32([(1e9, -1e9, 5.0), (np.float32(1e14), 0.0, 0.0)]), axis=0)
     expected, found = (cvt.place(mesh, 40, 1, 4, device=DEVICE) for mesh in (square, TriMesh(loose, square.triangles)))
     np.testing.assert_array_equal(found.barycentric, expected.barycentric)
 
 
 def test_slivers_alone_are_shared_out_soon():
-    """Strips as wide as a hundred-thousandth of their length: guides stand in rows, and nothing is cut to bits."""
+    """Slivers a hundred-thousandth as wide as long soon get guides in rows, without being cut into many pieces."""
     ends = np.array([(0, 0, 0), (1, 0, 0), (1, 1e-5, 0), (0, 1e-5, 0)])
     vertices = np.concatenate([ends + np.array([0.0, 0.1 * strip, 0.0]) for strip in range(4)]).astype(np.float32)
     triangles = np.concatenate([np.array([(0, 1, 2), (0, 2, 3)]) + 4 * strip for strip in range(4)]).astype(np.int32)
@@ -189,7 +190,7 @@ def test_slivers_are_sliced_and_nothing_of_them_is_lost(width):
 
 @pytest.mark.parametrize("corners", [3, 4, 7, 50])
 def test_an_n_gon_is_shared_out_whatever_its_triangles_are(corners):
-    """A fan of slivers from one corner, as Blender may cut it, and a wheel around its middle: the same surface."""
+    """An n-gon gets the same guides whatever its triangles are: a fan from one corner or a wheel around its middle."""
     angles = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
     rim = np.stack([np.cos(angles), np.sin(angles), np.zeros(corners)], axis=1).astype(np.float32)
     fan = TriMesh(rim, np.array([(0, i, i + 1) for i in range(1, corners - 1)], np.int32))

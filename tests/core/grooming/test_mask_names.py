@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vertex groups named after hair."""
+"""Vertex groups named after hair are recognized."""
 
 import pytest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of curves that become guides: the root is the end at the surface, and unusable curves are left out."""
+"""Curves that become guides have their root at the surface, and unusable curves are left out."""
 
 import itertools
 
@@ -14,7 +14,7 @@ GROUND = TriMesh(np.float32([[-5, -5, 0], [5, -5, 0], [5, 5, 0], [-5, 5, 0]]), n
 
 
 def grass(rng, count=40, least=2, most=12):
-    """Blades that rise from the domain: (points, starts), of any point counts."""
+    """Return blades that rise from the domain: (points, starts), of any point counts."""
     lines = []
     for _ in range(count):
         rise = np.sort(rng.random(rng.integers(least, most + 1)))
@@ -40,7 +40,9 @@ def test_turned_curves_are_found_and_turned_back(rng):
 
 
 def test_where_both_ends_are_near_the_others_decide(rng):
-    """Hair that lies flat says nothing of its direction."""
+    """Where both ends of a curve are near the surface, as of hair that lies flat, the other curves decide its
+    direction.
+    """
     points, starts = grass(rng)
     flat = np.float32([[0, 0, 0.01], [0.5, 0, 0.02], [1.0, 0, 0.005]])
     for is_turned in (False, True):
@@ -93,7 +95,7 @@ def test_what_is_no_curves_is_one_sentence(curves):
 
 
 def test_curves_further_away_than_the_surface_is_large_are_refused(rng):
-    """A hundred times too large, or beside another surface; a few strays alone are counted."""
+    """Curves farther away than the size of the surface are refused; a few strays are only counted."""
     points, starts = grass(rng)
     for far in (100.0 * points + 500.0, points + np.float32([0.0, 0.0, 11.0])):
         with pytest.raises(HairError, match="large: check unit and axis"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cryptomatte: hashes of the specification, and coverages that are added and ranked without loss."""
+"""Cryptomatte uses the hashes of its specification, and coverages are added and ranked without loss."""
 
 import numpy as np
 import pytest

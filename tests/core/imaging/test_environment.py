@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surroundings taken apart: nothing is lost, and what is put in is found again."""
+"""An environment split into lobes and a rest loses no light, and known lobes are found again."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ HEIGHT = 48
 
 
 def surroundings(radiance_of):
-    """(H, W, 3) of a function of unit directions (N, 3)."""
+    """Return (H, W, 3) radiance by a function of unit directions (N, 3)."""
     directions, _solid_angles = environment._texels(HEIGHT, 2 * HEIGHT)
     return np.broadcast_to(radiance_of(directions)[:, None], (len(directions), 3)).reshape(HEIGHT, 2 * HEIGHT, 3)
 
@@ -29,7 +29,9 @@ def test_even_light_has_no_lobes_and_the_same_sides():
 
 @pytest.mark.parametrize("sharpness", [60.0, 150.0])
 def test_a_bright_lobe_is_found_with_its_place_light_and_width(rng, sharpness):
-    """A spherical Gaussian of sharpness s has the irradiance 2 pi / s and the variance 1 / s, both to 1 / s."""
+    """A bright lobe is found with its place, light and width: sharpness s has irradiance 2 pi / s and variance 1 /
+    s.
+    """
     axis = rng.normal(size=3)
     axis /= np.linalg.norm(axis)
     (lobe,), sides = environment.split(
@@ -42,7 +44,9 @@ def test_a_bright_lobe_is_found_with_its_place_light_and_width(rng, sharpness):
 
 
 def test_a_wide_lobe_gives_a_ball_all_its_light():
-    """A cone of 29 degrees: a plane that faces it receives 4 % less, which the variance tells."""
+    """A wide lobe gives a ball all its light; the variance accounts for the 4 % less on a plane that faces a 29°
+    cone.
+    """
     least = np.cos(np.radians(29.0))
     (lobe,), _sides = environment.split(
         surroundings(lambda directions: 5.0 * np.maximum(directions[:, 1] - least, 0.0) / (1.0 - least))
@@ -69,7 +73,7 @@ def test_black_and_broken_pictures_give_no_light():
 
 
 def test_directions_average_polynomials_of_degree_five():
-    """Over the sphere the mean of x² is 1/3, of x⁴ 1/5, of x² y² 1/15, and of odd powers 0."""
+    """Directions average polynomials of degree five: over the sphere x² is 1/3, x⁴ 1/5, x² y² 1/15, odd powers 0."""
     x, y, _z = ambient_cube.DIRECTIONS.T
     means = [float(ambient_cube.WEIGHTS @ values) for values in (x**0, x**2, x**4, x**2 * y**2, x**3 * y**2, x)]
     np.testing.assert_allclose(means, [1.0, 1 / 3, 1 / 5, 1 / 15, 0.0, 0.0], atol=1e-12)
@@ -85,7 +89,9 @@ def test_sides_share_every_direction(rng):
 
 
 def test_an_image_that_is_turned_gives_turned_light():
-    """A sun, and a sky that is brighter on one side, about an axis; what is split anew has only its texels' places."""
+    """An image turned about an axis gives turned light, up to the positions of texels, for a sun and a sky with a
+    bright side.
+    """
     cosine, sine = np.cos(0.7), np.sin(0.7)
     to_image = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     axis = np.array([0.48, 0.6, 0.64])

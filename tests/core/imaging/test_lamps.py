@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps by importance: no light is lost, and changes are continuous."""
+"""Lamps chosen by importance lose no light, and change continuously."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ LAMP = np.dtype([(name, "<i4" if name == "kind" else "<f4", shape) for name, sha
 
 
 def some_lamps(rng, count):
-    """Lamps of every kind around the origin."""
+    """Return lamps of every kind around the origin."""
     found = np.zeros(count, LAMP)
     found["kind"] = np.arange(count) % 4
     positions = rng.normal(size=(count, 3))
@@ -38,7 +38,9 @@ def test_no_more_than_there_is_room_for_are_drawn_and_the_brightest_first(rng, c
 
 
 def test_a_lamp_fades_out_before_another_takes_its_place(rng):
-    """While importances change by a thousandth at a time no share changes by more than a fiftieth."""
+    """A lamp fades out before another takes its place: importances that change by 1/1000 change no share by more
+    than 1/50.
+    """
     start, end = 10.0 ** rng.uniform(-1.0, 1.0, (2, 40))
     moments = np.linspace(0.0, 1.0, 20_000)
     along = np.array([lamps.shares(start ** (1.0 - t) * end**t, 16) for t in moments])
@@ -51,7 +53,9 @@ def test_equal_lamps_are_treated_equally():
 
 
 def test_ambient_light_of_lamps_keeps_the_mean_irradiance(rng):
-    """Over all ways that a plane is turned: max(cos, 0) has the mean 1/4."""
+    """Ambient light of lamps keeps the mean irradiance over all orientations of a plane: max(cos, 0) has the mean
+    1/4.
+    """
     some, place = some_lamps(rng, 12), np.zeros((1, 3))
     normals = rng.normal(size=(200_000, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

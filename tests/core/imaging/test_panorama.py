@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panoramic pictures by the faces of a cube: no seams, no distortion."""
+"""Panoramas composed of a cube's faces have no seams and no distortion."""
 
 import math
 
@@ -25,13 +25,13 @@ def some(kind):
 
 
 def smooth(directions):
-    """(..., 2) numbers that change slowly with the direction (..., 3)."""
+    """Return (..., 2) numbers that change slowly with the direction (..., 3)."""
     x, y, z = np.moveaxis(directions, -1, 0)
     return np.stack([x * y + z, x - 0.5 * z * z], axis=-1)
 
 
 def drawn(lookup):
-    """{face: array} of `smooth` as seen on the faces."""
+    """Return {face: array} of `smooth` as seen on the faces."""
     texels = (2.0 * (np.arange(lookup.side) + 0.5) / lookup.side - 1.0) * lookup.half_width
     x, y = np.meshgrid(texels, texels)
     rays = np.stack([x, y, -np.ones_like(x)], axis=-1)
@@ -44,7 +44,7 @@ def drawn(lookup):
 
 
 def middles(size, window):
-    """(height, width, 2) places of pixels."""
+    """Return (height, width, 2) positions of pixels."""
     left, bottom, width, height = window
     x, y = np.meshgrid(left + np.arange(width) + 0.5, bottom + np.arange(height) + 0.5)
     return np.stack([x, y], axis=-1) / np.array(size)
@@ -61,7 +61,7 @@ def test_faces_are_turned_views_that_look_everywhere():
 @pytest.mark.parametrize("window", [(0, 0, 96, 64), (17, 30, 40, 21)])
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_the_faces_show_comes_back(kind, window):
-    """A function of the direction, in a picture and in a part of it."""
+    """A function of the direction, drawn on the faces, is restored in a panorama and in a part of it."""
     size = (96, 64)
     lookup = FaceLookup(some(kind), size, window)
     found = lookup.means(drawn(lookup), (7.0, 7.0))
@@ -76,7 +76,7 @@ def test_what_the_faces_show_comes_back(kind, window):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_sphere_has_one_distance(kind):
-    """Depths along the axes of the faces are distances again."""
+    """Depths along the axes of the faces become distances, so a sphere has one distance."""
     lookup = FaceLookup(some(kind), (48, 32), (0, 0, 48, 32))
     texels = (2.0 * (np.arange(lookup.side) + 0.5) / lookup.side - 1.0) * lookup.half_width
     depths = 3.0 / np.sqrt(1.0 + texels[:, None] ** 2 + texels**2)
@@ -97,7 +97,7 @@ def test_a_part_of_a_picture_draws_a_part_of_the_faces():
 
 
 def test_the_horizon_is_seen_all_around():
-    """Longitude grows to the right, latitude upwards, and the middle is ahead."""
+    """In a panorama, longitude grows to the right, latitude upward, and the middle is ahead."""
     wide = Panorama("EQUIRECTANGULAR")
     places = np.array([[0.5, 0.5], [0.75, 0.5], [0.25, 0.5], [0.5, 1.0]])
     expected = [[0, 0, -1], [1, 0, 0], [-1, 0, 0], [0, 1, 0]]
@@ -105,7 +105,7 @@ def test_the_horizon_is_seen_all_around():
 
 
 def test_a_fisheye_is_in_proportion():
-    """Angles from the axis are in proportion to the distance from the middle."""
+    """In a fisheye picture, angles from the axis are proportional to the distance from the middle."""
     lens = Panorama("FISHEYE_EQUIDISTANT", fov=math.pi)
     angles = np.arccos(-lens.directions(np.array([[0.5, 0.5], [0.75, 0.5], [0.5, 0.875], [1.0, 0.5]]))[:, 2])
     np.testing.assert_allclose(angles, np.array([0.0, 0.25, 0.375, 0.5]) * math.pi, atol=1e-7)

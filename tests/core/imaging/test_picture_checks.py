@@ -33,7 +33,7 @@ def write_exr(path, rng, compression=OpenEXR.ZIP_COMPRESSION, parts=1, height=70
 
 
 def cuts(size):
-    """Lengths that a file may have been cut to: few bytes less, few left, and some between."""
+    """Return lengths to which a file may have been cut: a few bytes less, few bytes left, and some between."""
     return sorted({0, 1, 7, 8, 9, size // 3, size // 2, size - 100, size - 2, size - 1} | set(range(10, size, 997)))
 
 
@@ -53,7 +53,7 @@ def test_a_cut_exr_is_found(tmp_path, rng, compression):
 
 
 def test_a_cut_exr_of_many_parts_is_found(tmp_path, rng):
-    """The headers of such a file are longer than what is read at first."""
+    """A truncated EXR of many parts is detected, although its headers are longer than what is read first."""
     path = write_exr(tmp_path / "f.exr", rng, parts=300)
     content = path.read_bytes()
     assert picture_checks.is_whole(path) and content.rindex(b"part 299") > 65_536
@@ -63,7 +63,7 @@ def test_a_cut_exr_of_many_parts_is_found(tmp_path, rng):
 
 
 def test_an_exr_that_was_never_finished_is_found(tmp_path, rng):
-    """OpenEXR fills the table of chunks in last."""
+    """An EXR that was never finished is detected, as OpenEXR writes the table of chunks last."""
     path = write_exr(tmp_path / "f.exr", rng, OpenEXR.NO_COMPRESSION, height=2)
     content = bytearray(path.read_bytes())
     place = len(content) - 2 * (8 + 40 * 12) - 16
@@ -92,7 +92,7 @@ def test_what_is_no_picture_is_not_whole(tmp_path):
 
 
 def test_a_small_part_of_a_frame_is_read_to_check_it(tmp_path, rng, monkeypatch):
-    """A thousand of them before a sequence goes on."""
+    """Only a small part of a frame is read to check it, as a sequence of a thousand frames is checked at its start."""
     path, counts = write_exr(tmp_path / "f.exr", rng, height=4320), []
 
     class Counted(io.BufferedReader):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Samples, moments and tiles of a picture."""
+"""Samples, moments and tiles of a picture satisfy their laws."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,9 @@ def test_moments_divide_the_exposure_evenly(position):
 
 
 def test_moments_are_where_the_shutter_is_open():
-    """Each part of the time gets moments by its share of the light; a curve without light has no effect."""
+    """Moments follow the shutter curve: each part of the time gets its share, and a curve without light has no
+    effect.
+    """
     openings = np.repeat([0.0, 1.0, 3.0, 0.0], 64)
     times = pixel_sampling.moments(2.0, "START", 400, openings)
     np.testing.assert_array_equal(np.histogram(times, [0.0, 0.5, 1.0, 1.5, 2.0])[0], [0, 100, 300, 0])
@@ -50,7 +52,7 @@ def test_tiles_cover_a_window_once(side):
 @pytest.mark.parametrize("width", [0.0, 1.0, 1.5, 3.0])
 @pytest.mark.parametrize("side", [1, 2, 4])
 def test_a_filter_is_a_window_around_the_middle_of_a_pixel(side, width):
-    """Over many shifts of the samples its weights have no lean, and none lies beyond the margin."""
+    """A filter's weights are centered on the pixel over many shifts of the samples, and zero beyond the margin."""
     margin = pixel_sampling.filter_margin(side, width)
     shifts = (np.arange(200) + 0.5) / 200 - 0.5
     weights = np.array([pixel_sampling.filter_weights(side, width, shift) for shift in shifts])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Apertures, and the focus of a thin lens."""
+"""Apertures are sampled evenly, and a thin lens has its focus."""
 
 import math
 
@@ -32,7 +32,9 @@ def test_points_fill_a_disk_evenly():
 
 @pytest.mark.parametrize("blades", [3, 6])
 def test_points_fill_a_polygon_evenly(blades):
-    """None lies beyond an edge, and as many in each sector and within each smaller copy as their areas are."""
+    """Points fill a polygon evenly: none is beyond an edge, and sectors and smaller copies have numbers by their
+    areas.
+    """
     rotation = 0.3
     found = points(Lens(1.0, 2.0, blades, rotation))
     normals = rotation + np.arange(blades) * 2.0 * math.pi / blades

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that keep their shape relative to a moving course."""
+"""Strands keep their shape relative to a moving course."""
 
 import numpy as np
 import pytest
@@ -12,14 +12,14 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def rotation(axis, angle):
-    """(3, 3) by an angle about an axis."""
+    """Return the rotation (3, 3) by an angle about an axis."""
     x, y, z = np.asarray(axis) / np.linalg.norm(axis)
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
 
 
 def courses_from(rng, elevation):
-    """(COUNT, POINTS, 3) smooth courses in the plane y = 0, that begin at an elevation above the ground and bend."""
+    """Return (COUNT, POINTS, 3) smooth courses in the plane y = 0 that bend, from an elevation above the ground on."""
     bends = rng.uniform(-0.3, 0.3, COUNT)
     angles = elevation + bends[:, None] * np.linspace(0.0, 1.0, POINTS - 1)
     steps = np.stack([np.cos(angles), np.zeros_like(angles), np.sin(angles)], axis=2) / POINTS
@@ -28,7 +28,7 @@ def courses_from(rng, elevation):
 
 @pytest.fixture
 def beside(rng):
-    """A function of courses: (points, starts, places) of strands of 3 to 30 points near them."""
+    """Return a function of courses: (points, starts, places) of strands of 3 to 30 points near them."""
 
     def near(courses):
         counts = rng.integers(3, 31, COUNT)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The strand nearest to each guide, compared with brute force."""
+"""The strand nearest to each guide is that of brute force."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of guides' regions: the parts into which lines and regions divide a surface, and the sides of open lines."""
+"""Guides have the regions into which lines divide a surface, and the sides of open lines."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ MARGIN = 0.005  # nearer to a line than this, either side will do
 
 @pytest.fixture(scope="module")
 def ground():
-    """A flat square from -½ to ½, along x and y."""
+    """Return a flat square from -½ to ½, along x and y."""
     mesh = flat_grid(16)
     return TriMesh(mesh.vertices - np.float32([0.5, 0.5, 0.0]), mesh.triangles)
 
@@ -39,7 +39,7 @@ def found(ground, roots, *polylines, regions=()):
 
 
 def assert_same_parts(labels, parts, chosen=slice(None)):
-    """Two guides have the same label if and only if they are in the same part."""
+    """Assert that two guides have the same label if and only if they are in the same part."""
     labels, parts = labels[chosen], np.asarray(parts)[chosen]
     np.testing.assert_array_equal(labels[:, None] == labels, parts[:, None] == parts)
     assert len(np.unique(parts)) > 1
@@ -61,7 +61,7 @@ def test_a_closed_line_divides_in_from_out(ground, roots):
 
 
 def test_lines_that_meet_divide_into_three(ground, roots):
-    """A T, whose foot does not matter beyond the bar."""
+    """Lines that meet as a T divide the surface into three parts, whatever the foot does beyond the bar."""
     x, y, _z = positions(ground, roots).T
     labels = found(ground, roots, [(-0.5, 0.0), (0.5, 0.0)], [(0.0, -0.5), (0.0, -0.003)])
     parts = np.where(y > 0.0, 2, x > 0.0)
@@ -75,7 +75,7 @@ def test_an_open_line_divides_past_its_ends_too(ground, roots, corners):
 
 
 def test_across_a_bent_line_are_others_than_on_the_same_side(ground, rng):
-    """Guides of pairs with a line between them, and of pairs beside it."""
+    """Guides of pairs across a bent line have different sides, and guides of pairs beside it the same side."""
     corners = np.array([(-0.3, -0.1), (-0.1, 0.1), (0.1, -0.1), (0.3, 0.1)])
     at = rng.uniform(0.05, 2.95, 200)
     part = (at % 1.0)[:, None]
@@ -89,7 +89,7 @@ def test_across_a_bent_line_are_others_than_on_the_same_side(ground, rng):
 
 
 def rooted(ground, places):
-    """`SurfacePoints` at places (N, 2) of the ground."""
+    """Return `SurfacePoints` at places (N, 2) of the ground."""
     corners = ground.corners[:, :, :2].astype(np.float64)
     edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
     inner = np.einsum("fij,nfj->nfi", np.linalg.inv(edges), places[:, None] - corners[:, 0])

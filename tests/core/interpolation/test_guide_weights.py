@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of weights: they sum to one, are continuous in the root, and exclude separated guides."""
+"""Weights sum to one, are continuous in the root, and exclude separated guides."""
 
 import math
 
@@ -22,12 +22,12 @@ def up(count):
 
 
 def flat(places):
-    """(N, 2) → (N, 3)"""
+    """Return (N, 3) from (N, 2), with zeros."""
     return np.pad(np.asarray(places, float), [(0, 0), (0, 1)])
 
 
 def dense(found, guide_count):
-    """(S, G): the weight of each guide."""
+    """Return (S, G): the weight of each guide."""
     indices, weights = found.indices.numpy(), found.weights.numpy()
     full = np.zeros((len(indices), guide_count + 1))
     np.put_along_axis(full, np.where(indices >= 0, indices, guide_count), weights, axis=1)
@@ -35,7 +35,7 @@ def dense(found, guide_count):
 
 
 def weights_at(roots, guide_roots, distance=None, limit=8, **region_labels):
-    """(S, G) on flat ground; roots (S, 2), guide_roots (G, 2)."""
+    """Return (S, G) weights on flat ground; roots (S, 2), guide_roots (G, 2)."""
     found = find_guides(
         vectors(flat(roots)),
         up(len(roots)),
@@ -49,7 +49,7 @@ def weights_at(roots, guide_roots, distance=None, limit=8, **region_labels):
 
 
 def steepest(weights, path):
-    """The largest change of weights, all guides together, by distance along a path."""
+    """Return the largest change of all weights together per distance along a path."""
     return (np.abs(np.diff(weights, axis=0)).sum(axis=1) / np.linalg.norm(np.diff(path, axis=0), axis=1)).max()
 
 
@@ -69,7 +69,7 @@ def test_weights_are_shares(rng, distance, limit):
 
 @pytest.mark.parametrize("distance", [None, 0.15, 0.4])
 def test_weights_change_without_a_step(rng, distance):
-    """Along a path past random guides, the finer it is walked the less changes from step to step.
+    """Weights change without a step: along a path past random guides, changes shrink with the steps.
 
     Eq. 9 alone, cut off at d and behind the k-th guide, changes by a tenth at once: a slope of thousands.
     """
@@ -82,14 +82,14 @@ def test_weights_change_without_a_step(rng, distance):
 
 
 def cut_off(roots, guide_roots, distance, limit):
-    """(S, G): Eq. 9 as it is printed, of the nearest guides within the distance."""
+    """Return (S, G) weights by Eq. 9 as printed, of the nearest guides within the distance."""
     apart = np.linalg.norm(roots[:, None] - guide_roots[None], axis=-1)
     w = np.exp(-(apart**2) / (0.5 * distance**2)) * (apart < distance) * (apart < np.sort(apart)[:, limit, None])
     return w / w.sum(axis=1, keepdims=True)
 
 
 def test_the_equation_alone_has_steps(rng):
-    """The test above would see them."""
+    """Eq. 9 alone has steps, which the test above detects."""
     guide_roots = rng.random((200, 2))
     along = np.linspace(0.1, 0.9, 40_001)
     path = np.stack([along, 0.5 + 0.2 * np.sin(9.0 * along)], axis=1)
@@ -110,7 +110,7 @@ def test_weights_end_at_the_influence_distance_and_at_the_first_guide_left_out(r
 
 
 def test_automatic_influence_is_local(rng):
-    """Guides ten times as dense on one side: each root follows eight guides, wherever it is."""
+    """Automatic influence is local: each root follows eight guides, also with one side ten times as dense."""
     guide_roots = np.concatenate([rng.random((1000, 2)), rng.random((100, 2)) + np.array([1.0, 0.0])])
     weights = weights_at(rng.random((500, 2)) * (2.0, 1.0), guide_roots)
     assert np.all((weights > 0.0).sum(axis=1) == 8)
@@ -170,7 +170,7 @@ def test_a_region_without_guides_follows_another_one_but_no_two(rng):
 
 
 def leaning(angles, lengths=1.0, point_count=9):
-    """(G, P, 3): straight guides at the corners of a small polygon that lean towards X by angles (G,)."""
+    """Return (G, P, 3): straight guides at the corners of a small polygon that lean towards X by angles (G,)."""
     angles = np.asarray(angles, float)
     around = np.linspace(0.0, 2.0 * np.pi, len(angles), endpoint=False)
     roots = 1e-3 * np.stack([np.cos(around), np.sin(around), np.zeros(len(angles))], axis=1)
@@ -179,7 +179,7 @@ def leaning(angles, lengths=1.0, point_count=9):
 
 
 def limited_weights(guides, limits, root=(9e-4, 0.0)):
-    """(G,) for a strand nearest to the first guide."""
+    """Return (G,) weights of a strand nearest to the first guide."""
     count = len(guides)
     found = find_guides(vectors(flat([root])), up(1), vectors(guides[:, 0]), up(count), None, max(count, 1))
     return dense(guide_weights.limited(found, vectors(guides), up(count), limits), count)[0]
@@ -209,7 +209,7 @@ def test_guides_beyond_the_length_limit_have_no_share():
 
 @pytest.mark.parametrize("limits", [Limits(angle=math.radians(60.0)), Limits(length=3.0)])
 def test_shares_fade_while_a_guide_is_combed_away(limits):
-    """No step, whether it turns away or grows."""
+    """The shares of a guide that is combed away fade without a step, whether it turns or grows."""
     shares = [
         limited_weights(leaning([0.0, turn], [1.0, 1.0 + 3.0 * turn]), limits, (1e-4, 0.0))[1]
         for turn in np.linspace(0.0, 1.5, 400)
@@ -220,7 +220,7 @@ def test_shares_fade_while_a_guide_is_combed_away(limits):
 
 
 def test_limits_of_no_effect(rng):
-    """What mixes all: no limits, or guides that are alike wherever they stand on a surface that bends."""
+    """Limits have no effect on guides that are alike on a bending surface, and no limits mix all guides."""
     guides = rng.normal(size=(7, 9, 3))
     found = find_guides(vectors([(0, 0, 0)]), up(1), vectors(guides[:, 0]), up(7), None, 7)
     free = guide_weights.limited(found, vectors(guides), up(7), Limits())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of interpolation: weighted means of rotated offsets with the guides' lengths, in all implementations."""
+"""Interpolated strands are weighted means of rotated offsets with the guides' lengths, in all implementations."""
 
 import numpy as np
 import pytest
@@ -21,14 +21,14 @@ def unit(array):
 
 
 def strands_between(roots, normals, guides, guide_normals, distance=None, limit=8, keep_length=1.0):
-    """Points (S, P, 3) by both stages; guides (G, P, 3)."""
+    """Return points (S, P, 3) by both stages; guides (G, P, 3)."""
     roots, normals, guides, guide_normals = map(vectors, (roots, normals, guides, guide_normals))
     weights = find_guides(roots, normals, guides[:, 0].contiguous(), guide_normals, distance, limit)
     return interpolation.interpolate(roots, normals, guides, guide_normals, weights, keep_length).numpy()
 
 
 def least_rotations(starts, end):
-    """Matrices (N, 3, 3) of the rotations about the axes across both that take unit vectors (N, 3) to another one."""
+    """Return matrices (N, 3, 3) of the least rotations that take unit vectors (N, 3) to others."""
     axes = np.cross(starts, end)
     sines = np.linalg.norm(axes, axis=1)
     angles = np.arctan2(sines, starts @ end)
@@ -37,7 +37,7 @@ def least_rotations(starts, end):
 
 @pytest.fixture
 def scene(rng):
-    """Guides and roots scattered over a unit sphere: a dict of the arguments of `strands_between`."""
+    """Return a dict of the arguments of `strands_between`, with guides and roots scattered over a unit sphere."""
     guide_roots, roots = unit(rng.normal(size=(60, 3))), unit(rng.normal(size=(200, 3)))
     curls = np.cumsum(0.02 * rng.normal(size=(60, 20, 3)) + 0.05 * guide_roots[:, None], axis=1)
     guides = guide_roots[:, None] + np.concatenate([np.zeros((60, 1, 3)), curls], axis=1)
@@ -49,7 +49,7 @@ def scene(rng):
 
 
 def weights_of(roots, guide_roots, distance, limit):
-    """(S, G): guide_weights.py's formula, every guide looked at, in double precision."""
+    """Return (S, G) weights by the formula of guide_weights.py over all guides, in double precision."""
     apart = np.linalg.norm(np.float32(roots)[:, None].astype(float) - np.float32(guide_roots)[None], axis=-1)
     ordered = np.sort(apart, axis=1)
     left_out = ordered[:, limit] if limit < len(guide_roots) else np.full(len(roots), np.inf)
@@ -64,7 +64,7 @@ def weights_of(roots, guide_roots, distance, limit):
 @pytest.mark.parametrize("distance", [None, 0.5, 0.2])
 @pytest.mark.parametrize("keep_length", [0.0, 0.4, 1.0])
 def test_strands_are_what_the_equations_say(scene, distance, keep_length):
-    """Eq. 7-10 read literally, recursion and all, with every guide looked at and rotations by scipy."""
+    """Strands equal a literal computation of Eq. 7-10, with recursion, all guides, and rotations by scipy."""
     guides = np.float32(scene["guides"]).astype(float)
     weights = weights_of(scene["roots"], guides[:, 0], distance, 8)
     guide_offsets, guide_lengths = offsets(guides), np.pad(segment_lengths(guides), [(0, 0), (1, 0)])
@@ -81,7 +81,7 @@ def test_strands_are_what_the_equations_say(scene, distance, keep_length):
 
 
 def test_segments_are_as_long_as_the_guides_are_on_average(scene):
-    """However much guides disagree; without it they were half as long here and there."""
+    """Segments are as long as the guides' on average, however much guides disagree."""
     weights = weights_of(scene["roots"], scene["guides"][:, 0], 0.5, 8)
     wanted = weights @ segment_lengths(scene["guides"])
     kept = segment_lengths(strands_between(**scene, distance=0.5))
@@ -92,7 +92,7 @@ def test_segments_are_as_long_as_the_guides_are_on_average(scene):
 
 @pytest.mark.parametrize("distance", [None, 0.2])
 def test_strands_change_without_a_step(rng, distance):
-    """The finer roots are walked past random guides, the less all points of the strand move from step to step."""
+    """Strands change without a step: their points move less with finer steps of roots past random guides."""
     up = np.array([0.0, 0.0, 1.0])
     roots = np.pad(rng.random((150, 2)), [(0, 0), (0, 1)])
     curls = np.cumsum(0.03 * rng.normal(size=(150, 20, 3)) + 0.05 * up, axis=1)
@@ -108,7 +108,7 @@ def test_strands_change_without_a_step(rng, distance):
 
 
 def test_guides_that_cancel_make_no_noise():
-    """Opposite guides leave no direction: the strand stays at its root, and does not grow along rounding errors."""
+    """Opposite guides cancel without noise: the strand stays at its root and does not grow along rounding errors."""
     guides = np.stack([np.linspace(0.0, 1.0, 9)[:, None] * np.array([side, 0.0, 0.0]) for side in (1.0, -1.0)])
     points = strands_between([(0.0, 0.5, 0.0)], [(0, 0, 1)], guides, [(0, 0, 1), (0, 0, 1)])
     np.testing.assert_allclose(points[0] - [0.0, 0.5, 0.0], np.zeros((9, 3)), atol=1e-3)
@@ -136,7 +136,7 @@ def test_mirrored_input_gives_mirrored_strands(scene):
 
 
 def test_strands_stay_within_the_hull_of_their_guides(scene, rng):
-    """On flat ground, in every direction some guide reaches as far as each strand (Eq. 10)."""
+    """On flat ground, strands stay within the hull of their guides in every direction (Eq. 10)."""
     up = np.array([0.0, 0.0, 1.0])
     flat = scene | {"normals": np.tile(up, (200, 1)), "guide_normals": np.tile(up, (60, 1))}
     shapes = strands_between(**flat, keep_length=0.0) - scene["roots"][:, None]
@@ -159,7 +159,9 @@ def test_the_order_of_guides_does_not_matter(scene, rng):
 
 @pytest.mark.parametrize("tilt", [0.0, 0.5, 1.5])
 def test_turning_normals_turn_strands_without_a_jump(tilt):
-    """All around and over the poles, where any choice of tangents must jump somewhere."""
+    """Turning normals turn strands without a jump, all around and over the poles, where any choice of tangents
+    jumps.
+    """
     angle = np.linspace(0.0, 2.0 * np.pi, 2000)
     normals = np.stack([np.sin(angle), np.zeros(2000), np.cos(angle)], axis=1)
     normals = Rotation.from_rotvec([tilt, 0.3 * tilt, 0.0]).apply(normals)
@@ -171,7 +173,7 @@ def test_turning_normals_turn_strands_without_a_jump(tilt):
 
 
 def test_opposite_normals_keep_the_length():
-    """There is no least rotation to the other side; any rotation will do, nothing else will."""
+    """Strands between opposite normals keep the length, by any of the rotations to the other side."""
     guide = np.linspace(0.0, 1.0, 5)[None, :, None] * np.array([0.4, 0.5, 0.3])
     for nudge in (0.0, 1e-7, 1e-4, 1e-3):
         normals = unit(np.array([[nudge, 0.0, -1.0], [0.0, 1.0, nudge]]))
@@ -194,7 +196,7 @@ def test_any_number_of_points(scene, point_count):
 @pytest.mark.parametrize("strand_count", [1, 4, 7, 16, 41])
 @pytest.mark.parametrize("limit", [1, 8, 20])
 def test_both_ways_are_one(scene, point_count, strand_count, limit):
-    """The processor's way and the GPU's: the same sums, added up in another order."""
+    """The processor's and the GPU's implementations give the same strands, up to the order of sums."""
     guides = np.concatenate([scene["guides"]] * 5, axis=1)[:, :point_count]
     arrays = scene["roots"][:strand_count], scene["normals"][:strand_count], guides, scene["guide_normals"]
 
@@ -208,7 +210,7 @@ def test_both_ways_are_one(scene, point_count, strand_count, limit):
 
 @pytest.mark.parametrize("point_count", [20, 41, 60])
 def test_strands_fill_rows_of_a_larger_array(scene, point_count):
-    """Wherever in memory these begin, and no more than these."""
+    """Strands fill rows of a larger array, at any position in memory and nowhere else."""
     guides = np.concatenate([scene["guides"]] * 3, axis=1)[:, :point_count]
     expected = strands_between(**scene | {"guides": guides})
     roots, normals, guides, guide_normals = (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of part lines: paths to guides go around them, have the shortest length, and change continuously."""
+"""Paths to guides around part lines have the shortest length, and change continuously."""
 
 import heapq
 from itertools import pairwise
@@ -18,7 +18,7 @@ from tests.support.strands.finding import find_guides
 
 @pytest.fixture(scope="module")
 def ground():
-    """A flat unit square, from 0 to 1."""
+    """Return a flat unit square, from 0 to 1."""
     mesh = flat_grid(16)
     low, high = mesh.vertices[:, :2].min(axis=0), mesh.vertices[:, :2].max(axis=0)
     assert np.allclose(mesh.vertices[:, 2], 0.0)
@@ -27,13 +27,13 @@ def ground():
 
 
 def segments(*corners):
-    """(L, 2, 3) of a polyline on flat ground."""
+    """Return (L, 2, 3) segments of a polyline on flat ground."""
     places = flat(corners)
     return np.stack([places[:-1], places[1:]], axis=1)
 
 
 def ways_between(ground, lines, roots, guide_roots):
-    """(S, G): the length of each way."""
+    """Return (S, G): the length of each path."""
     laid = part_lines.lay(ground, lines, DEVICE)
     apart = np.linalg.norm(np.asarray(roots)[:, None] - np.asarray(guide_roots)[None], axis=-1)
     order = np.argsort(apart, axis=1, kind="stable")
@@ -74,7 +74,9 @@ def test_a_way_across_a_straight_line_goes_round_the_nearer_end(ground, rng):
 
 
 def shortest_ways(corners, roots, guides):
-    """(S, G): through the plane by brute force, over places just beside the corners of a polyline."""
+    """Return (S, G) shortest lengths through the plane by brute force, over places just beside the corners of a
+    polyline.
+    """
     corners = np.asarray(corners, float)
     edges = np.diff(corners, axis=0) / np.linalg.norm(np.diff(corners, axis=0), axis=1, keepdims=True)
     apex = 1e-5 * (edges[:-1] - edges[1:])
@@ -118,7 +120,9 @@ CORNERS = {
 
 @pytest.mark.parametrize("corners", CORNERS.values(), ids=CORNERS)
 def test_ways_are_never_longer_than_the_shortest_there_is(ground, rng, corners):
-    """Ways are between the straight and the shortest way in length, and mostly the shortest itself."""
+    """Paths are at least as long as the straight path and at most as long as the shortest detour, and mostly equal
+    to it.
+    """
     roots, guides = 0.1 + 0.8 * rng.random((25, 2)), 0.1 + 0.8 * rng.random((25, 2))
     straight = np.linalg.norm(roots[:, None] - guides[None], axis=-1)
     shortest = shortest_ways(corners, roots, guides)
@@ -141,14 +145,14 @@ def test_a_closed_line_leaves_no_way_in_or_out(ground, rng):
 
 @pytest.mark.parametrize("corners", [[(0.0, 0.5), (1.0, 0.5)], [(0.005, 0.5), (0.99, 0.5)], [(-0.2, 0.5), (1.3, 0.5)]])
 def test_there_is_no_way_round_beyond_the_border(ground, rng, corners):
-    """The law holds for lines that end at the border, before it or beyond it."""
+    """No path leads around a line beyond the border, whether the line ends at the border, before it or beyond it."""
     roots, guide_roots = rng.random((800, 2)), rng.random((100, 2))
     weights = parted_weights(ground, segments(*corners), roots, guide_roots)
     assert np.all(weights[(roots[:, None, 1] > 0.5) != (guide_roots[:, 1] > 0.5)] == 0.0)
 
 
 def test_there_is_no_way_through_where_lines_meet(ground, rng):
-    """A T: the foot stands on the bar."""
+    """No path leads through the point where lines meet as a T."""
     lines = np.concatenate([segments((0.0, 0.5), (1.0, 0.5)), segments((0.5, 0.0), (0.5, 0.497))])
     roots, guide_roots = rng.random((800, 2)), rng.random((150, 2))
     weights = parted_weights(ground, lines, roots, guide_roots)
@@ -170,7 +174,7 @@ def parted_weights(ground, lines, roots, guide_roots, distance=None, limit=8):
 
 
 def test_weights_change_without_a_step_around_an_end(ground, rng):
-    """Half a circle around the end of a line, from one side of it to the other."""
+    """Weights change without a step along half a circle around the end of a line, from one side to the other."""
     guide_roots = rng.random((200, 2))
     angle = np.linspace(-np.pi + 0.01, np.pi - 0.01, 20_001)
     for radius in (0.02, 0.06):
@@ -181,7 +185,7 @@ def test_weights_change_without_a_step_around_an_end(ground, rng):
 
 
 def test_a_line_that_ends_separates_no_farther_than_the_way_round_is_longer(ground, rng):
-    """Behind its end roots follow guides of both sides as if there were no line."""
+    """Behind its end a line separates roots no farther than the detour is longer; they follow guides of both sides."""
     guide_roots = rng.random((300, 2))
     roots = np.array([0.65, 0.4]) + (0.3, 0.2) * rng.random((200, 2))
     line = segments((0.1, 0.5), (0.5, 0.5))
@@ -190,7 +194,9 @@ def test_a_line_that_ends_separates_no_farther_than_the_way_round_is_longer(grou
 
 
 def test_lines_lie_on_the_surface():
-    """A chord through a sphere becomes an arc on it, and what is behind the sphere is not parted by it."""
+    """Lines lie on the surface: a chord through a sphere becomes an arc, and does not part what is behind the
+    sphere.
+    """
     sphere = subdivided_sphere(4)
     arc = np.array([[(-0.6, 0.0, 0.8), (0.6, 0.0, 0.8)]])
     laid = part_lines.lay(sphere, arc, DEVICE)
@@ -214,7 +220,7 @@ def test_lines_lie_on_the_surface():
 
 
 def test_a_line_of_thousands_of_points_is_laid_with_hundreds(ground, rng):
-    """Strands look at each of them."""
+    """A line of thousands of points is simplified to hundreds, as strands look at each point."""
     turn = np.linspace(0.0, np.pi, 5000)
     fine = 0.5 + 0.3 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     assert len(part_lines.lay(ground, segments(*fine), DEVICE).points) < 300
@@ -228,7 +234,7 @@ def test_a_line_of_thousands_of_points_is_laid_with_hundreds(ground, rng):
 
 
 def test_edges_are_put_in_order(rng):
-    """Lines, a ring and a fork, shuffled and turned around: every edge once, and each line in one go."""
+    """Shuffled edges of lines, a ring and a fork are put in order: every edge once, and each line continuously."""
     lines = [range(5), range(5, 7), [*range(7, 12), 7], [12, 13, 14], [13, 15]]
     edges = np.array([pair for line in lines for pair in pairwise(line)])
     for _ in range(20):

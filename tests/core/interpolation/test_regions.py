@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of regions: a point belongs to the region with the largest weight, and any difference separates."""
+"""A point belongs to the region with the largest weight, and any difference separates."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from hair_addon.core.interpolation.regions import Regions, region_labels, region
 
 
 def test_two_regions_of_vertices_meet_halfway(square, rng):
-    """Two regions meet where their interpolated indicators pass one half."""
+    """Two regions of vertices meet halfway, where their interpolated indicators pass one half."""
     labels = rng.choice([-4, 9], len(square.vertices)).astype(np.int32)
     points = sample_surface(square, 2000, 1)
     share = mesh_math.interpolate(labels == 9, square, points)
@@ -32,7 +32,7 @@ def test_three_regions_at_a_triangle_are_those_of_the_nearest_corner():
 
 
 def test_kept_apart_is_what_differs_in_any(square, rng):
-    """Alike if and only if all are; of a region without guides: -1."""
+    """Points have the same label if and only if all their regions are alike; in a region without guides it is -1."""
     roots, guide_roots = sample_surface(square, 300, 1), sample_surface(square, 40, 2)
     some, others = (rng.integers(-(2**31), 2**31 - 1, 3).astype(np.int32) for _ in range(2))
     first = np.repeat(some[rng.integers(0, 3, len(square.triangles))][:, None], 3, axis=1)

@@ -121,13 +121,13 @@ def test_mismatched_data_is_refused(groomed, case):
 
 
 def test_no_queries_find_nothing():
-    """The grid has no cell to look into: reading the first query of none ended Blender."""
+    """No queries find no neighbors, although the grid has no cell, which once made Blender crash."""
     indices, distances = hash_grid.neighbours(vectors(3), vectors(0), 1.0, 4)
     assert indices.shape == distances.shape == (0, 4)
 
 
 def test_no_strands_follow_no_guides(groomed):
-    """Every stage takes none."""
+    """No strands follow no guides, in every stage."""
     guides, binding = groomed
     none = SurfacePoints(np.empty(0, np.int32), np.empty((0, 3), np.float32))
     bound = groom.bind_hair(SQUARE, guides, HairSettings(), roots=none, device=DEVICE)
