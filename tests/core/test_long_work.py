@@ -81,7 +81,7 @@ def square(side):
 
 
 def test_guides_of_a_thread_are_those_of_one_go(device):
-    """Progress never decreases."""
+    """Guides of a thread are those of one go, and progress never decreases."""
     settings, told = GuideSettings(guide_count=20, relax_iterations=5), []
     expected = groom.distribute_guides(square(1.0), settings, device=device)
 
@@ -97,7 +97,7 @@ def test_guides_of_a_thread_are_those_of_one_go(device):
 
 
 def test_guides_can_be_stopped_in_every_step(device):
-    """However late it is: nothing comes out."""
+    """Guides can be stopped in every step, however late, without a result."""
     settings, steps = GuideSettings(guide_count=10, relax_iterations=3), []
     groom.distribute_guides(square(1.0), settings, device=device, progress=lambda step, part: steps.append(part))
     for last in range(len(steps)):

@@ -18,7 +18,7 @@ from hair_addon.core.params import Settings, declared, param
 
 @dataclass(frozen=True)
 class Sample(Settings):
-    """A setting of each type."""
+    """Settings with one setting of each type."""
 
     count: int = param(3, "How many", low=1, high=2**31 - 1)
     size: float = param(0.5, "How large", low=-1e6, high=1e6)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shipped kernels: the same hair as from kernels compiled here, and none if they do not fit."""
+"""Shipped kernels give the same hair as kernels compiled here, and are not used if they do not fit."""
 
 import json
 import os
@@ -63,13 +63,13 @@ OLD_PROCESSOR = {
 
 @pytest.fixture(scope="module")
 def made():
-    """The folder as the extension's zip has it: compiled once for the same sources."""
+    """Return the folder as in the extension's zip, compiled once for the same sources."""
     return build_extension.compiled_kernels(is_for_tests=True)
 
 
 @pytest.fixture
 def folder(made, tmp_path, monkeypatch):
-    """A copy of that folder, which is the one that kernels are loaded from."""
+    """Return a copy of that folder, from which kernels are loaded."""
     copy = tmp_path / "kernels"
     shutil.copytree(made, copy)
     monkeypatch.setattr(compiled_kernels, "FOLDER", copy)
@@ -108,7 +108,7 @@ def test_of_several_that_ask_for_kernels_one_compiles_them(tmp_path, monkeypatch
 
 @pytest.fixture(scope="module")
 def folders(made, tmp_path_factory):
-    """A folder with the kernels of each kind of processor that this one is, the best first."""
+    """Return a folder with the kernels of each level that this processor supports, the best level first."""
     index = json.loads((made / compiled_kernels.INDEX).read_text(encoding="utf-8"))
     features = compiled_kernels.processor_features()
     found = []
@@ -141,7 +141,7 @@ def test_strands_are_the_same_bits_on_every_processor(folders):
 
 
 def made_by(*folders, environment=None):
-    """What any_processor.py prints for folders of kernels."""
+    """Return what any_processor.py prints for folders of kernels."""
     command = [sys.executable, any_processor.__file__, *folders]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
@@ -151,7 +151,7 @@ def made_by(*folders, environment=None):
 
 
 def test_no_kernel_is_compiled_for_gradients():
-    """Nothing asks for them, and they take as long to compile as all else."""
+    """No kernel is compiled for gradients, which nothing uses and which take as long to compile as everything else."""
     assert [module.name for module in compile_kernels._warp_modules() if module.options["enable_backward"]] == []
 
 
@@ -162,7 +162,9 @@ def test_native_code_is_among_the_sources():
 
 @pytest.mark.parametrize(("named", "expected"), [("/elsewhere", "/elsewhere"), ("", ROOT / "kernels")])
 def test_a_folder_is_named_by_the_environment(named, expected):
-    """So that processes of tests load what `make build` has compiled."""
+    """The environment variable names the folder of kernels, so that processes of tests load what `make build` has
+    compiled.
+    """
     program = "from hair_addon.core.kernels import compiled_kernels; print(compiled_kernels.FOLDER)"
     environment = os.environ | {compiled_kernels.VARIABLE: named}
     command = [sys.executable, "-c", program]
@@ -215,7 +217,9 @@ def test_other_options(folder, monkeypatch):
 
 
 def test_a_lesser_processor(folder):
-    """One that lacks a feature of each kind of processor gets none; of the best kind alone, the next kind's."""
+    """A processor without a feature of every level loads no kernels; one without a feature of the best level, the
+    next level's.
+    """
     first, *others = json.loads((folder / compiled_kernels.INDEX).read_text(encoding="utf-8"))["processors"]
     change_index(folder, lambda index: index["processors"][0]["features"].append("another"))
     assert loads() == bool(others)
@@ -237,6 +241,6 @@ def test_a_damaged_file(folder):
 
 
 def test_nothing_of_this_machine(made):
-    """The files hold no path."""
+    """The files of kernels contain no path of this machine."""
     for path in filter(os.path.isfile, made.rglob("*")):
         assert not [word for word in (str(ROOT), os.path.expanduser("~")) if word.encode() in path.read_bytes()]

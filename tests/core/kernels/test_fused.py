@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""a b + c rounded once, whether the processor has an instruction for it or not."""
+"""a b + c is rounded once, with or without an instruction of the processor for it."""
 
 from fractions import Fraction
 
@@ -24,7 +24,7 @@ for (int first = 0; first < out.shape[0]; first += LANES) {
 
 
 def numbers(rng):
-    """(3, N) float32: of any size; whose sum is near the middle between two floats; and too small for 24 bits."""
+    """Return (3, N) float32 of any size, with sums near the middle between two floats, and too small for 24 bits."""
     signs = rng.choice([-1.0, 1.0], (3, 400))
     any_size = signs * rng.uniform(1.0, 2.0, (3, 400)) * 2.0 ** rng.integers(-12, 12, (3, 400))
     odd = 1.0 + 2.0**-12 * rng.integers(1, 4096, (2, 400))  # products of 24 bits after the point
@@ -39,7 +39,7 @@ def numbers(rng):
 
 
 def nearest_float(exact):
-    """The float32 next to a fraction, the even one of two."""
+    """Return the float32 nearest to a fraction, the even one of two."""
     near = np.float32(float(exact))
     around = near, np.nextafter(near, np.float32(np.inf)), np.nextafter(near, np.float32(-np.inf))
     return min(around, key=lambda x: (abs(Fraction(float(x)) - exact), int(np.float32(x).view(np.int32)) & 1))

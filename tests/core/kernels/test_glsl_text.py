@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Warp's functions as GLSL: their text, and what is refused. tests/blender/gpu/test_kernel_programs.py runs kernels."""
+"""Warp's functions are translated to GLSL text or refused; tests/blender/gpu/test_kernel_programs.py runs kernels."""
 
 import pytest
 import warp as wp

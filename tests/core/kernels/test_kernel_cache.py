@@ -51,7 +51,7 @@ print(*(module.get_module_identifier(block_dim=1) for module in modules))
 
 
 def work(cache, temporary, before=()):
-    """Do the work in a process of its own; returns the folder that its kernels came from."""
+    """Do the work in a separate process, and return the folder from which its kernels came."""
     environment = ENVIRONMENT | {"PYTHONPATH": str(ROOT), "WARP_CACHE_PATH": str(cache), "TMPDIR": str(temporary)}
     line = [*before, sys.executable, "-c", WORK]
     done = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=120, check=False)
@@ -62,7 +62,7 @@ def work(cache, temporary, before=()):
 
 @pytest.fixture(scope="module")
 def compiled(tmp_path_factory):
-    """A cache that holds the five modules, and no others."""
+    """Return a cache that holds exactly the five modules."""
     folder = tmp_path_factory.mktemp("compiled")
     # In a process of its own, as all others here: a name follows from all that Warp has seen in its process.
     line = [sys.executable, "-c", WORK + NAMES]
@@ -75,7 +75,7 @@ def compiled(tmp_path_factory):
 
 @pytest.fixture
 def cache(compiled, tmp_path):
-    """A copy of that, which a test may damage."""
+    """Return a copy of the cache, which a test may damage."""
     return shutil.copytree(compiled, tmp_path / "cache")
 
 
@@ -88,7 +88,7 @@ def digest(cache):
 
 
 def test_damaged_entries_are_compiled_again(cache, tmp_path):
-    """One beside a whole one on another thread; each thread that compiles reads Warp's headers, in four seconds."""
+    """Damaged entries are compiled again, one of them while another thread compiles a different one."""
     code = file_of(cache, "bspline", ".o")
     code.write_bytes(code.read_bytes()[:700])
     file_of(cache, "counting_sort", ".meta").write_text("")
@@ -142,7 +142,7 @@ def test_a_flipped_bit_is_noticed(cache, tmp_path):
 
 @pytest.fixture
 def temporary(compiled, tmp_path):
-    """A temporary folder in which an earlier process has compiled the kernels."""
+    """Return a temporary folder in which an earlier process has compiled the kernels."""
     folder = tmp_path / "temporary"
     kept = folder / f"vellus_kernels_{os.getuid()}"
     shutil.copytree(compiled, kept)
@@ -166,7 +166,9 @@ needs_mounts = pytest.mark.skipif(
 @needs_mounts
 @pytest.mark.parametrize("options", ["size=64k", "size=64m,ro"], ids=["full", "read-only"])
 def test_a_disk_that_takes_no_kernel_is_left_for_a_temporary_folder(temporary, tmp_path, options):
-    """Warp's compiler ends the process when the disk is full."""
+    """If a disk takes no kernel, a temporary folder is used, as Warp's compiler ends the process when the disk is
+    full.
+    """
     (tmp_path / "disk").mkdir()
     mounting = f'mount -t tmpfs -o {options} small {tmp_path / "disk"} && exec "$@"'
     before = ["unshare", "-m", "bash", "-c", mounting, "bash"]
@@ -180,7 +182,7 @@ def test_a_cache_that_may_only_be_read_is_read(cache, tmp_path):
 
 
 def test_a_folder_that_others_may_write_is_not_trusted(tmp_path, monkeypatch):
-    """Its kernels would be somebody else's code."""
+    """A folder that others may write to is not trusted, as its kernels would be other people's code."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     own = kernel_cache.temporary_folder()
     assert own == kernel_cache.temporary_folder() and own.parent == tmp_path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modules loaded by several threads: each once, with cancellation and reported failures."""
+"""Modules loaded by several threads are compiled once each, with cancellation and reported failures."""
 
 import threading
 import time
@@ -18,7 +18,7 @@ numbers = count()
 
 
 class Module:
-    """What `kernel_setup` asks of a module of Warp's; not one of the add-on's, so none comes compiled."""
+    """A mock of Warp's modules for `kernel_setup`, which is not shipped compiled."""
 
     def __init__(self):
         self.name = f"tests.module_{next(numbers)}"
@@ -31,7 +31,7 @@ def modules():
 
 @pytest.fixture
 def compiled(monkeypatch):
-    """How often each module was compiled, by name."""
+    """Return {name of a module: how often it was compiled}."""
     times = Counter()
 
     def compile_anew(_device, module):
@@ -45,7 +45,7 @@ def compiled(monkeypatch):
 
 @pytest.fixture
 def endless(monkeypatch, compiled):
-    """The first module is compiled at once, the others when somebody has asked to stop."""
+    """Compile the first module immediately, and the others only when a stop was requested."""
     compile_one = kernel_entries.compile_anew
 
     def compile_anew(device, module):
@@ -116,7 +116,7 @@ def test_a_failure_is_raised_and_tried_again(modules, compiled, monkeypatch):
 
 @pytest.mark.usefixtures("endless")
 def test_the_end_of_python_stops_it(modules, compiled):
-    """Or the compiler would be at work while its library is taken down."""
+    """The end of Python stops compilation, as the compiler would otherwise work while its library is unloaded."""
     job = Job(lambda progress: kernel_setup.load(modules, "cpu", progress))
     while not kernel_setup._under_way:
         time.sleep(0.001)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""C++ of kernels is read from files: constants have the values that Python gives, headers are part of the source."""
+"""C++ of kernels is read from files with the constants of Python and with headers as part of the source."""
 
 import pytest
 import warp as wp

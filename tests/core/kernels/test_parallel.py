@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kernels on all cores give what one core gives."""
+"""Kernels give the same results on all cores as on one core."""
 
 import os
 import threading
@@ -64,7 +64,9 @@ def test_the_start_of_kernels_is_signaled_once(rng, monkeypatch, core_count):
 
 @pytest.mark.parametrize("row_count", [0, 1, 50_001])
 def test_a_launch_on_one_core_pauses_before_its_first_and_between_its_rows(rng, row_count):
-    """Results are the same, and an exception of a pause ends the launch."""
+    """A launch on one core pauses before its first row and between rows with the same results; an exception of a
+    pause ends it.
+    """
     values, factors = rng.random((row_count, 3), np.float32), np.float32([1.0, 2.0, 4.0])
     there = wp.array(values, dtype=float, device="cpu", ndim=2)
     given = [Rows(there), wp.array(factors, dtype=float, device="cpu")]
@@ -121,7 +123,7 @@ def test_what_any_thread_raises_is_raised_when_all_are_done(failing):
 
 
 def test_on_one_core_only_the_calling_thread_has_a_single_part():
-    """Shares of a thread are one on one core, and as many as before after it and in other threads."""
+    """On one core only the calling thread has a single part; later, and in other threads, shares are as before."""
     usual = parallel.part_count(1_000_000, "cpu")
     with ThreadPoolExecutor(1) as pool, parallel.on_one_core():
         assert parallel.part_count(1_000_000, "cpu") == parallel.share_count(1_000_000, "cpu") == 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replayed launches equal new launches with the present contents of arrays."""
+"""Replayed launches equal new launches with the current contents of arrays."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def _add(values: wp.array[float], factor: float, sums: wp.array[float]):
 
 
 class Sums:
-    """Sums of some values by two launches, known to `Replays` by the factor alone."""
+    """Sums of values by two launches, whose only identification for `Replays` is the factor."""
 
     def __init__(self, device):
         self.device, self.replays = wp.get_device(device), Replays(device)

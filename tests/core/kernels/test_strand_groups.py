@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A strand has the same bits in any group: kernels process groups of strands, and branch if any of them needs it."""
+"""A strand has the same bits in any group, although kernels branch if any strand of a group needs it."""
 
 import pytest
 

@@ -10,7 +10,7 @@ from hair_addon.core.params import Param
 
 
 def plane(count=4, size=1.0):
-    """A square of count² quads with vertices from 0 to size, and its UVs (F, 3, 2) from 0 to 1."""
+    """Return a square of count² quads with vertices from 0 to size, and its UVs (F, 3, 2) from 0 to 1."""
     y, x = np.mgrid[0 : count + 1, 0 : count + 1] / count
     vertices = np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3)
     first = (np.arange(count)[:, None] * (count + 1) + np.arange(count)).ravel()

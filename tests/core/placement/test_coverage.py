@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of coverage: full among guides, zero far away, independent of the mesh."""
+"""Coverage is full among guides, zero far away, and independent of the mesh."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from hair_addon.core.placement.coverage import LEVELS, coverage
 
 
 def grid(count):
-    """A square of 1 m, cut into count² squares of two triangles."""
+    """Return a square of 1 m, cut into count² squares of two triangles."""
     x, y = np.meshgrid(*[np.linspace(0.0, 1.0, count + 1, dtype=np.float32)] * 2)
     vertices = np.stack([x.ravel(), y.ravel(), 0.0 * x.ravel()], axis=1)
     corner = (np.arange(count)[:, None] * (count + 1) + np.arange(count)).ravel()
@@ -19,7 +19,7 @@ def grid(count):
 
 
 def rooted_in(rng, low, high, count=400):
-    """(count, 3) random roots where x is between two numbers."""
+    """Return (count, 3) random roots with x between two numbers."""
     return np.float32(np.c_[rng.uniform(low, high, count), rng.random(count), np.zeros(count)])
 
 
@@ -35,7 +35,7 @@ def test_it_is_full_among_roots_and_zero_away_from_them(rng, cuts):
 
 
 def test_every_triangle_that_holds_a_root_is_full(rng):
-    """However large it is beside the distances between roots: else no hair would grow there."""
+    """Every triangle with a root is fully covered, however large it is compared with the distances between roots."""
     mesh = grid(4)
     roots = rooted_in(rng, 0.0, 0.2)
     weights = coverage(mesh, roots)

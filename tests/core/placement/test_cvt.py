@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of relaxation: the energy never rises, sites stay on their surface, and end up evenly placed."""
+"""Relaxation never raises the energy, keeps sites on their surface, and ends with evenly placed sites."""
 
 import os
 from functools import partial
@@ -33,7 +33,7 @@ def relaxed(mesh, count, iterations, density=None, seed=1):
 
 
 def on_square(places):
-    """Places (N, 2) in the unit square's first triangles → `SurfacePoints` on a square of two triangles, and it."""
+    """Return `SurfacePoints` at places (N, 2) on a square of two triangles, and the square."""
     corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], np.float32)
     mesh = TriMesh(corners, np.array([(0, 1, 2), (0, 2, 3)], np.int32))
     x, y = np.asarray(places, np.float64).T
@@ -45,7 +45,7 @@ def on_square(places):
 
 @pytest.fixture(scope="session")
 def surfaces(head, scalp, sphere, square):
-    """(mesh, density) of different kinds: a mask, closed and uniform, open with a density that falls to nothing."""
+    """Return (mesh, density) of different kinds: a mask, closed and uniform, open with a density that falls to zero."""
     return {"scalp": (head, scalp), "sphere": (sphere, None), "square": (square, square.vertices[:, 0])}
 
 
@@ -72,7 +72,7 @@ def test_sites_stay_on_the_surface_where_there_is_density(surfaces, name):
 
 
 def test_sites_do_not_leave_their_islands(square):
-    """Density in two far corners only: what lies between has none to stand on."""
+    """Sites do not leave their islands, with density only in two far corners."""
     x, y, _ = square.vertices.T
     density = ((np.maximum(x, y) < 0.3) | (np.minimum(x, y) > 0.7)).astype(float)
     sites = relaxed(square, 20, 30, density).sites
@@ -80,7 +80,7 @@ def test_sites_do_not_leave_their_islands(square):
 
 
 def test_sites_do_not_stop_where_density_ends(square):
-    """The centroid of a ring is in its hole, and the nearest place on the ring is its border: density zero."""
+    """Sites do not stop at density zero, at the border of a ring whose centroid is in its hole."""
     radius = np.linalg.norm(square.vertices[:, :2] - 0.5, axis=1)
     ring = ((radius > 0.25) & (radius < 0.45)).astype(float)
     for seed in range(5):
@@ -89,7 +89,7 @@ def test_sites_do_not_stop_where_density_ends(square):
 
 
 def test_energy_is_the_integral(sphere):
-    """Against a sum over a million random points, each with the nearest site found another way."""
+    """The energy equals a sum over a million random points, with the nearest sites found by another method."""
     sites = sample_surface(sphere, 50, seed=3)
     points = mesh_math.positions(sphere, sample_surface(sphere, 1_000_000, seed=4))
     distances, _ = cKDTree(mesh_math.positions(sphere, sites)).query(points)
@@ -98,7 +98,9 @@ def test_energy_is_the_integral(sphere):
 
 
 def test_energy_of_a_square_lattice():
-    """A square's second moment is a sixth of its area squared: 3.9 % above the hexagon's; all cells are equal."""
+    """The energy of a square lattice is 3.9 % above the hexagons', by a second moment of a sixth of its area
+    squared.
+    """
     middles = (np.indices((12, 12)).reshape(2, -1).T + 0.5) / 12.0
     quality = measure(*on_square(middles))
     np.testing.assert_allclose(quality.relative_energy, (1.0 / 6.0) / (5.0 / (18.0 * 3.0**0.5)), rtol=5e-3)
@@ -121,9 +123,9 @@ def test_four_sites_share_a_square():
     ("name", "energy", "variation"), [("sphere", 1.03, 0.08), ("scalp", 1.02, 0.12), ("square", 1.08, 0.14)]
 )
 def test_converged_sites_are_even(surfaces, name, energy, variation):
-    """200 sites: within a few per cent of what no distribution can beat; a random one needs twice the energy.
+    """200 converged sites are within a few percent of the best possible energy, random sites at twice that.
 
-    The square's border costs it more: cells along it are not hexagons.
+    The square's border costs energy, as cells along it are not hexagons.
     """
     mesh, density = surfaces[name]
     start = sample_surface(mesh, 200, 1, density)
@@ -134,7 +136,9 @@ def test_converged_sites_are_even(surfaces, name, energy, variation):
 
 
 def test_sites_follow_the_density(square):
-    """Density rises from left to right, so the mean of x is 2/3 and a quarter of all sites are in the left half."""
+    """Sites follow a density that rises from left to right: the mean of x is 2/3, and a quarter of them is in the
+    left half.
+    """
     x = mesh_math.positions(square, relaxed(square, 400, 100, square.vertices[:, 0]).sites)[:, 0]
     assert abs(x.mean() - 2.0 / 3.0) < 0.01
     assert abs(np.mean(x < 0.5) - 0.25) < 0.03
@@ -161,7 +165,7 @@ def test_size_does_not_matter(sphere, scale):
 
 
 def test_a_site_with_an_empty_cell_keeps_its_place(sphere):
-    """Among sites at one place, the first one gets the cell."""
+    """A site with an empty cell keeps its place; among sites at one place, the first one gets the cell."""
     site = sample_surface(sphere, 1, seed=1)
     twins = SurfacePoints(np.repeat(site.triangle, 40), np.repeat(site.barycentric, 40, axis=0))
     others = sample_surface(sphere, 5, seed=2)
@@ -174,7 +178,9 @@ def test_a_site_with_an_empty_cell_keeps_its_place(sphere):
 
 
 def test_cells_do_not_depend_on_how_far_neighbours_are_known(head, scalp, monkeypatch):
-    """With two known neighbors per site, the other neighbors are found by a search of all sites."""
+    """Cells do not depend on the number of known neighbors: with two per site, all sites are searched for the
+    others.
+    """
     sites = sample_surface(head, 150, 5, scalp)
     expected = relax(head, sites, 0, scalp).energies
     monkeypatch.setattr(voronoi, "SITES_AROUND", 2)
@@ -188,7 +194,9 @@ def test_triangles_without_area_are_passed_over(sphere):
 
 
 def test_a_gradient_is_the_slope_of_the_energy(square):
-    """Against differences of the energy between sites moved a little: on a plane, nothing is projected."""
+    """The gradient is the slope of the energy by finite differences of sites, on a plane, where nothing is
+    projected.
+    """
     sites = sample_surface(square, 40, seed=6)
     domain = Domain(square, 40, square.vertices[:, 0], device=DEVICE)
     cells = CutCells(domain, 40, DEVICE)
@@ -223,7 +231,7 @@ def test_energy_is_below_lloyds_from_the_same_start(surfaces, name):
 
 @pytest.mark.parametrize("name", ["scalp", "sphere", "square"])
 def test_placed_sites_are_even(surfaces, name):
-    """A dozen rounds from coarse to fine beat forty of Lloyd's."""
+    """Sites placed by a dozen rounds from coarse to fine are more even than by forty of Lloyd's."""
     mesh, density = surfaces[name]
     sites = place(mesh, 600, 1, 12, density=density)
     lloyd = relax(mesh, sample_surface(mesh, 600, 1, density), 40, density, steps_kept=0).sites
@@ -261,7 +269,7 @@ def test_threads_do_not_change_a_bit(head, scalp, monkeypatch):
 
 
 def test_density_is_followed_twenty_to_one(square):
-    """Twenty times the density on one half: twenty times as many sites there, and even shares of it.
+    """Twenty times the density on one half gives twenty times as many sites there, with even shares.
 
     The sparse half is ten sites wide, so borders count.
     """
@@ -276,7 +284,7 @@ def test_density_is_followed_twenty_to_one(square):
 
 
 def test_islands_have_their_shares(sphere):
-    """Three spheres of radii 1, 2 and 3, apart: areas go as 1, 4 and 9."""
+    """Three separate spheres of radii 1, 2 and 3 have shares of 1, 4 and 9."""
     radii = np.array([1.0, 2.0, 3.0])
     vertices = np.concatenate([r * sphere.vertices + (10.0 * i, 0.0, 0.0) for i, r in enumerate(radii)])
     triangles = np.concatenate([sphere.triangles + i * len(sphere.vertices) for i in range(3)])
@@ -286,7 +294,9 @@ def test_islands_have_their_shares(sphere):
 
 
 def test_two_sides_of_a_thin_part_are_no_neighbours(square):
-    """Two sheets a fraction of a spacing apart, back to back: each is shared out as if it were alone."""
+    """Two sides of a thin part are no neighbors: sheets a fraction of a spacing apart are divided as if each were
+    alone.
+    """
     vertices = np.concatenate([square.vertices, square.vertices - np.float32([0.0, 0.0, 1e-3])])
     triangles = np.concatenate([square.triangles, square.triangles[:, ::-1] + len(square.vertices)])
     mesh = TriMesh(vertices, triangles.astype(np.int32))
@@ -300,7 +310,7 @@ def test_two_sides_of_a_thin_part_are_no_neighbours(square):
 
 
 def test_a_closed_thin_box_keeps_its_sides_apart(square):
-    """The same through connected vertices: normals tell the sides of a folded sheet apart, islands cannot."""
+    """A closed thin box keeps its sides apart by normals, as its vertices are connected."""
     fold = np.float32(2e-3)
     x, y, _ = square.vertices.T
     folded = np.stack([np.abs(x - 0.5), y, np.where(x < 0.5, -fold, fold)], axis=1).astype(np.float32)
@@ -332,7 +342,7 @@ def test_symmetric_sites_are_images(sphere, count):
 
 
 def test_curvature_draws_sites_to_where_a_surface_bends():
-    """A long capsule, flat around its middle along one axis: its ends bend twice as much."""
+    """Curvature draws sites to where a surface bends: the ends of a capsule bend twice as much as its middle."""
     ball = subdivided_sphere(4)
     shift = np.where(ball.vertices[:, :1] > 0.0, 2.0, -2.0) * np.float32([1.0, 0.0, 0.0])
     capsule = TriMesh((ball.vertices + shift).astype(np.float32), ball.triangles)
@@ -345,7 +355,9 @@ def test_curvature_draws_sites_to_where_a_surface_bends():
 
 
 def test_an_image_is_followed(square):
-    """White in one corner of the UV map, a tenth as bright elsewhere, and black in another corner."""
+    """Sites follow an image: white in one corner of the UV map, a tenth as bright elsewhere, and black in another
+    corner.
+    """
     corner_uvs = square.vertices[square.triangles][:, :, :2]
     values = np.full((32, 32), 0.1, np.float32)
     values[:16, :16], values[16:, 16:] = 1.0, 0.0
@@ -363,7 +375,7 @@ def test_a_black_image_is_refused(square):
 
 
 def test_one_guide_is_placed_where_the_share_of_the_area_is_on_a_small_island(device):
-    """Half of the area lies before the island in the middle, which few starts have a point on."""
+    """One guide is placed at the right share of the area on a small island, where few starts have a point."""
     triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
     vertices = np.concatenate([size * triangle + [3 * i, 0, 0] for i, size in enumerate((1.0, 0.25, 1.0))])
     islands = TriMesh(vertices.astype(np.float32), np.arange(9, dtype=np.int32).reshape(3, 3))

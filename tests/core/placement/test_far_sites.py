@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The search for cells among the far sites of a site instead of all sites."""
+"""The search for cells among the far sites of a site equals the search among all sites."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SITE_COUNT = 900
 
 @pytest.fixture(scope="module")
 def slivers():
-    """400 separate strips of two slivers each, which cross each other in a cube."""
+    """Return 400 separate strips of two slivers each, which cross each other in a cube."""
     random = np.random.default_rng(1)
     along, across = random.normal(size=(2, 400, 3))
     across -= np.sum(across * along, axis=1, keepdims=True) / np.sum(along**2, axis=1, keepdims=True) * along

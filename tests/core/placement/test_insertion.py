@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""New sites are placed evenly between existing ones, where density allows."""
+"""New sites are placed evenly between existing sites, where density allows."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from hair_addon.core.placement.insertion import insert
 
 
 def spacing(places, others=None):
-    """(N,) distance from each place to the nearest other one, or to the nearest of others."""
+    """Return (N,) distances from each place to the nearest other place, or to the nearest of others."""
     apart = np.linalg.norm(places[:, None] - (places if others is None else others)[None], axis=2)
     if others is None:
         np.fill_diagonal(apart, np.inf)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of the parts of placement: springs between sites, farthest points, moves along the surface."""
+"""The parts of placement satisfy their laws: springs between sites, farthest points, moves along the surface."""
 
 import numpy as np
 import pytest
@@ -16,13 +16,13 @@ from tests.support.devices import DEVICE
 
 
 def springs_between(domain, sites):
-    """`Springs` of sites, and the state that they are of."""
+    """Return the `Springs` of sites and their state."""
     state = cvt._State(domain, CutCells(domain, len(sites), DEVICE), sites, DEVICE)
     return Springs(sites_on(domain, sites, DEVICE), state.sums.masses, DEVICE), state
 
 
 def test_springs_pull_alike_in_both_directions(head, scalp):
-    """The network is symmetric and resists every move: so a step that it chooses lowers the energy."""
+    """Springs pull alike in both directions and resist every move, so a step that they choose lowers the energy."""
     domain = Domain(head, 300, scalp, device=DEVICE)
     springs, state = springs_between(domain, sample_surface(head, 300, 1, scalp))
     normals = domain.normals[state.sites.triangle]
@@ -35,7 +35,7 @@ def test_springs_pull_alike_in_both_directions(head, scalp):
 
 
 def test_springs_are_near_to_the_hessian(sphere):
-    """Against the difference of gradients, for moves that are smooth over the sphere and for such as are not."""
+    """Springs are near to the Hessian by differences of gradients, for smooth and for rough moves over the sphere."""
     sites = cvt.place(sphere, 300, 1, 40, device=DEVICE)
     domain = Domain(sphere, 300, device=DEVICE)
     springs, state = springs_between(domain, sites)
@@ -68,7 +68,7 @@ def test_farthest_points_are_the_farthest(square):
 
 
 def test_moved_sites_are_at_the_nearest_place(head):
-    """The search knows how far it must look: as far as the site came from."""
+    """Moved sites are at the nearest place, which is searched as far away as the site came from."""
     domain = Domain(head, 100, device=DEVICE)
     sites = sample_surface(domain.mesh, 500, 1)
     places = mesh_math.positions(domain.mesh, sites).astype(np.float64)

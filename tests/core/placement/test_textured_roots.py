@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Roots by an image: none where it is black, density by brightness elsewhere, the same for the same seed."""
+"""An image gives no roots where it is black and a density by brightness elsewhere, the same for the same seed."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from tests.core.grooming.test_groom_defaults import plane
 
 
 def sampled(values, count=4000, seed=1, density=None, cells=2):
-    """(count, 2) positions in [0, 1] on a square that an image is laid over."""
+    """Return (count, 2) positions in [0, 1] on a square that an image covers."""
     mesh, uvs = plane(1.0, cells)
     roots = sample_textured(mesh, count, seed, density, Texture(np.asarray(values, np.float32), uvs))
     np.testing.assert_allclose(roots.barycentric.sum(axis=1), 1.0, atol=1e-5)

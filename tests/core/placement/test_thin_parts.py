@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sites on parts of a surface that are thinner than the distance between sites."""
+"""Sites are even on parts of a surface that are thinner than the distance between sites."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ SITE_COUNT = 700
 
 @pytest.fixture(scope="module")
 def eared():
-    """(A ball with six thin flaps, each about a spacing of its sites wide, (F,) bool which triangles are a flap's)."""
+    """Return (a ball with six thin flaps, each about a spacing of sites wide, (F,) whether triangles are a flap's)."""
     ball = subdivided_sphere(5)
     heights = np.zeros(len(ball.vertices))
     for axis in range(3):
@@ -29,14 +29,14 @@ def eared():
 
 
 def test_thin_flaps_hold_their_share_of_sites(eared):
-    """The few sites of a coarse level are drawn to both sides of what is thin, and have to leave again."""
+    """Thin flaps hold their share of sites, although few sites of a coarse level are drawn to both of their sides."""
     mesh, is_flap = eared
     found = [is_flap[cvt.place(mesh, SITE_COUNT, seed, 12, device=DEVICE).triangle].mean() for seed in range(3)]
     assert np.mean(found) == pytest.approx(mesh.areas[is_flap].sum() / mesh.areas.sum(), rel=0.16)
 
 
 def test_crowded_sites_go_to_the_widest_gaps():
-    """Three of many even sites were put beside others: they alone leave, to where they lacked, and nobody does then."""
+    """Three crowded sites among many even ones go to the widest gaps, and then no site moves."""
     mesh = subdivided_sphere(4)
     even, moved = cvt.place(mesh, 300, 1, 20, device=DEVICE), [10, 120, 230]
     beside = even[np.arange(300)]
@@ -59,7 +59,7 @@ def test_crowded_sites_go_to_the_widest_gaps():
 
 
 def _sheet():
-    """Two sheets back to back, far nearer to each other than sites are."""
+    """Return two sheets back to back, far nearer to each other than sites are."""
     square = flat_grid(12)
     vertices = np.concatenate([square.vertices, square.vertices - np.float32([0.0, 0.0, 1e-3])])
     triangles = np.concatenate([square.triangles, square.triangles[:, ::-1] + len(square.vertices)])
@@ -68,7 +68,9 @@ def _sheet():
 
 @pytest.mark.parametrize("name", ["sheet", "eared"])
 def test_spacing_is_that_of_sites_on_the_same_side(eared, name):
-    """Against brute force: the nearest, and the mean of the six nearest, on the same side of the same island."""
+    """The spacing is that of the nearest site, or of the six nearest, on the same side of the same island, by brute
+    force.
+    """
     mesh = _sheet() if name == "sheet" else eared[0]
     points = sample_surface(mesh, 300, 5)
     domain = Domain(mesh, 300, device=DEVICE)
@@ -100,7 +102,7 @@ def test_neighbours_are_the_nearest_in_order_whatever_side_they_are_on():
 
 
 def test_a_site_alone_on_its_side_steps_no_farther_than_to_its_neighbours():
-    """Fifty sites on one side, one on the other: its spacing is finite, and the energy can be computed."""
+    """A site alone on its side has a finite spacing, and the energy can be computed."""
     mesh = _sheet()
     half = len(mesh.triangles) // 2
     points = sample_surface(mesh, 200, 7)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One set of settings for all models, and named looks."""
+"""One set of settings and named looks serve all models."""
 
 from dataclasses import replace
 
@@ -92,7 +92,7 @@ def test_a_white_dye_is_none_and_another_only_darkens():
 
 
 def test_roughness_means_one_width_in_both_modes():
-    """Marschner's Gaussian is of theta_h, half of theta_i + theta_o."""
+    """Roughness means one width in both modes, as Marschner's Gaussian is of theta_h, half of theta_i + theta_o."""
     settings = appearance.table_settings(Appearance(roughness=0.2))
     assert np.degrees(settings.beta_r) == pytest.approx(5.09, abs=0.01)
 
@@ -130,7 +130,7 @@ def test_impossible_looks_are_refused(wrong):
 
 
 def color_of(name, **changes):
-    """Return the color, RGB, of a groom of this look."""
+    """Return the color, RGB, of a groom with a look."""
     look = replace(presets.PRESETS[name][1], **changes)
     return np.array(appearance.kajiya_kay_settings(look).diffuse_color)
 
@@ -191,7 +191,9 @@ def test_wet_presets_are_soaked_hair(name):
 
 @pytest.mark.parametrize("name", NATURAL)
 def test_hair_darkens_with_each_step_of_wetness(name):
-    """What a fiber scatters and what it sends back, of all light; and R's share of it, for Kajiya and Kay's model."""
+    """Hair darkens with each step of wetness, by all scattered and all reflected light and by R's share for
+    Kajiya-Kay.
+    """
     looks = [appearance.wetted(presets.PRESETS[name][1], wetness) for wetness in STEPS]
     small = lookup_tables.Settings(size=32)
     tables = [lookup_tables.bake(appearance.table_settings(look, small)) for look in looks]

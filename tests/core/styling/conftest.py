@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair of the same surfaces and settings is placed once: placing is tested beside, and takes longer than styles do."""
+"""Place hair of the same surfaces and settings once, as placing takes longer than styles and has its own tests."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from tests.support import remembered
 
 @pytest.fixture(scope="session", autouse=True)
 def functions_remember():
-    """For hair that fixtures of modules grow, too."""
+    """Remember results, also for hair that fixtures of modules grow."""
     with pytest.MonkeyPatch.context() as patch:
         remembered.remember(patch)
         yield

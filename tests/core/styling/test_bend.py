@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Bend: angles, directions, and bends after each other."""
+"""Bend turns strands by its angles and directions, also after other bends."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def directions(points):
 
 
 def flat_strands(count=12):
-    """Straight strands that lie on a plane, each in another direction from one root."""
+    """Return straight strands on a plane, each in another direction from one root."""
     angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     ahead = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
     return (np.linspace(0.0, 0.2, 41)[None, :, None] * ahead[:, None]).astype(np.float32)
@@ -70,7 +70,7 @@ def test_random_directions_go_all_round():
 
 
 def test_a_roll_winds_up():
-    """Three turns over the last quarter: the tip ends near where the roll begins."""
+    """A roll of three turns over the last quarter winds up, so the tip ends near the start of the roll."""
     strands = flat_strands()
     made = stepped(strands, bend.Settings(**bend.ROLL))
     np.testing.assert_allclose(made[:, :31], strands[:, :31], atol=1e-6)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Braid: tresses, their distances, and the course of their center lines."""
+"""Braid has tresses with their distances, and center lines with their course."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ EVEN = {"radius": RADIUS, "pitch": PITCH, "thickness": 0.0, "root": 1.0, "tip": 
 
 
 def lock(count=90, length=0.3, point_count=121, size=0.01):
-    """(S, P, 3): straight strands rooted in a disc of a radius [m], and the strand in the middle."""
+    """Return (S, P, 3) straight strands rooted in a disc of a radius [m], and the strand in the middle."""
     rank = np.arange(count)
     radius, angle = size * np.sqrt((rank + 0.5) / count), 2.399963 * rank
     strands = np.zeros((count, point_count, 3), np.float32)
@@ -25,14 +25,14 @@ def lock(count=90, length=0.3, point_count=121, size=0.01):
 
 
 def tresses_of(points, count):
-    """(S,): the tress of each strand, by the sector of the lock that it is rooted in."""
+    """Return (S,): the tress of each strand, by the sector of the lock in which it is rooted."""
     angle = np.arctan2(points[:, 0, 1], points[:, 0, 0])
     first = np.pi / 2.0 if count == 3 else 0.0
     return np.round((angle - first) / (2.0 * np.pi / count)).astype(int) % count
 
 
 def distances_between(points, line):
-    """(…,) [m] from points (…, 3) to a curve through points (P, 3)."""
+    """Return (…,) distances [m] from points (…, 3) to a curve through points (P, 3)."""
     places = np.arange(len(line))
     fine = np.linspace(0.0, len(line) - 1.0, 12 * len(line))
     dense = np.stack([np.interp(fine, places, line[:, k]) for k in range(3)], axis=1)
@@ -65,7 +65,7 @@ def test_centre_lines_of_tresses_stay_apart():
 
 
 def test_each_tress_goes_over_the_next_in_turn():
-    """All three wind through the same places, a third of the pitch after each other."""
+    """Each tress goes over the next in turn: all three wind through the same places, a third of the pitch apart."""
     strands, centre = lock()
     made = stepped(strands, braid.Settings(pattern="BRAID", **EVEN), centres=centre).astype(np.float64)
     label = tresses_of(made, 3)
@@ -101,7 +101,7 @@ def test_without_a_radius_a_braid_is_a_clump():
 
 
 def swung(strands, angle, is_bent=False):
-    """(S, P, 3) strands that swing about their roots, which stay, around the Y axis; is_bent: the tips by the angle."""
+    """Return (S, P, 3) strands that swing around the Y axis at fixed roots; is_bent: the tips by the angle."""
     segments = np.diff(strands.astype(np.float64), axis=1)
     part = np.linspace(0.0, 1.0, segments.shape[1]) if is_bent else np.ones(segments.shape[1])
     cosine, sine = np.cos(angle * part), np.sin(angle * part)
@@ -111,7 +111,7 @@ def swung(strands, angle, is_bent=False):
 
 
 def turns(before, after):
-    """(S, P - 1) angles [rad] between the segments of strands in two frames."""
+    """Return (S, P - 1) angles [rad] between the segments of strands in two frames."""
     units = [np.diff(points.astype(np.float64), axis=1) for points in (before, after)]
     units = [segments / np.linalg.norm(segments, axis=2, keepdims=True) for segments in units]
     return 2.0 * np.arcsin(np.linalg.norm(units[1] - units[0], axis=2) / 2.0)
@@ -143,7 +143,9 @@ def test_strands_turn_as_their_guides_do(name, is_bent):
 
 @pytest.mark.parametrize("pattern", ["BRAID", "ROPE"])
 def test_strands_do_not_slide_along_their_tress(pattern):
-    """A swing of 50° moves no point along the braid by more than a fiftieth of what its root is beside the middle."""
+    """Strands do not slide along their tress: a swing of 50° moves points by 1/50 of their root's distance from the
+    middle.
+    """
     strands, centre = lock(size=0.025, count=60)
     settings = braid.Settings(pattern=pattern, **(EVEN | {"pitch": 0.04}))
     places = []
@@ -154,7 +156,7 @@ def test_strands_do_not_slide_along_their_tress(pattern):
 
 
 def test_strands_stretch_only_where_they_gather():
-    """There by half at most, and in the braid by a twentieth: a strand as a whole by one too."""
+    """Strands stretch by half at most where they gather and by a twentieth in the braid, as wholes by a twentieth."""
     strands, centre = lock(size=0.025, count=60)
     for angle in np.radians([0.0, 25.0]):
         before = swung(strands, angle)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Clump: strands gather on their center's line, in locks of whole smaller locks."""
+"""Clump gathers strands on their center's line, in locks of whole smaller locks."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -21,14 +21,14 @@ def hair():
 
 
 def bundle(rng, count=64, radius=0.006):
-    """(S, P, 3): strands beside a curved one, each a little further away from it along its length."""
+    """Return (S, P, 3) strands beside a curved one, each farther from it along its length."""
     centre = curved_strands(rng, 1)
     away = rng.uniform(-radius, radius, (count, 1, 3)) * (1.0, 1.0, 0.0)
     return (centre + away * np.linspace(1.0, 1.5, 41)[:, None]).astype(np.float32), centre
 
 
 def distances_to(line, points):
-    """(…,) [m] from points to a polyline (P, 3), the last segment of which goes on."""
+    """Return (…,) distances [m] from points to a polyline (P, 3) with its last segment extended."""
     line, points = line.astype(np.float64), points.astype(np.float64)
     start, way = line[:-1], np.diff(line, axis=0)
     part = np.einsum("...nc,nc->...n", points[..., None, :] - start, way) / (way**2).sum(axis=1)
@@ -77,7 +77,7 @@ def test_the_strand_of_the_centre_stays(rng):
 
 
 def test_strands_leave_their_roots_by_degrees():
-    """No first segment lies flat on the surface, also where the profile is full at the root."""
+    """Strands leave their roots gradually: no first segment lies flat, also where the profile is full at the root."""
     strands = straight_strands(9, 0.2, 41, 0.003)
     for settings in (FULL, replace(FULL, root=0.0, shape=0.32)):
         segments = np.diff(stepped(strands, settings), axis=1)
@@ -162,7 +162,7 @@ def test_sites_are_as_many_as_the_size_says(hair):
 
 
 def test_progress_of_placing_locks_rises_and_may_stop_it(hair):
-    """What is stopped leaves nothing of the tree, and what is placed then is what is placed at once."""
+    """The progress of placing locks rises and may stop it, which leaves nothing, and later placing is the same."""
     settings = clump.Settings(size=0.014, levels=3, seed=11)
     tree, told = program.tree_settings(settings), []
 
@@ -204,7 +204,7 @@ def test_locks_too_small_for_a_surface_are_larger_ones(hair, monkeypatch):
 
 
 def test_more_strength_gathers_more(hair):
-    """Strands of a lock come closer together along their lengths, the more the stronger."""
+    """Strands of a lock come closer together along their lengths with more strength."""
     spreads = []
     for amount in (0.01, 0.3, 0.6, 1.0):
         settings = clump.Settings(amount=amount, levels=1, size=0.03, stray=0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Curl: helices on straight strands, waves in a plane, locks in one phase."""
+"""Curl winds straight strands into helices, waves lie in a plane, and locks have one phase."""
 
 from dataclasses import replace
 from itertools import islice
@@ -15,12 +15,12 @@ ALL = {"root": 1.0, "tip": 1.0, "start": 0.0}
 
 
 def helix(**settings):
-    """Settings of ten points a turn or more, without random numbers."""
+    """Return settings of ten points per turn or more, without random numbers."""
     return curl.Settings(**({"radius": 0.004, "pitch": 0.04, "coherence": 1.0, **ALL} | settings))
 
 
 def winding(points):
-    """(S,) turns about the Z axis through each root, by which strands wind to the left."""
+    """Return (S,) turns to the left of strands around the Z axis through their roots."""
     away = points[:, :, :2] - points[:, :1, :2]
     angle = np.unwrap(np.arctan2(away[:, 12:, 1], away[:, 12:, 0]), axis=1)
     return (angle[:, -1] - angle[:, 0]) / (2.0 * np.pi)
@@ -28,7 +28,7 @@ def winding(points):
 
 @pytest.mark.parametrize("point_count", [41, 81])
 def test_a_straight_strand_winds_at_the_radius(point_count):
-    """About the axis of its coil, once the radius has grown to its full size."""
+    """A straight strand winds at the radius around the axis of its coil, once the radius has grown fully."""
     settings = helix(left_handed=0.0)
     points = stepped(straight_strands(1, 0.3, point_count), settings)[0].astype(np.float64)
     turn = curl.turn_length(settings)
@@ -56,7 +56,7 @@ def test_a_part_of_the_locks_winds_to_the_left():
 
 
 def test_a_coil_reaches_as_far_as_its_pitch_says():
-    """The law holds for ten points per turn, except in the first half turn, over which the radius grows."""
+    """A coil reaches as far as its pitch says with ten points per turn, except in the first half turn."""
     settings = helix(radius=0.005, pitch=0.03)
     turn = curl.turn_length(settings)
     points = stepped(straight_strands(1, 10 * turn, 101), settings)[0]
@@ -108,7 +108,7 @@ def test_switchbacks_wind_back():
 
 
 def test_switchbacks_that_are_far_apart_leave_most_coils_alone():
-    """Only the sense in which coils wind differs; a change of sense takes three tenths of the distance."""
+    """Switchbacks that are far apart leave most coils alone, as a change takes three tenths of their distance."""
     strands = straight_strands(200, 0.3)
     members = np.arange(200)
     kept = winding(stepped(strands, helix(left_handed=0.0), members=members))
@@ -120,7 +120,7 @@ def test_switchbacks_that_are_far_apart_leave_most_coils_alone():
 
 @pytest.mark.parametrize("style", [curl.Settings(), frizz.Settings()], ids=["curl", "frizz"])
 def test_strands_that_turn_back_change_by_degrees(style):
-    """Frames of a strand that turns by 170° from segment to segment turn with it, without a jump."""
+    """Strands that turn back by 170° between segments change gradually, as their frames turn without a jump."""
     strands = straight_strands(8)
     angles = np.radians(170.0) * (np.arange(40) >= 20)
     segments = 0.005 * np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], axis=1)
@@ -131,7 +131,7 @@ def test_strands_that_turn_back_change_by_degrees(style):
 
 
 def bent_lock(rng, count=60, length=0.24, point_count=121, normal=1.0):
-    """Strands that bend over from roots in a disc of 10 mm, and the one in the middle: (S, P, 3), (1, P, 3), normals.
+    """Return strands that bend over from a disc of 10 mm, and the one in the middle: (S, P, 3), (1, P, 3), normals.
 
     normal: -1 where normals point into the surface.
     """
@@ -149,7 +149,7 @@ def bent_lock(rng, count=60, length=0.24, point_count=121, normal=1.0):
 
 
 def distances_to(points, line):
-    """(N,) [m] from points (N, 3) to a curve through points (P, 3)."""
+    """Return (N,) distances [m] from points (N, 3) to a curve through points (P, 3)."""
     fine = np.linspace(0.0, len(line) - 1.0, 8 * len(line))
     dense = np.stack([np.interp(fine, np.arange(len(line)), line[:, k]) for k in range(3)], axis=1)
     return np.linalg.norm(points[:, None] - dense, axis=-1).min(axis=1)
@@ -161,7 +161,7 @@ def root_mean_square(values):
 
 @pytest.mark.parametrize("normal", [1.0, -1.0])
 def test_a_clumped_lock_is_one_ringlet(normal, rng):
-    """Strands that begin at different places along the lock are as near to each other as without curls."""
+    """A clumped lock is one ringlet: strands from different places along it are as close as without curls."""
     strands, centre, normals = bent_lock(rng, normal=normal)
     where = {"centres": centre, "normals": normals, "centre_normals": normal * UP}
     gathered = clump.Settings(levels=1, thickness=0.03, shape=0.1, stray=0.0)
@@ -194,7 +194,7 @@ def test_strands_that_slide_along_a_crooked_centre_change_by_degrees():
 
 
 def test_strands_of_a_lock_that_are_cut_wind_as_the_others(rng):
-    """A turn is at its place along the lock, not along the strand: also for strands that are shorter."""
+    """Strands that are cut wind as the others of their lock, as turns have places along the lock."""
     strands, centre, normals = bent_lock(rng)
     where = {"centres": centre, "normals": normals}
     gathered, ringlet = clump.Settings(levels=1, thickness=0.0, amount=1.0, root=1.0, stray=0.0), helix(pitch=0.036)
@@ -205,7 +205,7 @@ def test_strands_of_a_lock_that_are_cut_wind_as_the_others(rng):
 
 
 def test_strands_that_leave_their_lock_go_on_by_themselves(rng):
-    """Those that grow opposite to their center wind as often as strands alone do."""
+    """Strands that leave their lock, as they grow opposite to its center, wind as often as single strands."""
     strands, centre, _ = bent_lock(rng, count=8)
     away = strands * (-1.0, 1.0, 1.0)
     tilted = clump.Settings(levels=1, amount=1e-6, stray=0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Styles fitted to a surface: only lengths are scaled with its size."""
+"""Styles fitted to a surface scale only lengths with its size."""
 
 from dataclasses import replace
 

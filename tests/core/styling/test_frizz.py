@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Frizz: its size, its spectrum, and how alike neighbors are."""
+"""Frizz has its size and spectrum, and neighbors are alike by its coherence."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ LENGTH, POINTS = 0.3, 129
 
 
 def offsets(count=600, strands=None, **settings):
-    """(S, P, 2) [m]: how far straight strands depart from a line through their root, along their own path."""
+    """Return (S, P, 2) offsets [m] of straight strands from a line through their root."""
     given = {"amplitude": 2e-4, "wavelength": 0.03, "root": 1.0, "tip": 1.0, "stray": 0.0}
     strands = straight_strands(count, LENGTH, POINTS, 1e-3) if strands is None else strands
     points = stepped(strands, frizz.Settings(**(given | settings)))
@@ -20,7 +20,7 @@ def offsets(count=600, strands=None, **settings):
 
 @pytest.mark.parametrize("octaves", [1, 2, 3])
 def test_the_amplitude_is_the_root_mean_square(octaves):
-    """The law holds for each coordinate; differences of independent points have twice the amplitude's square."""
+    """The amplitude is the root mean square of each coordinate, and of differences twice the square."""
     rho = offsets(2000, octaves=octaves, amplitude=1e-4)
     square = ((rho[:, 60:] - rho[:, :1]) ** 2).mean()
     assert np.sqrt(0.5 * square) == pytest.approx(1e-4, rel=0.03)
@@ -28,7 +28,9 @@ def test_the_amplitude_is_the_root_mean_square(octaves):
 
 @pytest.mark.parametrize("octaves", [1, 2])
 def test_there_are_no_waves_beyond_the_band(octaves):
-    """One part in a hundred of the energy at most is beyond twice the highest frequency."""
+    """There are no waves beyond the band: at most one part in a hundred of the energy is beyond twice the highest
+    frequency.
+    """
     rho = offsets(octaves=octaves, amplitude=5e-5, wavelength=0.04)
     rho -= rho.mean(axis=1, keepdims=True)
     window = np.hanning(POINTS)[None, :, None]
@@ -53,7 +55,7 @@ def test_coherent_neighbours_are_alike_and_distant_strands_are_not():
 
 
 def test_waves_that_points_cannot_carry_are_left_out():
-    """Wavelengths below two segments leave the strand as it is; a long one does not."""
+    """Waves below two segments are left out, so the strand stays; longer waves displace it."""
     assert np.abs(offsets(50, wavelength=1.4 * LENGTH / (POINTS - 1), octaves=1)).max() < 1e-6
     assert np.abs(offsets(50, wavelength=0.05, octaves=1)).max() > 1e-4
 

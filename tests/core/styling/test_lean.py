@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Lean: guides turn in the given direction, and none penetrates the surface."""
+"""Lean turns guides in the given direction, and no guide penetrates the surface."""
 
 from functools import cache
 
@@ -28,7 +28,7 @@ def hair():
 
 
 def leaned(hair, *styles, guides=None, **inputs):
-    """(G, P, 3): guides as strands follow them."""
+    """Return (G, P, 3): guides as strands follow them."""
     guides = hair.guides if guides is None else guides
     return hair.bound(*styles, inputs=Inputs(**inputs) if inputs else None).guides(guides).numpy().astype(np.float64)
 
@@ -72,9 +72,9 @@ def test_a_missing_target_leaves_guides(fur):
 @pytest.mark.parametrize("amount", [0.2, 1.0])
 @pytest.mark.parametrize("seed", [1, 4, 7])
 def test_no_guide_ends_under_the_surface(seed, clearance, amount):
-    """Guides that hug a ball keep the clearance, once they have left their root by twice as much.
+    """No guide ends under the surface: guides that hug a ball keep the clearance beyond twice that from their root.
 
-    Some stand at the top of the ball, and are told to go straight into it.
+    Some stand at the top of the ball, and lean straight into it.
     """
     fur = groomed(seed)
     made = leaned(fur, lean.Settings(amount=amount, clearance=clearance, **ALL))
@@ -106,7 +106,7 @@ def test_a_guide_without_amount_keeps_its_bits(fur):
 
 
 def test_opposite_directions_do_not_vanish(fur):
-    """Guides that point straight up, and lean down by half."""
+    """Opposite directions do not vanish: guides that point straight up lean down by half."""
     points = fur.guides.numpy().copy()
     points[:, 1:] = points[:, :1] + np.linspace(0.0, 0.3, points.shape[1])[1:, None] * -DOWN
     up = from_numpy(points.astype(np.float32), fur.guides.roots)
@@ -123,6 +123,6 @@ def test_non_finite_guides_are_refused(fur):
 
 
 def test_strands_follow_leaned_guides(hair):
-    """Hair of a head that leans down ends lower."""
+    """Strands follow leaned guides, so hair of a head that leans down ends lower."""
     made, plain = hair.styled(lean.Settings(**ALL)), hair.plain
     assert np.median(made[:, -1, 2] - plain[:, -1, 2]) < -0.01

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of masks: weights are interpolated on the surface, multiplied, clipped and inverted."""
+"""Masks are weights that are interpolated on the surface, multiplied, clipped and inverted."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def hair():
 
 
 def corners_of(hair, weights):
-    """(F, 3) float32 of weights (V,) of vertices."""
+    """Return (F, 3) float32 of weights (V,) of vertices."""
     return weights.astype(np.float32)[hair.mesh.triangles]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of random numbers: even, independent of each other, and the kernel's own."""
+"""Random numbers are even and independent, and equal the kernel's."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_they_are_the_identity_s_alone(identities):
 
 @pytest.mark.parametrize("seed", [0, 7, 2**31 - 1])
 def test_the_kernel_has_the_same(identities, seed):
-    """Read from strands that Trim scales by them."""
+    """The kernel has the same random numbers, read from strands that Trim scales by them."""
     some = identities[:500]
     settings = trim.Settings(random=1.0, method="SCALE", seed=seed)
     points = stepped(straight_strands(500, 1.0, 2, 0.0), settings, identities=some)

@@ -62,7 +62,7 @@ GROOMINGS = len(HAIR)
 
 
 def sliders():
-    """[(class, name)] of what can be keyed."""
+    """Return [(class, name)] of the settings that can be keyed."""
     found = []
     for settings_class in kinds.KINDS.values():
         for field in fields(settings_class):
@@ -77,7 +77,9 @@ def sliders():
 
 
 def cases():
-    """Each slider on each grooming; all take long but one grooming for the first and every third slider of a style."""
+    """Return each slider on each grooming; one grooming for the first and every third slider of a style is not
+    `long`.
+    """
     counts = Counter()
     for place, (settings_class, name) in enumerate(sliders()):
         counts[settings_class] += 1
@@ -89,7 +91,7 @@ def cases():
 
 
 def is_by_degrees(moves):
-    """Whether the last two of ever shorter steps, each half as long as the one before, moved strands half as far."""
+    """Whether strands moved half as far in the last two of ever shorter steps, each half as long as the one before."""
     if len(moves) <= FEWEST_HALVINGS:
         return False
     return min(moves[-3] / moves[-2], moves[-2] / moves[-1]) > 1.7

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Smooth: attenuation of waves, and unchanged strands."""
+"""Smooth attenuates waves, and leaves smooth strands unchanged."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests.support.dynamics.stepped import curved_strands, stepped, straight_str
 
 
 def wave(wavelength, size=2e-4, length=1.0, point_count=241):
-    """(1, P, 3): a strand that waves slightly about a line."""
+    """Return (1, P, 3): a strand that waves slightly about a line."""
     s = np.linspace(0.0, length, point_count)
     points = np.stack([size * np.sin(2.0 * np.pi * s / wavelength), 0.0 * s, s], axis=1)
     return points[None].astype(np.float32)
@@ -18,7 +18,7 @@ def wave(wavelength, size=2e-4, length=1.0, point_count=241):
 
 @pytest.mark.parametrize("part", [0.25, 0.5, 0.75, 1.0])
 def test_what_is_left_of_a_wave_is_sinc_squared(part):
-    """The law holds for directions away from the ends, where less strand can be averaged."""
+    """What is left of a wave is sinc squared, away from the ends, where less strand is averaged."""
     strand = wave(0.1)
     made = stepped(strand, smooth.Settings(length=0.1 * part))
     inner = slice(60, 180)
@@ -44,7 +44,7 @@ def test_twice_the_length_makes_strands_straight(rng):
 
 
 def test_smoothing_does_not_bend(rng):
-    """The sum of angles between segments does not grow."""
+    """Smoothing does not bend strands: the sum of angles between segments does not grow."""
 
     def bending(points):
         segments = np.diff(points.astype(np.float64), axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of styles bound to hair: strands reached by a stroke, work of a slider, and separate regions."""
+"""Styles bound to hair reach the strands of a stroke, limit the work of a slider, and separate regions."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def hair():
 
 
 def combed_guides(hair, chosen, amount=0.01):
-    """The guides, of which some are moved."""
+    """Return the guides with some of them moved."""
     points = hair.guides.numpy().copy()
     points[chosen, 1:, 0] += amount * np.linspace(0.0, 1.0, points.shape[1] - 1)
     return from_numpy(points, hair.guides.roots, hair.device)
@@ -46,7 +46,7 @@ def combed_guides(hair, chosen, amount=0.01):
 
 @pytest.mark.parametrize("name", STACKS)
 def test_a_stroke_reaches_every_strand_that_moves(hair, name):
-    """Found by comparing all strands; and no strand is found that follows no moved guide and no moved center."""
+    """A stroke reaches every strand that moves, and no strand without a moved guide or a moved center."""
     bound = hair.bound(*STACKS[name])
     followers = guide_weights.reach(hair.binding.guide_weights, len(hair.guides))
     before = hair.styled(*STACKS[name])
@@ -106,7 +106,7 @@ def test_guides_stay_as_they_were_combed(hair):
 
 
 class Counts:
-    """Searches, places of sites and launches, from now on."""
+    """Counts searches, places of sites and launches from now on."""
 
     def __init__(self, monkeypatch):
         self.searches = self.sites = self.launches = 0
@@ -173,14 +173,14 @@ def test_no_style_launches_nothing(hair, monkeypatch):
 
 
 def regions_of(mesh):
-    """(F, 3) int32: two halves of a square."""
+    """Return (F, 3) int32: two halves of a square."""
     middles = mesh.vertices[mesh.triangles].mean(axis=1)
     labels = (middles[:, 0] > 0.5 * mesh.vertices[:, 0].max()).astype(np.int32)
     return Regions(np.repeat(labels[:, None], 3, axis=1))
 
 
 def parted_line(mesh):
-    """(L, 2, 3): a line through the middle of a square, from beyond one side to beyond the other."""
+    """Return (L, 2, 3): a line through the middle of a square, from beyond one side to beyond the other."""
     size = mesh.vertices[:, 0].max()
     y = np.linspace(-0.2, 1.2, 15) * size
     line = np.stack([np.full(15, 0.5 * size), y, np.zeros(15)], axis=1).astype(np.float32)
@@ -205,7 +205,7 @@ def test_no_style_mixes_across_regions_and_part_lines(kind, name):
 
 
 def test_a_region_without_a_site_joins_no_lock():
-    """Sites are fewer than regions: strands of a region of its own stay by themselves."""
+    """A region without a site joins no lock: with fewer sites than regions, its strands remain alone."""
     mesh = flat_grid(8, 0.1)
     labels = (np.arange(len(mesh.triangles)) // 2 % 8).astype(np.int32)
     regions = (Regions(np.repeat(labels[:, None], 3, axis=1)),)
@@ -238,7 +238,7 @@ def test_arrays_that_do_not_fit_are_refused(hair):
 @pytest.mark.parametrize("stack", ["levels", "no clump"])
 @pytest.mark.parametrize("member", [-2, 10**6])
 def test_strands_and_centres_that_are_not_there_are_refused(hair, stack, member):
-    """Members of the first level of clumps, or of the guides, which are the clumps of styles without any."""
+    """Missing strands and centers are refused, as members of the first level of clumps or of the guides."""
     bound = hair.bound(*STACKS[stack])
     points = from_numpy(np.zeros((500, 41, 3), np.float32), hair.binding.roots, hair.device).points
     members = bound.data.members.numpy().copy()
@@ -262,6 +262,6 @@ def test_a_mask_of_guides_is_mixed_as_strands_are(hair, rng):
 
 
 def test_smoothing_before_and_after_a_clump_differ(hair):
-    """Styles act in order."""
+    """Styles act in order: smoothing before and after a clump differ."""
     first, second = smooth.Settings(length=0.1), frizz.Settings()
     assert np.abs(hair.styled(first, second) - hair.styled(second, first)).max() > 1e-3

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws that every style has, alone and in stacks, on hair of the sample head."""
+"""Every style satisfies these laws, alone and in stacks, on hair of the sample head."""
 
 from dataclasses import fields, replace
 from itertools import pairwise
@@ -32,7 +32,7 @@ def hair():
 
 @pytest.fixture(scope="module")
 def made_again():
-    """Return the same hair, of new objects."""
+    """Return the same hair as new objects."""
     return head(400, 60)
 
 
@@ -42,7 +42,7 @@ def style(request):
 
 
 def masked(settings, weights, hair):
-    """Settings with a mask, and the `Inputs` that it is read from: weights (V,) of the surface."""
+    """Return settings with a mask, and the `Inputs` for it: weights (V,) of the surface."""
     settings = replace(settings, mask="mask")
     return settings, Inputs(masks={program.mask_key(settings): Mask(weights.astype(np.float32)[hair.mesh.triangles])})
 
@@ -56,7 +56,7 @@ def test_every_style_does_something(hair, style):
 
 
 def require_same_lengths(after, before):
-    """Of each segment, and of whole strands, but for the rounding of coordinates of up to a meter."""
+    """Assert equal lengths of segments and strands, up to rounding of coordinates of up to a meter."""
     after, before = (segment_lengths(points.astype(np.float64)) for points in (after, before))
     np.testing.assert_allclose(after, before, rtol=2e-5, atol=1e-7)
     np.testing.assert_allclose(after.sum(axis=1), before.sum(axis=1), rtol=2e-6, atol=2e-7)
@@ -72,7 +72,7 @@ def test_lengths_stay_in_a_stack(hair):
 
 
 def test_a_style_without_effect_leaves_the_bits(hair, style):
-    """One that is off, or whose amount, mask or profile is zero."""
+    """A style that is off, or whose amount, mask or profile is zero, leaves the bits."""
     without = [replace(style, is_on=False), replace(style, amount=0.0)]
     if "root" in {field.name for field in fields(style)}:
         without.append(replace(style, root=0.0, tip=0.0))
@@ -85,7 +85,7 @@ def test_a_style_without_effect_leaves_the_bits(hair, style):
 
 @pytest.mark.parametrize("name", ON_STRANDS)
 def test_strands_outside_a_mask_keep_their_bits(hair, name):
-    """Whatever styles come before and after, and also next to strands within the mask."""
+    """Strands outside a mask keep their bits, with any styles before and after, and next to strands within the mask."""
     settings, inputs = masked(STYLES[name], np.maximum(hair.mesh.vertices[:, 0], 0.0) * 10.0, hair)
     others = bend.Settings(), frizz.Settings()
     outside = inputs.masks[program.mask_key(settings)].of_strands(hair.binding) == 0.0
@@ -116,7 +116,7 @@ def test_another_seed_other_strands(hair):
 
 
 def test_the_place_in_the_list_of_another_style_does_not_matter(hair):
-    """A style that is off draws no random numbers of others."""
+    """The place of a style that is off does not matter, as it draws no random numbers of others."""
     off = frizz.Settings(is_on=False, seed=9)
     np.testing.assert_array_equal(hair.styled(off, *STACK), hair.styled(*STACK))
 
@@ -152,9 +152,10 @@ def test_the_width_of_vectors_does_not_matter(rng, width):
 
 @pytest.mark.parametrize("point_count", [41, 257])
 def test_rounding_is_not_amplified(rng, point_count):
-    """Strands whose coordinates are rounded the other way are styled alike, however many points they have.
+    """Rounding is not amplified: strands with coordinates rounded the other way are styled alike, with any point
+    count.
 
-    Half of the strands are longer than their lock's center: the direction of its last segment carries them on.
+    Half of the strands are longer than their lock's center: the direction of its last segment extends them.
     """
     strands = curved_strands(rng, 100, point_count=point_count)
     members = rng.integers(0, 5, 100)
@@ -211,7 +212,7 @@ def test_turned_moved_scaled_and_mirrored_before_or_after(rng, name, is_mirrored
 
 
 def degenerate_strands(point_count):
-    """{name: (P, 3)}."""
+    """Return {name: (P, 3)}."""
     line = np.linspace(0.0, 1.0, point_count)[:, None] * (0.1, 0.0, 0.2)
     doubled = np.repeat(line[::2], 2, axis=0)[:point_count]
     back = np.abs(np.linspace(-1.0, 1.0, point_count))[:, None] * (0.0, 0.0, 0.2)
@@ -243,7 +244,7 @@ def test_degenerate_strands_stay_finite(point_count):
 
 
 def test_strands_that_are_near_are_alike(rng):
-    """Two roots 1e-5 apart, in one lock: only random numbers of strands tell them apart."""
+    """Strands with roots 1e-5 apart in one lock are alike except for their own random numbers."""
     strands = np.repeat(curved_strands(rng, 20), 2, axis=0)
     strands[1::2] += (1e-5, 0.0, 0.0)
     normals = np.tile([0.0, 0.0, 1.0], (40, 1))
@@ -265,7 +266,7 @@ def test_strands_that_are_near_are_alike(rng):
 
 
 def test_other_points_a_strand_make_the_same_hair(hair):
-    """With twice as many points every second point is near the old one, for styles that points can carry."""
+    """With twice as many points every second point is near the former point, for styles that the points can show."""
     for settings in (bend.Settings(), curl.Settings(pitch=0.12), clump.Settings(), lean.Settings(), wet.Settings()):
         fine, coarse = hair.styled(settings, point_count=81), hair.styled(settings)
         assert np.median(np.linalg.norm(fine[:, ::2] - coarse, axis=2)) < 2e-3, settings

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of the frames that styles act in: least rotations, smooth over the surface, shared within a clump."""
+"""Frames in which styles act are least rotations, smooth over the surface, and shared within a clump."""
 
 import numpy as np
 import pytest
@@ -14,12 +14,12 @@ SMALL = 1e-3  # [rad], of the bends by which frames are read
 
 
 def turned(u, a, b):
-    """Vectors (…, 3), across unit vectors a, by the least rotation from a to b."""
+    """Return vectors (…, 3), across unit vectors a, turned by the least rotation from a to b."""
     return u - (a + b) * ((u * b).sum(-1) / (1.0 + (a * b).sum(-1)))[..., None]
 
 
 def reference(normal):
-    """(…, 3): r(n), across n."""
+    """Return (…, 3): r(n), across n."""
     x, y, z = np.moveaxis(normal, -1, 0)
     return np.stack([1.0 - x * x / (1.0 + z), -x * y / (1.0 + z), -x], axis=-1)
 
@@ -30,7 +30,7 @@ def directions(points):
 
 
 def transported(points, normals, centre_normals):
-    """(S, P-1, 3) u_i of strands, by the definition."""
+    """Return (S, P-1, 3): u_i of strands by the definition."""
     t = directions(points)
     u = turned(reference(centre_normals), centre_normals, normals)
     found, before = [], normals
@@ -46,14 +46,16 @@ def unit(vectors):
 
 
 def read_frames(strands, **where):
-    """(S, P-1, 3) the u_i that the kernel bends strands to, but for a turn about the strand that all segments share."""
+    """Return (S, P-1, 3): the u_i of the kernel's bends, up to a turn about the strand that all segments share."""
     settings = bend.Settings(angle=SMALL, root=1.0, tip=1.0)
     before, after = directions(strands), directions(stepped(strands, settings, **where))
     return unit(after - before * (after * before).sum(axis=-1, keepdims=True))
 
 
 def test_frames_are_transported_by_least_rotations(rng):
-    """What bends read is at one angle to the frames of the definition, all along each strand."""
+    """Frames are transported by least rotations: bends have one angle to the frames of the definition along each
+    strand.
+    """
     strands = curved_strands(rng, 40)
     normals = unit(rng.normal(UP, 0.3, (40, 3)))
     u = transported(strands, normals, normals)
@@ -65,7 +67,7 @@ def test_frames_are_transported_by_least_rotations(rng):
 
 
 def phases(normals, centre_normals=None, axes=None):
-    """(N, 3): how far a wave displaces straight strands along normals (N, 3), each in its own clump's frame.
+    """Return (N, 3) displacements by a wave of straight strands along normals (N, 3), each in its own clump's frame.
 
     centre_normals: (1, 3) of the one clump that all are in.
     """
@@ -136,7 +138,7 @@ def test_a_straight_strand_along_its_normal_has_the_reference(rng):
 
 
 def spread(vectors):
-    """Part of unit vectors (S, 3) that their mean lacks: 0 where all are alike."""
+    """Return the part of unit vectors (S, 3) that their mean lacks: 0 where all are alike."""
     return 1.0 - np.linalg.norm(vectors.mean(axis=0))
 
 

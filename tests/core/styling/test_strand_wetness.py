@@ -26,7 +26,7 @@ def inputs_of(hair, style, **mask):
 
 
 def half(hair):
-    """(F, 3) weights: one on one half of the square, zero on the other."""
+    """Return (F, 3) weights: one on one half of the square, zero on the other."""
     x = hair.mesh.vertices[hair.mesh.triangles][:, :, 0].mean(axis=1)
     return np.repeat((x > np.median(x)).astype(np.float32)[:, None], 3, axis=1)
 
@@ -48,7 +48,7 @@ def test_an_even_mask_gives_its_part_of_the_amount(hair, weight):
 
 
 def test_strands_are_wet_where_they_change(hair):
-    """A mask of zeros and ones, inverted too: the strands that the style leaves alone are dry, the others soaked."""
+    """With a mask of zeros and ones, inverted too, strands that the style changes are soaked and others dry."""
     plain = replace(PLACES, cling=0.0)  # strands beside wet guides that lean would lean too
     for style in (plain, replace(plain, invert_mask=True)):
         inputs = inputs_of(hair, style, corners=half(hair), is_inverted=style.invert_mask)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Trim: lengths, and cutters."""
+"""Trim changes lengths, and cuts at cutters."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def test_a_scaled_strand_keeps_its_shape(strands):
 
 
 def test_a_cut_strand_lies_on_the_old_one(strands):
-    """Each point is within a thousandth of the length of the polyline, which a curve between points is not on."""
+    """A cut strand lies on the old strand: each point is within a thousandth of the length of the polyline."""
     made = stepped(strands, trim.Settings(factor=0.55)).astype(np.float64)
     for old, new in zip(strands.astype(np.float64), made, strict=True):
         start, way = old[:-1], np.diff(old, axis=0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of Wet: no effect at zero; wetter hair clings, joins and swells more."""
+"""Wet has no effect at zero, and wetter hair clings, joins and swells more."""
 
 from dataclasses import replace
 
@@ -18,14 +18,14 @@ def hair():
 
 
 def test_wetness_zero_is_dry(hair):
-    """At zero the bits are those of dry hair, whatever styles come before."""
+    """Wetness zero is dry: the bits are those of dry hair, whatever styles come before."""
     np.testing.assert_array_equal(hair.styled(replace(LOCK, amount=0.0)), hair.plain)
     others = curl.Settings(), frizz.Settings()
     np.testing.assert_array_equal(hair.styled(*others, replace(LOCK, amount=0.0)), hair.styled(*others))
 
 
 def test_hardly_wet_is_nearly_dry(hair):
-    """Its locks join by the square root of the wetness."""
+    """Hardly wet hair is nearly dry, as locks join by the square root of the wetness."""
     moved = np.linalg.norm(hair.styled(replace(LOCK, amount=1e-6)) - hair.plain, axis=2)
     assert np.median(moved[:, -1]) < 2e-4
 
@@ -49,7 +49,7 @@ def test_small_locks_form_first(hair):
 
 
 def test_water_straightens_curls(hair):
-    """The more, the wetter: the sum of the angles between segments falls."""
+    """Water straightens curls more with more wetness: the sum of angles between segments falls."""
 
     def bending(points):
         segments = np.diff(points.astype(np.float64), axis=1)

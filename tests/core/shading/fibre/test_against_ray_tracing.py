@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The baked tables against an independent ray tracer of a smooth cylinder."""
+"""The baked tables equal an independent ray tracer of a smooth cylinder."""
 
 import numpy as np
 import pytest
@@ -19,32 +19,32 @@ THETA_D = {degrees: np.radians(degrees) for degrees in (0, 20, 40, 47, 60, 75)} 
 
 @pytest.fixture(scope="module", params=MELANIN)
 def hair(request):
-    """(sigma_a, tables without caustic treatment) of one hair color."""
+    """Return (sigma_a, tables without caustic treatment) of one hair color."""
     sigma_a = tuple(map(float, sigma_a_from_melanin(MELANIN[request.param], 0.0)))
     tables = lookup_tables.bake(lookup_tables.Settings(eta=ETA, sigma_a=sigma_a, caustic="exact", size=SIZE))
     return sigma_a, tables
 
 
 def row_of(theta_d):
-    """(row, theta_d of its middle) next to an angle."""
+    """Return (row, theta_d of its middle) next to an angle."""
     row = min(int(np.cos(theta_d) * SIZE), SIZE - 1)
     return row, np.arccos((row + 0.5) / SIZE)
 
 
 def lobes(n, n_trt):
-    """(3, W, C) of N_R, N_TT, N_TRT from rows of the tables (W, 4) and (W, 3)."""
+    """Return (3, W, C) of N_R, N_TT, N_TRT from rows of the tables (W, 4) and (W, 3)."""
     return np.stack([np.repeat(n[:, 3:], 3, axis=1), n[:, :3], n_trt])
 
 
 def assert_close(found, expected, where):
-    """Within 1 % or 3e-4."""
+    """Assert agreement within 1 % or 3e-4."""
     excess = np.abs(found - expected) - np.maximum(0.01 * np.abs(expected), 3e-4)
     assert np.all(excess[:, where] < 0.0)
 
 
 @pytest.mark.parametrize("degrees", share_of(THETA_D, 2))
 def test_texels_are_the_light_that_leaves_through_them(hair, degrees):
-    """In the middle of a row the caustic's texel agrees too: both values are means over it."""
+    """Texels are the light that leaves through them, also the caustic's in the middle of a row, as both are means."""
     sigma_a, tables = hair
     row, theta_d = row_of(THETA_D[degrees])
     traced = cylinder_tracer.trace(theta_d, ETA, sigma_a, ray_count=200_000)
@@ -54,7 +54,7 @@ def test_texels_are_the_light_that_leaves_through_them(hair, degrees):
 
 @pytest.mark.parametrize("degrees", THETA_D)
 def test_rows_hold_all_the_energy(hair, degrees):
-    """The sum over a row is ½ int A dh."""
+    """A row holds all the energy: its sum is ½ int A dh."""
     sigma_a, tables = hair
     row, theta_d = row_of(THETA_D[degrees])
     expected = cylinder_tracer.energies(cylinder_tracer.trace(theta_d, ETA, sigma_a, ray_count=20_000))
@@ -64,7 +64,7 @@ def test_rows_hold_all_the_energy(hair, degrees):
 
 @pytest.mark.parametrize("degrees", share_of([10, 33, 55, 70]))
 def test_half_float_lookups_between_rows(hair, degrees):
-    """What a shader reads from half floats with bilinear filtering, away from the caustic."""
+    """Bilinear lookups of half floats between rows agree, away from the caustic."""
     sigma_a, tables = hair
     theta_d = np.radians(degrees)
     expected = cylinder_tracer.cell_means(cylinder_tracer.trace(theta_d, ETA, sigma_a, ray_count=200_000), SIZE)
@@ -84,7 +84,9 @@ def test_half_float_lookups_between_rows(hair, degrees):
 
 @pytest.mark.parametrize("degrees", THETA_D)
 def test_roots_agree_with_ray_tracing(degrees):
-    """Point evaluation, averaged over cells by brute force, away from the caustic and the edges of support."""
+    """Roots agree with ray tracing, averaged over cells by brute force, away from the caustic and the edges of
+    support.
+    """
     theta_d, sigma_a = THETA_D[degrees], (0.1, 0.5, 2.0)
     cell_count, samples = 64, 200
     expected = cylinder_tracer.cell_means(cylinder_tracer.trace(theta_d, ETA, sigma_a, 200_000), cell_count)

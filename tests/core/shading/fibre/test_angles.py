@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Angles about a fiber: from directions, back to directions, and the symmetries between."""
+"""Angles about a fiber are computed from directions and back, and have their symmetries."""
 
 import numpy as np
 from hypothesis import given

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Azimuthal roughness: a density, and a matrix that moves light between cells without losing any."""
+"""Azimuthal roughness is a density, and a matrix that moves light between cells without losing any."""
 
 import numpy as np
 import pytest
@@ -35,13 +35,13 @@ def test_no_light_is_lost_and_none_is_negative(axes, scale):
 @pytest.mark.parametrize("axes", ["ANGLES", "COSINES"])
 @given(scale=scales)
 def test_even_light_stays_even(axes, scale):
-    """Fails when the light from the other side of the circle is left out, or taken twice."""
+    """Even light stays even, which fails if light from the other side of the circle is omitted or counted twice."""
     np.testing.assert_allclose(azimuthal.roughening(edges_of(axes), scale).sum(axis=1), 1.0, rtol=1e-9)
 
 
 @pytest.mark.parametrize("scale", [0.05, 0.4, 3.0])
 def test_elements_are_means_of_the_density_over_cells(scale):
-    """Against brute force: every pair of points of two cells, on both sides of the circle."""
+    """Elements are means of the density over cells, by brute force over pairs of points on both sides of the circle."""
     edges = edges_of("ANGLES", 12)
     inside = (np.arange(200) + 0.5) / 200 * edges[1]
     for row, column in [(0, 0), (0, 11), (5, 7), (11, 11), (11, 3)]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Elliptic sections: the index of [Marschner03], and the limit of a circle."""
+"""Elliptic sections have the index of [Marschner03], and a circle as their limit."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ def test_weights_say_the_index_that_is_linear_in_the_cosine(rng):
 
 
 def test_azimuth_from_the_major_axis(rng):
-    """Against the angles themselves, in the frame of the fiber."""
+    """The azimuth from the major axis equals the angles in the frame of the fiber."""
     phi_i, phi_o, theta_i, theta_o = rng.uniform(-1.5, 1.5, (4, 300))
     light, view = (
         np.stack([np.cos(t) * np.cos(p), np.cos(t) * np.sin(p), np.sin(t)], axis=-1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The energy-conserving mode: the white furnace, the smooth limit, the near field, its tables."""
+"""The energy-conserving mode passes the white furnace, and has its smooth limit, near field and tables."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def energy_settings(**details):
 
 
 def halves(settings):
-    """Baked tables as half floats keep them."""
+    """Return baked tables rounded to half floats."""
     tables = lookup_tables.bake(settings)
     return replace(tables, **{name: lookup_tables.to_half(getattr(tables, name)).astype(float) for name in TABLES})
 
@@ -59,7 +59,9 @@ def test_m_table_holds_the_lobes():
 
 
 def test_with_falling_roughness_light_leaves_as_from_a_smooth_fibre():
-    """The light that is elsewhere vanishes with the roughness: the integral of the difference over all texels."""
+    """With falling roughness light leaves as from a smooth fiber: the integral of the difference over all texels
+    vanishes.
+    """
     smooth = lookup_tables.bake(lookup_tables.Settings(sigma_a=SIGMA_A, caustic="exact"))
     misplaced = []
     for radial_roughness in (0.2, 0.1, 0.05, 0.0):
@@ -75,7 +77,7 @@ WIDE_TOLERANCES = {0.15: 0.03, 0.3: 5e-3, 0.7: 1e-3, 1.0: 1e-3}  # by radial rou
 
 @pytest.mark.parametrize(("row", "radial_roughness"), pairs([3, 90, 173, 255], WIDE_TOLERANCES))
 def test_texels_are_the_rays_of_the_whole_width(radial_roughness, row):
-    """The matrix over exact cells against quadrature over the fiber's width, which knows no cells."""
+    """Texels are the rays of the whole width: the matrix over exact cells equals quadrature over the fiber's width."""
     settings = energy_settings(radial_roughness=radial_roughness)
     tables = lookup_tables.bake(settings)
     phi = (np.arange(256) + 0.5) / 256 * np.pi
@@ -118,7 +120,9 @@ def test_the_first_highlight_turns_to_the_root_and_a_coat_sharpens_it_alone():
 
 
 def test_transmitted_light_is_half_as_wide_and_inner_reflections_twice():
-    """Widths as of Marschner's lobes: the deviation of theta_i + theta_o from the lobe's center."""
+    """Transmitted light is half as wide and inner reflections twice, by the deviation of theta_i + theta_o, as for
+    Marschner.
+    """
     settings = energy_settings(roughness=0.15, tilt=0.05)
     theta_i = np.linspace(-1.5, 1.5, 6001)
     weights = energy_conserving.m_lobes(theta_i, 0.0, settings) * np.cos(theta_i)[:, None]

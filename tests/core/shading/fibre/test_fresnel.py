@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fresnel's equations at their known points, and the flattening of inclined rays."""
+"""Fresnel's equations hold at their known points, and inclined rays are flattened correctly."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,9 @@ def test_bravais_index_bends_the_flat_ray_as_snell_bends_the_inclined_one(eta, t
 
 @given(indices, cosines, st.floats(-1.57, 1.57))
 def test_flat_reflectance_is_that_of_the_inclined_ray(eta, cos_theta_d, gamma):
-    """Fails when the second polarisation is bent by eta'', which then reflects totally at grazing theta_d."""
+    """The flat reflectance is that of the inclined ray, which fails if the second polarization is refracted by
+    eta''.
+    """
     eta_prime, eta_double_prime = bravais_indices(cos_theta_d, eta)
     cos_gamma_t = np.sqrt(1.0 - (np.sin(gamma) / eta_prime) ** 2)
     flat = bravais_reflectance(np.cos(gamma), cos_gamma_t, eta_prime, eta_double_prime)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mirror cone, and the energy, of Kajiya and Kay's cylinder."""
+"""Kajiya and Kay's cylinder has a mirror cone and conserves energy."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The longitudinal function: unit area, symmetry, no overflow."""
+"""The longitudinal function has unit area and symmetry, and does not overflow."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,9 @@ def lobe(theta_i, theta_o, v):
 @pytest.mark.parametrize("v", [1e-4, 0.01, 0.0846, 1.0, 30.0])
 @pytest.mark.parametrize("degrees", [0, 40, 80, 90])
 def test_lobe_is_of_unit_area(v, degrees):
-    """Over the cosine-weighted inclination, at grazing light too: the Gaussian that it replaces loses light there."""
+    """A lobe has unit area over the cosine-weighted inclination, also at grazing light, where a Gaussian loses
+    light.
+    """
     theta_o = np.radians(degrees)
     sin_i = np.sin(theta_o) * -1.0
     # Cosine-weighted inclination is the sine: dense where the lobe is.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of the Marschner model: normalisation, reciprocity, symmetry, energy, and the published figures."""
+"""The Marschner model satisfies normalization, reciprocity, symmetry and energy, and agrees with published figures."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_m_is_of_unit_area_in_theta_o():
 
 
 def test_cuticle_tilt_turns_the_highlights_apart_as_a_traced_wedge_does():
-    """R towards the root, TT and TRT towards the tip: -1, eta - 1 and 2 eta - 1 tilts, within a tenth of a tilt."""
+    """The cuticle tilt turns highlights as a traced wedge does: R by -1, TT by eta - 1 and TRT by 2 eta - 1 tilts."""
     tilt = 3.0 * DEGREE
     centres = [alpha for alpha, _ in marschner.longitudinal_lobes(marschner.Settings(tilt=tilt))]
     np.testing.assert_allclose(centres, [-tilt, 0.55 * tilt, 2.1 * tilt], atol=0.1001 * tilt)
@@ -43,14 +43,16 @@ def test_cuticle_tilt_turns_the_highlights_apart_as_a_traced_wedge_does():
 
 
 def test_mirrored_light_leaves_as_fresnel_says():
-    """Straight back, N_R is a quarter of the reflectance at normal incidence; over phi, a mirror's N_R is 1."""
+    """Mirrored light leaves as Fresnel says: straight back, N_R is a quarter of the reflectance; a mirror's N_R is 1
+    over phi.
+    """
     assert marschner.n_r(0.0, 1.0, ETA) == pytest.approx(0.25 * (0.55 / 2.55) ** 2)
     total, _ = quad(lambda phi: marschner.n_r(phi, 1e-6, ETA), -np.pi, np.pi)
     assert total == pytest.approx(1.0, abs=1e-4)
 
 
 def test_straight_through_light_crosses_two_surfaces_and_one_diameter():
-    """At phi = pi, dphi/dgamma = 2 / eta - 2."""
+    """Straight through, light crosses two surfaces and one diameter: at phi = pi, dphi/dgamma = 2 / eta - 2."""
     fresnel = (0.55 / 2.55) ** 2
     expected = 0.5 * (1.0 - fresnel) ** 2 * np.exp(-2.0 * 0.7) / (2.0 - 2.0 / ETA)
     assert marschner.n_tt(np.pi, 1.0, ETA, (0.7,))[0] == pytest.approx(expected)
@@ -113,7 +115,9 @@ def test_more_absorption_never_brightens(rng):
 
 
 def glint_energy(degrees, gain, width):
-    """Energy of N_TRT after the caustic treatment, by its energy before: integrals over phi and over h."""
+    """Return the energy of N_TRT after the caustic treatment relative to that before, integrated over phi and over
+    h.
+    """
     cos_theta_d = np.cos(degrees * DEGREE)
     settings = marschner.Settings(sigma_a=NO_ABSORPTION, glint_gain=gain, glint_width=width * DEGREE)
     phi = (np.arange(20_000) + 0.5) / 20_000 * np.pi

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rays through the fiber: energy, the caustic, the inverse of the exit angle."""
+"""Rays through the fiber conserve energy, and have a caustic and an inverse of the exit angle."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,9 @@ ETA = 1.55
 
 
 def test_only_the_later_bounces_are_missing():
-    """Without absorption R + TT + TRT = 1 - (1 - F) F²: the geometric series cut after three terms."""
+    """Only later bounces are missing: without absorption R + TT + TRT = 1 - (1 - F) F², the series cut after three
+    terms.
+    """
     fresnel = np.linspace(0.0, 1.0, 11)
     r, tt, trt = paths.attenuation(fresnel, transmittance=1.0)
     np.testing.assert_allclose(r + tt + trt, 1.0 - (1.0 - fresnel) * fresnel**2, rtol=1e-14)
@@ -35,7 +37,7 @@ def test_no_ray_gains_light(fresnel, transmittance):
 
 
 def test_light_through_the_axis_crosses_one_diameter():
-    """Beer's law over two radii: the report's exponent, twice that, would square it."""
+    """Light through the axis crosses one diameter: Beer's law over two radii, half of the report's exponent."""
     found = paths.crossing_transmittance(np.array(0.0), np.array(1.0), ETA, (0.3, 1.0))
     np.testing.assert_allclose(found, np.exp([-0.6, -2.0]))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pigment and color against absorption: published values, and there and back."""
+"""Pigment and color agree with absorption by published values, in both directions."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,9 @@ def test_more_melanin_absorbs_more_and_blue_most(melanin, redness):
 
 @pytest.mark.parametrize(("melanin", "concentration"), [(0.220, 0.3), (0.659, 1.3), (0.9987, 8.0)])
 def test_blond_brown_and_black_have_the_published_eumelanin(melanin, concentration):
-    """Concentrations of [DEon11] with the absorption given there, which Cycles' scale exceeds by 1.207."""
+    """Blond, brown and black hair have the eumelanin of [DEon11] at its absorption, which Cycles' scale exceeds by
+    1.207.
+    """
     published = concentration * np.array([0.419, 0.697, 1.37])
     np.testing.assert_allclose(pigment.sigma_a_from_melanin(melanin, 0.0), published, rtol=0.01)
 
@@ -50,7 +52,7 @@ def test_darker_hair_absorbs_more_and_a_colour_bleached_white_nothing(component,
 
 
 def test_smooth_fibres_follow_the_published_fit():
-    """At azimuthal roughness 0 the fit is its first coefficient [Chiang16]: a groom of sigma_a = 1 is e^-5.969."""
+    """Smooth fibers follow the fit of [Chiang16] with only its first coefficient: sigma_a = 1 is e^-5.969."""
     assert pigment.color_from_sigma_a(1.0, 0.0) == pytest.approx(np.exp(-5.969))
     assert pigment.color_from_sigma_a(1.0, 1.0) == pytest.approx(np.exp(-3.375))
 
@@ -60,7 +62,9 @@ colors = st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3)
 
 @given(colors, st.floats(1e-6, 10.0), st.floats(1e-6, 10.0))
 def test_less_that_is_sent_back_darkens_as_in_a_deep_layer(color, first, second):
-    """K / S of the colors differs by the scattering, and two changes are one."""
+    """Less reflected light darkens hair as in a deep layer: K / S differs by the scattering, and two changes combine
+    to one.
+    """
     color = np.array(color)
     np.testing.assert_allclose(pigment.color_of_scattering(color, 1.0), color, rtol=1e-12, atol=1e-300)
     found = pigment.color_of_scattering(color, first)

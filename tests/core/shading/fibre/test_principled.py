@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Roughness of Blender's Principled Hair against published widths, and there and back."""
+"""Roughness of Blender's Principled Hair agrees with published widths, in both directions."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scattering of a path at a fiber, compared with `energy_conserving`."""
+"""Scattering of a path at a fiber equals that of `energy_conserving`."""
 
 import numpy as np
 import pytest
@@ -85,14 +85,14 @@ def turns(row):
 
 
 def turned(row, weight):
-    """Directions, weights and what even light would give, of many turns of a path."""
+    """Return directions, weights and the values for even light of many scattering events."""
     found = [wp.zeros(200_000, dtype=wp.vec3) for _ in range(3)]
     wp.launch(_turns, dim=len(found[0]), inputs=[row, wp.vec3(*VIEWER), wp.vec3(*weight)], outputs=found)
     return [array.numpy().astype(float) for array in found]
 
 
 def valued(row, lights, weight, offset_count):
-    """Values (L, offsets, 3) and densities (L, offsets) of lights (L, 3)."""
+    """Return values (L, offsets, 3) and densities (L, offsets) of lights (L, 3)."""
     found = wp.zeros((len(lights), offset_count), dtype=wp.vec3), wp.zeros((len(lights), offset_count), dtype=float)
     inputs = [row, wp.vec3(*VIEWER), wp.array(lights.astype(np.float32), dtype=wp.vec3), wp.vec3(*weight)]
     wp.launch(_values, dim=found[0].shape, inputs=inputs, outputs=found)
@@ -109,7 +109,7 @@ def test_values_are_those_of_the_model(row, rng):
 
 
 def test_turns_are_distributed_as_the_values(row, turns):
-    """Moments of the light's direction: of turns, and of values all over the sphere."""
+    """Sampled directions are distributed as the values, by the moments of the light's direction over the sphere."""
     directions, weights, even = turns
     z, turn = np.meshgrid((np.arange(48) + 0.5) / 24 - 1.0, 2.0 * np.pi * (np.arange(96) + 0.5) / 96)
     across = np.sqrt(1.0 - z.ravel() ** 2)

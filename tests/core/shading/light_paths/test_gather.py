@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among strands: laws of closed and of simple scenes, and a random walk of its own."""
+"""Light among strands satisfies the laws of closed and of simple scenes, and agrees with a separate random walk."""
 
 from dataclasses import replace
 
@@ -23,7 +23,9 @@ WHITE, BLACK = (0.0, 0.0, 0.0), (1e4, 1e4, 1e4)
 
 
 def level_view(middle, along, up, size, depth):
-    """A `View` without perspective: size (2,) [m] around a middle on its near plane, depth [m] along a direction."""
+    """Return a `View` without perspective: size (2,) [m] around a middle on its near plane, depth [m] along a
+    direction.
+    """
     axes = np.stack([np.cross(along, up), up, along])
     scaled = axes / (0.5 * np.array([*size, depth]))[:, None]
     to_clip = np.eye(4)
@@ -69,13 +71,13 @@ def sun(axis, power=3.0):
 
 
 def gathered(*args, **details):
-    """(systems, Z, Y, X, 12) sums and how many paths."""
+    """Return (systems, Z, Y, X, 12) sums and the number of paths."""
     sums, taken = gather.gather(*args, **details)
     return np.stack([of_hair.numpy() for of_hair in sums]), taken
 
 
 def by_voxel(sums):
-    """(Z, Y, X, N) numbers as `voxel_means` takes them."""
+    """Return (Z, Y, X, N) numbers as `voxel_means` takes them."""
     return wp.array(sums, dtype=wp.float64, device="cpu")
 
 
@@ -106,7 +108,7 @@ def test_paths_are_the_same_again(rng):
 
 
 def test_what_ends_at_a_pause_leaves_sums_as_they_are(rng):
-    """Another view that is stopped at any of its pauses has no part in the light, nor do its paths."""
+    """A view that is stopped at any pause adds neither light nor paths to the sums."""
     grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.2, 0.3), device="cpu")
     light = surroundings(world=1.0)
     other_view = level_view((-4.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (2.0, 2.0), 8.0)
@@ -133,7 +135,9 @@ def test_what_ends_at_a_pause_leaves_sums_as_they_are(rng):
 
 
 def test_faint_light_counts_as_much_in_the_mean(rng):
-    """What is drawn tells which light is faint: if it is thirty times as bright as what paths find, nearly all is."""
+    """Faint light counts as much in the mean: where drawn light is thirty times as bright as the paths', nearly all
+    is the paths'.
+    """
     grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), voxel_count=625)
     light = surroundings(lamps=np.concatenate([sun((0.0, 1.0, 0.0)), sun((0.6, 0.8, 0.0), 1.0), sun((0.0, 0.6, -0.8))]))
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 20_000)
@@ -169,7 +173,7 @@ def test_light_of_voxels_and_what_they_keep_of_the_drawn_is_that_of_paths(rng):
 
 
 def test_the_nearest_strand_is_met(rng):
-    """Against all segments, without a grid: rays among strands that bend."""
+    """A ray among bent strands hits the nearest one, by comparison with all segments without a grid."""
     points = strands_in_a_box(rng, 60)
     points += 0.03 * rng.normal(size=points.shape)
     grid = grid_of(points, BLACK, 0.02, voxel_count=375)
@@ -199,7 +203,9 @@ def test_the_nearest_strand_is_met(rng):
     ("axis", "least", "most"), [((0, 1, 0), 0.99, 1.01), ((-1, 0, 0), 0.5, 1.01), ((0, -1, 0), 0.0, 0.05)]
 )
 def test_a_strand_within_another_is_shaded_on_the_far_side(rng, axis, least, most):
-    """Two round strands nearly in one place: light from the viewer's side meets the first, from behind the second."""
+    """Of two round strands nearly in one place, light from the viewer's side hits the first and light from behind
+    the second.
+    """
     alone = np.stack([np.zeros(3), np.zeros(3), np.linspace(-1.0, 1.0, 3)], axis=-1)[None]
     # Near enough that strands before them are not in view.
     seen_in = level_view((0.0, -0.03, 0.5), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.018, 0.018), 8.0)
@@ -221,7 +227,7 @@ def test_a_strand_within_another_is_shaded_on_the_far_side(rng, axis, least, mos
 
 
 def test_paths_start_as_often_as_rays_meet_strands(rng):
-    """Thin short strands beside thick long strands get their share of paths with few samples."""
+    """Paths start as often as rays hit strands: thin short strands beside thick long ones get their share."""
     thin, thick = strands_in_a_box(rng, 4_000), strands_in_a_box(rng, 60)
     thin = thin.mean(axis=1, keepdims=True) + 0.05 * (thin - thin.mean(axis=1, keepdims=True))
     points = np.concatenate([thin, thick])
@@ -238,7 +244,9 @@ def test_paths_start_as_often_as_rays_meet_strands(rng):
 
 
 def test_strands_next_to_the_camera_leave_paths_for_others(rng):
-    """Most of them is beside the picture or before its near plane, where nothing is seen of them."""
+    """Strands next to the camera leave paths to others, as most of them is beside the picture or before the near
+    plane.
+    """
     points = strands_in_a_box(rng, 3_000)
     points[:20] -= points[:20].mean(axis=1, keepdims=True)
     points[:20] += rng.uniform(-0.05, 0.05, (20, 1, 3))
@@ -252,7 +260,7 @@ def test_strands_next_to_the_camera_leave_paths_for_others(rng):
 
 
 def test_bent_strands_have_no_gaps():
-    """A thick ring across the rays: as much is seen as its area says."""
+    """Bent strands have no gaps: as much of a thick ring across the rays is hit as its area says."""
     turn = np.linspace(0.0, 1.9 * np.pi, 12)
     points = np.stack([0.5 * np.cos(turn), 0.0 * turn, 0.5 * np.sin(turn)], axis=-1)[None]
     grid = grid_of(points, BLACK, 0.2, voxel_count=250)
@@ -312,7 +320,7 @@ def test_samples_show_segments_of_thinned_strands(rng):
 
 @pytest.mark.parametrize("height", [0.5, 2.0])
 def test_a_sheet_of_strands_lets_as_much_through_as_poisson_says(height):
-    """Parallel strands before a bright world: a ray meets none with a chance of exp(-n), n the mean that it crosses."""
+    """A sheet of strands transmits exp(-n) of a bright world, with n the mean number of strands that a ray crosses."""
     rng = np.random.default_rng(5)
     radius, count = 0.004, 1500
     x, z = rng.uniform(-1.2, 1.2, count), np.linspace(-1.5, 1.5, 2)
@@ -326,7 +334,7 @@ def test_a_sheet_of_strands_lets_as_much_through_as_poisson_says(height):
 
 
 def test_more_paths_are_taken_where_few_find_light(rng):
-    """A sun behind deep hair: its light is known better by them. In an even world none is needed."""
+    """More paths are taken where few find light, as for a sun behind deep hair; in an even world none is added."""
     grid = grid_of(strands_in_a_box(rng, 1500), (0.1, 0.3, 1.0), voxel_count=2_500)
     behind, even = surroundings(lamps=sun((0.0, -1.0, 0.0))), surroundings(world=1.0)
     seen = seen_rays.seen_by(grid, behind.corners, ALONG_Y, 400)
@@ -343,7 +351,7 @@ def test_more_paths_are_taken_where_few_find_light(rng):
 
 
 def test_no_path_starts_on_hidden_hair(rng):
-    """Samples of hair that a wall hides start no path, and raise nothing."""
+    """Samples of hair that a wall hides start no path, and cause no error."""
     grid = grid_of(strands_in_a_box(rng, 200), WHITE, voxel_count=500)
     seen = seen_rays.seen_by(grid, surroundings().corners, ALONG_Y, 400)
     wall = surroundings([(-9, -2, -9), (9, -2, -9), (0, -2, 19)], [(0.5, 0.5, 0.5)], world=1.0)
@@ -367,7 +375,7 @@ def test_as_many_more_paths_are_taken_as_are_wanted(rng, monkeypatch):
 
 
 def lit_from_below(grid, light, path_count):
-    """`ratio` of light that does not come straight from a lamp."""
+    """Return the `ratio` of light that does not come straight from a lamp."""
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, path_count)
     found, _count = gathered(grid, light, seen, path_count)
     straight, _count = gathered(grid, replace(light, albedo=0.0 * light.albedo), seen, path_count)
@@ -375,7 +383,7 @@ def lit_from_below(grid, light, path_count):
 
 
 def test_light_off_a_floor_is_that_of_its_albedo(rng):
-    """Strands over a wide floor under a sun, white in a black world: twice the albedo, twice the light."""
+    """Light off a floor is proportional to its albedo, for strands over a wide floor under a sun, in a black world."""
     points = strands_in_a_box(rng, 3)
     grid = grid_of(points, BLACK, 0.002, voxel_count=625)
     down = sun((0.0, 0.0, -1.0))
@@ -384,7 +392,9 @@ def test_light_off_a_floor_is_that_of_its_albedo(rng):
 
 
 def test_a_surface_is_lit_as_its_normals_say(rng):
-    """A floor under a level sun, whose normals are those of a slope of 60 degrees: what it sends up is halved."""
+    """A surface is lit by its normals: a floor under a level sun with normals of a 60° slope reflects half the
+    light.
+    """
     grid = grid_of(strands_in_a_box(rng, 300), WHITE, 0.002, voxel_count=625)
     down = sun((0.0, 0.0, -1.0))
     slope = (np.sin(np.radians(60.0)), 0.0, np.cos(np.radians(60.0)))
@@ -396,7 +406,7 @@ def test_a_surface_is_lit_as_its_normals_say(rng):
 
 
 def test_white_fur_sends_back_what_a_random_walk_finds(rng):
-    """Upright strands on a black floor, 5 crossed by level light on its way through as much as they are long."""
+    """White fur on a black floor, 5 strands deep for level light, reflects what a random walk finds."""
     settings = lookup_tables.Settings(
         mode="energy", sigma_a=(0.005,) * 3, roughness=0.2, radial_roughness=0.3, tilt=np.radians(2.0)
     )

@@ -58,7 +58,9 @@ def _by_all_segments(
 
 
 def mixed_strands(rng, count=700):
-    """Long and short strands in a box twice as long as wide, some of no length, widths from one to twenty."""
+    """Return long and short strands in a box twice as long as wide, some of no length, with widths from one to
+    twenty.
+    """
     middles = rng.uniform(-0.5, 0.5, (count, 1, 3)) * [2.0, 1.0, 1.0]
     ways = rng.normal(size=(count, 1, 3)) * rng.choice([0.0, 0.01, 0.2], (count, 1, 1), p=[0.02, 0.5, 0.48])
     points = middles + np.linspace(-1.0, 1.0, 5)[:, None] * ways + rng.normal(0.0, 0.004, (count, 5, 3))
@@ -67,7 +69,7 @@ def mixed_strands(rng, count=700):
 
 
 def rays(rng, medium_points):
-    """Rays from within strands, from among them and from far away, along any direction and along axes."""
+    """Return rays from within strands, from among them and from far away, along any direction and along axes."""
     places = rng.uniform(-0.6, 0.6, (RAYS, 3)) * [2.0, 1.0, 1.0]
     directions = rng.normal(size=(RAYS, 3))
     directions[::5] = np.eye(3)[rng.integers(0, 3, len(directions[::5]))] * rng.choice([-1.0, 1.0], (RAYS // 5, 1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps in path tracing: as bright as an equal part of the world, and found by few paths."""
+"""Lamps in path tracing are as bright as an equal part of the world, and few paths find them."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -27,7 +27,7 @@ wp.set_module_options({"enable_backward": False})
 
 
 def lamp(kind, distance, radius, power=1.0):
-    """A lamp on the viewer's side of the origin, which shines along y."""
+    """Return a lamp on the viewer's side of the origin that shines along y."""
     found = np.zeros(1, LAMP)
     found["kind"], found["radius"], found["casts_shadow"] = kind, radius, 1
     found["position"][0, 1], found["axis"][0, 1], found["power"][0, :3] = -distance, 1.0, power
@@ -36,7 +36,7 @@ def lamp(kind, distance, radius, power=1.0):
 
 @pytest.mark.parametrize("kind", share_of([lamps.SUN, lamps.POINT, lamps.AREA], 2))
 def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
-    """Hair in a cone of light: a lamp far off, and a world with the radiance of its disk in each direction."""
+    """A wide lamp lights hair as a world that has the radiance of the lamp's disk in a cone."""
     rough = lookup_tables.Settings(mode="energy", roughness=0.8, radial_roughness=0.8)
     grid = grid_of(strands_in_a_box(rng, 600), (0.05, 0.3, 1.0), 0.02, rough, voxel_count=625)
     power = {lamps.SUN: 3.0, lamps.POINT: 12.0 * np.pi * 500.0**2, lamps.AREA: 3.0 * np.pi * 500.0**2}[kind]
@@ -53,7 +53,7 @@ def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
 
 
 def light_on_a_strand(light, path_count=20_000):
-    """`ratio` of a thin strand at the origin that a lamp lights, seen along y."""
+    """Return the `ratio` of a thin strand at the origin that a lamp lights, seen along y."""
     thin = np.stack([np.linspace(-0.02, 0.02, 3), np.zeros(3), np.zeros(3)], axis=-1)[None]
     grid = grid_of(thin, (0.05, 0.3, 1.0), 0.002, voxel_count=125)
     seen_in = level_view((0.0, -0.1, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.02, 0.004), 0.2)
@@ -61,7 +61,9 @@ def light_on_a_strand(light, path_count=20_000):
 
 
 def test_near_a_lamp_light_grows_as_its_disk_does():
-    """Strands at a quarter of a lamp's radius: one that shines all around turns its disk to them."""
+    """Near a lamp that shines all around, light grows as its disk, which turns to strands at a quarter of its
+    radius.
+    """
     around, forward = (
         light_on_a_strand(lamp(kind, 0.1, 0.4, power)) for kind, power in ((lamps.POINT, 4.0), (lamps.AREA, 1.0))
     )
@@ -69,13 +71,15 @@ def test_near_a_lamp_light_grows_as_its_disk_does():
 
 
 def turned(light, angle):
-    """A lamp that shines aside of y by an angle [rad]."""
+    """Return a lamp that shines at an angle [rad] from y."""
     light["axis"][0, :3] = 0.0, np.cos(angle), np.sin(angle)
     return light
 
 
 def test_a_spot_is_a_point_within_its_cone():
-    """No light beyond the cone; half the light halfway between the cosines of the cone and of its soft edge's start."""
+    """A spot is a point within its cone: no light beyond it, and half the light in the middle of its soft edge by
+    cosines.
+    """
     cos_cone, blend = np.cos(0.6), 0.4
     cosines = {"inside": 1.0, "halfway": cos_cone + 0.5 * blend * (1.0 - cos_cone), "beyond": cos_cone - 0.01}
     found = {}
@@ -90,7 +94,7 @@ def test_a_spot_is_a_point_within_its_cone():
 
 
 def test_an_area_lamp_of_less_spread_gives_as_much_light():
-    """The light over all directions in a narrower cone is that of a lamp without a cone."""
+    """An area lamp of less spread gives as much light in its narrower cone as a lamp without a cone."""
     edges = np.linspace(0.0, 0.75, 13)
     sums = []
     for cos_cone in (0.0, np.cos(0.7)):
@@ -111,7 +115,7 @@ def _falloffs(cos_cone: float, cosines: wp.array[float], out_falloffs: wp.array[
 
 @pytest.mark.parametrize("spread", [1.0, 2.0, 5.0, 20.0, 25.0, 90.0, 170.0, 180.0])
 def test_an_area_lamp_of_any_spread_sends_its_power(spread):
-    """Its radiance, by the cosine, summed over the cone: with the least spread of Blender too."""
+    """An area lamp of any spread sends its power: its radiance by the cosine, summed over the cone."""
     cos_cone = np.cos(0.5 * np.radians(spread))
     edges = np.linspace(cos_cone, 1.0, 501)
     cosines = wp.array((0.5 * (edges[:-1] + edges[1:])).astype(np.float32), dtype=float, device="cpu")
@@ -122,7 +126,7 @@ def test_an_area_lamp_of_any_spread_sends_its_power(spread):
 
 
 def test_a_lamp_among_hair_is_found_by_few_paths(rng):
-    """A disk of 6 cm amid strands: means of few paths differ little, as no path has too much light."""
+    """Few paths find a lamp among hair: for a disk of 6 cm amid strands their means differ little."""
     grid = grid_of(strands_in_a_box(rng, 4_000), (0.02, 0.04, 0.06), 0.004, voxel_count=6_250)
     near = level_view((0.0, -0.3, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.3, 0.3), 4.3)
     up = lamp(lamps.AREA, 0.0, 0.06)

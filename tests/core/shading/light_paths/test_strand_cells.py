@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every segment is in just the cells that it touches with its width."""
+"""Every segment is in exactly the cells that it touches with its width."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests.core.shading.light_paths.test_grid_walk import mixed_strands
 
 
 def touching(grid, wider):
-    """{(cell along X, Y, Z, segment)} where a segment with its radius, a part of a cell wider, comes into a cell."""
+    """Return {(cell along X, Y, Z, segment)} of the cells that a segment touches with its radius, slightly enlarged."""
     points, radii, strands = (array.numpy().astype(float) for array in (grid.points, grid.radii, grid.strands))
     segments = np.flatnonzero(np.diff(strands) == 0)
     k = grid.cells.along_voxel
@@ -31,7 +31,7 @@ def touching(grid, wider):
 
 
 def listed(grid):
-    """(The same of a grid's own lists, whether segments rise in every cell)."""
+    """Return (the same from a grid's own lists, whether segments rise in every cell)."""
     cells, k = grid.cells, grid.cells.along_voxel
     bricks, starts, segments = (array.numpy() for array in (cells.bricks, cells.starts, cells.segments))
     assert starts[0] == 0 and starts[-1] == len(segments) and (np.diff(starts) >= 0).all()
@@ -63,7 +63,7 @@ def test_strands_in_another_order_are_in_the_same_cells(rng):
 
 
 def test_a_gpu_sorts_as_cores_do(rng, monkeypatch):
-    """Both sorts on the processor: the same lists to the bit, however many cores take shares."""
+    """A GPU sorts as cores do: both sorts on the processor give the same lists to the bit, on any number of cores."""
     points, radii = mixed_strands(rng, 300)
     lists = []
     for name, share in (("_sorted", 1), ("_sorted_by_cores", 1), ("_sorted_by_cores", 5)):
@@ -79,7 +79,7 @@ def test_a_gpu_sorts_as_cores_do(rng, monkeypatch):
 
 
 def twice(cells):
-    """Cells in an array of twice their number, as a radix sort takes them."""
+    """Return cells in an array of twice their number, as a radix sort takes them."""
     room = strand_cells.wp.zeros(2 * len(cells), dtype=int, device="cpu")
     strand_cells.wp.copy(room, cells, count=len(cells))
     return room

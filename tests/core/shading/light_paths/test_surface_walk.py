@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scattering of a path at a surface: sampling against evaluation, energy, and Cycles' Principled BSDF."""
+"""Scattering of a path at a surface agrees in sampling and evaluation, conserves energy, and equals Principled BSDF."""
 
 import numpy as np
 import pytest
@@ -55,7 +55,7 @@ def _turns(
 
 
 def direction(theta, phi=0.0):
-    """Unit vector at an angle to the normal and an azimuth [degrees]."""
+    """Return the unit vector at an angle to the normal and an azimuth [degrees]."""
     theta, phi = np.radians(theta), np.radians(phi)
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta) + 0.0 * phi], axis=-1)
 
@@ -98,7 +98,9 @@ def turns(viewer, material, count, weight=(1.0, 1.0, 1.0)):
     ],
 )
 def test_light_is_that_of_principled_bsdf(material, angles, expected):
-    """Radiance by Cycles of Blender 5.2 under a sun of strength 1: angles of light and camera, and between azimuths."""
+    """Light is that of Cycles' Principled BSDF in Blender 5.2 under a sun of strength 1, by angles of light and
+    camera.
+    """
     light, view, between = angles
     found, _density = values(direction(view, between), direction(light), material)
     np.testing.assert_allclose(found[0] * np.ones(3), expected * np.ones(3), rtol=0.03)

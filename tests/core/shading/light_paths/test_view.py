@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rays through a part of a picture, from matrices of a graphics API."""
+"""Rays lead through a part of a picture, by matrices of a graphics API."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def _look(
 
 
 def camera(rng, is_perspective, near=0.01, far=1000.0):
-    """((4, 4) world to clip in single precision, place, axis) of a camera that looks at the origin from 3 m."""
+    """Return ((4, 4) world to clip in single precision, place, axis) of a camera that looks at the origin from 3 m."""
     axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     axes[2] *= np.sign(np.linalg.det(axes))  # right, up, back
     to_view = np.eye(4)
@@ -44,7 +44,7 @@ def camera(rng, is_perspective, near=0.01, far=1000.0):
 
 @pytest.mark.parametrize("is_perspective", [True, False])
 def test_rays_meet_the_places_that_they_are_for(rng, is_perspective):
-    """A strand's rim, which reflects most, is a hundredth of its radius: 3 m away a few micrometers."""
+    """Rays hit the places that they are for, to a hundredth of a strand's radius, a few micrometers at 3 m."""
     matrix, eye, back = camera(rng, is_perspective)
     places = rng.uniform(-0.3, 0.3, (500, 3)).astype(np.float32)
     found = [wp.zeros(500, dtype=float) for _ in range(4)]

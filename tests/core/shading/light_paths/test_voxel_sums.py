@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums by voxel against NumPy's, and the same bits in any order where a GPU adds up."""
+"""Sums by voxel equal NumPy's, with the same bits in any order of additions on a GPU."""
 
 import numpy as np
 import pytest
@@ -14,13 +14,13 @@ from tests.core.shading.light_paths.test_gather import WHITE, grid_of, strands_i
 
 @pytest.fixture(autouse=True)
 def on_the_processor():
-    """Arrays are made where the kernels run that they are compared with, on a computer with CUDA too."""
+    """Create the compared arrays on the processor, also on a computer with CUDA."""
     with wp.ScopedDevice("cpu"):
         yield
 
 
 def two_systems(rng):
-    """A grid of two hairs of 60 and 90 strands."""
+    """Return a grid of two hairs of 60 and 90 strands."""
     settings = lookup_tables.Settings(mode="energy")
     systems = [
         strand_grid.Strands(
@@ -133,7 +133,7 @@ def test_kept_points_are_in_the_world_with_the_absorption_of_their_places(rng):
 
 
 def test_white_hair_of_a_grid_has_a_voxel_for_every_place(rng):
-    """Corners of the grid are those of its hair, widths and all."""
+    """White hair has a voxel for every place, as the corners of the grid are those of its hair with widths."""
     points = strands_in_a_box(rng, 50)
     grid = grid_of(points, WHITE, 0.01, voxel_count=100)
     high = grid.corner + grid.voxel * np.array(grid.shape)

@@ -36,7 +36,7 @@ def _directions(
 
 
 def test_directions_are_as_dense_as_light(rng):
-    """Light of each half of the world, along three axes, found by directions and as the sum over texels."""
+    """Directions are as dense as light: each half of the world along three axes has the light of its texels."""
     picture = rng.exponential(size=(12, 24, 3)) ** 3
     with wp.ScopedDevice("cpu"):
         world = world_light.world_of(picture)
@@ -54,7 +54,7 @@ def test_directions_are_as_dense_as_light(rng):
 
 
 def test_directions_and_paths_that_meet_the_sky_find_the_same_light(rng, monkeypatch):
-    """Hair on a floor under an uneven sky; beside it the light of paths that only meet it."""
+    """Sampled directions and paths that reach the sky find the same light, for hair on a floor under an uneven sky."""
     grid = grid_of(strands_in_a_box(rng, 600), (0.05, 0.3, 1.0), 0.01, voxel_count=625)
     picture = 0.1 + 4.0 * (rng.random((8, 16, 1)) < 0.15) * np.ones(3)
     floor = [(-3, -3, -0.6), (3, -3, -0.6), (0, 5, -0.6)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Slices of absorption against tables that are baked for one absorption."""
+"""Slices of absorption equal tables that are baked for one absorption."""
 
 from dataclasses import replace
 
@@ -41,7 +41,7 @@ def test_any_absorption_between_slices_is_known_to_a_percent(rng, settings, sigm
 
 
 def test_channels_are_looked_up_each_for_itself(rng, settings):
-    """Against the tables of red, green and blue; M of the classic mode is read from a texture there."""
+    """Each channel is looked up in the tables of its own absorption; M of the classic mode is read from a texture."""
     sigma_a = (0.2, 0.5, 3.0)
     at = random_angles(rng, 2000)
     slices = absorption_slices.bake(settings, (0.1, 4.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The response of a fiber to light around it, against the integral over all directions."""
+"""The response of a fiber to surrounding light equals the integral over all directions."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dual scattering: forward and backward scattering of one fiber and of many."""
+"""Dual scattering has the forward and backward scattering of one fiber and of many."""
 
 from dataclasses import replace
 
@@ -34,7 +34,9 @@ def test_hair_passes_on_and_sends_back_the_published_parts(melanin):
 
 @pytest.mark.parametrize("mode", ["energy", "classic"])
 def test_what_goes_on_and_what_comes_back_are_all_that_is_scattered(mode):
-    """Against the integral of the tables' own radiance over the sphere."""
+    """Forward and backward scattering are all scattered light, by the integral of the tables' radiance over the
+    sphere.
+    """
     tables, _dual = baked(mode, caustic="exact")
     nodes, weights = np.polynomial.legendre.leggauss(200)
     other = 0.5 * np.pi * nodes[:, None]
@@ -63,7 +65,9 @@ parts = st.tuples(st.floats(0.01, 0.97), st.floats(0.01, 0.5))
 
 @given(parts, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(0.05, 0.3), st.floats(0.05, 0.3))
 def test_back_scattering_is_its_series(a, alpha_f, alpha_b, beta_f, beta_b):
-    """Light goes i strands deep, turns, and comes back through as many: summed event by event."""
+    """Back scattering equals its series, summed by events: light goes i strands deep, turns, and returns through i
+    strands.
+    """
     a_f, a_b = a
     i = np.arange(1, 3000)
     # One turn: i forward events in, i out. Three turns: i in and j, k between, any of which may be nought.
@@ -78,7 +82,7 @@ def test_back_scattering_is_its_series(a, alpha_f, alpha_b, beta_f, beta_b):
 
 
 def test_published_approximation_of_the_width_is_near():
-    """sigma_b of [Zinke08], fitted there to the series."""
+    """The width is near the published approximation sigma_b of [Zinke08], which is fitted to the series."""
     a_f, a_b, beta_f, beta_b = np.float64(0.5), np.float64(0.12), 0.1, 0.15
     _back, _shift, width = dual_scattering.back_scattering(a_f, a_b, 0.0, 0.0, beta_f, beta_b)
     published = (
@@ -136,7 +140,9 @@ parts_of_hair = st.floats(0.01, 0.8), st.floats(0.01, 0.19)
 
 @given(*parts_of_hair, st.floats(0.0, 9.0), st.floats(0.0, 9.0))
 def test_fluxes_solve_their_equations(a_f, a_b, front, behind):
-    """Kubelka and Munk: what passes a thin layer is lost by what it does not pass on, and gains what turns in it."""
+    """Fluxes solve the equations of Kubelka and Munk: a thin layer takes what it does not transmit, and adds what
+    turns.
+    """
     step = 1e-4
 
     def at(depth):
@@ -158,7 +164,7 @@ def test_without_strands_behind_and_in_front_nothing_is_sent_back():
 
 
 def test_lossless_hair_loses_nothing():
-    """All of the light that does not come through a layer comes back."""
+    """Lossless hair loses no light: what does not pass a layer returns."""
     deep = dual_scattering.deep_hair(np.full(3, 0.75), np.full(3, 0.25))
     for count in (0.5, 4.0, 30.0):
         assert np.sum(dual_scattering.layer_parts(count, *deep), axis=0) == pytest.approx(np.ones(3), abs=0.03)
@@ -177,7 +183,9 @@ def test_a_lone_strand_is_lit_as_one(rng):
 
 
 def test_deeper_strands_are_darker_and_of_purer_colour(rng):
-    """Over all directions: single lobes may gain where light has been spread."""
+    """Deeper strands are darker and of purer color over all directions, although single lobes may gain from spread
+    light.
+    """
     tables, dual = baked(size=64)
     at = directions(rng, 4000)
     weights = np.cos(at.theta_i) * np.cos(at.theta_o)
@@ -196,7 +204,9 @@ def test_deeper_strands_are_darker_and_of_purer_colour(rng):
 
 
 def test_a_white_strand_deep_in_white_hair_passes_on_what_it_receives():
-    """Summed over all views, the lobes of spread light have the energy of the row."""
+    """A white strand deep in white hair passes on all received light: its lobes over all views have the energy of
+    the row.
+    """
     tables, dual = baked(sigma_a=(0.0, 0.0, 0.0), tilt=0.0)
     unit = replace(dual, theta=dual.theta.copy())
     unit.theta[dual_scattering.QUANTITIES.index("a_f")] = 1.0
@@ -214,7 +224,7 @@ def test_a_white_strand_deep_in_white_hair_passes_on_what_it_receives():
 
 
 def moments(theta, radiance):
-    """(energy over theta and phi, mean, deviation) of radiance (T, F) that falls on every phi in [0, pi]."""
+    """Return (energy over theta and phi, mean, deviation) of radiance (T, F) for every phi in [0, pi]."""
     weights = radiance.mean(axis=1) * np.cos(theta)
     mean = np.average(theta, weights=weights)
     energy = 2.0 * np.pi * weights.sum() * (theta[1] - theta[0])
@@ -223,7 +233,9 @@ def moments(theta, radiance):
 
 @pytest.mark.parametrize("strand_count", [0.0, 3.0])
 def test_lobes_are_as_bright_as_wide_and_as_shifted_as_the_tables_say(strand_count):
-    """One lobe at a time: R of a black fiber, and what comes back from behind, with the same numbers for all lights."""
+    """Lobes have the brightness, width and shift of the tables, tested for R of a black fiber and for the backward
+    lobe.
+    """
     tables, dual = baked(sigma_a=(100.0, 100.0, 100.0), tilt=0.0, roughness=0.1)
     numbers = {"a_f": 0.8, "a_b": 0.1, "beta_f": 0.03, "beta_b": 0.05, "alpha_f": 0.002, "alpha_b": 0.004}
     for name, number in numbers.items():

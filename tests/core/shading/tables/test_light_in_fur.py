@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among parallel strands, against random walks: by events alone, and by the fiber's own scattering."""
+"""Light among parallel strands agrees with random walks, by events alone and by the fiber's own scattering."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from hair_addon.core.shading.tables import dual_scattering, lookup_tables
 
 @pytest.mark.parametrize(("front", "behind"), [(1.5, 6.0), (4.0, 1.0)])
 def test_drift_follows_the_number_of_events(rng, front, behind):
-    """Light that goes on or turns at each strand: its events are counted where it crosses a depth."""
+    """Drift follows the number of events where light, which continues or turns at each strand, crosses a depth."""
     a_f, a_b, cosine, shift = 0.72, 0.22, 0.96, 0.02
     count = 200_000
     depth, way, events = np.zeros(count), np.ones(count), np.zeros(count)
@@ -37,9 +37,9 @@ def test_drift_follows_the_number_of_events(rng, front, behind):
 
 
 def test_white_fur_sends_light_back_off_the_mirror_cone(rng):
-    """Strands upright on a black surface, 5 crossed by level light on its way through as much as they are long.
+    """White fur upright on a black surface, 5 strands deep for level light, reflects light off the mirror cone.
 
-    Light from 23° above the level, seen from 41°: none of it is on the cone of one scattering event.
+    Light comes from 23° above the level and is seen from 41°: none of it is on the cone of one scattering event.
     """
     settings = lookup_tables.Settings(
         mode="energy", sigma_a=(0.005,) * 3, roughness=0.2, radial_roughness=0.3, tilt=np.radians(2.0)
@@ -56,7 +56,7 @@ def test_white_fur_sends_light_back_off_the_mirror_cone(rng):
 
 
 def walked(rng, settings, view, light, depth, count=8000, most_events=120, blur=0.02):
-    """Mean radiance of fur seen from the azimuth of its light, by paths from the viewer towards the light.
+    """Return the mean radiance of fur, seen from the azimuth of its light, by paths from the viewer.
 
     blur: variance of the direction of the light [rad²].
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables compared with their model: axes, means over cells, lookups, half floats."""
+"""The tables agree with their model in axes, means over cells, lookups and half floats."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_every_texel_of_m_is_the_model_at_its_middle(tables):
 
 
 def cell_means(evaluate, tables, row, samples=400):
-    """Means over the cells of one row by brute force, (W, C)."""
+    """Return means over the cells of one row by brute force, (W, C)."""
     edges = lookup_tables.phi_edges(tables.settings)
     phi = edges[:-1, None] + np.diff(edges)[:, None] * centres(samples)
     return evaluate(phi, (row + 0.5) / tables.settings.size).mean(axis=1)
@@ -66,7 +66,7 @@ def test_both_pairs_of_axes_hold_the_same_energy():
 
 @pytest.mark.parametrize("size", [16, 33, 100])
 def test_tables_of_any_size_hold_the_same_light(size):
-    """Blocks of rows do not have to divide the table."""
+    """Tables of any size hold the same light, as blocks of rows do not have to divide a table."""
     tables = baked(size=size)
     row = size // 2
     expected = cell_means(lambda phi, c: marschner.n_r(phi, c, 1.55), tables, row)

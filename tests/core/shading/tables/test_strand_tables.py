@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of varied strands compared with tables baked for one absorption."""
+"""Tables of varied strands equal tables baked for one absorption."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ def bake(look, size=64):
 
 
 def exact(tables, sigma_a):
-    """`lookup_tables.Tables` of one absorption, of the same fiber."""
+    """Return `lookup_tables.Tables` of one absorption and the same fiber."""
     return lookup_tables.bake(replace(tables.settings, sigma_a=tuple(map(float, sigma_a))))
 
 
@@ -34,7 +34,7 @@ def random_angles(rng):
 
 @pytest.mark.parametrize("position", [0.0, 0.3, 0.5, 1.0])
 def test_dyed_hair_scatters_as_hair_of_that_colour(rng, position):
-    """If all strands have one absorption, tables of that absorption are the reference."""
+    """Dyed hair, whose strands all have one absorption, scatters as by tables of that absorption."""
     tables = bake(DYED)
     sigma_a = strand_variation.strand_sigma_a(tables.variation, 0.5, position)
     of_one = exact(tables, sigma_a)

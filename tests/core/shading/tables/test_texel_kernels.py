@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The kernels for GPUs, run on the processor by Warp, against NumPy's bake."""
+"""The kernels for GPUs, run by Warp on the processor, give the tables of NumPy."""
 
 import numpy as np
 import pytest
