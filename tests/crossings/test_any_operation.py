@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair survives any operations in any order: walk_operations.py, in a separate process whose crash is a failure."""
+"""Hair survives any operations in any order, in a separate process whose crash is a failure: walk_operations.py."""
 
 import subprocess
 import sys
@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def check(module, run_count, operation_count, seed, limit):
-    """Some operations a run; the seed fixes the ways; limit: [s]."""
+    """Run some operations; the seed fixes the walk; limit: [s]."""
     walked = subprocess.run(
         [sys.executable, "-u", "-m", f"tests.support.walk.{module}", *map(str, (run_count, operation_count, seed))],
         cwd=ROOT,
@@ -38,7 +38,8 @@ def test_random_operations_raise_no_exception(counts, seed):
 @pytest.mark.long
 @pytest.mark.parametrize("seed", walk_size.seeds(1, 10))
 def test_all_operators_and_settings(seed):
-    """A thousand steps a seed, with surfaces that move, and undo, redo, saving and loading that change nothing.
+    """A thousand random steps per seed, on moving surfaces, keep the invariants, and undo and loading change
+    nothing.
 
     How many of which seeds: `walk_size`.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's own tools take our Curves: sculpt mode, Cycles and EEVEE."""
+"""Blender's own tools accept our Curves: Sculpt Mode, Cycles and EEVEE."""
 
 import bpy
 import numpy as np
@@ -23,7 +23,9 @@ def test_sculpt_mode_opens(kind, request):
 
 @pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_EEVEE"])
 def test_blender_renders_the_hair(lit, engine, tmp_path):
-    """Strands cover the pixels that they run through, on a twisted surface, and are lit; guides are not seen."""
+    """Blender renders the hair: strands cover the pixels that they cross on a twisted surface, and are lit; guides
+    are invisible.
+    """
     scene, surface = bpy.context.scene, bpy.data.objects["Sphere"]
     lit.data.vellus.hair.radius, lit.data.vellus.hair.tip_taper = 0.03, 1.0
     twist = surface.modifiers.new("Twist", "SIMPLE_DEFORM")
@@ -51,7 +53,7 @@ def test_blender_renders_the_hair(lit, engine, tmp_path):
 
 
 def pixels_of(places):
-    """Rows, from the bottom, and columns of places (N, 3) in the scene's square picture."""
+    """Return rows, from the bottom, and columns of places (N, 3) in the scene's square picture."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     world_to_view, view_to_clip = read_camera(bpy.context.scene, depsgraph, PIXELS, PIXELS)
     clip = np.c_[places, np.ones(len(places))] @ (view_to_clip @ world_to_view).T
@@ -60,7 +62,7 @@ def pixels_of(places):
 
 
 def grown(mask):
-    """A mask with two pixels more on every side: strands are two pixels thick, and filters blur edges."""
+    """Return a mask with two more pixels on every side, for strands of two pixels and blurred edges."""
     padded = np.pad(mask, 2)
     shifts = [(y, x) for y in range(5) for x in range(5)]
     return np.any([padded[y : y + PIXELS, x : x + PIXELS] for y, x in shifts], axis=0)

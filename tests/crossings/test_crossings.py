@@ -19,7 +19,7 @@ from tests.support.reading import points, write_points
 
 @pytest.fixture(autouse=True)
 def no_traceback(capsys):
-    """Blender prints what is raised in handlers, and goes on."""
+    """Fail on exceptions in handlers, which Blender prints before it continues."""
     yield
     reported = capsys.readouterr().err
     assert "Traceback" not in reported, reported
@@ -54,13 +54,15 @@ def add_shape_key(sphere):
 
 
 def drawn(hair):
-    """(S, P, 3) that the viewport draws."""
+    """Return (S, P, 3), the points that the viewport draws."""
     return hair_cache.strands_on_gpu(hair.data).points
 
 
 @pytest.mark.parametrize(("deformer", "strand_count"), pairs(DEFORMERS, [40_000, 20], 2))
 def test_another_strand_count_on_a_deformed_surface(sphere, window, deformer, strand_count):
-    """The picture shows the strands that will be written, carried by their own roots."""
+    """With another strand count on a deformed surface, the picture shows the strands to be written, at their own
+    roots.
+    """
     DEFORMERS[deformer](sphere)
     bpy.ops.vellus.add_hair(guide_count=40, strand_count=600, length=0.4)
     hair = bpy.data.objects["Hair"]
@@ -79,7 +81,7 @@ def test_another_strand_count_on_a_deformed_surface(sphere, window, deformer, st
 
 
 def test_a_picture_between_writing_and_blenders_report(sphere, window):
-    """A script may draw before Blender has reported what was written."""
+    """A picture between writing and Blender's report, as a script may draw it, shows the written strands."""
     DEFORMERS["simple deform"](sphere)
     bpy.ops.vellus.add_hair(guide_count=40, strand_count=300, length=0.4)
     hair = bpy.data.objects["Hair"]
@@ -90,7 +92,7 @@ def test_a_picture_between_writing_and_blenders_report(sphere, window):
 
 
 def empty(curves_object):
-    """Select all in Edit Mode, and delete."""
+    """Select all in Edit Mode, and delete it."""
     bpy.context.view_layer.objects.active = curves_object
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.curves.select_all(action="SELECT")
@@ -132,7 +134,9 @@ CHANGES = [change_guide_length, comb, change_radius, change_strand_count, edit_m
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("is_window", [False, True])
 def test_emptied_hair_is_kept_after_changes(hair, monkeypatch, tmp_path, change, is_window, is_reloaded):
-    """It counts as edited by hand, and says so; the operator of its button grows it again."""
+    """Emptied hair stays empty after changes, as edited by hand with a message, and the operator of its button grows
+    it again.
+    """
     monkeypatch.setattr(running, "has_window", lambda: is_window)
     empty(hair)
     if is_reloaded:
@@ -169,7 +173,7 @@ def test_emptied_guides_are_kept_after_changes(hair, change):
 
 
 def test_a_part_of_the_strands_is_grown_again_as_a_whole(hair):
-    """Strands that were deleted are back after their operator was run again with the same settings."""
+    """Deleted strands are back after the operator runs again with the same settings."""
     before = points(hair)
     bpy.context.view_layer.objects.active = hair
     hair.data.remove_curves(indices=list(range(100)))

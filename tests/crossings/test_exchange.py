@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""USD and Alembic: guides and hair are exported in their posed positions, and read back the same."""
+"""USD and Alembic files have guides and hair in their posed positions, and are read back the same."""
 
 import bpy
 import numpy as np
@@ -36,7 +36,9 @@ FORMATS = {
 
 
 def world(curves_object):
-    """(S, P, 3) points and (S, P) radii [m] in the world: what Blender renders, after the object's modifiers."""
+    """Return (S, P, 3) points and (S, P) radii [m] in the world, as Blender renders them after the object's
+    modifiers.
+    """
     evaluated = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get())
     curves, matrix = evaluated.data, np.array(evaluated.matrix_world)
     points, radii = np.empty((len(curves.points), 3), np.float32), np.empty(len(curves.points), np.float32)
@@ -55,7 +57,7 @@ def grow(surface):
 
 
 def imported(path, read):
-    """The Curves objects of a file, by their strands' number."""
+    """Return the Curves objects of a file, by their number of strands."""
     before = set(bpy.data.objects)
     read(path)
     update()
@@ -90,7 +92,7 @@ def test_strands_come_back_as_they_went(sphere, tmp_path, capfd, format, is_draw
 
 
 def test_usd_keeps_what_strands_carry(sphere, tmp_path):
-    """What differs from strand to strand, where they are rooted, and in which clump: for tools that read primvars."""
+    """USD stores as primvars what differs by strand, with roots and clumps, for tools that read primvars."""
     _guides, hair = grow(sphere)
     path = str(tmp_path / "groom.usdc")
     export_usd(path, False)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""New hair with default settings: it covers its surface, follows its size, and is the same by every interface."""
+"""New hair with default settings covers its surface, follows its size, and is the same by every interface."""
 
 import math
 
@@ -31,7 +31,7 @@ def add_monkey(scene):
 
 
 def look_from(direction):
-    """A camera that sees a surface of two meters and its hair from a side."""
+    """Add a camera that sees a surface of two meters and its hair from a side."""
     scene, away = bpy.context.scene, Vector(direction).normalized()
     if scene.camera is None:
         scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -46,7 +46,9 @@ def alpha():
 
 
 def coverage(surface, hair):
-    """The mean alpha of hair over the silhouette of its surface, and the part of that which is half covered."""
+    """Return the mean alpha of hair over its surface's silhouette, and the part of the silhouette that is half
+    covered.
+    """
     strands = next(o for o in bpy.data.objects if o.data == hair)
     surface.is_holdout, strands.hide_render = False, True
     silhouette = alpha() == 1.0
@@ -57,18 +59,18 @@ def coverage(surface, hair):
 
 
 def sizes(guides, hair):
-    """{name: value} of the settings that follow from the surface."""
+    """Return {name: value} of the settings that follow from the surface."""
     owners = (guides.vellus.guides, GuideSettings), (hair.vellus.hair, HairSettings)
     return {name: getattr(group, name) for group, settings in owners for name in from_surface(settings)}
 
 
 def scaled(found, factor):
-    """`sizes` on a surface that is this much larger: lengths are, and gravity is no length."""
+    """Return `sizes` for a surface that is larger by a factor: lengths are scaled, gravity is not."""
     return {name: value if name == "gravity" else factor * value for name, value in found.items()}
 
 
 def hair_on(surface, **changes):
-    """(guides, hair) of new hair; changes: of the operator's settings."""
+    """Return (guides, hair) of new hair; changes: of the operator's settings."""
     bpy.context.view_layer.objects.active = surface
     before = set(bpy.data.hair_curves)
     assert bpy.ops.vellus.add_hair("EXEC_DEFAULT", True, **changes) == {"FINISHED"}  # as a window does, with undo
@@ -87,7 +89,7 @@ def test_hair_covers_its_surface(scene, coarse_shadows, add, side):
 
 @pytest.fixture
 def kernel_modules(monkeypatch):
-    """(loaded, launched): names of the modules that were loaded before work began, and of those that it asked for."""
+    """Return (loaded, launched): names of modules that were loaded before the work, and of modules that it used."""
     remembered.forget(monkeypatch)
     loaded, launched = set(), set()
     load_together, load = kernel_setup.load, kernel_cache.load
@@ -108,7 +110,7 @@ def kernel_modules(monkeypatch):
 
 @pytest.mark.parametrize(("group", "is_draped"), [("", False), ("top", True)])
 def test_first_hair_waits_for_the_kernels_that_it_launches(sphere, kernel_modules, group, is_draped):
-    """Each takes a while to compile where it comes not compiled; others are compiled later, in the background."""
+    """First hair waits only for the kernels that it launches, and others are compiled later in the background."""
     guides, _hair = hair_on(sphere, strand_count=300, density_group=group)
     assert guides.vellus.guides.drape == is_draped
     loaded, launched = kernel_modules
@@ -120,7 +122,7 @@ def test_first_hair_waits_for_the_kernels_that_it_launches(sphere, kernel_module
 
 @pytest.mark.parametrize("scale", [0.02, 2.0])
 def test_hair_follows_the_size_in_the_world(sphere, scale):
-    """An object that is scaled, and a mesh that is."""
+    """Hair follows the size in the world, of a scaled object and of a scaled mesh."""
     expected = sizes(*hair_on(sphere, **FEW))
     sphere.scale = (scale,) * 3
     bpy.context.view_layer.update()
@@ -203,7 +205,9 @@ def test_what_is_given_stays_and_the_rest_follows(sphere, given):
 
 
 def test_a_redo_with_what_is_shown_changes_nothing_else(sphere):
-    """Blender calls an operator again with all that its panel shows."""
+    """A redo with the shown settings changes nothing, as Blender calls an operator again with all that its panel
+    shows.
+    """
     guides, hair = hair_on(sphere, **FEW)
     shown = bpy.context.window_manager.operator_properties_last("vellus.add_hair")
     values = {name: getattr(shown, name) for name in (*sizes(guides, hair), "thickness")}
@@ -214,7 +218,7 @@ def test_a_redo_with_what_is_shown_changes_nothing_else(sphere):
 
 
 def test_another_surface_gets_sizes_of_its_own(sphere):
-    """An operator remembers what it had last, which nobody gave for the next surface."""
+    """Another surface gets its own sizes, although an operator remembers its last settings."""
     free = sizes(*hair_on(sphere, **FEW))
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=0.1)
     found = sizes(*hair_on(bpy.context.object, **FEW))

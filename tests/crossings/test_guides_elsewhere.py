@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Use as Guides for scripts and on the command line, and brushes that add to guides of any length."""
+"""Scripts and the command line use curves as guides, and brushes add to guides of any length."""
 
 import io
 import json
@@ -20,7 +20,7 @@ ESSENTIALS = "brushes/essentials_brushes-curve_sculpt.blend/Brush/"
 
 @pytest.fixture
 def lines(sphere, rng):
-    """30 lines of 5 points out of the sphere."""
+    """Return 30 lines of 5 points that start on the sphere."""
     return np.float32(list(lines_on(sphere, rng, 30, 5, 5)))
 
 
@@ -40,7 +40,9 @@ def test_a_script_uses_curves_as_guides_and_grows_hair(sphere, lines):
 
 
 def test_arrays_become_strands_on_a_mesh_of_arrays(sphere, lines):
-    """Lines that begin at their tips are reversed, and lines of one point are left out."""
+    """Arrays become strands on a mesh of arrays: lines that begin at their tips are reversed, and single points are
+    left out.
+    """
     vertices = np.array([vertex.co for vertex in sphere.data.vertices], np.float32)
     triangles = np.array([polygon.vertices[:] for polygon in sphere.data.polygons], np.int32)
     turned = [line[::-1] for line in lines]
@@ -97,7 +99,7 @@ def test_guides_come_from_the_same_file(sphere, lines, tmp_path):
 
 
 def test_guides_of_ours_keep_the_hair_that_follows_them(hair, tmp_path):
-    """Their data is replaced, as their modifier is applied: what points to them is told."""
+    """Guides of ours keep the hair that follows them when their modifier is applied and their data is replaced."""
     path = tmp_path / "ours.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     ended = run_here("groom", path, "--guides-from", path, "--strands", 100, "--out", tmp_path / "out.blend")
@@ -145,7 +147,7 @@ def brush(name):
 
 @pytest.fixture
 def shipped():
-    """Brushes as Blender ships them, before and after."""
+    """Return a function that resets brushes to the settings that Blender ships."""
 
     def reset():
         brushes._fitted.clear()

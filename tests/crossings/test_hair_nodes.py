@@ -17,7 +17,7 @@ CHORD = 5e-3  # an icosphere of four subdivisions lies this far within the spher
 
 
 class Strands:
-    """Curves as numbers: starts (S+1,), points (all points, 3), and attributes of theirs by name."""
+    """Curves as numbers: starts (S+1,), points (all points, 3), and attributes by name."""
 
     def __init__(self, curves, *names):
         self.starts = np.zeros(len(curves.curves) + 1, np.int32)
@@ -55,32 +55,32 @@ class Strands:
 
     @property
     def steps(self):
-        """(all points,) from the point before; zero at roots."""
+        """Return (all points,) distances from the point before, zero at roots."""
         return np.concatenate([np.append(0.0, np.linalg.norm(np.diff(strand, axis=0), axis=1)) for strand in self])
 
     @property
     def bends(self):
-        """(S,) mean second difference along each strand, by its length: zero for a straight one."""
+        """Return (S,) mean second differences along strands relative to their lengths, zero for straight ones."""
         bends = [np.linalg.norm(np.diff(strand, n=2, axis=0), axis=1).mean() for strand in self]
         return np.array(bends) / self.lengths
 
 
 @pytest.fixture
 def groom(sphere):
-    """(guides, hair) objects, few strands each."""
+    """Return (guides, hair) objects with few strands each."""
     bpy.ops.vellus.add_hair(guide_count=GUIDE_COUNT, strand_count=STRAND_COUNT, length=LENGTH, radius=0.004)
     return bpy.data.objects["Hair Guides"], bpy.data.objects["Hair"]
 
 
 def appended(name):
-    """The node group of Blender's hair assets."""
+    """Return the node group of Blender's hair assets."""
     with bpy.data.libraries.load(NODE_ASSETS, link=False, assets_only=True) as (_there, here):
         here.node_groups = [name]
     return here.node_groups[0]
 
 
 def evaluated(curves_object, group, *names, **inputs):
-    """`Strands` as they are and as a node group leaves them, given its inputs by name; no warning is shown."""
+    """Return `Strands` before and after a node group with inputs by name, and check that no warning is shown."""
     modifier = curves_object.modifiers.new("Hair Node", "NODES")
     modifier.node_group = group
     sockets = [s for s in group.interface.items_tree if getattr(s, "in_out", "") == "INPUT"]
@@ -104,7 +104,7 @@ def keeps_roots(before, after):
 
 
 def keeps_lengths(before, after):
-    """Assert that lengths stay, but for the corners that new points cut."""
+    """Assert that lengths stay, except where new points cut corners."""
     keeps_roots(before, after)
     np.testing.assert_allclose(after.lengths, before.lengths, rtol=0.01)
 
@@ -130,7 +130,7 @@ def smooths(before, after):
 
 
 def blends(before, after):
-    """Strands become more like those beside them."""
+    """Assert that strands become more like their neighbors."""
     keeps_roots(before, after)
     nearest = np.linalg.norm(before.roots[:, None] - before.roots[None], axis=-1)
     np.fill_diagonal(nearest, np.inf)
@@ -159,7 +159,7 @@ def displaces(before, after):
 
 
 def subdivides(before, after):
-    """Rolls, curls and braids: finer curves that leave from the same place and go elsewhere."""
+    """Assert that rolls, curls and braids have finer curves with the same roots and another course."""
     assert len(after) == len(before) and len(after.points) > len(before.points)
     np.testing.assert_allclose(after.roots, before.roots, atol=1e-4)
     assert after.bends.mean() > 0.0 and np.linalg.norm(after.points, axis=1).max() < 1.0 + 1.5 * LENGTH
@@ -173,14 +173,16 @@ def duplicates(before, after):
 
 
 def interpolates(before, after):
-    """As many strands as the density and the sphere's area ask for, rooted on it, no longer than what they follow."""
+    """Assert that strands have the number by density and area, are rooted on the sphere, and are no longer than
+    their guides.
+    """
     assert len(after) == pytest.approx(10.0 * 4.0 * np.pi, rel=0.25)
     np.testing.assert_allclose(np.linalg.norm(after.roots, axis=1), 1.0, atol=CHORD)
     assert after.lengths.max() < 1.01 * before.lengths.max() and after.lengths.min() > 0.2 * before.lengths.min()
 
 
 def generates(before, after):
-    """New ones beside those that were there."""
+    """Assert that new strands are beside the former ones."""
     is_old = np.array([min(np.linalg.norm(before.roots - root, axis=1)) < 1e-6 for root in after.roots])
     assert is_old.sum() == len(before)
     assert (~is_old).sum() == pytest.approx(10.0 * 4.0 * np.pi, rel=0.25)
@@ -261,7 +263,7 @@ def test_a_hair_node_does_what_it_says(groom, name):
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_a_group_of_fields_knows_our_curves(groom, name):
-    """Each output is stored as an attribute of the curves, by a modifier around the group."""
+    """A group of fields reads our curves: a modifier stores each output as an attribute."""
     group = appended(name)
     wrapper = bpy.data.node_groups.new("Wrapper", "GeometryNodeTree")
     wrapper.is_modifier = True
@@ -290,7 +292,9 @@ def test_a_group_of_fields_knows_our_curves(groom, name):
 
 
 def test_hair_nodes_work_where_the_surface_is_now(groom):
-    """They come after the nodes that carry strands: on a twisted sphere, what is trimmed keeps its root there."""
+    """Hair nodes work on the deformed surface, after the nodes that carry strands: trimmed hair keeps its roots
+    there.
+    """
     twist = bpy.data.objects["Sphere"].modifiers.new("Twist", "SIMPLE_DEFORM")
     twist.deform_method, twist.angle = "TWIST", 2.0
     bpy.context.view_layer.update()
@@ -303,7 +307,7 @@ def test_hair_nodes_work_where_the_surface_is_now(groom):
 
 
 def test_clumps_are_those_of_the_guides(groom):
-    """Tips meet at the strand that stands for their guide: the curve that `guide_curve_index` names is among ours."""
+    """Clumps are those of the guides: tips meet at the strand that `guide_curve_index` names."""
     guides, hair = groom
     before, after = evaluated(hair, appended("Clump Hair Curves"), Factor=1.0)
     leader = attribute(hair, "guide_curve_index")

@@ -35,7 +35,9 @@ def test_hair_of_another_scene_grows_as_if_it_were_shown(hair):
 
 
 def test_a_file_beside_another_scene_stores_the_same_roots(hair, tmp_path):
-    """The roots are the same also if hair has its own transform, as after *Apply*."""
+    """A file saved beside another scene stores the same roots, also of hair with its own transform, as after
+    *Apply*.
+    """
     surface = hair.data.surface
     surface.modifiers.new("Subdivision", "SUBSURF").levels = 1
     bpy.context.view_layer.update()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Vellus writes, it reads back: guides as guides, hair as hair, with widths, identities, weights, unit, axis."""
+"""Vellus reads back what it writes: guides and hair with widths, identities, weights, unit and axis."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ FILES = {
 
 
 def shown(guides, hair):
-    """(guide points, guide widths, strand points, strand widths) in the world [m]."""
+    """Return (guide points, guide widths, strand points, strand widths) in the world [m]."""
     found = []
     for curves in (guides, hair):
         points = strand_arrays.world_points(curves)
@@ -42,7 +42,7 @@ def shown(guides, hair):
 
 
 def assert_same(found, expected):
-    """To the last tenth of a micrometer, and to the last bits of widths."""
+    """Assert equality to a tenth of a micrometer, and of widths to the last bits."""
     for values, wanted, tolerance in zip(found, expected, (1e-6, 1e-9, 1e-6, 1e-9), strict=True):
         np.testing.assert_allclose(values, wanted, rtol=0.0, atol=tolerance)
 
@@ -92,7 +92,7 @@ def test_a_groom_comes_back_as_it_was(sphere, scene, tmp_path, name, unit):
 
 @pytest.mark.parametrize("name", ["exported.usdc", "exported.abc", "groom.blend"])
 def test_groups_come_together_or_one_by_its_name(sphere, tmp_path, name):
-    """Strands keep to the guides of their own group."""
+    """Groups are read together or one by its name, and strands follow the guides of their own group."""
     settings = api.GroomSettings(
         api.GuideSettings(guide_count=GUIDE_COUNT), api.HairSettings(strand_count=STRAND_COUNT)
     )

@@ -12,7 +12,7 @@ SIDE = 16
 
 @pytest.fixture
 def image(sphere):
-    """A white image that a material of the sphere shows."""
+    """Return a white image that a material of the sphere shows."""
     image = bpy.data.images.new("Density", SIDE, SIDE)
     paint(image, slice(None))
     material = bpy.data.materials.new("Painted")
@@ -24,14 +24,14 @@ def image(sphere):
 
 @pytest.fixture
 def masked(image):
-    """Guides on what the image has white; not called `guides`, which would begin with a file that has some."""
+    """Return guides on the white part of the image; not named `guides`, which would load a file with guides."""
     bpy.ops.vellus.distribute_guides(guide_count=60, length=0.5, density_image="Density")
     bpy.context.view_layer.update()
     return bpy.data.objects["Guides"]
 
 
 def paint(image, columns, is_reported=True):
-    """White columns on black; is_reported: as an image that a stroke or an undo has changed."""
+    """Paint white columns on black; is_reported: as a stroke or an undo reports the image."""
     pixels = np.zeros((SIDE, SIDE, 4), np.float32)
     pixels[:, columns] = 1.0
     image.pixels.foreach_set(pixels.ravel())
@@ -77,7 +77,7 @@ def test_an_unchanged_image_moves_no_guide(masked, image):
 
 
 def test_guides_wait_until_painting_is_left(masked, image, sphere):
-    """Blender need not report an image when a stroke ends in the viewport."""
+    """Guides wait until painting is left, as Blender need not report an image when a stroke ends in the viewport."""
     before = points(masked)
     bpy.context.view_layer.objects.active = sphere
     bpy.ops.object.mode_set(mode="TEXTURE_PAINT")
@@ -99,7 +99,7 @@ def test_guides_without_auto_update_stay(masked, image):
 
 
 def test_an_image_painted_black_is_reported_until_it_is_painted_again(masked, image):
-    """The image is reported also for bound hair with unchanged settings, which loses no strands."""
+    """An image painted black is reported until it is painted again, also for bound hair, which loses no strands."""
     bpy.ops.vellus.interpolate_hair(strand_count=40)
     hair = next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR")
     hair.data.vellus.hair.density_image = "Density"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel, scripts and command line: the same settings give the same strands, bit by bit."""
+"""Panel, scripts and command line give the same strands, bit by bit, for the same settings."""
 
 import bpy
 import numpy as np
@@ -29,7 +29,7 @@ POSES = {
     params=[pytest.param(name, marks=() if name in {"stretched", "mirrored"} else pytest.mark.long) for name in POSES]
 )
 def surface(request, sphere):
-    """The sphere, standing in the world in one way or another."""
+    """Return the sphere with one of several transforms."""
     for name, value in POSES[request.param].items():
         setattr(sphere, name, value)
     bpy.context.view_layer.update()
@@ -103,7 +103,7 @@ def test_arrays_make_what_an_object_of_them_does(sphere):
 
 
 def test_settings_given_to_hair_that_is_there_make_the_same(surface):
-    """The hair equals hair grown with these settings."""
+    """Settings given to existing hair give the same strands as hair grown with these settings."""
     bpy.ops.vellus.add_hair(guide_count=25, strand_count=100)
     settings = api.GroomSettings(api.GuideSettings(**GUIDES), api.HairSettings(**HAIR, seed=SEED))
     hair = bpy.data.objects["Hair"]

@@ -31,7 +31,7 @@ def far(curves_object, lifted=0.0):
 
 @pytest.fixture
 def folded(scene):
-    """Hair on a folded quad, whose shape key makes Blender cut it otherwise."""
+    """Return hair on a folded quad, whose shape key makes Blender divide it differently."""
     mesh = bpy.data.meshes.new("Folded")
     mesh.from_pydata(QUAD, [], [(0, 1, 2, 3)])
     surface = bpy.data.objects.new("Folded", mesh)
@@ -76,7 +76,7 @@ def test_hair_that_follows_guides_of_another_surface_is_not_asked_for_but_told(h
 
 
 def test_curves_that_became_hair_begin_where_they_did(hair):
-    """Off the surface, as far as they store."""
+    """Curves that became hair begin as far off the surface as they store."""
     strands = points(hair) + np.float32((0.0, 0.0, 0.3))
     write_points(hair, strands)
     hair.data.vellus.kind = "NONE"
@@ -99,7 +99,9 @@ def test_roots_that_were_deleted_are_not_asked_for(hair):
 
 
 def test_what_the_walk_paints_is_there_after_undo_and_redo(hair):
-    """Blender brings the pixels of an image back, past its first step, only where they are in the file."""
+    """Pixels that the walk paints are restored by undo and redo, which Blender does only for images stored in the
+    file.
+    """
     bpy.ops.ed.undo_push(message="before")
     walking = Artist.__new__(Artist)
     PaintingSteps.paint_image(walking, number=1, of="hair", brightness=1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that fail halfway, or refuse, do not change the file and its folder."""
+"""Operators that fail halfway, or refuse, leave the file and its folder unchanged."""
 
 import contextlib
 import sys
@@ -25,7 +25,7 @@ MANY_PARTS = tuple((n + 1) / 30 for n in range(30))
 
 
 class Broken(Exception):
-    """What no function of ours raises."""
+    """An exception that no function of ours raises."""
 
 
 def things(name):
@@ -45,14 +45,14 @@ def on_sphere(_rng):
 
 
 def on_bare_mesh(_rng):
-    """Whose rest positions Blender does not store yet, and whose mirrored faces are to be told apart."""
+    """Set up a mesh whose rest positions Blender does not store yet, with mirrored faces to tell apart."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, location=(4.0, 0.0, 0.0))
     bpy.context.object.name = "Other"
     bpy.context.object.modifiers.new("Mirror", "MIRROR").use_axis[2] = True
 
 
 def on_other_mesh(rng):
-    """The hair is to be transferred to it, or read of a library."""
+    """Set up another mesh to which the hair is transferred, or on which it is read from a library."""
     on_bare_mesh(rng)
     api.add_style(bpy.data.hair_curves["Hair"], api.Curl(mask="top"))
     select(things("Hair"))
@@ -65,7 +65,7 @@ def on_drawn(rng, kind="CATMULL_ROM"):
 
 
 def on_splines(rng):
-    """A curve object: Blender converts it in place."""
+    """Set up a curve object, which Blender converts in place."""
     data = bpy.data.curves.new("Spline", "CURVE")
     data.dimensions = "3D"
     for line in lines_on(things("Sphere"), rng, 6):
@@ -140,7 +140,7 @@ def on_library(rng):
 
 
 def save_groom(path, name=""):
-    """As the operator does, but for a picture, which takes seconds to draw."""
+    """Save a groom as the operator does, without its picture, which takes seconds to draw."""
     hair, picture = bpy.data.hair_curves["Hair"], np.ones((8, 8, 4), np.float32)
     run_now(groom_library.saving(hair, path, name, "Hair/Short", picture))
 
@@ -202,7 +202,7 @@ CASES = [(name, *case) for name, cases in MAKING.items() for case in cases]
 
 
 def cases():
-    """Each of `CASES`, failing at two parts of its calls; that it fails at many takes long."""
+    """Return each of `CASES` failing at two of its calls; failing at many calls is `long`."""
     for place, case in enumerate(CASES):
         name = f"{case[0]}-{case[1].__name__}"
         yield pytest.param(*case, FEW_PARTS[place % 2], id=f"{name}-few")
@@ -214,7 +214,7 @@ def test_every_operator_is_one_that_makes_data_or_not():
 
 
 def run(name, settings, folder):
-    """Run an operator; whether it ended well."""
+    """Run an operator, and return whether it succeeded."""
     if name == "save_groom":  # the operator's libraries are those of the preferences
         save_groom(folder / "saved.blend")
         return True
@@ -223,7 +223,7 @@ def run(name, settings, folder):
 
 
 class Fault:
-    """Counts the calls of functions of the add-on while it is entered; that of a number fails."""
+    """Within the context, count the calls of functions of the add-on, and let that of a given number fail."""
 
     def __init__(self, number=0):
         self.number, self.count, self._before = number, 0, None
@@ -250,7 +250,7 @@ class Fault:
 
 
 def called_back(frame):
-    """Whether Blender has called what runs: it only prints the errors of handlers and of settings' functions."""
+    """Whether Blender has called the running function, as it only prints errors of handlers and property functions."""
     while frame is not None and "tests" not in frame.f_code.co_filename:
         if "/live/" in frame.f_code.co_filename or "/settings/" in frame.f_code.co_filename:
             return True
@@ -260,7 +260,7 @@ def called_back(frame):
 
 @pytest.mark.parametrize("name, begin, settings, parts", [*cases()])
 def test_what_fails_half_way_leaves_nothing(hair, tmp_path, name, begin, settings, parts):
-    """Any function of the add-on raises what nobody expects: the file is as before, and no file is half written."""
+    """An unexpected exception in any function of the add-on leaves the file as before, and no file half written."""
     FOLDER[:] = [tmp_path]
     begin(np.random.default_rng(1))
     bpy.context.view_layer.update()
@@ -392,7 +392,7 @@ def test_settings_that_the_interface_refuses_leave_the_surface_as_it_was(hair, t
 
 
 def test_a_mask_that_was_never_painted_is_saved_and_transferred(hair, tmp_path):
-    """Its vertex group has no vertices."""
+    """A mask that was never painted, whose vertex group has no vertices, is saved and transferred."""
     on_styled(None)
     bpy.ops.vellus.paint_style_mask()
     bpy.ops.object.mode_set(mode="OBJECT")

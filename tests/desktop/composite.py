@@ -36,12 +36,12 @@ def scene():
 
 
 def hair():
-    """The objects of hair of the scene."""
+    """Return the objects of hair of the scene."""
     return [o for o in scene().objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"]
 
 
 def pixels_of(path):
-    """(height, width, 3) display colors of a file."""
+    """Return (height, width, 3) display colors of a file."""
     image = bpy.data.images.load(str(path))
     pixels = np.array(image.pixels, np.float32).reshape(image.size[1], image.size[0], 4)
     bpy.data.images.remove(image)
@@ -49,7 +49,7 @@ def pixels_of(path):
 
 
 def differ(name, other):
-    """The mean difference of two pictures."""
+    """Return the mean difference of two pictures."""
     return float(np.abs(pixels_of(OUT / f"{name}.png") - pixels_of(OUT / f"{other}.png")).mean())
 
 
@@ -75,13 +75,13 @@ def rendering():
 
 
 def render(name):
-    """F12, into a file."""
+    """Render by F12 into a file."""
     begin_render(f"{name}.png", write_still=True)
     yield from rendering()
 
 
 def toggle():
-    """Press the button, which leaves a step of the undo history behind."""
+    """Press the button, which adds a step to the undo history."""
     with in_viewport():
         bpy.ops.vellus.toggle_composite("EXEC_DEFAULT", True)
     yield
@@ -99,7 +99,7 @@ def is_on():
 
 
 def browsers():
-    """[(window, area)] of file browsers."""
+    """Return [(window, area)] of file browsers."""
     windows = bpy.context.window_manager.windows
     return [(other, area) for other in windows for area in other.screen.areas if area.type == "FILE_BROWSER"]
 
@@ -108,7 +108,7 @@ def browsers():
 
 
 def build():
-    """The surfaces before a camera, one sample a pixel; the hair of one was deleted by hand."""
+    """Set up the surfaces before a camera with one sample per pixel, and delete the hair of one by hand."""
     install(ZIP)
     yield from any_scene.build(OUT)
     emptied = next(o for o in hair() if o.data.surface.name == "Scaled")
@@ -131,7 +131,7 @@ def build():
 
 
 def turn_on():
-    """Pictures by Cycles alone, and with the hair by Vellus; undone, and redone."""
+    """Take pictures by Cycles alone and with the hair by Vellus; undo and redo."""
     yield from render("own")
     yield from toggle()
     yield from render("on")
@@ -151,7 +151,7 @@ def animate():
 
 
 def reload_while_it_renders():
-    """Another file is opened in the middle of a render."""
+    """Open another file in the middle of a render."""
     bpy.ops.wm.save_as_mainfile(filepath=SCENE)
     scene().vellus.sample_count = 64
     yield
@@ -166,7 +166,7 @@ def reload_while_it_renders():
 
 
 def copy():
-    """The scene is copied with its objects; then the scene of the copy's hair is deleted."""
+    """Copy the scene with its objects, and delete the scene of the copy's hair."""
     with in_viewport():
         bpy.ops.scene.new(type="FULL_COPY")
     yield from wait_for(lambda: scene().vellus.hair_scene.background_set == scene(), 10.0)
@@ -184,7 +184,7 @@ def copy():
 
 
 def disable():
-    """Without the add-on, and with it again; then everything as before."""
+    """Disable and enable the add-on, and restore everything."""
     bpy.ops.preferences.addon_disable(module=MODULE)
     yield from render("disabled")
     bpy.ops.preferences.addon_enable(module=MODULE)
@@ -196,7 +196,7 @@ def disable():
 
 
 def focus():
-    """Our engine in the viewport through the camera, in focus and out of it."""
+    """Show our engine in the viewport through the camera, in focus and out of focus."""
     area, region = viewport()
     scene().render.engine, area.spaces.active.shading.type = "VELLUS", "RENDERED"
     area.spaces.active.region_3d.view_perspective = "CAMERA"
@@ -214,7 +214,7 @@ def focus():
 
 
 def export():
-    """Export Groom, where the file browser is told to, of hair that moves with its surface."""
+    """Export a groom of hair that moves with its surface, to the path in the file browser."""
     keyed = next(o for o in hair() if o.data.surface.name == "Keyed")
     bpy.context.view_layer.objects.active = keyed
     with in_viewport():

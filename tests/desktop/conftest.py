@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A desktop Blender, and profiles of it in which the extension is installed."""
+"""A desktop Blender, and profiles with the installed extension."""
 
 import fcntl
 import os
@@ -21,14 +21,14 @@ LONG_FILES = (
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Begin with the walks that take longest."""
+    """Run the walks that take longest first."""
     rank = {name: number for number, name in enumerate(LONG_FILES)}
     items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
 
 
 @pytest.fixture(scope="session")
 def desktop():
-    """The `DesktopBlender` of this machine."""
+    """Return the `DesktopBlender` of this machine."""
     try:
         return desktop_blender.find_or_install()
     except desktop_blender.Unavailable as reason:
@@ -36,7 +36,7 @@ def desktop():
 
 
 def _once(tmp_path_factory, name, make):
-    """The path that `make` makes of a folder: once, also where several processes test."""
+    """Return the path that `make` creates in a folder, once for all processes of tests."""
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent
@@ -51,7 +51,7 @@ def _once(tmp_path_factory, name, make):
 
 @pytest.fixture(scope="session")
 def extension(tmp_path_factory):
-    """The extension's zip."""
+    """Return the extension's zip."""
     return _once(
         tmp_path_factory,
         "extension",
@@ -61,7 +61,7 @@ def extension(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def new_profile(desktop, extension, tmp_path_factory):
-    """A function that returns a new profile in which the extension is installed, and its first-time setup done.
+    """Return a function that returns a new profile with the installed extension, after its first-time setup.
 
     Its files are links: what is written in place is written into all profiles.
     """

@@ -49,7 +49,7 @@ def build():
 
 
 def begin_render(name, sample_count):
-    """F12, into a file."""
+    """Render by F12 into a file."""
     scene = bpy.context.scene
     scene.vellus.sample_count, scene.render.filepath = sample_count, str(OUT / name)
     bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
@@ -57,7 +57,7 @@ def begin_render(name, sample_count):
 
 
 def disable():
-    """In mid-render: it renders on, and Blender handles its events; when that has ended the add-on goes."""
+    """Disable the add-on during a render: it continues, Blender handles events, and the add-on ends with the render."""
     yield from begin_render("disabled.png", SAMPLES)
     yield from wait(1.0)  # it draws
     start = time.monotonic()
@@ -75,7 +75,7 @@ def disable():
 
 
 def enable():
-    """Again; and what was disabled and enabled in one render stays."""
+    """Enable the add-on; it stays if it was disabled and enabled within one render."""
     bpy.ops.preferences.addon_enable(module=MODULE)
     yield
     facts["enable"] = {"there": is_there()}

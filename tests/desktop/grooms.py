@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A groom in a window: tubes by the dialog and the redo panel, and an asset applied from the shelf.
+"""Grooms in a window: tubes by the dialog and the redo panel, and an asset applied from the shelf.
 
 Steps of a walk in which there is hair.
 """
@@ -11,7 +11,7 @@ from tests.desktop.window import drag, in_viewport, press, take_picture, viewpor
 
 
 def tubes(hair, facts):
-    """Hair Tubes: the dialog, then fewer by the redo panel, then undone. Notes numbers of polygons."""
+    """Create tubes by the dialog, fewer by the redo panel, and undo; notes numbers of polygons."""
     with in_viewport():
         bpy.context.view_layer.objects.active = hair
         bpy.ops.ed.undo_push(message="Hair")
@@ -37,7 +37,8 @@ def _polygons():
 
 
 def shelf(hair, folder, facts):
-    """Save Groom to a library while the shelf is open; a click puts it on another mesh; undone. Notes numbers of hair.
+    """Save a groom to a library with the shelf open, apply it to another mesh by a click, and undo; notes numbers of
+    hair.
 
     folder: of the library, which does not exist yet.
     """

@@ -51,7 +51,7 @@ facts |= {"tools": {}, "tubes": {}, "shelf": {}}
 
 
 def guides():
-    """(G, 41, 3) positions."""
+    """Return (G, 41, 3) positions."""
     return curve_points(of_kind("GUIDES")).reshape(len(of_kind("GUIDES").data.curves), -1, 3)
 
 
@@ -60,20 +60,22 @@ def bound():
 
 
 def strands():
-    """(S, P, 3) positions as viewports show them, which may not be written yet."""
+    """Return (S, P, 3) positions as viewports show them, which may not be written yet."""
     if bound() is not None:
         return bound().shown.points.copy()
     return curve_points(of_kind("HAIR")).reshape(len(of_kind("HAIR").data.curves), -1, 3)
 
 
 def are_in(rows, others):
-    """Whether each row of (N, 41, 3) is one of others, to the last bit."""
+    """Whether each row of (N, 41, 3) equals one of the others, to the last bit."""
     known = {row.tobytes() for row in others}
     return all(row.tobytes() in known for row in rows)
 
 
 def groom():
-    """Hair on a sphere, its guides waved, one eighth of them selected in Sculpt Mode; two empties to cut with."""
+    """Set up hair on a sphere with waved guides, an eighth of them selected in Sculpt Mode, and two empties as
+    cutters.
+    """
     install(ZIP)
     refine_to()
     for thing in list(bpy.data.objects):
@@ -104,7 +106,7 @@ def groom():
 
 
 def use(name):
-    """One tool: facts about guides and hair after each step."""
+    """Use a tool, and note facts about guides and hair after each step."""
     before, hair_before = guides(), strands()
     is_chosen = (before[:, 0] > 0.0).all(axis=1)
     with in_viewport():
@@ -151,7 +153,7 @@ def use(name):
 
 
 def comb_straight():
-    """Hair with a style is shown without it in Sculpt Mode, and while a brush combs; with it afterwards.
+    """Show styled hair without its style in Sculpt Mode and while a brush combs, and with its style afterwards.
 
     The guides are hidden before: combing shows them.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copies of hair by each of Blender's commands: with guides of their own, or with a message and a button."""
+"""Copies of hair by each of Blender's commands have guides of their own, or a message and a button."""
 
 import bpy
 import numpy as np
@@ -26,7 +26,7 @@ def comb(guides, amount=0.2):
 
 @pytest.fixture
 def second(hair):
-    """Another hair system on the same sphere."""
+    """Add another hair system on the same sphere."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
     bpy.ops.vellus.add_hair(guide_count=30, strand_count=80, length=0.2)
     made = next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR" and o != hair)
@@ -51,7 +51,7 @@ def alt_d_then_single_user():
 
 
 def alt_d_then_single_user_one_after_another():
-    """Hair before guides and guides before hair."""
+    """Copy hair before guides, and guides before hair."""
     select(*ALL)
     bpy.ops.object.duplicate(linked=True)
     for name in ("Sphere", "Hair", "Guides", "Second Guides", "Second"):
@@ -158,7 +158,7 @@ def test_a_linked_duplicate_of_a_surface_with_its_hair_may_be_moved_without_a_wa
 
 
 def test_own_guides_on_a_surface_of_another_shape_give_strands_new_roots(hair):
-    """Hair that followed guides of another surface is rooted on that one."""
+    """On a surface of another shape, Make Own Guides gives strands new roots."""
     bpy.ops.mesh.primitive_cube_add(size=3.0)
     cube = bpy.context.object
     hair.data.surface, hair.parent = cube, cube
@@ -203,7 +203,9 @@ def test_pasted_into_another_file(hair, second):
 
 
 def test_what_was_deleted_together_is_not_missed(hair, second):
-    """Blender keeps the Curves of deleted objects until the file is saved."""
+    """Objects that were deleted together are not missed, although Blender keeps their Curves until the file is
+    saved.
+    """
     select("Guides", "Hair")
     bpy.ops.object.delete()
     sphere = bpy.data.objects["Sphere"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair duplicated, linked, appended, overridden, in two scenes, and while the add-on is off."""
+"""Hair can be duplicated, linked, appended, overridden, in two scenes, and in a file without the add-on."""
 
 import dataclasses
 import math
@@ -33,7 +33,7 @@ def comb(guides, amount):
 
 
 def test_a_duplicated_head_has_hair_of_its_own(hair):
-    """Shift-D of surface, guides and hair: combing one leaves the other alone."""
+    """A duplicated head has its own hair: combing one head leaves the other unchanged."""
     select("Sphere", "Guides", "Hair")
     bpy.ops.object.duplicate()
     bpy.context.view_layer.update()
@@ -58,7 +58,7 @@ def test_duplicated_hair_follows_the_same_guides(hair):
 
 
 def test_duplicated_hair_has_a_look_of_its_own(hair):
-    """Blender lets a duplicate share its material: another look must not repaint the first."""
+    """Duplicated hair has its own look, although Blender lets a duplicate share its material."""
     select("Hair")
     bpy.ops.object.duplicate()
     bpy.context.view_layer.update()
@@ -91,7 +91,7 @@ def test_a_full_copy_of_the_scene_is_on_its_own(hair):
 
 @pytest.fixture
 def groom_file(hair, tmp_path):
-    """A .blend with hair, and another one that is open."""
+    """Return a .blend with hair, while another file is open."""
     path = tmp_path / "groom.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -99,7 +99,7 @@ def groom_file(hair, tmp_path):
 
 
 def bring(path, is_linked):
-    """The hair object of a file, linked or appended, in the scene."""
+    """Return the hair object of a file, linked or appended, in the scene."""
     with bpy.data.libraries.load(str(path), link=is_linked) as (_source, target):
         target.objects = ["Hair"]
     for brought in bpy.data.objects:
@@ -119,7 +119,7 @@ def test_appended_hair_brings_what_it_follows(groom_file):
 
 
 def linked_guides(file):
-    """The guides of a file, linked, after Blender has evaluated their surface."""
+    """Return the linked guides of a file, after Blender has evaluated their surface."""
     return bring(file, is_linked=True).data.vellus.guide_curves
 
 
@@ -160,7 +160,7 @@ LINKED = {
 
 @pytest.mark.parametrize("operator", LINKED)
 def test_linked_hair_is_left_alone(groom_file, operator):
-    """Blender would take the change and lose it on reload."""
+    """Linked hair is not changed, as Blender would lose the change on reload."""
     hair = bring(groom_file, is_linked=True)
     before, made = snapshot(), points(hair)
     with pytest.raises(RuntimeError, match="is linked from another file"):
@@ -180,7 +180,9 @@ def test_linked_hair_is_drawn_and_settings_change_nothing(groom_file):
 
 
 def test_linked_hair_keeps_the_materials_of_its_file(groom_file):
-    """Undo frees a material of this file and leaves what is linked alone: the next one would end Blender."""
+    """Linked hair keeps the materials of its file when undo frees materials of this file, which once made Blender
+    crash.
+    """
     hair = bring(groom_file, is_linked=True)
     linked = list(hair.data.materials)
     hair.data.vellus.appearance.roughness = 0.9
@@ -283,7 +285,7 @@ def test_a_removed_material_comes_back(hair):
 
 
 def held(value, depth=3):
-    """Yield all that a value refers to, itself first, through containers, caches and dataclasses."""
+    """Yield a value and all that it refers to, through containers, caches and dataclasses."""
     yield value
     if depth == 0:
         return
@@ -301,7 +303,9 @@ def held(value, depth=3):
 
 
 def test_no_module_keeps_blenders_data(hair):
-    """A reference that outlives its owner is a crash to come: none in any module after all of them had work to do."""
+    """No module holds a reference to Blender's data after all had work to do, as a reference to freed data would
+    crash.
+    """
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location.z = 5.0
     bpy.context.scene.collection.objects.link(camera)
@@ -319,7 +323,7 @@ def test_no_module_keeps_blenders_data(hair):
 
 
 def test_a_surface_without_faces_is_reported(hair):
-    """Guides remember triangles that are gone."""
+    """A surface without faces is reported, for guides whose triangles no longer exist."""
     sphere = bpy.data.objects["Sphere"]
     before = points(hair)
     sphere.data.clear_geometry()

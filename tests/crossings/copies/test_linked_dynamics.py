@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulated characters linked by a shot: baked in the shot, with the same motion as in their own file."""
+"""Simulated characters linked by a shot are baked in the shot, and move as in their own file."""
 
 import shutil
 
@@ -18,7 +18,7 @@ HOW_MANY = '"Hair" keeps the {} strands of its file: change them there.'
 
 @pytest.fixture
 def character(hair, tmp_path):
-    """(file of hair that swings, its points in a frame as they are in that file), not baked there."""
+    """Return (file of hair that swings, without baked frames; its points in a frame)."""
     surface, guides = bpy.data.objects["Sphere"], bpy.data.objects["Guides"]
     collection = bpy.data.collections.new("Character")
     for part in (surface, guides, hair):
@@ -42,7 +42,7 @@ def bake(last=FRAME):
 
 
 def shot_of(path, folder, way):
-    """A new file that links a character; returns its path."""
+    """Save a new file that links a character, and return its path."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     shot = folder / "shot.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(shot))
@@ -66,7 +66,7 @@ def shot_of(path, folder, way):
 
 
 def shown_hair():
-    """The object of the hair that is in the shot."""
+    """Return the object of the hair in the shot."""
     found = [o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"]
     return next((o for o in found if o.override_library is not None), found[0])
 
@@ -96,7 +96,9 @@ def test_a_shot_bakes_and_shows_a_linked_character(character, tmp_path, way):
 
 @pytest.mark.parametrize("way", ["linked", "local"])
 def test_linked_hair_keeps_its_strands_and_local_hair_between_linked_guides_does_not(character, tmp_path, way):
-    """Blender resizes no Curves of another file: a sentence says so, and the hair stays as it was."""
+    """Linked hair keeps its strands, and local hair between linked guides is refused with a sentence and stays as it
+    was.
+    """
     path, there = character
     shot_of(path, tmp_path, "linked")
     bpy.context.scene.frame_set(FRAME)
@@ -131,7 +133,7 @@ def test_a_shot_has_settings_of_its_own(character, tmp_path):
 
 
 def test_characters_of_files_with_one_name_have_frames_of_their_own(character, tmp_path):
-    """Two folders with a character.blend each; the project may be moved as a whole."""
+    """Characters in files of one name in two folders have separate frames, also when the project is moved."""
     path, _there = character
     project, moved = tmp_path / "project", tmp_path / "moved"
     for owner in ("one", "other"):
@@ -156,7 +158,9 @@ def test_characters_of_files_with_one_name_have_frames_of_their_own(character, t
 
 
 def test_shots_in_one_folder_have_frames_of_their_own(character, tmp_path):
-    """A shot that was saved from another plays the other's frames until it is baked."""
+    """Shots in one folder have separate frames, except that a shot saved from another plays its frames until it is
+    baked.
+    """
     path, there = character
     shutil.rmtree(path.parent / "haircache")
     first = shot_of(path, tmp_path, "linked")

@@ -17,7 +17,7 @@ COMBED = ("Guides", "Kept", "Made")
 
 @pytest.fixture(scope="module")
 def placed_file(blender, tmp_path_factory):
-    """A file with hair on a turned surface that a modifier bends."""
+    """Save a file with hair on a turned surface that a modifier bends."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bend = placed_hair.grow("turned").modifiers.new("Bend", "SIMPLE_DEFORM")
     bend.deform_method, bend.angle = "BEND", 0.5
@@ -27,7 +27,7 @@ def placed_file(blender, tmp_path_factory):
 
 
 def attach_all(other, is_picked):
-    """By selecting the mesh too, or by picking it in the panel before."""
+    """Attach all hair to a mesh that is selected, or was picked in the panel before."""
     for name in COMBED:
         select(*([] if is_picked else [other]), bpy.data.objects[name])
         if is_picked:
@@ -37,7 +37,7 @@ def attach_all(other, is_picked):
 
 
 def stand(place):
-    """A mesh of the same shape in the world as the body is seen in, whose object stands at one of `PLACES`."""
+    """Add a mesh with the body's visible shape in the world, whose object is at one of `PLACES`."""
     body = bpy.data.objects["Body"]
     mesh = bpy.data.meshes.new_from_object(body.evaluated_get(bpy.context.evaluated_depsgraph_get()))
     other = bpy.data.objects.new("Other", mesh)
@@ -72,7 +72,7 @@ def test_attached_hair_stays_where_it_is(placed_file, place, is_deleted, is_pick
 
 @pytest.mark.parametrize("is_reopened", [False, True])
 def test_hair_without_a_parent_follows_a_surface_that_is_renamed(placed_file, tmp_path, is_reopened):
-    """It was not picked: only its name is another."""
+    """Hair without a parent follows its surface when the surface is renamed, which picks no other surface."""
     bpy.ops.wm.read_homefile(filepath=placed_file)
     for name in ("Guides", "Kept"):
         bpy.data.objects[name].parent = None

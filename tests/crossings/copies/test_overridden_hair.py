@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair of a library override: Blender stores its dynamics alone. All else is refused; it is drawn and played."""
+"""Overridden hair keeps its own dynamics, which Blender stores; all other changes are refused, and it is drawn and
+played.
+"""
 
 import bpy
 import numpy as np
@@ -16,14 +18,14 @@ REFUSED = "is a library override: make it local first"
 
 @pytest.fixture
 def styled(hair):
-    """Hair with styles that the character's file has."""
+    """Return hair with styles of the character's file."""
     api.set_styles(hair.data, [api.Clump(size=0.2), api.Curl(radius=0.02)])
     update()
     return hair
 
 
 def state_of(part):
-    """All that a groom stores in Curves."""
+    """Return everything that a groom stores in Curves."""
     state = part.data.vellus
     kinds = [style.kind for style in state.styles]
     groups = [[getattr(group, name) for name in group.keys()] for group in (state.guides, state.hair, state.appearance)]

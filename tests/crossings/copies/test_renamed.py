@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Data that settings refer to, renamed, deleted, unlinked or appended: followed, or reported."""
+"""Data that settings refer to are followed or reported when renamed, deleted, unlinked or appended."""
 
 import bpy
 import numpy as np
@@ -21,7 +21,7 @@ LAST = 4
 
 @pytest.fixture
 def collider(guides, tmp_path):
-    """A ball among the guides, which they collide with, in a collection of the scene."""
+    """Add a ball among the guides, which collide with it, in a collection of the scene."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=0.5, location=(1.3, 0.0, 0.0))
     ball, body = bpy.context.object, bpy.data.collections.new("Body")
     bpy.context.scene.collection.children.link(body)
@@ -33,7 +33,7 @@ def collider(guides, tmp_path):
 
 
 def baked(guides):
-    """(G, P, 3) points of guides in the last frame, local at rest."""
+    """Return (G, P, 3) points of guides in the last frame, local at rest."""
     api.bake_dynamics(guides, LAST, starts_over=True)
     bpy.context.scene.frame_set(LAST)
     return simulated_guides.point_cache.get(guides.data.session_uid).copy()
@@ -68,7 +68,9 @@ def test_a_bake_without_its_colliders_is_refused(guides, collider, lose, sentenc
 
 
 def test_a_bake_whose_collider_is_not_evaluated_is_refused(guides, collider, monkeypatch):
-    """If only a name refers to it, as from a library override; it would stand still, or be at the origin."""
+    """A bake is refused if a collider is not evaluated, as in a library override, where it would stand still or be
+    at the origin.
+    """
     del guides.data["vellus_named"]
     for module in (file_changes, guide_baking):
         monkeypatch.setattr(module.followed_names, "follow", lambda: None)
@@ -80,7 +82,7 @@ def test_a_bake_whose_collider_is_not_evaluated_is_refused(guides, collider, mon
 
 @pytest.fixture
 def line(hair):
-    """A part line across the sphere, which also cuts hair, and an image that is painted on one half."""
+    """Add a part line across the sphere, which also cuts hair, and an image that is painted on one half."""
     curve = bpy.data.curves.new("Line", "CURVE")
     curve.dimensions = "3D"
     spline = curve.splines.new("POLY")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene setting for EEVEE's strand width, in each scene to which hair is added."""
+"""Each scene to which hair is added gets the setting for EEVEE's strand width."""
 
 import bpy
 import pytest
@@ -10,7 +10,7 @@ from tests.support.pictures.rendering import add_orthographic_camera
 
 @pytest.fixture
 def character(hair, tmp_path):
-    """The file of a collection with hair."""
+    """Return the file of a collection with hair."""
     collection = bpy.data.collections.new("Character")
     for part in (bpy.data.objects[name] for name in ("Sphere", "Guides", "Hair")):
         bpy.context.scene.collection.objects.unlink(part)
@@ -23,7 +23,7 @@ def character(hair, tmp_path):
 
 @pytest.fixture
 def rendered_type():
-    """A function that renders a scene in the background; returns how that render draws hair."""
+    """Return a function that renders a scene in the background, and returns how that render draws hair."""
     seen = []
 
     class Look(bpy.types.RenderEngine):
@@ -46,7 +46,7 @@ def rendered_type():
 
 
 def bring(way, path):
-    """Bring the character to the scene of an empty file, as a script does, which updates nothing."""
+    """Link the character to the scene of an empty file without an update, as a script does."""
     scene, within = bpy.context.scene, {"directory": f"{path}/Collection/", "filename": "Character"}
     if way == "appended":
         bpy.ops.wm.append(**within)

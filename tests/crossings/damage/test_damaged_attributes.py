@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Our attributes that were removed, retyped or overwritten count as missing or stale."""
+"""Attributes of ours that were removed, retyped or overwritten count as missing or outdated."""
 
 import bpy
 import numpy as np
@@ -39,7 +39,7 @@ FLOATS = {"not a number": np.nan, "infinite": np.inf, "negative": -1.0, "huge": 
 
 
 def retype(datablock, name, kind):
-    """Remove an attribute, and make one of another (type, domain) by its name unless that is None."""
+    """Replace an attribute by one with another (type, domain) and its name, or remove it for None."""
     if name in datablock.attributes:
         datablock.attributes.remove(datablock.attributes[name])
     if kind is not None:
@@ -48,7 +48,7 @@ def retype(datablock, name, kind):
 
 
 def fill(datablock, name, value):
-    """Give all of an attribute one value."""
+    """Set all elements of an attribute to one value."""
     attribute = datablock.attributes[name]
     is_vector = attribute.data_type in {"FLOAT2", "FLOAT_VECTOR"}
     width = {"FLOAT2": 2, "FLOAT_VECTOR": 3}.get(attribute.data_type, 1)
@@ -58,14 +58,14 @@ def fill(datablock, name, value):
 
 
 def bend():
-    """Let a modifier carry the sphere's hair elsewhere."""
+    """Let a modifier move the sphere's hair."""
     twist = bpy.data.objects["Sphere"].modifiers.new("Twist", "SIMPLE_DEFORM")
     twist.deform_method, twist.angle = "TWIST", 1.0
     update()
 
 
 def use_all(folder):
-    """Everything that reads hair: drawn at rest and carried, re-evaluated, an edited surface, saved."""
+    """Draw hair at rest and deformed, evaluate it again, edit its surface, and save it."""
     sphere, hair, guides = (bpy.data.objects[name] for name in ("Sphere", "Hair", "Guides"))
     update()
     assert all(np.isfinite(drawn_points(shown)).all() for shown in (hair, guides))
@@ -110,7 +110,7 @@ def test_attributes_of_impossible_values_are_stale(lit, integer, number, tmp_pat
 
 
 def test_damaged_roots_are_found_again_where_strands_begin(lit):
-    """The nearest place of the surface, as if nothing had been stored: strands are carried with it."""
+    """Damaged roots are replaced by the nearest places of the surface, and strands follow it from these."""
     bend()
     expected = api.points(lit)
     for name, value in (("root_vertex_2", 2**31 - 1), ("root_barycentric", np.nan)):
@@ -122,7 +122,7 @@ def test_damaged_roots_are_found_again_where_strands_begin(lit):
 
 
 def test_damaged_roots_are_not_kept(lit):
-    """A changed setting places strands again, whose roots were those that are stored."""
+    """Damaged roots are not kept when a changed setting places strands again."""
     fill(lit.data, "root_barycentric", 1e9)
     lit.data.vellus.hair.tip_taper = 0.5
     curves_door_roots = points(lit)[:, 0]
@@ -133,7 +133,9 @@ def test_damaged_roots_are_not_kept(lit):
 
 @pytest.mark.parametrize("kind", [("FLOAT", "POINT"), ("FLOAT_VECTOR", "CORNER"), ("FLOAT_VECTOR", "POINT")])
 def test_foreign_rest_positions_are_ignored(lit, kind):
-    """One of the right type holds no numbers: Blender writes over it once it is asked to."""
+    """Foreign rest positions of the right type and without numbers are ignored, and Blender replaces them when
+    asked.
+    """
     sphere = bpy.data.objects["Sphere"]
     sphere.add_rest_position_attribute = False
     sphere.data.attributes.new("rest_position", *kind)

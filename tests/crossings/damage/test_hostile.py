@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Degenerate meshes, numbers and curves: hair grows correctly, or one message says why not."""
+"""Degenerate meshes, numbers and curves grow correct hair, or one message says why not."""
 
 import math
 
@@ -57,7 +57,7 @@ def make(vertices, faces, name="Odd"):
 
 
 def grow(**changes):
-    """(guides, hair) objects on the active mesh."""
+    """Return the new (guides, hair) objects on the active mesh."""
     arguments = {"guide_count": 12, "strand_count": 60, "relax_iterations": 3, "length": 0.1, **changes}
     assert bpy.ops.vellus.add_hair(**arguments) == {"FINISHED"}
     hair = bpy.context.object
@@ -132,7 +132,7 @@ def test_hair_scales_with_its_surface(sphere, scale):
 @pytest.mark.parametrize("rotation", [(0.4, 0.0, 0.3), (math.pi, 1.0, 0.0)])
 @pytest.mark.parametrize("curvature", [0.0, 1.0])
 def test_turning_a_surface_moves_no_root(sphere, rotation, curvature):
-    """Placed on the turned mesh, roots came a third of their distance elsewhere: relaxation amplifies rounding."""
+    """Turning a surface moves no root, although relaxation on the turned mesh would amplify rounding."""
     expected = [points(curves_object)[:, 0] for curves_object in grow(guide_count=100, curvature=curvature)]
     bpy.ops.vellus.delete_hair()
     sphere.rotation_euler = rotation
@@ -144,7 +144,7 @@ def test_turning_a_surface_moves_no_root(sphere, rotation, curvature):
 
 @pytest.mark.parametrize("scale", [(2, 2, 2), (-2, 2, 2), (2, 1, 1), (-1, 2, 1)])
 def test_symmetric_guides_mirror_the_objects_own_axis(sphere, scale):
-    """However it is turned and scaled; an ico sphere is its own image to a few thousandths."""
+    """Symmetric guides mirror across the object's own axis, however it is turned and scaled."""
     sphere.rotation_euler, sphere.scale = (0.3, 0.2, 0.5), scale
     bpy.context.view_layer.update()
     bpy.ops.vellus.distribute_guides(guide_count=20, symmetric=True, relax_iterations=3, length=0.3)
@@ -166,7 +166,7 @@ def test_hair_grows_outwards_on_a_mirrored_surface(sphere, scale):
 
 
 def test_mirroring_a_surface_roots_nothing_anew(sphere):
-    """Faces are wound the other way in the world, but they are the same faces."""
+    """A mirrored surface gives no new roots: its faces are the same, although wound the other way in the world."""
     guides, _hair = grow()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     before = scene_door.read_surface(sphere, depsgraph)
@@ -177,7 +177,9 @@ def test_mirroring_a_surface_roots_nothing_anew(sphere):
 
 
 def test_a_rotated_parent_bends_hair_by_the_worlds_gravity(sphere):
-    """Upside down under a parent, guides lean the other way in their own coordinates."""
+    """A rotated parent bends hair by the world's gravity: upside down, guides lean the other way in their
+    coordinates.
+    """
     upright = points(grow(gravity=1.0)[0])
     bpy.ops.vellus.delete_hair()
     parent = bpy.data.objects.new("Parent", None)
@@ -226,7 +228,7 @@ def test_hair_is_drawn_on_the_faces_that_a_modifier_makes(sphere, kind):
 
 
 def test_a_surface_that_becomes_non_finite_is_reported(sphere):
-    """Hair is not carried to such positions, and drawing does not crash Blender."""
+    """A surface that becomes non-finite is reported, its hair is not moved, and drawing does not crash Blender."""
     guides, hair = grow()
     before = points(hair)
     sphere.data.vertices[0].co.x = math.nan
@@ -269,7 +271,7 @@ def test_hair_waits_until_a_mode_is_left(sphere, mode):
 
 @pytest.mark.parametrize("guide_count", [1, 2, 500])
 def test_any_number_of_guides_will_do(scene, guide_count):
-    """More guides than the mesh has faces, and one for all hair."""
+    """Any number of guides works, from one for all hair to more than the mesh has faces."""
     make(SQUARE, [(0, 1, 2, 3)])
     guides, hair = grow(guide_count=guide_count)
     assert len(guides.data.curves) == guide_count
@@ -279,7 +281,9 @@ def test_any_number_of_guides_will_do(scene, guide_count):
 
 @pytest.mark.parametrize("distance", [0.0, -1.0, 1e-9, 1e5])
 def test_any_influence_distance_will_do(guides, distance):
-    """Roots without a guide in reach follow the nearest; a distance far beyond the mesh reaches all guides."""
+    """Any influence distance works: without guides in reach roots follow the nearest, and a huge one reaches all
+    guides.
+    """
     assert bpy.ops.vellus.interpolate_hair(strand_count=80, automatic_influence=False, influence_distance=distance) == {
         "FINISHED"
     }
@@ -290,7 +294,7 @@ def test_any_influence_distance_will_do(guides, distance):
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1.0])
 @pytest.mark.parametrize(("group", "settings_class"), [("guides", GuideSettings), ("hair", HairSettings)])
 def test_unusual_property_values_grow_hair_or_are_reported(hair, group, settings_class, value):
-    """However they came there, by a driver or a file: what is drawn stays finite."""
+    """Unusual property values from drivers or files grow finite hair or are reported."""
     hair.data.vellus.hair.automatic_influence = False
     for name, default, _details in declared(settings_class):
         if not isinstance(default, float):
@@ -311,7 +315,7 @@ def test_unusual_property_values_grow_hair_or_are_reported(hair, group, settings
 
 @pytest.mark.parametrize("sizes", [(1, 1, 1), (2, 7, 41), (3, 300)])
 def test_guides_of_any_point_counts_are_followed(sphere, sizes):
-    """Guides may be drawn by the artist, or come from another tool."""
+    """Guides with any point counts are followed, as drawn by an artist or made by another tool."""
     guides, _hair = grow(guide_count=len(sizes))
     first = points(guides)[:, 0]
     guides.data.remove_curves()
@@ -357,7 +361,7 @@ def test_hair_without_guides_left_keeps_what_it_has(hair):
 
 
 def test_a_file_whose_hair_is_no_curves_is_refused(guides):
-    """A file may hold any number under our names: they are read through the settings' ranges."""
+    """A file whose hair is no Curves is refused, and numbers under our names are read through the settings' ranges."""
     state = guides.data.vellus
     state.guides["guide_count"] = -5
     with pytest.raises(Exception, match="Guide count must be"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Damaged files: every reader raises one message or returns valid values; no traceback, no hang, no crash."""
+"""Damaged files make every reader raise one message or return valid values, without traceback, hang or crash."""
 
 import re
 import subprocess
@@ -56,13 +56,13 @@ OTHERS = {
 
 
 def reading_modules():
-    """Modules of the add-on that call one of `READING`."""
+    """Return the modules of the add-on that call one of `READING`."""
     paths = ADDON.rglob("*.py")
     return {path.relative_to(ADDON).as_posix() for path in paths if READING.search(path.read_text(encoding="utf-8"))}
 
 
 def test_every_reader_has_mutants():
-    """For each reader of the add-on, `readers.py` has a file to damage or a reason why not."""
+    """Every reader of the add-on has a file to damage in `readers.py`, or a reason why not."""
     known, reading = {reader.module for reader in readers().values()}, reading_modules()
     assert reading - known - OTHERS.keys() == set()
     assert OTHERS.keys() - reading == set()

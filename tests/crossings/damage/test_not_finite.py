@@ -21,7 +21,7 @@ def nothing_said():
 
 
 def lamp(kind, owner, name, value):
-    """A light that is set to be wrong."""
+    """Add a light for non-finite values."""
 
     def make():
         light = bpy.data.lights.new("Bad", kind)

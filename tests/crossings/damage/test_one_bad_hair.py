@@ -20,7 +20,7 @@ SMALL = {"width": 24, "height": 18}
 
 @pytest.fixture
 def two(lit):
-    """(bad, good) hair between the same guides; the bad one comes first by its name."""
+    """Return (bad, good) hair between the same guides; the bad hair comes first by name."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
     bpy.ops.vellus.interpolate_hair(strand_count=40, radius=0.004)
     lit.name = lit.data.name = "A bad one"
@@ -28,7 +28,7 @@ def two(lit):
 
 
 def unwritten(hair, growing):
-    """Hair whose points are computed, and wait to be written."""
+    """Return hair whose computed points are not written yet."""
     bound = bindings.of(hair.data)
     bound.growing, bound.is_written, bound.has_moved_only = growing, False, True
 

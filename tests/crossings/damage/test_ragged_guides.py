@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides of 2 to 200 points each: drawn, exported, edited and combed as guides of one count are."""
+"""Guides of 2 to 200 points each are drawn, exported, edited and combed like guides of one count."""
 
 import bpy
 import numpy as np
@@ -20,14 +20,14 @@ from tests.support.reading import write_points
 
 @pytest.fixture
 def ragged(sphere, rng):
-    """80 guides of 2 to 200 points, and hair between them."""
+    """Return 80 guides of 2 to 200 points, and hair between them."""
     made = curves_object(list(lines_on(sphere, rng, 80, 2, 200)))
     use(made, radius=0.004)
     return made
 
 
 def ends(points, counts):
-    """(G, 2, 3): the first and the last point of each curve."""
+    """Return (G, 2, 3): the first and the last point of each curve."""
     last = np.cumsum(counts) - 1
     return np.stack([points[last - counts + 1], points[last]], axis=1)
 
@@ -68,7 +68,9 @@ def test_strands_follow_a_stroke_as_if_made_anew(ragged, sphere, monkeypatch, ki
 
 
 def test_catmull_rom_guides_are_read_as_blender_draws_them(sphere):
-    """A half circle through seven points: on its way between them too."""
+    """Catmull-Rom guides are read as Blender draws them, also between their points: a half circle through seven
+    points.
+    """
     turn = np.linspace(0.0, np.pi, 7)
     arc = np.stack([np.cos(turn), 0.0 * turn, 1.0 + np.sin(turn)], axis=1)
     for kind, is_round in (("CATMULL_ROM", True), ("POLY", False)):

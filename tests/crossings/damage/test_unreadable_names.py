@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names that are not UTF-8, as in damaged .blend files, which Python cannot read, and very long names."""
+"""Very long names, and names that are not UTF-8 in damaged files, which Python cannot read, are handled."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_hair_of_unreadable_names_is_drawn_edited_and_saved(tmp_path):
-    """Also layers of guides, which can be renamed."""
+    """Hair with unreadable names is drawn, edited and saved, and its layers of guides can be renamed."""
     program = [sys.executable, "-m", "tests.support.walk.walk_unreadable_names", str(tmp_path)]
     done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, errors="replace", timeout=120)
     assert done.returncode == 0 and "all was used" in done.stdout, done.stderr[-3000:]
@@ -23,7 +23,7 @@ def test_hair_of_unreadable_names_is_drawn_edited_and_saved(tmp_path):
 
 
 def test_names_of_any_length_are_names(sphere):
-    """Blender cuts them where they are too long."""
+    """Names of any length can be used, and Blender truncates them where they are too long."""
     sphere.vertex_groups["top"].name = sphere.name = "ä" * 300
     name = sphere.vertex_groups[0].name
     guides = api.distribute_guides(sphere, guide_count=10, density_group=name)

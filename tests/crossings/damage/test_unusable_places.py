@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms on unusable meshes, and unusable curves: one message, and nothing is left behind."""
+"""Grooms on unusable meshes and unusable curves give one message and leave nothing behind."""
 
 import bpy
 import numpy as np
@@ -13,7 +13,7 @@ from tests.support.reading import snapshot
 
 @pytest.fixture
 def target(hair):
-    """A second sphere, beside the hairy one."""
+    """Add a second sphere beside the hairy one."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, location=(3.0, 0.0, 0.0))
     bpy.context.object.name = "Target"
     update()
@@ -60,7 +60,9 @@ def test_a_mesh_that_cannot_take_a_groom_is_one_sentence(hair, target, tmp_path,
 
 @pytest.mark.parametrize("operator", ["use_as_guides", "use_as_hair"])
 def test_curves_on_a_mesh_that_viewports_hide_are_one_sentence(sphere, lines, operator):
-    """Its modifiers would be left out, and its transform may be an old one."""
+    """Curves on a mesh that viewports hide are refused with one sentence, as its modifiers and transform may be
+    outdated.
+    """
     before = stored(lines).copy()
     hidden_in_viewports(sphere)
     update()
@@ -72,7 +74,7 @@ def test_curves_on_a_mesh_that_viewports_hide_are_one_sentence(sphere, lines, op
 
 @pytest.fixture
 def linked_mesh(target, tmp_path):
-    """The second sphere as an object of this file whose mesh is linked."""
+    """Return the second sphere as a local object whose mesh is linked."""
     path, mesh = tmp_path / "library.blend", target.data
     bpy.data.libraries.write(str(path), {mesh})
     name = mesh.name
@@ -84,7 +86,7 @@ def linked_mesh(target, tmp_path):
 
 
 def test_masks_are_not_painted_on_a_linked_mesh(hair, sphere, linked_mesh, rng, tmp_path):
-    """Blender paints them there, and has lost them when the file is opened again."""
+    """Masks are not painted on a linked mesh, where Blender would lose them when the file is opened again."""
     hair.data.vellus.guide_curves.vellus.guides.density_group = "top"
     update()
     file = api.save_groom(hair, tmp_path / "Bob.blend", picture=np.zeros((4, 4, 4)))
@@ -116,7 +118,7 @@ def test_a_linked_groom_is_saved_under_the_name_of_its_hair(hair, tmp_path):
 
 @pytest.mark.parametrize("bevel", [0.0, 0.002])
 def test_curve_objects_become_hair_as_thick_as_their_bevel(sphere, rng, bevel):
-    """Points of curve objects have the radius 1: a factor, with which hair came as tubes of 2 m."""
+    """Curve objects become hair as thick as their bevel, as their points' radius of 1 is a factor."""
     drawn = bpy.data.curves.new("Drawn", "CURVE")
     drawn.dimensions, drawn.bevel_depth = "3D", bevel
     for line in lines_on(sphere, rng, 20):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transforms that are applied after a bake: baked and delivered frames play where they did, and nothing is outdated."""
+"""Transforms applied after a bake keep baked and delivered frames in place, and outdate nothing."""
 
 import bpy
 import numpy as np
@@ -18,7 +18,7 @@ LAST = 4
 
 @pytest.fixture(scope="module")
 def baked_files(blender, tmp_path_factory):
-    """A function of one of `PLACES`: a file with simulated hair there, whose guides are baked."""
+    """Return a function from one of `PLACES` to a file with simulated hair there, with baked guides."""
     folder, files = tmp_path_factory.mktemp("baked"), {}
 
     def file_of(place):

@@ -12,7 +12,7 @@ from tests.support.reading import evaluated_points, points
 
 
 class _Reader(bpy.types.RenderEngine):
-    """Stands for Cycles: keeps what a renderer is handed of the hair and its surface in every frame."""
+    """A mock of Cycles that stores the hair and its surface in every frame as a renderer receives them."""
 
     bl_idname = "VELLUS_TEST_READER"
     bl_label = "Reader"
@@ -75,7 +75,7 @@ def test_an_export_has_hair_in_every_frame(arm, scene, tmp_path):
 
 
 def linked_groom(tmp_path, sphere):
-    """[sphere, guides, hair] objects, linked from a file."""
+    """Return [sphere, guides, hair] objects, linked from a file."""
     grow(sphere)
     path = str(tmp_path / "library.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)

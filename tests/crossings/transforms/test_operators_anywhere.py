@@ -21,12 +21,14 @@ CHOSEN = ["moved", "turned", "small", "uneven", "mirrored", "on a scaled rig", "
 
 @pytest.fixture(scope="module")
 def placed_files(blender, tmp_path_factory):
-    """A function of one of `placed_hair.PLACES`: the file of a surface there, with vertices to draw a line over."""
+    """Return a function from one of `placed_hair.PLACES` to the file of a surface there, with vertices to draw a
+    line over.
+    """
     return placed_hair.files_in(tmp_path_factory.mktemp("placed"), _add_arc)
 
 
 def _add_arc(body):
-    """A vertex group of half a circle over the body, with its angles as weights."""
+    """Add a vertex group of half a circle over the body, with its angles as weights."""
     places = np.array([vertex.co for vertex in body.data.vertices]) - body.data.vertices[0].co
     middle = (places.min(axis=0) + places.max(axis=0)) / 2.0
     x, y, z = (places - middle).T
@@ -36,7 +38,7 @@ def _add_arc(body):
 
 
 def opened(path, is_applied=False):
-    """Open a file, and apply the transform of its surface; returns what is seen."""
+    """Open a file and apply the transform of its surface; returns what is seen."""
     bpy.ops.wm.read_homefile(filepath=path)
     bpy.context.view_layer.update()
     if is_applied:
@@ -58,7 +60,7 @@ def copy_of(*names):
 
 
 def require_same(found, wanted, size, name=""):
-    """Check points and widths in the world; each is a member of `Placed.strands`."""
+    """Assert equal points and widths in the world, each by a member of `Placed.strands`."""
     tolerance = 2e-6 * size + 1e-6 * abs(wanted[0]).max()
     np.testing.assert_allclose(found[0], wanted[0], rtol=0.0, atol=tolerance, err_msg=name)
     np.testing.assert_allclose(found[1], wanted[1], rtol=1e-4, err_msg=f"widths of {name}")
@@ -69,7 +71,9 @@ def require_same(found, wanted, size, name=""):
 
 @pytest.mark.parametrize(("with_body", "place"), pairs([False, True], CHOSEN, 3))
 def test_own_guides_are_copies_in_place(placed_files, place, with_body):
-    """Hair does not move, and copied guides have the place on their surface that the copied ones have on theirs."""
+    """Own guides are copies in place: hair does not move, and they have the original guides' places on their
+    surface.
+    """
     before = opened(placed_files(place))
     copies = copy_of(*(["Body"] if with_body else []), "Hair")
     hair = copies[-1]
@@ -104,7 +108,7 @@ def test_restored_guides_are_where_they_were(placed_files, place):
 
 
 def draw(operator, active):
-    """Draw a line over the body as the Draw tool does, at points in the world."""
+    """Draw a line over the body at points in the world, as the Draw tool does."""
     body, hair = bpy.data.objects["Body"], bpy.data.objects[active]
     select(hair)
     getattr(bpy.ops.vellus, operator)()
@@ -124,7 +128,7 @@ def draw(operator, active):
 
 
 def uncombed(path, is_applied):
-    """Open a file and regenerate its guides, which follow flow lines then; returns what is seen."""
+    """Open a file and regenerate its guides, which then follow flow lines; returns what is seen."""
     opened(path, is_applied)
     select(bpy.data.objects["Guides"])
     settings = {"guide_count": placed_hair.GUIDES, "length": 0.3 * seen().size, "gravity": 0.0}
@@ -177,7 +181,7 @@ def test_curls_need_the_same_points(placed_files, place):
 
 
 def require_imported(before, made):
-    """Check that new objects have the hair and the guides of `Hair` in the world, with its widths."""
+    """Assert that new objects have the hair and the guides of `Hair` in the world, with its widths."""
     after = seen()
     for kind, name in (("HAIR", "Hair"), ("GUIDES", "Guides")):
         (one,) = (o for o in made if o.type == "CURVES" and o.data.vellus.kind == kind)

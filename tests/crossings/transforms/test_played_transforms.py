@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transforms applied during playback of guides: the simulation continues with the same positions and velocities."""
+"""Simulation continues with the same positions and velocities when transforms are applied during playback."""
 
 import bpy
 import numpy as np
@@ -16,7 +16,9 @@ APPLIED, LAST = 4, 6
 
 @pytest.fixture
 def played(blender, monkeypatch):
-    """A function that grows hair that simulates at a place, on a surface that a parent swings: its guides."""
+    """Return a function of a place that grows simulated hair there, on a surface that a parent swings, and returns
+    its guides.
+    """
     monkeypatch.setattr(running, "has_window", lambda: True)
 
     def grow(place, is_bent, add_body):
@@ -43,7 +45,7 @@ def played(blender, monkeypatch):
 
 
 def _add_monkey():
-    """A mesh with quads that are divided otherwise where they are scaled unevenly."""
+    """Add a mesh with quads that are divided differently if scaled unevenly."""
     bpy.ops.mesh.primitive_monkey_add(size=1.0)
     body = bpy.context.object
     body.name = "Body"
@@ -51,7 +53,7 @@ def _add_monkey():
 
 
 def _swing(body):
-    """Let the object that a body stands on go to and fro: keys of its own would move it when they are applied."""
+    """Let the parent of a body swing, as applying transforms would move the body's own keys."""
     rig = body.parent
     if rig is None:
         rig = bpy.data.objects.new("Rig", None)
@@ -69,7 +71,7 @@ def _swing(body):
 
 
 def _play(guides, change=None):
-    """{frame: (what is seen, the state of the solver)} of all frames, the first ones as they are seen again."""
+    """Return {frame: (what is seen, the state of the solver)} of all frames; the first ones as they are shown again."""
     frames = {}
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
@@ -101,10 +103,10 @@ def _set_origin():
 
 
 def _require_same(alone, changed, points):
-    """The law: strands and their velocities are as they would be.
+    """Assert that strands and their velocities are the same.
 
-    points: tolerance in parts of the size; None where the surface has other triangles, by which hair is made otherwise.
-    What touches the surface does so to the last bit: some strands come to lie elsewhere by a thousandth.
+    points: tolerance as a fraction of the size; None where the surface has other triangles, by which hair is generated
+    differently. Contact with the surface depends on the last bit: some strands come to lie elsewhere by a thousandth.
     """
     for frame, (of_alone, state) in alone.items():
         of_changed, state_of_changed = changed[frame]

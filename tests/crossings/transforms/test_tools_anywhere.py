@@ -25,12 +25,12 @@ SIZED = {"attract_guides": ["clearance"], "push_outside": ["clearance"]}
 
 @pytest.fixture(scope="module")
 def placed_files(blender, tmp_path_factory):
-    """A function of one of `PLACES`: the file of a surface there, with a plane to trim by."""
+    """Return a function from one of `PLACES` to the file of a surface there, with a plane to trim by."""
     return placed_hair.files_in(tmp_path_factory.mktemp("placed"), _add_cutter)
 
 
 def _add_cutter(body):
-    """A plane to trim by, and a vertex group."""
+    """Add a plane to trim by, and a vertex group."""
     size, middle = placed_hair.world_scale(body), seen().vertices.mean(axis=0)
     bpy.ops.mesh.primitive_plane_add(location=middle, rotation=(0.4, 0.2, 0.0))
     bpy.context.object.name = "Cutter"
@@ -40,7 +40,7 @@ def _add_cutter(body):
 
 
 def after_tool(path, tool, values, is_applied):
-    """What is seen after a tool, in a file."""
+    """Return what is seen after a tool in a file."""
     bpy.ops.wm.read_homefile(filepath=path)
     bpy.context.view_layer.update()
     size = placed_hair.world_scale(bpy.data.objects["Body"])
@@ -74,7 +74,7 @@ def test_tools_do_the_same_in_the_world(placed_files, place, name):
 
 @pytest.fixture(scope="module")
 def symmetric_file(blender, tmp_path_factory):
-    """A file with combed guides on a body that is its own image across its X axis."""
+    """Return a file with combed guides on a body that is symmetric across its X axis."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=0.5)
     body = bpy.context.object
@@ -100,7 +100,7 @@ def symmetric_file(blender, tmp_path_factory):
 
 
 def mirrored_in(path, place):
-    """Local points of guides (G, P, 3) that were mirrored, combed on one side, and got the shape of that side."""
+    """Return local points of guides (G, P, 3), mirrored, combed on one side, and copied from that side."""
     bpy.ops.wm.read_homefile(filepath=path)
     PLACES.get(place, lambda _body: None)(bpy.data.objects["Body"])
     bpy.context.view_layer.update()

@@ -20,13 +20,13 @@ from tests.support.placed_hair import PLACES, Placed, require_carried, seen
 
 @pytest.fixture(scope="module")
 def placed_files(blender, tmp_path_factory):
-    """A function of one of `PLACES`: the file of a surface there, made once."""
+    """Return a function from one of `PLACES` to the file of a surface there, created once."""
     return placed_hair.files_in(tmp_path_factory.mktemp("placed"))
 
 
 @pytest.fixture
 def place(request, placed_files):
-    """The name of a place, whose file is open."""
+    """Open the file of a place, and return the place's name."""
     bpy.ops.wm.read_homefile(filepath=placed_files(request.param))
     bpy.context.preferences.edit.use_global_undo = True
     bpy.context.view_layer.update()
@@ -38,7 +38,7 @@ def body():
 
 
 def choose(chosen):
-    """Select the body alone, with its rig, or with all hair: Blender refuses guides, which have two users."""
+    """Select the body alone, with its rig, or with all hair; Blender refuses guides, which have two users."""
     rig = bpy.data.objects.get("Rig")
     hair = [o for o in bpy.data.objects if o.type == "CURVES" and o.data.users == 1]
     others = {"body": [], "body and rig": [rig], "rig": [rig], "hair": hair}[chosen]
@@ -46,7 +46,7 @@ def choose(chosen):
 
 
 def apply(chosen="body", **given):
-    """*Object ▸ Apply*, of what is selected."""
+    """Apply the transform of selected objects by *Object ▸ Apply*."""
 
     def change():
         choose(chosen)
@@ -56,7 +56,7 @@ def apply(chosen="body", **given):
 
 
 def set_origin(kind, chosen="body"):
-    """*Object ▸ Set Origin*."""
+    """Set the origin by *Object ▸ Set Origin*."""
 
     def change():
         choose(chosen)
@@ -67,7 +67,7 @@ def set_origin(kind, chosen="body"):
 
 
 def operate(operator, **given):
-    """An operator on the body alone."""
+    """Call an operator on the body alone."""
 
     def change():
         choose("body")
@@ -159,7 +159,7 @@ def test_hair_goes_wherever_its_surface_goes(place, change):
     indirect=["place"],
 )
 def test_hair_stays_where_faces_that_are_subdivided_are_turned(place, change):
-    """Blender turns the faces of the cage: those that they are divided into come in another order."""
+    """Hair stays on subdivided faces when Blender turns the faces of the cage, which changes their order."""
 
     def seen_with_cage():
         found = seen()
@@ -177,7 +177,9 @@ def test_hair_stays_where_faces_that_are_subdivided_are_turned(place, change):
 
 @pytest.mark.parametrize("place", ["moved"], indirect=True)
 def test_styles_are_mirrored_with_the_surface(place):
-    """Curls that turn right turn left on an object that is mirrored, and nothing jumps when that is applied."""
+    """Styles are mirrored with the surface: right-handed curls become left-handed, and applying the scale changes
+    nothing.
+    """
     hair = bpy.data.objects["Hair"]
     select(hair)
     for style in ("LEAN", "BEND", "BRAID"):
@@ -205,7 +207,9 @@ def test_styles_are_mirrored_with_the_surface(place):
     indirect=["place"],
 )
 def test_strands_stay_as_they_are_seen_where_a_transform_is_applied_to_a_deformed_surface(place, change):
-    """They turn with it by other angles in other local coordinates."""
+    """Strands keep their visible shape when a transform is applied to a deformed surface, which changes local
+    angles.
+    """
     placed_hair.bend(body())
     before = seen()
     CHANGES[change]()
@@ -216,7 +220,9 @@ def test_strands_stay_as_they_are_seen_where_a_transform_is_applied_to_a_deforme
 @pytest.mark.parametrize("change", ["apply scale", "Apply Scale of the panel"])
 @pytest.mark.parametrize("place", ["moved"], indirect=True)
 def test_hair_stays_where_its_surface_was_scaled_unevenly_after_it_grew(place, change):
-    """Strands that are made again for a surface of such a shape are others; these were made before it was scaled."""
+    """Hair stays when its surface was scaled unevenly after it grew, although regenerated strands would be
+    different.
+    """
     body().scale = (2.0, 0.5, 1.2)
     before = seen()
     CHANGES[change]()
@@ -283,7 +289,7 @@ def test_hair_without_guides_stays_on_its_surface(place):
     indirect=True,
 )
 def test_locks_stay_the_same(place):
-    """Places and shapes of clumps depend on the rest surface alone, with all its bits."""
+    """Locks stay the same, as places and shapes of clumps depend only on the rest surface with all its bits."""
     select(bpy.data.objects["Hair"])
     bpy.ops.vellus.add_style(style="CLUMP")
     before = seen()

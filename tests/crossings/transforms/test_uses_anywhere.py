@@ -30,7 +30,7 @@ FROM_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # ax
 
 @pytest.fixture(scope="module")
 def placed_files(blender, tmp_path_factory):
-    """A function of one of `PLACES`: the file of a surface there, made once."""
+    """Return a function from one of `PLACES` to the file of a surface there, created once."""
     return placed_hair.files_in(tmp_path_factory.mktemp("placed"))
 
 
@@ -52,7 +52,7 @@ def data(name):
 
 
 def usd_curves(path):
-    """{path in a USD file: (points (N, 3), widths (N,))} [m]."""
+    """Return {path in a USD file: (points (N, 3), widths (N,))} [m]."""
     bpy.utils.expose_bundled_modules()
     from pxr import Usd, UsdGeom
 
@@ -67,7 +67,7 @@ def usd_curves(path):
 
 
 def alembic_curves(path, meters, axes):
-    """The same of an Alembic file in some unit, by (3, 3) axes of the file → Blender's."""
+    """Return the same of an Alembic file in some unit, by (3, 3) axes of the file → Blender's."""
     objects, found = alembic_reader.objects(alembic_reader.read(path)), {}
     for name, one in objects.items():
         if ".geom" not in one.properties or "nVertices" not in one.properties[".geom"].children:
@@ -144,7 +144,7 @@ def test_files_have_hair_where_it_is_shown(placed_files, tmp_path, place):
 
 
 def mesh_of(made):
-    """Where the vertices of a mesh object are in the world, and where its faces look: (V, 3), (F, 3) unit."""
+    """Return vertices (V, 3) and unit normals of faces (F, 3) of a mesh object in the world."""
     bpy.context.view_layer.update()
     matrix = np.array(made.matrix_world)
     vertices = np.array([vertex.co for vertex in made.data.vertices])
@@ -163,7 +163,7 @@ MESHES = {
     ("made", "place"), pairs(MESHES, ["large", "uneven", "mirrored", "mirrored and uneven", "on a sheared rig"], 2)
 )
 def test_meshes_of_hair_are_where_it_is(placed_files, place, made):
-    """Faces look the same way, also where the surface is mirrored."""
+    """Meshes of hair are where the hair is, and their faces have the same orientation, also on mirrored surfaces."""
     found = []
     for is_applied in (False, True):
         opened(placed_files(place), is_applied)
@@ -207,7 +207,7 @@ COPIES = {
     share_of(["turned", "small", "large", "uneven", "mirrored", "on a sheared rig", "in a scene of centimeters"]),
 )
 def test_copies_on_a_mesh_elsewhere_are_the_same_in_the_world(placed_files, tmp_path, place):
-    """The same mesh, whose object has another transform."""
+    """Copies on the same mesh with another object transform are the same in the world."""
     for name, copy in COPIES.items():
         opened(placed_files(place))
         before, body = seen(), bpy.data.objects["Body"]
@@ -258,7 +258,7 @@ def test_converted_particle_hair_is_where_it_was(blender, place):
 
 
 def baked(folder):
-    """{frame: what is seen} of soft guides that fall and collide with their surface."""
+    """Return {frame: what is seen} of soft guides that fall and collide with their surface."""
     scene, guides = bpy.context.scene, data("Guides")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "moving.blend"))
     guides.vellus.simulates, guides.vellus.dynamics.bend_stiffness = True, 1e-2

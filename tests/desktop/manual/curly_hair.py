@@ -65,7 +65,7 @@ def guides_object():
 
 
 def strands():
-    """(S, P, 3) positions of the hair as it is drawn, which may not be written yet."""
+    """Return (S, P, 3) positions of the hair as it is drawn, which may not be written yet."""
     bound = addon().groom.bindings.of(hair_object().data)
     if bound is not None:
         return bound.points.copy()
@@ -73,13 +73,13 @@ def strands():
 
 
 def moved(before):
-    """The largest distance by which strands moved [m]."""
+    """Return the largest distance by which strands moved [m]."""
     after = strands()
     return float(np.linalg.norm(after - before, axis=2).max()) if after.shape == before.shape else math.inf
 
 
 def show_styles_alone():
-    """Of the tab's panels, the sidebar shows Styles and no other."""
+    """Show only the panel Styles in the sidebar's tab."""
     classes = addon().panels.CLASSES
     for panel in reversed(classes):
         is_shown = panel.bl_idname.startswith(("VELLUS_PT_style", "VELLUS_UL"))
@@ -89,13 +89,13 @@ def show_styles_alone():
 
 
 def show_all_panels():
-    """What `show_styles_alone` took away comes back: the add-on unregisters all of its panels at the end."""
+    """Restore the panels that `show_styles_alone` removed, as the add-on unregisters all of its panels at the end."""
     while hidden:
         bpy.utils.register_class(hidden.pop())
 
 
 def add_style(offer):
-    """The button of the panel, and the entry of its menu by the keyboard."""
+    """Press the button of the panel, and choose the entry of its menu by the keyboard."""
     state = hair_object().data.vellus
     panel = sidebar()
     x, y = _ADD if len(state.styles) else _ADD_FIRST
@@ -283,7 +283,7 @@ def look():
 
 
 def key_move_undo():
-    """A style is keyed, moved, and the move undone: the key stays with it."""
+    """Key and move a style, and undo the move: the key stays with the style."""
     hair = hair_object().data
     state = hair.vellus
     hair.vellus.styles["Curl"].curl.keyframe_insert("amount", frame=1)
@@ -303,7 +303,7 @@ def key_move_undo():
 
 
 def keyed_style():
-    """The name of the style that the curve of the action drives."""
+    """Return the name of the style that the action's curve drives."""
     animation = hair_object().data.animation_data
     bag = animation.action.layers[0].strips[0].channelbags[0]
     path = bag.fcurves[0].data_path
@@ -311,7 +311,7 @@ def keyed_style():
 
 
 def comb_styled():
-    """Hair is combed with its styles on."""
+    """Comb hair with its styles on."""
     activate(guides_object())
     with in_viewport():
         bpy.ops.vellus.comb_guides()
@@ -339,7 +339,7 @@ PARTS = {
 
 
 def go_on():
-    """Open the file of the part before."""
+    """Open the file of the previous part."""
     if not MORE:
         refine_to(SAMPLES)
     bpy.ops.wm.open_mainfile(filepath=str(SCENE))
@@ -350,7 +350,7 @@ def go_on():
 
 
 def save():
-    """For the next part."""
+    """Save the file for the next part."""
     bpy.ops.wm.save_as_mainfile(filepath=str(SCENE))
     yield
 

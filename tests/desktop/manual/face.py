@@ -17,7 +17,7 @@ _LIGHTS = (
 
 
 def light():
-    """Key, fill and rims for a head: Blender's first scene has one light, for a cube of two meters."""
+    """Add key, fill and rim lights for a head, as Blender's first scene has one light, for a cube of two meters."""
     key = bpy.data.objects["Light"]
     key.location, key.data.energy, key.data.shadow_soft_size = (0.75, -1.35, 1.35), 60.0, 0.25  # [m], [W], [m]
     for name, place, watts, size in _LIGHTS:
@@ -30,7 +30,7 @@ def light():
 
 
 def dress(head, target):
-    """Give an imported head what a portrait has without hair; target: what its eyes look at [m]."""
+    """Give an imported head skin and eyes for a portrait without hair; target: what its eyes look at [m]."""
     material = bpy.data.materials.new("Skin")
     material.diffuse_color, material.roughness = (*skin.COLOR, 1.0), 0.6  # of Solid view
     head.data.materials.clear()

@@ -31,19 +31,19 @@ TURN = math.radians(15.0)  # of the view in each step of the orbit
 
 
 def live():
-    """The `LiveLight` of the viewport, or None."""
+    """Return the `LiveLight` of the viewport, or None."""
     return next(iter(addon().render.viewport.live_light.light_cache.values()), None)
 
 
 def note(name):
-    """A picture of the window, and how much light of paths it has."""
+    """Take a picture of the window, and note the share of light by paths."""
     take_picture(OUT / f"strip_{name}.png", 1)
     shown = live()
     facts.setdefault("parts", {})[name] = 0.0 if shown is None else shown._part()
 
 
 def hair_rendered():
-    """The cube's default hair in Rendered shading, as it comes."""
+    """Show the cube's default hair in Rendered shading."""
     install(ZIP)
     bpy.context.preferences.system.viewport_aa = "OFF"
     area, region = viewport()
@@ -63,7 +63,7 @@ def hair_rendered():
 
 
 def rest():
-    """The light of paths, until all are followed."""
+    """Wait at rest until all paths are traced."""
     yield from wait_for(lambda: live() is not None and live()._part() > 0.0, 120.0)
     note("first_paths")
     yield from wait_for(lambda: live().is_done, 240.0)
@@ -71,7 +71,7 @@ def rest():
 
 
 def orbit():
-    """Around the hair, which stays in that light."""
+    """Orbit around the hair, which stays in that light."""
     area, _region = viewport()
     view = area.spaces.active.region_3d
     for step in range(3):

@@ -47,12 +47,12 @@ _NEW_HAIR_SYSTEM = (120, 46)
 
 
 def step(name):
-    """A picture of the screen after a step."""
+    """Take a picture of the screen after a step."""
     take_picture(OUT / f"first_{name}.png", SAMPLES)
 
 
 def covered(hair):
-    """The part of the mesh's pixels in the 3D view that hair changes."""
+    """Return the part of the mesh's pixels in the 3D view that hair changes."""
     _area, region = viewport()
     mesh = hair.data.surface
     pictures = {}
@@ -83,7 +83,7 @@ def look_at(thing, direction, distance):
 
 
 def three_clicks():
-    """From the installed extension to hair on the default cube: the sidebar, the tab, the button."""
+    """Grow hair on the default cube from the installed extension: the sidebar, the tab, the button."""
     install(ZIP)
     bpy.context.preferences.system.use_region_overlap = False
     if not MORE:
@@ -111,7 +111,7 @@ def three_clicks():
 
 
 def open_head():
-    """The sample's head with a scalp, in place of the cube."""
+    """Open the sample's head with a scalp, in place of the cube."""
     for thing in list(bpy.data.objects):
         if thing.type in {"MESH", "CURVES"}:
             bpy.data.objects.remove(thing)

@@ -52,7 +52,7 @@ COLUMNS = {
 
 
 def set_up():
-    """The hair on a model, and beside it a mesh in its color, in Blender's initial scene."""
+    """Set up the hair on a model in Blender's initial scene, and beside it a mesh in its color."""
     install(ZIP)
     bpy.context.preferences.system.viewport_aa = "OFF"
     addon().render.viewport.hair_picture.SAMPLE_COUNT = SAMPLES
@@ -98,7 +98,7 @@ def set_up():
 
 
 def material_of(color):
-    """A material of this color in all shading modes."""
+    """Return a material of this color in all shading modes."""
     material = bpy.data.materials.new("Color")
     material.diffuse_color = color
     material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = color
@@ -106,7 +106,7 @@ def material_of(color):
 
 
 def model():
-    """The surface of the hair."""
+    """Return the surface of the hair."""
     cube = bpy.data.objects["Cube"]
     if PART == "cube":
         return cube
@@ -121,7 +121,7 @@ def model():
 
 
 def show():
-    """A picture in each mode."""
+    """Take a picture in each mode."""
     area, region = viewport()
     shading = area.spaces.active.shading
     facts["view"] = rectangle(region)

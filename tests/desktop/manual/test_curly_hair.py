@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The manual's ten steps to curly hair, in a window with a clean profile."""
+"""The manual's ten steps to curly hair work in a window with a clean profile."""
 
 import pytest
 
@@ -16,7 +16,7 @@ PARTS = {"opengl": ("cut", "curl", "beyond"), "vulkan": ("cut", "curl")}
 
 @pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)
 def walk(request, desktop, extension, new_profile):
-    """The `Walk` with one backend."""
+    """Return the `Walk` with one backend."""
     parts = PARTS[request.param]
     return walks.take(
         desktop, "manual/curly_hair", extension, new_profile(), request.param, parts=parts, limit=600, size=SIZE

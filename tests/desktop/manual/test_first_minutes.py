@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A new artist's first ten minutes, in a window with a clean profile: hair in three clicks, then README's steps."""
+"""A new artist's first ten minutes work in a window with a clean profile: hair in three clicks, then README's steps."""
 
 import pytest
 
@@ -12,7 +12,7 @@ SIZE = (1100, 700)  # of the window [pixels]: software drivers take their time f
 
 @pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)
 def walk(request, desktop, extension, tmp_path_factory):
-    """The `Walk` with one backend."""
+    """Return the `Walk` with one backend."""
     profile = tmp_path_factory.mktemp("profile")
     return walks.take(desktop, "manual/first_minutes", extension, profile, request.param, limit=600, size=SIZE)
 
@@ -23,7 +23,7 @@ def test_it_comes_to_its_end(walk):
 
 
 def test_three_clicks_bring_hair_that_covers_the_cube(walk):
-    """The arrow of the sidebar, the Hair tab, New Hair System."""
+    """Three clicks, on the arrow of the sidebar, the Hair tab and New Hair System, bring hair that covers the cube."""
     assert (walk.facts["category"], walk.facts["surface"]) == ("Hair", "Cube")
     assert walk.facts["covered"] > 0.7
 

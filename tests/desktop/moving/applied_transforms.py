@@ -48,7 +48,7 @@ def head_with_hair():
 
 
 def compared(name, change):
-    """Do something that leaves the head where it is; notes the light of hair, and how much of it is another."""
+    """Do something that leaves the head in place, and note the light of hair and the part of it that changed."""
     activate(head())
     yield from wait(0.3)
     before = offscreen_light(addon())
@@ -83,7 +83,7 @@ def mirrored():
 
 
 def rig_in_centimeters():
-    """The head on a rig whose unit is a centimeter, to which all transforms are applied with the rig."""
+    """Put the head on a rig in centimeters, and apply all transforms to it with the rig."""
     rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.scene.collection.objects.link(rig)
     rig.scale, rig.location = (0.01,) * 3, (0.1, 0.2, 0.0)

@@ -41,7 +41,7 @@ def hair():
 
 
 def evaluated():
-    """Curves as Blender's evaluation has them for viewports."""
+    """Return Curves as Blender's evaluation has them for viewports."""
     return hair().evaluated_get(bpy.context.evaluated_depsgraph_get()).data
 
 
@@ -52,7 +52,7 @@ def positions(curves):
 
 
 def state():
-    """(whether Blender's evaluation leaves out the strands, how far it has moved their points at most)."""
+    """Return (whether Blender's evaluation leaves out the strands, the largest movement of their points)."""
     shown, stored = evaluated(), hair().data
     is_whole = len(shown.curves) == len(stored.curves)
     moved = float(np.abs(positions(shown) - positions(stored)).max()) if is_whole else 0.0
@@ -86,7 +86,7 @@ def hair_on_a_ball_that_bends():
 
 
 def played():
-    """Blender leaves out the strands while the timeline plays, and the window shows them carried."""
+    """Play the timeline: Blender leaves out the strands, and the window shows them deformed."""
     with in_viewport():
         bpy.ops.screen.animation_play()
     yield from wait_for(lambda: bpy.context.scene.frame_current >= LAST, 120.0)
@@ -107,7 +107,7 @@ def played():
 
 
 def played_beside_workbench():
-    """Hair that another engine shows is carried in each frame: Workbench stands for all, as it draws at once."""
+    """Play with Workbench, which stands for all other engines: its hair is deformed in each frame."""
     bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
     space = viewport()[0].spaces.active
     space.shading.type = "RENDERED"
@@ -123,7 +123,7 @@ def played_beside_workbench():
 
 
 def dragged():
-    """A slider bends the surface step by step, and rests."""
+    """Bend the surface by a slider step by step, and let it rest."""
     ball().data.shape_keys.animation_data_clear()
     yield from wait(0.5)
     for step in range(8):
@@ -136,7 +136,7 @@ def dragged():
 
 
 def previewed():
-    """Material Preview shows hair once; View Selected finds it."""
+    """Show hair in Material Preview, where it is drawn once and found by View Selected."""
     bpy.context.scene.render.engine = "BLENDER_EEVEE"  # Workbench has no Material Preview
     space = viewport()[0].spaces.active
     space.shading.type = "MATERIAL"

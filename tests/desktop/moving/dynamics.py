@@ -47,7 +47,7 @@ def scene():
 
 
 def strands():
-    """(S, P, 3) positions of the hair as it is drawn, which may not be written yet."""
+    """Return (S, P, 3) positions of the hair as it is drawn, which may not be written yet."""
     hair = of_kind("HAIR").data
     bound = addon().groom.bindings.of(hair)
     if bound is not None:
@@ -56,18 +56,18 @@ def strands():
 
 
 def moved(before, after=None):
-    """The largest distance between strands [m]."""
+    """Return the largest distance between strands [m]."""
     after = strands() if after is None else after
     return float(np.linalg.norm(after - before, axis=2).max()) if after.shape == before.shape else math.inf
 
 
 def light():
-    """What the 3D view shows of hair."""
+    """Return what the 3D view shows of hair."""
     return offscreen_light(addon())
 
 
 def differ(before, after):
-    """The part of the pixels with hair whose coverage differs by more than two of their 16 samples."""
+    """Return the part of the pixels with hair whose coverage differs by more than two of their 16 samples."""
     is_hair = (before[..., 3] > 0.0) | (after[..., 3] > 0.0)
     return float((np.abs(before - after)[..., 3] > 2.5 / 16.0)[is_hair].mean())
 
@@ -98,7 +98,7 @@ def go_to(frame):
 
 
 def look(_scene, _depsgraph):
-    """Called after each change of frame, and after the add-on: keeps what is drawn."""
+    """Store what is drawn; called after each change of frame, after the add-on."""
     if of_kind("HAIR") is not None and of_kind("GUIDES") is not None and f"{MODULE}.hair_addon.blender" in sys.modules:
         seen[scene().frame_current] = strands()
 
@@ -130,7 +130,7 @@ def hair_on_a_swinging_ball():
 
 
 def played():
-    """The timeline plays, and hair moves in the picture."""
+    """Play the timeline, in whose pictures hair moves."""
     combed, before = strands(), light()
     bpy.app.handlers.frame_change_post.append(look)
     play()
@@ -151,7 +151,7 @@ def played():
 
 
 def jumped_back():
-    """A jump shows the frame as it was played."""
+    """Jump to a frame, which is shown as it was played."""
     go_to(COMPARED)
     yield from wait(0.3)
     np.save(LIGHT, light())
@@ -160,7 +160,7 @@ def jumped_back():
 
 
 def undone():
-    """Ctrl Z while simulated frames are shown: what was undone is undone, and hair stays where it was."""
+    """Undo by Ctrl Z while simulated frames are shown: the operation is undone, and hair stays in place."""
     guides = of_kind("GUIDES")
     shown, before = strands(), guides.data.vellus.dynamics.damping
     with in_viewport():
@@ -181,7 +181,7 @@ def undone():
 
 
 def baked():
-    """Bake with its progress; then a longer one, and Esc."""
+    """Bake with its progress, then bake longer and press Esc."""
     scene().frame_end, scene().frame_current = COMPARED + 2, 3
     reported, running = set(), addon().host.running
     with in_viewport():
@@ -228,7 +228,7 @@ def frames():
 
 
 def deleted():
-    """Guides are deleted while they play, and come back by Ctrl Z."""
+    """Delete guides while they play, and restore them by Ctrl Z."""
     scene().frame_end = 60
     play()
     yield from wait_for(lambda: scene().frame_current >= 6, 60.0)
@@ -249,7 +249,7 @@ def deleted():
 
 
 def disabled():
-    """The add-on is disabled while it plays."""
+    """Disable the add-on while the animation plays."""
     activate(of_kind("GUIDES"))
     play()
     yield from wait_for(lambda: scene().frame_current >= 6, 60.0)
@@ -284,7 +284,7 @@ def is_busy():
 
 
 def ended():
-    """While it is baked: undo and redo; its window is closed; the add-on is disabled."""
+    """Undo, redo, close the window and disable the add-on while frames are baked."""
     with in_viewport():
         bpy.ops.ed.undo_push(message="Before")
     bpy.ops.wm.window_new()
@@ -311,7 +311,7 @@ def ended():
 
 
 def loaded():
-    """Another file is opened while it plays, and while it is baked."""
+    """Open another file during playback and during a bake."""
     activate(of_kind("GUIDES"))
     scene().frame_end = 1000
     play()
@@ -328,7 +328,7 @@ def loaded():
 
 
 def state_after_load():
-    """What is wrong after a file was opened: nothing is computed, and hair is where the file has it."""
+    """Return what is wrong after a file was opened: nothing is computed, and hair has the file's positions."""
     return [] if not is_busy() and np.isfinite(strands()).all() else [state(), is_busy()]
 
 
@@ -337,7 +337,7 @@ PARTS |= {"end": (loaded, ended), "vanish": (deleted, disabled)}
 
 
 def go_on():
-    """Open the file of the part before."""
+    """Open the file of the previous part."""
     refine_to()
     bpy.ops.wm.open_mainfile(filepath=str(SCENE))
     yield from wait(1.0)

@@ -15,7 +15,7 @@ SIZE = (640, 400)  # of the window [pixels]: software drivers take their time fo
 
 @pytest.fixture(scope="module")
 def walk(desktop, extension, new_profile):
-    """The `Walk` with OpenGL: what is read of the surface is the same with any driver."""
+    """Return the `Walk` with OpenGL, as the surface is read in the same way with any driver."""
     return walks.take(desktop, "moving/applied_transforms", extension, new_profile(), "opengl", size=SIZE)
 
 

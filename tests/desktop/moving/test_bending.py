@@ -16,7 +16,7 @@ SIZE = (640, 400)  # of the window [pixels]: software drivers take their time fo
 
 @pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
 def walk(request, desktop, extension, new_profile):
-    """The `Walk` with one backend."""
+    """Return the `Walk` with one backend."""
     return walks.take(desktop, "moving/bending", extension, new_profile(), request.param, size=SIZE)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulated hair in a window: played, undone, baked, stopped, and deleted."""
+"""Simulated hair in a window is played, undone, baked, stopped, and deleted."""
 
 import pytest
 
@@ -23,7 +23,7 @@ PARTS = {"opengl": ("play", "bake", "end", "vanish"), "vulkan": ("play", "vanish
 
 @pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
 def walk(request, desktop, extension, new_profile):
-    """The `Walk` with one backend."""
+    """Return the `Walk` with one backend."""
     parts = PARTS[request.param]
     return walks.take(
         desktop, "moving/dynamics", extension, new_profile(), request.param, parts=parts, limit=400, size=SIZE
@@ -96,6 +96,8 @@ def test_another_file_is_opened_while_it_plays_and_while_it_is_baked(walk):
 
 @walks.with_opengl
 def test_baking_goes_on_after_a_redo_and_ends_with_its_window_and_the_addon(walk):
-    """The scene is at its frame again at once."""
+    """Baking continues after a redo and ends with its window and the add-on, and the scene is in its frame again at
+    once.
+    """
     ended = {"redo": True, "window closed": [False, 1], "add-on disabled": 1, "add-on enabled": [False, 1]}
     assert walk.facts["ended"] == ended

@@ -13,7 +13,7 @@ class Exchanges:
     """Mixin of any_setting.py's `Artist`, whose random numbers and scene its steps use."""
 
     def add_asset_library(self):
-        """An asset library in the walk's folder, which a new profile lacks."""
+        """Add an asset library in the walk's folder, which a new profile lacks."""
         libraries = bpy.context.preferences.filepaths.asset_libraries
         if LIBRARY_NAME not in libraries:
             folder = self.folder / "library"
@@ -21,7 +21,7 @@ class Exchanges:
             libraries.new(name=LIBRARY_NAME, directory=str(folder))
 
     def do_library(self):
-        """Save a groom as an asset, or apply one that was saved."""
+        """Save a groom as an asset, or apply a saved one."""
         saved = sorted((self.folder / "library").glob("*.asset.blend"))
         if saved and self.random.random() < 0.5:
             surface = self._surface()
@@ -35,7 +35,7 @@ class Exchanges:
             self._call("save_groom", name=name, library=LIBRARY_NAME, overwrites=overwrites)
 
     def do_meshes(self):
-        """Hair as cards with textures or as tubes; the meshes are surfaces of later steps, until there are many."""
+        """Convert hair to cards with textures or to tubes, which become surfaces of later steps up to a limit."""
         made = sorted(o.name for o in self._objects("MESH") if not len(o.vertex_groups))
         if len(self._objects("MESH")) >= _MOST_MESHES and made:
             self.say(f"remove {made[0]}")
@@ -52,7 +52,7 @@ class Exchanges:
             self._call("hair_tubes", **counts)
 
     def do_transfer(self):
-        """A hair system to another mesh, or to its own."""
+        """Transfer a hair system to another mesh or to its own."""
         source, target = self._curves(), self._surface()
         if source is None or target is None or not self._has_room() or not self._activate(source):
             return
@@ -65,7 +65,7 @@ class Exchanges:
         self._call("transfer_groom", **settings)
 
     def do_foreign_curves(self):
-        """Curves of another hand on a surface become guides, or hair with guides derived from it."""
+        """Convert curves of other tools on a surface to guides, or to hair with derived guides."""
         surface = self._surface()
         if surface is None or surface.library is not None or not self._has_room() or not self._activate(surface):
             return
@@ -83,7 +83,7 @@ class Exchanges:
             self._call("use_as_hair", guide_count=self.random.choice([1, 10]), **switches)
 
     def do_particles(self):
-        """A particle system's hair becomes strands or guides."""
+        """Convert a particle system's hair to strands or guides."""
         surface = self._surface()
         if surface is None or surface.library is not None or not self._has_room() or not self._activate(surface):
             return
@@ -98,7 +98,7 @@ class Exchanges:
             made.vellus.hair.strand_count = 200  # between guides they are tens of thousands by default
 
     def do_any_operator(self):
-        """Any operator as a script calls it, with few strands and otherwise its defaults."""
+        """Call any operator as a script does, with few strands and otherwise its defaults."""
         thing = self.random.choice([self._curves(), self._surface()])
         if thing is None or not self._activate(thing) or not self._has_room():
             return

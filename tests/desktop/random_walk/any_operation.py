@@ -20,7 +20,7 @@ class Operations:
     plays_until = 0  # the number of the step
 
     def do_dynamics(self):
-        """Any setting of simulated guides, or of a mesh as a collider, keyed now and then."""
+        """Change any setting of simulated guides, or of a mesh as a collider, sometimes with a key."""
         guides, surface = self._curves("GUIDES"), self._surface()
         if guides is None or surface is None:
             return
@@ -47,7 +47,7 @@ class Operations:
             bpy.context.scene.frame_set(frame)
 
     def do_play(self):
-        """Begin to play, so that the next steps are taken while Blender plays."""
+        """Start playback, so that the next steps are taken while Blender plays."""
         guides = self._curves("GUIDES")
         if guides is not None and guides.library is None and self._activate(guides):
             self.say(f"play {guides.name}")
@@ -56,7 +56,7 @@ class Operations:
             self.plays_until = self.step_count + 2
 
     def stop_playing(self):
-        """End what `do_play` began, two steps later: each step takes seconds while every frame is played."""
+        """Stop what `do_play` started, two steps later, as each step takes seconds while every frame is played."""
         if self.step_count >= self.plays_until and window().screen.is_animation_playing:
             self.say("stop playing")
             with in_viewport():
@@ -74,7 +74,7 @@ class Operations:
         self._call(self.random.choice(["bake_dynamics", "deliver_dynamics", "free_dynamics", "remove_delivery"]))
 
     def do_preset(self):
-        """A preset of dynamics, of styles or of the look, or the stiffness that guides need."""
+        """Apply a preset of dynamics, of styles or of the look, or the stiffness that guides need."""
         curves_object = self._curves()
         if curves_object is None or not self._activate(curves_object):
             return
@@ -86,7 +86,7 @@ class Operations:
         self._call(name, **(wanted | ({"seconds": 0.1} if name == "drape_guides" else {})))
 
     def do_guide_tool(self):
-        """Any tool with any of its settings, in Object or Edit Mode."""
+        """Use any tool with any settings, in Object or Edit Mode."""
         guides = self._curves("GUIDES")
         if guides is None or len(guides.data.curves) > 500 or not self._activate(guides):
             return
@@ -101,7 +101,7 @@ class Operations:
         self._leave_mode()
 
     def do_export(self):
-        """A groom in every format, standing or moving."""
+        """Export a groom in every format, still or moving."""
         hair = self._curves("HAIR")
         if hair is not None and self._activate(hair):
             bpy.context.scene.frame_end = _LAST_FRAME
@@ -113,7 +113,7 @@ class Operations:
         self._call("toggle_composite")
 
     def do_collider(self):
-        """A collection of colliders, one of which is hidden or deleted."""
+        """Set a collection of colliders, one of them hidden or deleted."""
         guides, surface = self._curves("GUIDES"), self._surface()
         if guides is None or surface is None or guides.library is not None:
             return
@@ -140,11 +140,11 @@ class Operations:
             operator("INVOKE_DEFAULT" if is_clicked else "EXEC_DEFAULT", **wanted)
 
     def is_working(self):
-        """Whether work that a click began goes on."""
+        """Whether work that a click started continues."""
         return self.blender.host.running.job() is not None
 
     def wait_for_work(self):
-        """Wait, as artists have to, for what a click began; Esc now and then."""
+        """Wait, as artists have to, for what a click started, with Esc now and then."""
         if not self.is_working():
             return
         self.say("working")

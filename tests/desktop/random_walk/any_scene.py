@@ -10,7 +10,7 @@ LIBRARY = "library.blend"
 
 
 def build(folder):
-    """Surfaces of every kind with hair, and one that is linked with its hair from another file."""
+    """Build surfaces of every kind with hair, one of them linked with its hair from another file."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     yield
     with in_viewport():

@@ -29,7 +29,7 @@ _BLOCKS_AN_OBJECT, _MORE_BLOCKS = 8, 150  # curves, meshes, materials, images; w
 
 
 class Artist(Operations, Exchanges):
-    """Takes random steps; each is printed before it is taken, so that the log ends with what ended Blender."""
+    """Takes random steps, each printed before it is taken, so that the log ends with the step that crashed Blender."""
 
     def __init__(self, seed, folder):
         self.random = random.Random(seed)
@@ -47,7 +47,7 @@ class Artist(Operations, Exchanges):
     # ------------------------------------------------------------------------------------------------- the scene
 
     def begin(self):
-        """The scene as the part before left it, or a new one."""
+        """Open the scene of the previous part, or create a new one."""
         self.add_asset_library()
         if "random" not in facts:
             yield from any_scene.build(self.folder)
@@ -60,7 +60,7 @@ class Artist(Operations, Exchanges):
         yield
 
     def end(self):
-        """Keep what the next part goes on with."""
+        """Save what the next part continues with."""
         with in_viewport():
             self._save()
         facts.update(step_count=self.step_count, random=self.random.getstate(), steps=self.taken)
@@ -68,7 +68,7 @@ class Artist(Operations, Exchanges):
     # ------------------------------------------------------------------------------------------------- the steps
 
     def take(self, end):
-        """All steps before number `end`, with Blender's own events and redraws between them."""
+        """Take all steps before number `end`, with Blender's own events and redraws between them."""
         moves = [getattr(self, name) for name in sorted(dir(self)) if name.startswith("do_")]
         weights = [12.0 if move in (self.do_setting, self.do_two_settings) else 1.0 for move in moves]
         while self.step_count < end:
@@ -100,7 +100,7 @@ class Artist(Operations, Exchanges):
             bpy.ops.ed.undo_push(message=message)
 
     def _try(self, action, *arguments):
-        """Do something and go on: what raises stays in the log, where it is looked for at the end."""
+        """Run a function and continue: exceptions stay in the log, which is checked at the end."""
         try:
             action(*arguments)
         except RuntimeError as refusal:  # an operator that reported why not; its traceback if it raised
@@ -109,7 +109,7 @@ class Artist(Operations, Exchanges):
             traceback.print_exc()
 
     def say(self, text):
-        """Tell the log, at once."""
+        """Print to the log immediately."""
         self.taken.append(text)
         print(f"any_setting: {text}", flush=True)
 
