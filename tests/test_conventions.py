@@ -21,7 +21,7 @@ CODE = MODULES + NATIVE + SHADERS + SCRIPTS
 
 
 def name_of(path):
-    """Path inside the add-on, as CONTRIBUTING.md writes it: core/geometry/mesh.py."""
+    """Return the path inside the add-on as CONTRIBUTING.md writes it: core/geometry/mesh.py."""
     return path.relative_to(ADDON).as_posix()
 
 
@@ -32,12 +32,12 @@ def syntax(path):
 
 @functools.cache
 def nodes(tree):
-    """All nodes of a file's syntax, walked once for all rules."""
+    """Return all nodes of a file's syntax, walked once for all rules."""
     return tuple(ast.walk(tree))
 
 
 def listed_packages():
-    """CONTRIBUTING.md's list of packages, top to bottom."""
+    """Return CONTRIBUTING.md's list of packages, top to bottom."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     return [line.split()[0] for line in re.search(r"## Packages.*?```\n(.*?)```", text, re.DOTALL)[1].splitlines()]
 
@@ -48,7 +48,7 @@ ROOTS = {"__init__", "__main__"}
 
 
 def package_of(path):
-    """The listed package that a file is in."""
+    """Return the listed package that a file is in."""
     name = name_of(path).removesuffix(".py")
     if name in ROOTS:
         return ""
@@ -56,7 +56,9 @@ def package_of(path):
 
 
 def imports(path):
-    """Every import of a file, nested ones too: (line, absolute dotted name or None, file inside the add-on or None)."""
+    """Return every import of a file, also nested: (line, absolute dotted name or None, file inside the add-on or
+    None).
+    """
     for node in nodes(syntax(path)):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name, None) for alias in node.names)
@@ -70,7 +72,7 @@ def imports(path):
 
 
 def outside_imports(path):
-    """(line, dotted name) of what a file imports from outside the add-on."""
+    """Return (line, dotted name) of what a file imports from outside the add-on."""
     return [(line, name) for line, name, _ in imports(path) if name is not None]
 
 
@@ -98,7 +100,7 @@ def test_a_package_imports_only_packages_above_it(path):
 
 @each_file(MODULES)
 def test_no_import_stands_in_a_function(path):
-    """Late imports belong in a package that imports its modules on first use."""
+    """No import is in a function: late imports belong in a package that imports its modules on first use."""
     tree = syntax(path)
     functions = [node for node in nodes(tree) if isinstance(node, ast.FunctionDef)]
     late = [node.lineno for function in functions for node in ast.walk(function) if isinstance(node, ast.ImportFrom)]
@@ -111,7 +113,7 @@ def line_is_ours(path, line):
 
 @each_file(MODULES)
 def test_the_addon_imports_itself_relatively(path):
-    """Blender installs it as bl_ext.<repository>.vellus: no other name of it can be known."""
+    """The add-on imports itself relatively, as Blender installs it as bl_ext.<repository>.vellus."""
     assert [(line, name) for line, name in outside_imports(path) if name.split(".")[0] == "hair_addon"] == []
 
 
@@ -119,7 +121,7 @@ def test_the_addon_imports_itself_relatively(path):
 
 
 def attribute_lines(tree, *chains):
-    """Lines of attribute chains such as `bpy.props` or, for any object, `.foreach_get`."""
+    """Return the lines of attribute chains such as `bpy.props` or, for any object, `.foreach_get`."""
     for line, chain in _attribute_chains(tree):
         if any(chain == wanted or (wanted[0] == "." and f".{chain}".endswith(wanted)) for wanted in chains):
             yield line
@@ -131,12 +133,12 @@ def _attribute_chains(tree):
 
 
 def import_lines(path, *names):
-    """Lines that import one of these packages, or anything in them."""
+    """Return the lines that import one of these packages, or anything in them."""
     return [line for line, name in outside_imports(path) if any(f"{name}.".startswith(f"{n}.") for n in names)]
 
 
 def array_lines(path):
-    """Where arrays of geometry pass between Blender and NumPy; a picture's pixels are not geometry."""
+    """Return the lines where arrays of geometry pass between Blender and NumPy; a picture's pixels are not geometry."""
     tree = syntax(path)
     pixels = attribute_lines(tree, ".pixels.foreach_get", ".pixels.foreach_set", ".rect.foreach_set")
     return sorted({*attribute_lines(tree, ".foreach_get", ".foreach_set", ".attributes.new")} - {*pixels})
@@ -195,7 +197,7 @@ def test_code_is_in_its_package(path):
 
 @each_file(MODULES)
 def test_native_code_stands_in_files(path):
-    """C++ and CUDA are read from a file beside the module that declares the function."""
+    """C++ and CUDA are in a file beside the module that declares the function."""
     calls = [node for node in nodes(syntax(path)) if isinstance(node, ast.Call)]
     sources = [ast.unparse(call.args[0]) for call in calls if ast.unparse(call.func) == "wp.func_native"]
     assert [source for source in sources if not source.startswith("native_code.body(__file__,")] == []
@@ -211,7 +213,7 @@ OPERATORS = ADDON / "blender" / "ui" / "operators"
 
 @each_file(OPERATORS.glob("*.py"))
 def test_tuples_name_every_operator_and_every_file_of_operators(path):
-    """Blender registers what these tuples name, and an operator that is missing in them has no effect."""
+    """Tuples name every operator and every file of operators, as Blender registers only these."""
     tuples = [
         node for node in nodes(syntax(path)) if isinstance(node, ast.Assign) and isinstance(node.value, ast.Tuple)
     ]
@@ -227,7 +229,7 @@ def test_tuples_name_every_operator_and_every_file_of_operators(path):
 
 
 def public_functions(body):
-    """Public functions and methods, and methods that operators call, such as __len__; kernels excepted."""
+    """Return public functions and methods, and methods that operators call, such as __len__, without kernels."""
     for node in body:
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
             yield from public_functions(node.body)
@@ -266,9 +268,9 @@ def test_core_imports_without_blender():
 
 
 def test_register_is_light():
-    """Blender registers add-ons while an artist waits for it to start: without Warp, and without what is used later.
+    """Registering imports neither Warp nor what is used later, as Blender registers add-ons while it starts.
 
-    How long it takes is a benchmark (test_registering.py).
+    The time is a benchmark (test_registering.py).
     """
     source = (
         "import sys, bpy\n"
@@ -293,13 +295,13 @@ BENCHMARKS = [path for path in TESTS if path.parent.name == "benchmarks"]
 
 @each_file(path for path in TESTS if path not in {*BENCHMARKS, Path(__file__)})
 def test_no_test_but_benchmarks_holds_a_clock_to_a_limit(path):
-    """A test with a time limit would fail on a busy machine; tests count operations instead."""
+    """No test except benchmarks has a time limit, as it would fail on a busy machine; tests count operations."""
     assert not CLOCKS.search(path.read_text(encoding="utf-8"))
 
 
 @each_file(BENCHMARKS)
 def test_every_benchmark_is_long(path):
-    """`make test` runs only benchmarks of memory, which other work does not change."""
+    """Every benchmark is `long`, except those of memory, which `make test` runs as other work does not change them."""
     tests = [node for node in syntax(path).body if getattr(node, "name", "").startswith("test_")]
     unmarked = [test.name for test in tests if not any("mark.long" in ast.unparse(d) for d in test.decorator_list)]
     assert tests and not unmarked, unmarked
@@ -307,7 +309,9 @@ def test_every_benchmark_is_long(path):
 
 @each_file(NATIVE)
 def test_no_compiler_fuses_as_it_likes(path):
-    """A strand is the same bits on every processor and beside any others: `fused` of lanes.h says what is fused."""
+    """No compiler fuses operations implicitly, so a strand has the same bits on every processor; `fused` in lanes.h
+    fuses.
+    """
     text = path.read_text(encoding="utf-8")
     assert not re.search(r"#pragma (clang fp|STDC|float_control)", text)
     assert path.name == "lanes.h" or not re.search(r"fmaf?\b", text)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's zip: built, validated, installed into a clean profile, enabled, used, and gone without a trace.
+"""The extension's zip is built, validated, installed into a clean profile, enabled, used, and removed without a
+trace.
 
 Blender runs in a Python that has the bpy wheel and what it requires, and nothing else of the project's: neither Warp
 nor OpenEXR, so that both must come out of the zip.
@@ -26,9 +27,10 @@ ROOT = build_extension.ROOT
 
 @pytest.fixture(scope="session")
 def extension():
-    """The zip of this platform, validated by Blender's own tool; a build costs half a second once wheels are there.
+    """Return the extension's zip of this platform, validated by Blender's own tool.
 
-    Built from a checkout that has run, so that there is bytecode to leave out.
+    It is built from a checkout that has run, so that there is bytecode to leave out. A build takes half a second once
+    wheels are there.
     """
     compileall.compile_dir(build_extension.ROOT / "hair_addon" / "core", quiet=1)
     return build_extension.build(compile_kernels.this_platform(), is_for_tests=True)
@@ -36,7 +38,7 @@ def extension():
 
 @pytest.fixture(scope="session")
 def bare_python():
-    """A Python with bpy and its own requirements, in the versions of requirements.lock; reused between runs."""
+    """Return a Python with bpy and its requirements, in the versions of requirements.lock, reused between runs."""
     folder = ROOT / "build" / "bare-venv"
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     uv = [sys.executable, "-m", "uv", "--quiet"]
@@ -50,7 +52,7 @@ def bare_python():
 
 @pytest.fixture(scope="session")
 def walk(extension, bare_python, tmp_path_factory):
-    """A function that walks one way through the installed extension, each in a Blender of its own, in one profile."""
+    """Return a function that uses the installed extension in one way, each in a Blender of its own, in one profile."""
     home = tmp_path_factory.mktemp("home")
     profile = tmp_path_factory.mktemp("profile")
     environment = {"PATH": os.environ["PATH"], "HOME": str(home), "BLENDER_USER_RESOURCES": str(profile)}
@@ -69,7 +71,7 @@ def walk(extension, bare_python, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def used(walk):
-    """What the operators and scripts made, in the Blender that installed the extension."""
+    """Return what operators and scripts made, in the Blender that installed the extension."""
     return walk.used
 
 
@@ -100,7 +102,7 @@ def test_zip_holds_what_blender_runs_and_nothing_else(extension):
 
 
 def test_bare_python_has_neither_warp_nor_openexr(bare_python):
-    """Bare Python lacks both; otherwise the next tests would pass without the zip's wheels."""
+    """Bare Python has neither Warp nor OpenEXR; otherwise the next tests would pass without the zip's wheels."""
     for name in ("warp", "OpenEXR"):
         found = subprocess.run([bare_python, "-I", "-c", f"import {name}"], capture_output=True, text=True)
         assert "ModuleNotFoundError" in found.stderr
@@ -146,7 +148,7 @@ def test_enabling_and_disabling_twice_leaves_nothing_behind(walk):
 
 @pytest.mark.usefixtures("used")
 def test_nothing_is_written_outside_the_profile(walk):
-    """Exceptions are Warp's kernel cache of a user, and Blender's own thumbnails."""
+    """Nothing is written outside the profile, except Warp's kernel cache of a user and Blender's own thumbnails."""
     written = {path.relative_to(walk.home).parts[:2] for path in walk.home.rglob("*") if path.is_file()}
     assert written <= {(".cache", "warp"), (".cache", "thumbnails")}
     package = walk.profile / "extensions" / "user_default" / "vellus"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laws of the GLSL sources by which Blender's Metal backend can take them: it makes a C++ class of each program.
+"""The GLSL sources satisfy Blender's Metal backend, which makes a C++ class of each program.
 
 Its types and functions are those of the Metal Shading Language, its functions are members of the class [Metal24].
 """
@@ -44,7 +44,7 @@ _STRUCT = re.compile(r"\bstruct\s+(\w+)")
 
 
 def code(path):
-    """The text of a source without its comments."""
+    """Return the text of a source without its comments."""
     return re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))
 
 
@@ -53,7 +53,7 @@ STRUCTS = {name for text in CODE.values() for name in _STRUCT.findall(text)}
 
 
 def where(found):
-    """{file, or Warp's kernel: what was found in its code} where that is anything."""
+    """Return {file, or Warp's kernel: what was found in its code} where that is not empty."""
     every = {name: found(text) for name, text in CODE.items()}
     return {name: bad for name, bad in every.items() if bad}
 
@@ -63,7 +63,7 @@ def test_no_name_is_a_word_of_metal():
 
 
 def test_no_function_is_declared_before_its_definition():
-    """Members of a class cannot be."""
+    """No function is declared before its definition, as members of a class cannot be."""
     assert not where(lambda text: [name for name, end in _FUNCTION.findall(text) if end == ";"])
 
 
@@ -72,7 +72,7 @@ def test_no_function_hides_one_of_metal():
 
 
 def test_structs_and_arrays_are_filled_by_their_members():
-    """C++ has no constructors of these."""
+    """Structs and arrays are filled by their members, as C++ has no constructors of these."""
     structs = "|".join(sorted(STRUCTS))
     assert not where(lambda text: re.findall(rf"\b(?:{structs})\s*\(|{_TYPE}\s*\[\w*\]\s*\(", text))
 

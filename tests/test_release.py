@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is released is what is locked: manifest, lock file, version, and nothing of one machine in the checkout."""
+"""A release has the locked versions in manifest and lock file, and nothing of one machine."""
 
 import re
 import tomllib
@@ -32,7 +32,7 @@ def version_of(package):
 
 @each_file(TEXTS)
 def test_no_registry_address(path):
-    """Each machine chooses its own package sources."""
+    """The checkout has no registry address, as each machine chooses its own package sources."""
     text = path.read_text(encoding="utf-8")
     registries = r"https?://\S*(pypi|pythonhosted|/simple\b|artifact)"
     options = r"(?<!emit-)\b(extra-)?index-url\b|--find-links|--index\b|--trusted-host"
@@ -77,7 +77,9 @@ def test_lock_is_in_step_with_pyproject(group):
 
 
 def test_peers_are_pinned_apart():
-    """Only `make bench` needs them: they are in a lock of their own, and what both have is of one version."""
+    """Peers, which only `make bench` needs, are pinned in a lock of their own, in the same versions as the main
+    lock.
+    """
     text = (ROOT / "requirements-bench.lock").read_text(encoding="utf-8")
     pins = dict(re.findall(r"^([\w-]+)==([^\s;\\]+)", text, re.MULTILINE))
     assert {canonicalize_name(requirement.name) for requirement in REQUIREMENTS["bench"]} <= set(pins)
@@ -86,7 +88,7 @@ def test_peers_are_pinned_apart():
 
 @pytest.mark.parametrize("platform", MANIFEST["platforms"])
 def test_each_platform_has_its_wheels(platform):
-    """Warp for any Python; OpenEXR for Blender's own (3.13) and Debian's (3.14); in the versions of the lock."""
+    """Each platform has its wheels in the locked versions: Warp for any Python, OpenEXR for Python 3.13 and 3.14."""
     wheels = [wheel.name.split("-")[:3] for wheel in build_extension.wheels_of(platform)]
     openexr, warp = version_of("openexr"), version_of("warp-lang")
     assert sorted(wheels) == [["openexr", openexr, "cp313"], ["openexr", openexr, "cp314"], ["warp_lang", warp, "py3"]]

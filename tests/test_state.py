@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What modules hold between calls: caches, which blender/live/invalidation.py names, and handles, jobs and locks."""
+"""State between calls is a cache named in blender/live/invalidation.py, or a listed handle, job or lock."""
 
 import ast
 
@@ -80,19 +80,19 @@ _CHANGING = {
 
 
 def called(node):
-    """The name of what an expression calls, without its module; empty where it calls nothing."""
+    """Return the name of what an expression calls, without its module; empty if it calls nothing."""
     return ast.unparse(node.func).rpartition(".")[2] if isinstance(node, ast.Call) else ""
 
 
 def module_values(tree):
-    """{name: value} of what a module assigns at its top."""
+    """Return {name: value} of what a module assigns at its top."""
     assigned = [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign)]
     pairs = [(t, node) for node in assigned for t in (node.targets if isinstance(node, ast.Assign) else [node.target])]
     return {target.id: node.value for target, node in pairs if isinstance(target, ast.Name)}
 
 
 def changed_in_place(tree):
-    """Names that are written to by key, or by a method that changes what it is called on."""
+    """Return names that are written to by key, or by a method that changes its object."""
     for node in nodes(tree):
         is_written = isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load)
         if is_written or (isinstance(node, ast.Attribute) and node.attr in _CHANGING):
@@ -100,7 +100,7 @@ def changed_in_place(tree):
 
 
 def state_of(tree):
-    """Names of a module whose values may change while it is loaded, but for caches."""
+    """Return names of a module whose values may change while it is loaded, except caches."""
     found = {name for node in nodes(tree) if isinstance(node, ast.Global) for name in node.names}
     changed = set(changed_in_place(tree))
     for name, value in module_values(tree).items():
@@ -111,7 +111,7 @@ def state_of(tree):
 
 
 def cached_functions(tree):
-    """Names of functions under `functools.cache` or `lru_cache`."""
+    """Return names of functions under `functools.cache` or `lru_cache`."""
     for node in nodes(tree):
         if isinstance(node, ast.FunctionDef):
             names = {ast.unparse(decorator).partition("(")[0].rpartition(".")[2] for decorator in node.decorator_list}
@@ -132,7 +132,7 @@ def test_functions_whose_results_are_kept_are_listed():
 
 
 def test_caches_stand_at_the_top_of_a_module():
-    """Caches are at module level, where `invalidation.CACHES` can name them."""
+    """Caches are at the top of a module, where `invalidation.CACHES` can name them."""
     for path in MODULES:
         tree = syntax(path)
         made = [node.lineno for node in nodes(tree) if called(node) == "Cache"]

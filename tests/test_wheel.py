@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wheel of the half that works on arrays: `pip install .` gives it to scripts without Blender."""
+"""`pip install .` gives scripts without Blender a wheel of the part that works on arrays."""
 
 import subprocess
 import sys

@@ -15,7 +15,9 @@ from tests.desktop.window import install  # noqa: E402
 
 
 def set_up():
-    """Install, and save that it is enabled; end Blender once the setup is done. Called by Blender between redraws."""
+    """Install and save the enabled extension, and end Blender once the setup is done; Blender calls this between
+    redraws.
+    """
     first_setup = install(ZIP).live.first_setup
     if not first_setup._is_done():
         return 0.2

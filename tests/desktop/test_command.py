@@ -17,7 +17,9 @@ SMALL = ("--guides", 40, "--strands", 300, "--seed", 5)
 
 @pytest.fixture(scope="module")
 def vellus(desktop, extension, tmp_path_factory):
-    """A function that calls blender --command vellus in a profile with the extension; `.folder` is seen by both."""
+    """Return a function that calls blender --command vellus in a profile with the extension; `.folder` is visible to
+    both.
+    """
     profile = tmp_path_factory.mktemp("profile")
     installing = ("--command", "extension", "install-file", "--repo", "user_default", "--enable")
     installed = desktop.command(*installing, extension, profile=profile)
@@ -31,12 +33,12 @@ def vellus(desktop, extension, tmp_path_factory):
 
 
 def results(done):
-    """Lines of JSON; before the command begins Blender may have told of itself."""
+    """Return the lines of JSON, as Blender may print lines before the command begins."""
     return [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
 
 
 def test_it_makes_the_arrays_that_python_does(vellus, tmp_path):
-    """The same code runs on another Python and NumPy: arrays are equal up to rounding."""
+    """The installed command makes the same arrays as Python, up to rounding, on another Python and NumPy."""
     out = vellus.folder / "head.npz"
     done = vellus("groom", HEAD, *SMALL, "--out", out, "--json")
     assert done.returncode == 0, done.stderr
@@ -98,7 +100,9 @@ bpy.ops.wm.save_mainfile()
 
 
 def test_another_engine_ends_before_a_frame_that_is_not_baked(vellus, desktop):
-    """Blender's own engine with `-a` writes the frames before, then ends with status 1 and one sentence."""
+    """Another engine with `-a` writes the frames before a missing baked frame, then ends with status 1 and one
+    sentence.
+    """
     folder = vellus.folder / "unbaked"
     folder.mkdir()
     shot = folder / "shot.blend"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Composite Hair in a window: rendered, animated, undone, copied, opened again, disabled; and a groom by the dialog."""
+"""Composite Hair in a window is rendered, animated, undone, copied, reopened and disabled, and a groom is exported."""
 
 import pytest
 
@@ -18,7 +18,7 @@ PARTS = {"opengl": ("all",), "vulkan": ("renders",)}
 
 @pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
 def walk(request, desktop, extension, new_profile):
-    """The `Walk` with one backend."""
+    """Return the `Walk` with one backend."""
     parts = PARTS[request.param]
     return walks.take(desktop, "composite", extension, new_profile(), request.param, parts=parts, size=(640, 400))
 

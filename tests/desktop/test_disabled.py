@@ -14,7 +14,7 @@ SAID = "Vellus: Blender renders: Vellus is disabled when the render has ended."
 
 @pytest.fixture(scope="module")
 def walk(desktop, extension, new_profile):
-    """The `Walk` with one backend: it is Blender's threads that matter."""
+    """Return the `Walk` with one backend, as only Blender's threads matter."""
     return walks.take(desktop, "disabled", extension, new_profile(), "opengl", size=(640, 400), limit=240)
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide tools in a window: each from its menu, redone, undone; hair that is combed without its styles; and then
-tubes of it, and the groom in a library."""
+"""The guide tools work in a window, each from its menu, redone and undone, and so do unstyled combing, tubes and the
+library.
+"""
 
 import pytest
 
@@ -16,7 +17,7 @@ TOOLS = (
 
 @pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)
 def walk(request, desktop, extension, new_profile):
-    """The `Walk` with one backend."""
+    """Return the `Walk` with one backend."""
     return walks.take(desktop, "guide_tools", extension, new_profile(), request.param, size=(760, 540))
 
 
@@ -46,7 +47,7 @@ def test_hair_is_straight_while_it_is_combed(walk):
 
 
 def test_combing_shows_hidden_guides(walk):
-    """The brush moves the shown guides, and hair follows."""
+    """Combing shows hidden guides: the brush moves them, and hair follows."""
     shown = [walk.facts[name] for name in ("were shown", "are shown", "combing mode")]
     assert shown == [False, True, "SCULPT_CURVES"] and min(walk.facts["combed"]) > 1e-3
 

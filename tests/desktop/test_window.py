@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A window of Blender with OpenGL: position, look and interactive updates of hair; Vulkan has a file of its own."""
+"""A window of Blender with OpenGL shows hair in place, with its look and its updates; another file tests Vulkan."""
 
 import re
 import sysconfig
@@ -36,7 +36,7 @@ PARTS = {"opengl": ("groom", "view", "render", "mend_and_write"), "vulkan": ("gr
 
 
 def walk_with(backend, desktop, extension, profile):
-    """The `Walk` with one backend, in a profile of its own."""
+    """Return the `Walk` with one backend, in a profile of its own."""
     packages = Path(sysconfig.get_paths()["purelib"]).resolve()
     return walks.take(
         *(desktop, "walk", extension, profile, backend),
@@ -51,12 +51,12 @@ def walk_with(backend, desktop, extension, profile):
 
 @pytest.fixture(scope="module")
 def walk(desktop, extension, tmp_path_factory):
-    """The `Walk` with OpenGL."""
+    """Return the `Walk` with OpenGL."""
     return walk_with("opengl", desktop, extension, tmp_path_factory.mktemp("profile"))
 
 
 def seen(walk, name):
-    """(height, width, 3) display colors of the screen after a step, 0 to 1, first row at the bottom."""
+    """Return (height, width, 3) display colors of the screen after a step, 0 to 1, first row at the bottom."""
     image = bpy.data.images.load(str(walk.folder / f"{name}.png"))
     try:
         width, height = image.size
@@ -68,13 +68,13 @@ def seen(walk, name):
 
 
 def part(picture, rectangle):
-    """The pixels of a (left, bottom, width, height)."""
+    """Return the pixels of a rectangle (left, bottom, width, height)."""
     left, bottom, width, height = rectangle
     return picture[bottom : bottom + height, left : left + width]
 
 
 def beside_sidebar(walk, name):
-    """A picture of the screen, black where the sidebar is: its list of systems says which of them are hidden."""
+    """Return a picture of the screen with a black sidebar, whose list of systems shows which ones are hidden."""
     picture = seen(walk, name).copy()
     part(picture, walk.facts["sidebar"]["rectangle"])[:] = 0.0
     return picture
@@ -133,7 +133,7 @@ def test_hair_is_where_it_should_be_and_nowhere_else(walk, step):
 
 
 def shown(light, transform):
-    """(N, 4) premultiplied linear light → (N, 3) display colors of what is covered."""
+    """Return (N, 3) display colors of the covered pixels of (N, 4) premultiplied linear light."""
     view, look, exposure, gamma = transform
     settings = display_transform.DisplayTransform("sRGB", view, "" if look == "None" else look, gamma, "Linear Rec.709")
     colors = 2.0**exposure * light[:, :3] / np.maximum(light[:, 3:], 1e-6)
@@ -141,7 +141,7 @@ def shown(light, transform):
 
 
 def test_the_window_shows_what_is_drawn_offscreen(walk):
-    """Pixels covered by hair agree in the scene's view transform up to noise, as samples differ."""
+    """The window shows what is drawn offscreen: covered pixels agree in the scene's view transform up to noise."""
     view = walk.facts["steps"]["grown"]["view"]
     window, bare = (part(seen(walk, name), view) for name in ("grown", "grown_bare"))
     light = np.load(walk.folder / "offscreen.npy")
@@ -191,7 +191,9 @@ def test_pictures_and_tables_are_written_while_the_window_lives_on(walk):
 
 
 def test_selected_hair_is_outlined_by_its_silhouette(walk):
-    """The theme's orange is all around the hair and nowhere else; without Outline Selected there is none."""
+    """Selected hair has an outline in the theme's orange around its silhouette only, and none without Outline
+    Selected.
+    """
     view = walk.facts["steps"]["grown"]["view"]
     names = ("selected", "not_outlined", "not_outlined_bare")
     outlined, plain, bare = (part(seen(walk, name), view) for name in names)
@@ -209,7 +211,7 @@ def test_selected_hair_is_outlined_by_its_silhouette(walk):
 
 
 def test_our_engine_draws_surfaces_and_hair_in_the_window(walk):
-    """With and without hair, the lit head is neither black nor the background."""
+    """Our engine draws surfaces and hair in the window: the lit head is neither black nor the background."""
     facts = walk.facts["steps"]["grown"]
     drawn, bare = (part(seen(walk, name), facts["view"]) for name in ("engine", "engine_bare"))
     assert (np.abs(drawn - bare).max(axis=-1) > 10.0 / 255.0).mean() > 0.02

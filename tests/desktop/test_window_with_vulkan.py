@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A window of Blender with Vulkan: tests of test_window.py that depend on the driver; another process runs them."""
+"""A window of Blender with Vulkan passes the tests of test_window.py that depend on the driver."""
 
 import pytest
 
@@ -25,5 +25,5 @@ pytestmark = pytest.mark.desktop
 
 @pytest.fixture(scope="module")
 def walk(desktop, extension, tmp_path_factory):
-    """The `Walk` with Vulkan."""
+    """Return the `Walk` with Vulkan."""
     return walk_with("vulkan", desktop, extension, tmp_path_factory.mktemp("profile"))

@@ -48,17 +48,17 @@ facts.setdefault("steps", {})
 
 
 def screen(name, redraws=1):
-    """A picture of the whole screen."""
+    """Take a picture of the whole screen."""
     take_picture(OUT / f"{name}.png", redraws)
 
 
 def points(name):
-    """(N, 3) positions of an object's curves."""
+    """Return (N, 3) positions of an object's curves."""
     return curve_points(bpy.data.objects[name])
 
 
 def show(step, **more):
-    """A picture with hair and one without, and what must be true of them."""
+    """Take a picture with hair and one without, and note facts about them."""
     hair = bpy.data.objects["Hair"]
     screen(step)
     hair.hide_set(True)
@@ -76,7 +76,7 @@ def show(step, **more):
 
 
 def install():
-    """The extension, from its zip, into an empty profile."""
+    """Install the extension from its zip into an empty profile."""
     result = bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
     facts["installed"] = {"result": list(result), "enabled": MODULE in bpy.context.preferences.addons}
     facts["version"] = bpy.app.version_string
@@ -84,7 +84,7 @@ def install():
 
 
 def head():
-    """The sample's head alone, in the middle of the view, lit by a sun over the viewer's shoulder."""
+    """Show the sample's head alone, in the middle of the view, lit by a sun over the viewer's shoulder."""
     for thing in list(bpy.data.objects):
         bpy.data.objects.remove(thing)
     head_object = import_head()
@@ -107,7 +107,7 @@ def head():
 
 
 def grow():
-    """The panel's operators."""
+    """Grow hair by the panel's operators."""
     area, _region = viewport()
     sidebar = next(region for region in area.regions if region.type == "UI")
     screen("empty")
@@ -132,7 +132,7 @@ def grow():
 
 
 def shading_modes():
-    """Hair in every way a viewport shades."""
+    """Show hair in each shading mode of a viewport."""
     area, _region = viewport()
     # EEVEE's pictures are not compared. Its lamps and shadows take software drivers a minute with Vulkan.
     bpy.context.scene.eevee.taa_samples, bpy.context.scene.eevee.use_shadows = 1, False
@@ -166,7 +166,7 @@ def shading_modes():
 
 
 def comb():
-    """A stroke of the Comb brush across the guides, in sculpt mode, by the mouse; undone, and redone."""
+    """Comb guides by a stroke of the Comb brush with the mouse in Sculpt Mode, then undo and redo it."""
     guides = bpy.data.objects["Guides"]
     guides.hide_set(False)
     with in_viewport():
@@ -206,7 +206,7 @@ def comb():
 
 
 def click():
-    """On hair and beside it, with each of the tools that select."""
+    """Click hair, and places beside it, with each of the tools that select."""
     blender = addon()
     area, region = viewport()
     hair, head_object = bpy.data.objects["Hair"], bpy.data.objects["Head"]
@@ -241,7 +241,7 @@ def click():
 
 
 def write_files():
-    """A picture and tables, the latter where the file browser is told to: both while the window lives on."""
+    """Write a picture, and tables to the path in the file browser, while the window remains open."""
     with in_viewport():
         bpy.ops.object.camera_add()
         camera = bpy.context.scene.camera = bpy.context.object
@@ -267,7 +267,7 @@ def write_files():
 
 
 def render():
-    """Our engine, in a viewport with Rendered shading and by F12, which opens a window of its own."""
+    """Render with our engine in a viewport with Rendered shading, and by F12, which opens another window."""
     scene, hair = bpy.context.scene, bpy.data.objects["Hair"]
     area, _region = viewport()
     scene.render.engine, scene.render.film_transparent = "VELLUS", False
@@ -296,7 +296,7 @@ def render():
 
 
 def save_and_load():
-    """The file as it is, opened again."""
+    """Save the file and open it again."""
     hair = points("Hair")
     bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "head.blend"))
     with in_viewport():
@@ -308,7 +308,7 @@ def save_and_load():
 
 
 def switch_off():
-    """Without the add-on, Blender draws the hair."""
+    """Disable the add-on, so that Blender draws the hair."""
     bpy.ops.preferences.addon_disable(module=MODULE)
     yield
     show("off")
@@ -317,7 +317,7 @@ def switch_off():
 
 
 def twins():
-    """The tests of the shaders' functions, on this window's backend."""
+    """Run the tests of the shaders' functions on this window's backend."""
     sys.path += [str(ROOT), *MORE]  # behind what this Blender has of its own
     os.chdir(ROOT)  # where pytest finds its settings
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"  # those that are there are built for another Python
@@ -331,7 +331,7 @@ def twins():
 
 
 def break_shader():
-    """A driver that refuses the shader that lays hair over the viewport: twice, and mended again."""
+    """Act as a driver that refuses the shader that lays hair over the viewport, twice, and then restore the shader."""
     shaders = addon().gpu.programs.shaders
     file = shaders.FOLDER / "picture" / "display_transform.glsl"
     text = file.read_text()
@@ -353,7 +353,9 @@ def reopen():
 
 
 def hurry():
-    """Four samples a pixel in each pass, as with a graphics card, and 16 in all: fine after four redraws, not 32."""
+    """Draw four samples per pixel in each pass, as with a graphics card, and 16 in all, so that four redraws are
+    enough.
+    """
     refine_to(16)
     addon().render.viewport.hair_picture.samples_per_side = lambda: 2
     yield

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A walk through the add-on in a window of Blender: runs a script of this folder and returns its results."""
+"""A walk through the add-on in a window of Blender runs a script of this folder and returns its results."""
 
 import json
 import re
@@ -26,7 +26,7 @@ LONG_WITH_VULKAN = [
 
 
 class Walk:
-    """What came of a walk: `facts` that its script noted, the `log` of all it printed, its pictures in `folder`."""
+    """The result of a walk: `facts` noted by its script, the `log` of its output, and its pictures in `folder`."""
 
     def __init__(self, folder, parts):
         self.folder, self.parts = folder, list(parts)
@@ -41,15 +41,15 @@ class Walk:
             self.facts = json.loads(facts.read_text())
 
     def is_done(self, part):
-        """Whether a part came to its end, and Blender ended as it does when nothing is wrong."""
+        """Whether a part reached its end, and Blender ended without an error."""
         return part in self.facts["done"] and not any(self.statuses)
 
     def complaints(self):
-        """Lines of the console that tell of an error, or of what the add-on refused."""
+        """Return lines of the console with an error or with what the add-on refused."""
         return [line for line in self.log.splitlines() if _COMPLAINT.match(line)]
 
     def assert_done(self):
-        """Every part is done."""
+        """Assert that every part is done."""
         assert all(map(self.is_done, self.parts)), self.log[-4000:]
 
 

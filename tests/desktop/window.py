@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's window for walks: its 3-D view, screenshots, the mouse."""
+"""Blender's window for walks, with its 3-D view, screenshots and the mouse."""
 
 import subprocess
 import sys
@@ -33,10 +33,10 @@ def addon():
 
 
 def refine_to(sample_count=2):
-    """Viewports draw so many samples of each pixel's hair, and one of all else: each is a redraw of its own.
+    """Set the number of samples of hair to which viewports refine, with one sample for everything else.
 
-    For drivers without a GPU, which take as long for shadow maps, so these are small too; once the add-on is installed,
-    in each Blender of a walk.
+    For drivers without a GPU, which take as long for shadow maps, so these are small too; call it in each Blender of a
+    walk once the add-on is installed.
     """
     bpy.context.preferences.system.viewport_aa = "OFF"
     addon().render.viewport.hair_picture.SAMPLE_COUNT = sample_count
@@ -49,25 +49,25 @@ def window():
 
 
 def viewport():
-    """(area, region) of the 3-D view."""
+    """Return (area, region) of the 3-D view."""
     area = next(area for area in window().screen.areas if area.type == "VIEW_3D")
     return area, next(region for region in area.regions if region.type == "WINDOW")
 
 
 def in_viewport():
-    """The context that a click into the 3-D view has."""
+    """Return the context of a click into the 3-D view."""
     area, region = viewport()
     return bpy.context.temp_override(window=window(), area=area, region=region)
 
 
 def sidebar():
-    """The 3D view's region of panels."""
+    """Return the 3D view's region of panels."""
     area, _region = viewport()
     return next(region for region in area.regions if region.type == "UI")
 
 
 def activate(chosen):
-    """Make an object active, and the only one that is selected."""
+    """Make an object active and the only selected one."""
     with in_viewport():
         bpy.ops.object.select_all(action="DESELECT")
     chosen.select_set(True)
@@ -75,12 +75,12 @@ def activate(chosen):
 
 
 def of_kind(kind):
-    """The first object of hair ("HAIR") or guides ("GUIDES"), None where there is none."""
+    """Return the first object of hair ("HAIR") or guides ("GUIDES"), None if there is none."""
     return next((o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == kind), None)
 
 
 def curve_points(curves_object):
-    """(N, 3) positions of an object's curves, in its own coordinates."""
+    """Return (N, 3) positions of an object's curves, in its own coordinates."""
     curves = curves_object.data
     values = np.empty((len(curves.points), 3), np.float32)
     curves.attributes["position"].data.foreach_get("vector", values.ravel())
@@ -88,7 +88,7 @@ def curve_points(curves_object):
 
 
 def import_head():
-    """The sample's head, from its OBJ file."""
+    """Import the sample's head from its OBJ file."""
     with in_viewport():
         bpy.ops.wm.obj_import(filepath=str(_HEAD))
         head = bpy.context.object
@@ -98,7 +98,7 @@ def import_head():
 
 
 def take_picture(path, redraws=1):
-    """Redraw until nothing is refined any more, and write a picture of the whole screen."""
+    """Redraw until no viewport refines its picture, and write a picture of the whole screen."""
     with in_viewport():
         bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=redraws)
         # Vulkan draws and shows beside Blender, up to two pictures late.
@@ -108,7 +108,9 @@ def take_picture(path, redraws=1):
 
 
 def mask_scalp(head):
-    """Give the head the group `scalp` of what is above its hairline; returns (V,) whether, and (V, 3) positions."""
+    """Add the group `scalp` above the hairline to the head; returns (V,) whether vertices are in it, and (V, 3)
+    positions.
+    """
     positions = np.empty((len(head.data.vertices), 3), np.float32)
     head.data.vertices.foreach_get("co", positions.ravel())
     above = positions[:, 2] > np.interp(positions[:, 1], *_HAIRLINE.T)
@@ -117,39 +119,39 @@ def mask_scalp(head):
 
 
 def wait(seconds):
-    """Leave Blender to itself for a while."""
+    """Yield to Blender for some time."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         yield
 
 
 def wait_for(happened, seconds=60.0):
-    """Leave Blender to itself until something has happened, or will not any more."""
+    """Yield to Blender until a condition is true or a time has passed."""
     end = time.monotonic() + seconds
     while not happened() and time.monotonic() < end:
         yield
 
 
 def shaders_compiled():
-    """Leave Blender to itself until EEVEE has no shader left to compile, which it does beside."""
+    """Yield to Blender until EEVEE has compiled all shaders, which it does in other threads."""
     yield from wait(1.0)
     yield from wait_for(lambda: not bpy.app.is_job_running("SHADER_COMPILATION"), 12.0)
 
 
 def rectangle(region):
-    """(left, bottom, width, height) of a region [pixels]."""
+    """Return (left, bottom, width, height) of a region [pixels]."""
     return [region.x, region.y, region.width, region.height]
 
 
 def places(points):
-    """(N, 3) world positions → (N, 2) pixels of the screen, from its lower left corner."""
+    """Convert (N, 3) world positions to (N, 2) pixels of the screen, from its lower left corner."""
     area, region = viewport()
     clip = np.c_[points, np.ones(len(points))] @ np.array(area.spaces.active.region_3d.perspective_matrix).T
     return (0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * (region.width, region.height) + (region.x, region.y)
 
 
 def drag(start, end, steps=12):
-    """The left mouse button, pressed at a place of the window and let go at another."""
+    """Press the left mouse button at a place of the window, and release it at another."""
     for step in range(steps + 1):
         x, y = (int(value) for value in start + (end - start) * step / steps)
         window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
@@ -162,14 +164,14 @@ def drag(start, end, steps=12):
 
 
 def click(x, y):
-    """The left mouse button, pressed and let go at a place of the window."""
+    """Click the left mouse button at a place of the window."""
     place = np.array([x, y])
     yield from drag(place, place, steps=1)
     yield from wait(0.3)
 
 
 def key(name, place=None, **held):
-    """A key, pressed and let go while the mouse is at a place, by default in the middle of the 3D view.
+    """Press and release a key while the mouse is at a place, by default in the middle of the 3D view.
 
     held: `ctrl`, `shift`.
     """
@@ -184,7 +186,9 @@ def key(name, place=None, **held):
 
 
 def press(key, in_window, area):
-    """A key while the mouse is in the middle of an area; not let go, for which the window may be gone already."""
+    """Press a key while the mouse is in the middle of an area, without releasing it, as the window may be gone by
+    then.
+    """
     at = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
     in_window.event_simulate(type="MOUSEMOVE", value="NOTHING", **at)
     yield
@@ -193,7 +197,7 @@ def press(key, in_window, area):
 
 
 def offscreen_light(blender, has_shadow=True):
-    """(height, width, 4) linear premultiplied light of what the 3-D view shows of hair, 16 samples a pixel.
+    """Return (height, width, 4) linear premultiplied light of hair in the 3-D view, 16 samples per pixel.
 
     blender: the add-on's package of this name; has_shadow: with the shadow of hair on its surface.
     """

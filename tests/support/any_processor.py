@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Digests of hair on one processor, and checks that strands do not depend on each other: `any_processor.py [FOLDER …]`.
+"""Digests of hair on one processor, and checks that strands do not depend on each other: `any_processor.py [FOLDER
+…]`.
 
 Prints a line of JSON for each folder of compiled kernels; without one, for kernels that Warp compiles. Needs neither
 Blender nor pytest, so that it also runs on an emulated processor, for example in QEMU's user mode:
@@ -32,7 +33,7 @@ def laws():
 
 
 def digests():
-    """{name: SHA-256}: of groups, and of a groom from the head's mesh to styled strands."""
+    """Return {name: SHA-256} of groups, and of a groom from the head's mesh to styled strands."""
     made = {name: found.all() for name, found in strand_groups.all_groups().items()}
     mesh = read_obj(HEAD)
     hair = Groom(mesh, groom.GuideSettings(guide_count=60, curvature=1.0), groom.HairSettings(strand_count=400), "cpu")
@@ -45,7 +46,7 @@ def digests():
 
 
 def digest(values):
-    """SHA-256 of an array's bits."""
+    """Return the SHA-256 of an array's bits."""
     return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()[:16]
 
 
@@ -58,7 +59,7 @@ def use(folder):
 
 
 def not_from(folder):
-    """The names of modules that are loaded from elsewhere from now on, filled as they are loaded."""
+    """Return a list that records the names of modules loaded from elsewhere from now on."""
     use(folder)
     load, names = compiled_kernels.load, []
 

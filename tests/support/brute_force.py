@@ -5,7 +5,7 @@ import numpy as np
 
 
 def closest_points(points, corners):
-    """(N, 3) points, (F, 3, 3) corners of triangles → (N, F, 3): the closest point of each triangle."""
+    """Return (N, F, 3): the closest point of each triangle (F, 3, 3) to points (N, 3)."""
     a, b, c = (corners[None, :, k] for k in range(3))
     p = points[:, None]
     normal = np.cross(b - a, c - a)

@@ -101,7 +101,7 @@ def write_obj(path, vertices, triangles, name="Tetrahedron"):
 
 
 def load(path):
-    """{name: array} of an .npz."""
+    """Return {name: array} of an .npz file."""
     with np.load(path) as arrays:
         return dict(arrays)
 

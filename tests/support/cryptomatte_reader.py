@@ -36,7 +36,7 @@ def name_number(name):
 
 
 def mattes(path, layer):
-    """{name: (height, width) coverage} of a layer such as "ViewLayer.CryptoObject", first row at the bottom.
+    """Return {name: (height, width) coverage} of a layer such as "ViewLayer.CryptoObject", first row at the bottom.
 
     Names come from the manifest; asserts that numbers in the file are those of names, and the conversion's name.
     """

@@ -9,7 +9,9 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def each_file(paths: Iterable[Path]) -> Callable:
-    """Turn a function that checks one `path` into one test of all files: one test per file would be thousands."""
+    """Turn a function that checks one `path` into a single test of all files, as one test per file would be
+    thousands.
+    """
     paths = list(paths)
 
     def test_of(rule):

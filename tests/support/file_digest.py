@@ -11,7 +11,7 @@ _NOT_COMPARED = {"all_ids", "libraries", "screens", "window_managers", "workspac
 
 
 def of_file():
-    """{(kind, name): description} of all datablocks, and of what is active and selected."""
+    """Return {(kind, name): description} of all datablocks, and of what is active and selected."""
     found = {}
     for kind in (p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"):
         for one in getattr(bpy.data, kind) if kind not in _NOT_COMPARED else ():

@@ -32,7 +32,7 @@ def reopen(folder):
 
 
 def parts():
-    """(sphere, guides, hair) objects that are overridden in the open file."""
+    """Return (sphere, guides, hair) objects that are overridden in the open file."""
     found = [o for o in bpy.data.objects if o.override_library is not None]
     curves = {o.data.vellus.kind: o for o in found if o.type == "CURVES"}
     return next(o for o in found if o.type == "MESH"), curves["GUIDES"], curves["HAIR"]

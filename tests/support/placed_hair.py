@@ -34,7 +34,7 @@ def files_in(folder, add=lambda _body: None):
 
 
 def add_body():
-    """A mesh of 1 m without any symmetry, off its origin."""
+    """Add a mesh of 1 m without any symmetry, off its origin."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=0.5)
     body = bpy.context.object
     body.name = body.data.name = "Body"
@@ -115,7 +115,9 @@ def bend(body):
 
 
 def grow(place):
-    """A body at one of `PLACES` or `SUBDIVIDED` with combed guides and styled hair, kept hair, and hand-made guides."""
+    """Grow combed guides with styled hair, kept hair, and hand-made guides on a body at one of `PLACES` or
+    `SUBDIVIDED`.
+    """
     body = add_body()
     (PLACES | SUBDIVIDED)[place](body)
     bpy.context.view_layer.update()
@@ -172,7 +174,7 @@ def comb(guides, amount=0.15):
 
 
 def world_scale(an_object):
-    """The mean factor from an object's local units to the world's."""
+    """Return the mean factor from an object's local units to the world's."""
     return abs(an_object.matrix_world.to_3x3().determinant()) ** (1.0 / 3.0)
 
 
@@ -192,7 +194,7 @@ class Placed:
 
 
 def seen(body_name="Body"):
-    """The present `Placed`."""
+    """Return the current `Placed`."""
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     body = bpy.data.objects[body_name].evaluated_get(depsgraph)

@@ -6,14 +6,14 @@ import numpy as np
 
 
 def vertex_positions(mesh_object):
-    """(V, 3) float32 of a mesh object's own vertices."""
+    """Return (V, 3) float32 of a mesh object's own vertices."""
     positions = np.empty((len(mesh_object.data.vertices), 3), np.float32)
     mesh_object.data.vertices.foreach_get("co", positions.ravel())
     return positions
 
 
 def points(curves_object):
-    """(S, P, 3) float32 in local coordinates."""
+    """Return (S, P, 3) float32 in local coordinates."""
     curves = curves_object.data
     positions = np.empty((len(curves.points), 3), np.float32)
     curves.attributes["position"].data.foreach_get("vector", positions.ravel())
@@ -37,7 +37,7 @@ def write_points(curves_object, positions):
 
 
 def attribute(curves_object, name, width=1):
-    """(N,) or (N, width) values of a curves attribute."""
+    """Return (N,) or (N, width) values of a curves attribute."""
     data = curves_object.data.attributes[name].data
     kind = np.int32 if curves_object.data.attributes[name].data_type == "INT" else np.float32
     values = np.empty((len(data), width), kind)
@@ -79,7 +79,7 @@ def guide_map(datablock):
 
 
 def read_picture(path):
-    """(values,) of a picture file's pixels."""
+    """Return (values,) of a picture file's pixels."""
     image = bpy.data.images.load(str(path))
     try:
         return np.array(image.pixels[:])

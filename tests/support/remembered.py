@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Results that tests ask for again and again, and that depend on arguments alone, computed once per process."""
+"""Results that tests request repeatedly and that depend on arguments alone, computed once per process."""
 
 import dataclasses
 import hashlib

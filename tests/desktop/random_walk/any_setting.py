@@ -121,7 +121,7 @@ class Artist(Operations, Exchanges):
             self.say(f"{len(offered)} operators apply")
 
     def look(self):
-        """Draw the window, and compare what is kept of hair with what a first drawing would bring."""
+        """Draw the window, and compare cached hair with a first drawing."""
         with in_viewport():
             bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=1)
         cache = self.blender.render.hair_cache
@@ -142,7 +142,7 @@ class Artist(Operations, Exchanges):
         self._nothing_grows()
 
     def _nothing_grows(self):
-        """Handlers are there once, and datablocks are as many as the objects of the scene account for."""
+        """Assert that handlers exist once, and that there are as many datablocks as the scene's objects need."""
         for name in dir(bpy.app.handlers):
             functions = getattr(bpy.app.handlers, name)
             if isinstance(functions, list):
@@ -165,7 +165,7 @@ class Artist(Operations, Exchanges):
         return bpy.data.objects[self.random.choice(found)] if found else None
 
     def do_setting(self):
-        """Any property that hair stores, at any value it takes; counts stay small enough to draw."""
+        """Set any property that hair stores to any valid value; counts stay small enough to draw."""
         curves_object = self._curves()
         if curves_object is None:
             return
@@ -184,7 +184,7 @@ class Artist(Operations, Exchanges):
         setattr(group, name, value)
 
     def do_two_settings(self):
-        """Both before Blender has evaluated either."""
+        """Set two properties before Blender has evaluated either."""
         self.do_setting()
         self.do_setting()
 
@@ -219,7 +219,7 @@ class Artist(Operations, Exchanges):
         return self.random.choice([low, high, low + (high - low) * self.random.random() ** 3])
 
     def do_style(self):
-        """A style is added, moved, removed or keyed."""
+        """Add, move, remove or key a style."""
         hair = self._curves("HAIR")
         if hair is None or not self._activate(hair):
             return
@@ -246,7 +246,7 @@ class Artist(Operations, Exchanges):
             self.say(f"{hair.name}: {hair.data.vellus.hair.strand_count} strands")
 
     def do_edit(self):
-        """Delete all or some in Edit Mode."""
+        """Delete all or some points in Edit Mode."""
         curves_object = self._curves()
         if curves_object is None or curves_object.library is not None or not self._activate(curves_object):
             return
@@ -269,7 +269,7 @@ class Artist(Operations, Exchanges):
             self._call("interpolate_hair", strand_count=self.random.choice([1, 500, 3000]))
 
     def do_comb(self):
-        """Move the points of some guides, as a brush does: in sculpt mode, the mode left open now and then."""
+        """Move the points of some guides in Sculpt Mode as a brush does, and sometimes leave the mode open."""
         guides = self._curves("GUIDES")
         if guides is None or guides.library is not None or not len(guides.data.points) or not self._activate(guides):
             return
@@ -370,7 +370,7 @@ class Artist(Operations, Exchanges):
             bpy.ops.object.mode_set(mode="OBJECT")
 
     def _activate(self, thing):
-        """Select one object alone; whether it can be."""
+        """Select one object alone, and return whether that is possible."""
         self._leave_mode()
         if not thing.visible_get():
             return False
@@ -381,7 +381,7 @@ class Artist(Operations, Exchanges):
 
 
 def steps():
-    """The steps before the part's number, once the extension is there."""
+    """Return the steps before the part's number, once the extension is installed."""
     install(ZIP)
     artist = Artist(int(MORE[0]), OUT)
     yield from artist.begin()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings in random order in a window with a clean profile: Blender does not crash, and nothing raises."""
+"""Settings in random order in a window with a clean profile neither crash Blender nor raise exceptions."""
 
 import pytest
 
@@ -14,7 +14,7 @@ PARTS = {"opengl": 50, "vulkan": 25}
 
 
 def check(desktop, extension, profile, seed, step_count, limit, backend="opengl"):
-    """Take the steps that follow from a seed; what was printed is in out/desktop.
+    """Take the steps that follow from a seed; their output is in out/desktop.
 
     limit: of a part [s]. The steps are the same with either backend.
     """
@@ -42,5 +42,5 @@ def test_a_few_random_settings(desktop, extension, new_profile):
 @pytest.mark.parametrize("backend", desktop_blender.BACKENDS)
 @pytest.mark.parametrize("seed", walk_size.seeds(1, 5))
 def test_many_random_settings(desktop, extension, new_profile, seed, backend):
-    """How many steps of which seeds: `walk_size`."""
+    """Many random settings cause no fault; `walk_size` gives the number of steps and the seeds."""
     check(desktop, extension, new_profile(), seed, step_count=walk_size.steps(300), limit=3000, backend=backend)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shadow maps of processes that tests start are as small as those of tests: Python runs this file when it starts.
+"""Processes that tests start have shadow maps as small as tests, by this file, which Python runs when it starts.
 
 The folder of this file is in `commands.PYTHONPATH`. A picture of a few pixels takes a sixth of its time then.
 """
@@ -31,7 +31,7 @@ CHANGES = {
 
 
 class _Changing:
-    """A finder of these modules that changes them once they are loaded."""
+    """A module finder that changes certain modules after they are loaded."""
 
     @staticmethod
     def find_spec(name, path, target=None):

@@ -54,7 +54,7 @@ _PLAIN = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
 
 
 class Digests:
-    """{name: SHA-256} under a prefix."""
+    """A dict {name: SHA-256} with a prefix for names."""
 
     def __init__(self, found, prefix):
         self._found, self._prefix = found, prefix
@@ -94,7 +94,7 @@ class Digests:
         self.add(f"{name}/corners", corners)
 
     def add_node_groups(self):
-        """Every node group of the file."""
+        """Add every node group of the file."""
         for tree in bpy.data.node_groups:
             self.add_tree(f"node group/{tree.name}", tree)
 
@@ -104,11 +104,11 @@ class Digests:
             self.add(f"{name}/{found.name}", attribute(found))
 
     def add_properties(self, name, group):
-        """The values of a group of properties."""
+        """Add the values of a group of properties."""
         self.add(name, values_of(group))
 
     def add_tree(self, name, tree):
-        """The nodes of a material or of a node group."""
+        """Add the nodes of a material or of a node group."""
         self.add(name, tree_values(tree))
 
     def add_picture(self, name="picture", **settings):
@@ -122,7 +122,7 @@ class Digests:
             self.add_pixels(name, path)
 
     def add_pixels(self, name, path):
-        """Each channel of an .exr."""
+        """Add each channel of an .exr."""
         with OpenEXR.File(str(path), separate_channels=True) as file:
             for part in file.parts:
                 for channel, values in part.channels.items():
@@ -130,7 +130,7 @@ class Digests:
 
 
 def attribute(found):
-    """(N,) or (N, width) values of a geometry attribute."""
+    """Return (N,) or (N, width) values of a geometry attribute."""
     member, kind, width = _VALUES[found.data_type]
     values = np.empty((len(found.data), width), kind)
     found.data.foreach_get(member, values.ravel())
@@ -138,7 +138,7 @@ def attribute(found):
 
 
 def values_of(owner):
-    """{property: value} of a group of properties, with the groups in it; datablocks by name."""
+    """Return {property: value} of a group of properties with nested groups; datablocks by name."""
     found = {}
     for details in owner.bl_rna.properties:
         if details.identifier == "rna_type":
@@ -161,7 +161,7 @@ def plain(value):
 
 
 def tree_values(tree):
-    """Nodes with their settings and sockets, and links, in the order of the tree."""
+    """Return nodes with their settings and sockets, and links, in the order of the tree."""
     base = {p.identifier for p in bpy.types.Node.bl_rna.properties}
     nodes = []
     for node in tree.nodes:
@@ -176,12 +176,12 @@ def tree_values(tree):
 
 
 def sides(node):
-    """Inputs and outputs of a node."""
+    """Return the inputs and outputs of a node."""
     return list(node.inputs), list(node.outputs)
 
 
 def end(node, socket):
-    """The name of a link's node, and the place of its socket."""
+    """Return the name of a link's node and the place of its socket."""
     return node.name, next(i for side in sides(node) for i, s in enumerate(side) if s == socket)
 
 

@@ -30,12 +30,12 @@ def activate(chosen):
 
 
 def objects_of(*datablocks):
-    """The objects of Curves datablocks."""
+    """Return the objects of Curves datablocks."""
     return [next(o for o in bpy.data.objects if o.data == datablock) for datablock in datablocks]
 
 
 def link(name, data, location=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)):
-    """A new object in the scene."""
+    """Return a new object in the scene."""
     made = bpy.data.objects.new(name, data)
     made.location, made.rotation_euler = location, rotation
     bpy.context.scene.collection.objects.link(made)
@@ -43,7 +43,7 @@ def link(name, data, location=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)):
 
 
 def film(distance=6.0, height=0.0):
-    """A camera that looks along Y, a sun and a soft light, both with shadows."""
+    """Add a camera that looks along Y, and a sun and a soft light with shadows."""
     camera = link("Camera", bpy.data.cameras.new("Camera"), (0.0, -distance, height), (math.pi / 2, 0.0, 0.0))
     bpy.context.scene.camera = camera
     sun = link("Sun", bpy.data.lights.new("Sun", "SUN"), rotation=(math.pi / 3, 0.2, 0.3))
@@ -54,14 +54,14 @@ def film(distance=6.0, height=0.0):
 
 
 def vertices(mesh_object):
-    """(V, 3) float32."""
+    """Return (V, 3) float32 positions of vertices."""
     found = np.empty((len(mesh_object.data.vertices), 3), np.float32)
     mesh_object.data.vertices.foreach_get("co", found.ravel())
     return found
 
 
 def weigh(mesh_object, name, weights):
-    """A vertex group of weights (V,)."""
+    """Add a vertex group of weights (V,)."""
     group = mesh_object.vertex_groups.new(name=name)
     for vertex in np.flatnonzero(weights > 0.0):
         group.add([int(vertex)], float(weights[vertex]), "REPLACE")
@@ -87,7 +87,7 @@ def comb(guides, chosen, offset):
 
 
 def image(name, pixels):
-    """An image of (H, W, 4) float32."""
+    """Return an image of (H, W, 4) float32."""
     made = bpy.data.images.new(name, pixels.shape[1], pixels.shape[0], float_buffer=True, is_data=True)
     made.pixels.foreach_set(pixels.ravel())
     made.update()
@@ -95,7 +95,7 @@ def image(name, pixels):
 
 
 def grown(surface, guides=None, hair=None, look=None):
-    """Objects of guides and hair on a mesh object."""
+    """Return objects of guides and hair on a mesh object."""
     settings = api.GroomSettings(
         api.GuideSettings(**{"guide_count": 60} | (guides or {})),
         api.HairSettings(**{"strand_count": 800} | (hair or {})),
@@ -111,7 +111,7 @@ def grown(surface, guides=None, hair=None, look=None):
 
 
 def cube(found, _folder):
-    """Kajiya-Kay; few neighbors; all settings that are fitted to the surface at their defaults."""
+    """Hair by Kajiya-Kay, with few neighbors and defaults for all settings that are fitted to the surface."""
     bpy.ops.mesh.primitive_cube_add()
     guides = api.distribute_guides(bpy.context.object, guide_count=50)
     hair = api.interpolate_hair(guides, strand_count=800, neighbour_limit=2, keep_length=0.3, guide_map=False)
@@ -126,7 +126,9 @@ def cube(found, _folder):
 
 
 def suzanne(found, _folder):
-    """Density by curvature, mirrored guides, strands that differ, the energy-conserving mode, a subdivided surface."""
+    """Hair with density by curvature, mirrored guides, varied strands and Energy Conserving, on a subdivided
+    surface.
+    """
     bpy.ops.mesh.primitive_monkey_add()
     surface = bpy.context.object
     surface.modifiers.new("Subdivision", "SUBSURF").levels = 1
@@ -142,7 +144,7 @@ def suzanne(found, _folder):
 
 
 def masked_by_group(found, _folder):
-    """Masks of weights for guides and strands, a region of weights, the classic mode, a turned and stretched object."""
+    """Hair with masks and a region of weights and the classic mode, on a turned and stretched object."""
     surface = sphere()
     height = vertices(surface)[:, 2]
     weigh(surface, "top", np.clip(height + 0.3, 0.0, 1.0))
@@ -162,7 +164,7 @@ def masked_by_group(found, _folder):
 
 
 def masked_by_image(found, _folder):
-    """A mask of an image; strands follow when it is painted over."""
+    """Hair with a mask by an image; strands follow when it is painted over."""
     surface = sphere()
     side = np.linspace(0.0, 1.0, 32, dtype=np.float32)
     pixels = np.ones((32, 32, 4), np.float32)
@@ -182,7 +184,7 @@ def masked_by_image(found, _folder):
 
 
 def parted(found, _folder):
-    """A part line and regions of faces, on guides combed apart; deleting, restoring and selecting."""
+    """Hair with a part line and regions of faces, on guides combed apart, deleted, restored and selected."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=20, y_subdivisions=20, size=1.0)
     surface = bpy.context.object
     regions = surface.data.attributes.new("region", "INT", "FACE")
@@ -210,7 +212,9 @@ def parted(found, _folder):
 
 
 def head(found, _folder):
-    """The sample head: the operator of the panel, steps of a stroke, the classic mode, shown and removed guides."""
+    """Hair on the sample head by the panel's operator and steps of a stroke, with the classic mode and guides shown
+    and removed.
+    """
     bpy.ops.wm.obj_import(filepath=str(HEAD))
     surface = activate(bpy.context.selected_objects[0])
     surface.data.transform(surface.matrix_world)
@@ -243,7 +247,7 @@ def head(found, _folder):
 
 
 def carried(found, folder):
-    """A surface deformed by a shape key and a modifier: strands in other frames, with motion blur."""
+    """Hair on a surface deformed by a shape key and a modifier: strands in other frames, with motion blur."""
     surface = sphere()
     guides, hair = grown(surface, {"length": 0.4}, {"radius": 0.004})
     rest = vertices(surface)
@@ -274,7 +278,7 @@ def carried(found, folder):
 
 
 def hand_made(found, _folder):
-    """Unattached curves with unequal point counts and a modifier, some reversed, used as guides."""
+    """Guides from unattached curves with unequal point counts and a modifier, some of them reversed."""
     surface = sphere()
     rng = np.random.Generator(np.random.PCG64(20260101))
     lines = []
@@ -297,7 +301,9 @@ def hand_made(found, _folder):
 
 
 def lit_by_the_world(found, folder):
-    """An image of the world, the energy-conserving mode with dual scattering and shadows; the render engine, passes."""
+    """Hair lit by an image of the world, with Energy Conserving, dual scattering and shadows; the render engine with
+    passes.
+    """
     bpy.ops.mesh.primitive_plane_add(size=6.0, location=(0.0, 0.0, -1.0))
     surface = sphere()
     _guides, hair = grown(surface, {"length": 0.3}, {"radius": 0.006})
@@ -325,7 +331,7 @@ def lit_by_the_world(found, folder):
 
 
 def edited(found, folder):
-    """A surface that is sculpted and scaled under its hair, two systems on it, and a file that is saved and opened."""
+    """Hair whose surface is sculpted and scaled, with two systems, in a file that is saved and opened."""
     surface = sphere()
     first = grown(surface)
     second = grown(surface, {"seed": 9, "guide_count": 20, "gravity": 1.0}, {"strand_count": 200, "seed": 2})

@@ -35,7 +35,7 @@ def plain_arrays(found, _folder):
 
 
 def tables_and_settings(found, folder):
-    """Tables as files, of both modes and both axes; settings as files, read back."""
+    """Files of tables of both modes and axes, and of settings that are read back."""
     for mode, axes in (("classic", "ANGLES"), ("classic", "COSINES"), ("energy", "ANGLES"), ("energy", "COSINES")):
         for path in api.bake_tables(folder / f"{mode} {axes}", size=32, mode=mode, axes=axes):
             found.add_file(f"{mode}, {axes}/{path.name}", path)
@@ -76,7 +76,7 @@ def rendered(found, folder):
 
 
 def interface(found, _folder):
-    """Registered classes: names, tooltips, properties with defaults and ranges; functions for scripts."""
+    """Names, tooltips and properties of registered classes, and functions for scripts."""
     ours = [name for name in dir(bpy.types) if name.upper().startswith("VELLUS")]
     found.add("names", ours)
     for name in ours:
@@ -158,7 +158,7 @@ def run_command(words, folder):
 
 
 def add_commands(found, ran):
-    """Digests of what `run_commands` returned."""
+    """Add digests of what `run_commands` returned."""
     for name, status, reported, files in ran:
         found.add(f"{name}/said", [status, *reported])
         for file, data in files.items():

@@ -32,7 +32,7 @@ _STARTS = 2  # processes of a round that start and end, beside the one that meas
 
 
 class Clock:
-    """{name: [(wall time [s], CPU time of all cores [s])]}."""
+    """Times {name: [(wall time [s], CPU time of all cores [s])]}."""
 
     def __init__(self):
         self.found = {}
@@ -51,7 +51,7 @@ class Clock:
 
 
 def measure(checkout, is_start_alone):
-    """{what: [(clock, work)]} of a checkout's add-on."""
+    """Return {what: [(clock, work)]} of a checkout's add-on."""
     sys.path.insert(0, str(checkout))
     clock = Clock()
     clock.time("start", lambda: importlib.import_module("hair_addon").register())
@@ -68,7 +68,7 @@ def measure(checkout, is_start_alone):
 
 
 def scene(checkout):
-    """The sample head before a camera, in a sun's light; returns its object."""
+    """Return the sample head's object before a camera, in a sun's light."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.obj_import(filepath=str(checkout / "blend_samples" / "head.obj"))
     surface = bpy.context.selected_objects[0]
@@ -86,7 +86,7 @@ def scene(checkout):
 
 
 def groom(api, surface):
-    """Curves of 200 guides and of 30,000 strands."""
+    """Return Curves of 200 guides and of 30,000 strands."""
     settings = api.GroomSettings(api.GuideSettings(guide_count=200), api.HairSettings(strand_count=30_000))
     made = api.add_hair(surface, settings)
     bpy.context.view_layer.update()
@@ -125,7 +125,7 @@ def measured(checkout, *words):
 
 
 def one_round(checkout):
-    """{what: (clock, work)}, the medians of one round [s]."""
+    """Return {what: (clock, work)}, the medians of one round [s]."""
     found = measured(checkout)
     for _ in range(_STARTS):
         found["start"] += measured(checkout, "--start-alone")["start"]
@@ -133,7 +133,7 @@ def one_round(checkout):
 
 
 def report(checkouts, rounds):
-    """Print a line for each measured thing and checkout. rounds: [{checkout: {what: (clock, work)}}]."""
+    """Print a line for each measurement and checkout; rounds: [{checkout: {what: (clock, work)}}]."""
     for what in rounds[0][checkouts[0]]:
         print(what)
         first = np.array([found[checkouts[0]][what] for found in rounds])
@@ -146,7 +146,7 @@ def report(checkouts, rounds):
 
 
 def main():
-    """Time checkouts, alternating between them."""
+    """Time checkouts in alternating order."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     own = Path(__file__).resolve().parents[3]
     parser.add_argument("--checkouts", type=Path, nargs="+", default=[own], metavar="FOLDER", help="[this one]")

@@ -14,7 +14,7 @@ FAR = 10.0  # [m] from any collider
 
 
 def lanes_of(strands, device):
-    """(S, N, 3) points of strands, S a multiple of LANES → lane groups."""
+    """Return lane groups of (S, N, 3) points of strands, S a multiple of LANES."""
     count = strands.shape[1]
     groups = strands.reshape(-1, LANES, 3 * count).transpose(0, 2, 1)
     return wp.array(np.ascontiguousarray(groups, np.float32), dtype=float, device=device)
@@ -26,7 +26,7 @@ def planes_of(found, vertex_count):
 
 
 def strands_of(points):
-    """Points (N, 3) as the tips of strands whose roots are far away, and whose segments are too."""
+    """Return strands with points (N, 3) as tips, with roots and other segments far away."""
     count = -(-len(points) // LANES) * LANES
     strands = np.full((count, 2, 3), FAR, np.float32)
     strands[: len(points), 1] = points
@@ -59,20 +59,20 @@ def is_plane(planes):
 
 
 def bumpy(rng, radius=0.1):
-    """A closed mesh with ridges and hollows, around the origin."""
+    """Return a closed mesh with ridges and hollows, around the origin."""
     ball = subdivided_sphere(2, radius)
     return TriMesh(ball.vertices * rng.uniform(0.8, 1.1, (len(ball.vertices), 1)).astype(np.float32), ball.triangles)
 
 
 def around(rng, mesh, count, most=0.004):
-    """Points near a mesh, on both sides."""
+    """Return points near a mesh, on both sides."""
     corners = mesh.corners[rng.integers(len(mesh.triangles), size=count)]
     weights = rng.dirichlet(np.ones(3), count)
     return np.einsum("nk,nki->ni", weights, corners) + rng.uniform(-most, most, (count, 3))
 
 
 def sheet(rng):
-    """A bumpy square of 0.2 m at z = 0."""
+    """Return a bumpy square of 0.2 m at z = 0."""
     grid = flat_grid(6, 0.2)
     vertices = grid.vertices - np.float32([0.1, 0.1, 0.0])
     vertices[:, 2] = rng.uniform(-0.004, 0.004, len(vertices))
@@ -80,7 +80,7 @@ def sheet(rng):
 
 
 def slab(rng):
-    """A closed plate, 2 mm thick."""
+    """Return a closed plate, 2 mm thick."""
     top = sheet(rng)
     count = len(top.vertices)
     below = top.vertices - np.float32([0.0, 0.0, 0.002])

@@ -13,7 +13,7 @@ def update():
 
 
 def grow(surface, guide_count=40, strand_count=200, **settings):
-    """Guides and hair on a surface: (guides, hair) objects."""
+    """Return (guides, hair) objects on a surface."""
     before = set(bpy.data.objects)
     bpy.context.view_layer.objects.active = surface
     # Unset values are fitted to the surface in its present pose, which may be bent.

@@ -37,7 +37,7 @@ class Ball:
 
 
 def planes_of(surface, points, keep, friction, slide=(0.0, 0.0, 0.0)):
-    """(S, N, 8) of points (S, N, 3) within 5 cm; friction: of each strand."""
+    """Return planes (S, N, 8) of points (S, N, 3) within 5 cm; friction: of each strand."""
     heights, normals = surface.heights_and_normals(points)
     planes = np.zeros((*points.shape[:2], rod_solver.PLANE_ROWS))
     is_near = (heights < 0.05)[..., None]

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Elastic rods in equilibrium, by equations that share nothing with the solver."""
+"""Elastic rods in equilibrium, by equations that are independent of the solver."""
 
 import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
 
 
 def heavy_elastica(bending, weight, length, count):
-    """(count, 3) points of a strand clamped level that bends under its weight [N/m]: EI θ'' = -w (L - s) cos θ.
+    """Return (count, 3) points of a level clamped strand that bends under its weight [N/m]: EI θ'' = -w (L - s) cos
+    θ.
 
     The first test of Romero et al., Physical validation of simulators in computer graphics, 2021.
     """
@@ -31,7 +32,8 @@ def heavy_elastica(bending, weight, length, count):
 
 
 def kirchhoff(bending, twisting, weight, length, curvature, frame, moment, count):
-    """(count, 3) points of a curved rod under its weight [N/m], and the moment at its tip, where there must be none.
+    """Return (count, 3) points of a curved rod under its weight [N/m], and the moment at its tip, which must be
+    zero.
 
     curvature: (3,) natural, in the material frame [1/m]; frame: (3, 3) at the root, the third column along the rod;
     moment: (3,) at the root [N m]. Kirchhoff's equations: r' = d₃, D' = D [u]×, m' = -d₃ × n, u = K⁻¹ Dᵀ m + u₀.

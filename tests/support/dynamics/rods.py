@@ -21,19 +21,19 @@ LINE_MASS = 1300.0 * np.pi * 4e-5**2  # [kg/m]
 
 
 def line(length, vertex_count, direction=(1.0, 0.0, 0.0)):
-    """(1, N, 3): a straight strand from the origin."""
+    """Return (1, N, 3): a straight strand from the origin."""
     direction = np.asarray(direction, float) / np.linalg.norm(direction)
     return (np.linspace(0.0, length, vertex_count)[:, None] * direction)[None]
 
 
 def arc(radius, turns, vertex_count):
-    """(1, N, 3): part of a level circle that leaves the origin along x, curving to y."""
+    """Return (1, N, 3): part of a level circle that leaves the origin along x and curves to y."""
     angle = np.linspace(0.0, 2.0 * np.pi * turns, vertex_count)
     return radius * np.stack([np.sin(angle), 1.0 - np.cos(angle), 0.0 * angle], axis=-1)[None]
 
 
 def curl(length, vertex_count, turns=4.0, radius=0.006, fall=0.3):
-    """(1, N, 3): a coil."""
+    """Return (1, N, 3): a coil."""
     along = np.linspace(0.0, length, vertex_count)
     angle = 2.0 * np.pi * turns * along / length
     coil = [0.6 * along, radius * np.sin(angle), radius * (1.0 - np.cos(angle)) - fall * along]
@@ -60,7 +60,7 @@ class Simulation:
         return self
 
     def substeps(self, count):
-        """Positions (count, S, N, 3) after each of so many substeps with still roots."""
+        """Return positions (count, S, N, 3) after each of `count` substeps with still roots."""
         step = replace(self.step, count=1)
         found = []
         for _ in range(count):
@@ -83,15 +83,15 @@ class Simulation:
 
     @property
     def points(self):
-        """(S, N, 3) float64 [m]."""
+        """Return (S, N, 3) float64 [m]."""
         return self.rods.positions().astype(float)
 
     @property
     def speed(self):
-        """(S,) largest of each strand [m/s]."""
+        """Return (S,) largest speed of each strand [m/s]."""
         return np.linalg.norm(self.rods.velocities(), axis=2).max(axis=1)
 
 
 def in_lanes(values, device=DEVICE):
-    """(S, points, numbers) → an array of `Surroundings` on a device."""
+    """Return an array of `Surroundings` on a device from (S, points, numbers)."""
     return rod_solver.wp.array(rod_solver.to_lanes(values, rod_solver.lane_count(device)), dtype=float, device=device)

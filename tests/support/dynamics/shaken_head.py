@@ -11,7 +11,7 @@ NECK = np.array([0.0, -0.04, 0.72])
 
 
 def grown(mesh, count=96, length=0.2):
-    """(count, 41, 3): straight guides from the upper part of the head, outwards and a little down."""
+    """Return (count, 41, 3): straight guides from the upper part of the head, outward and a little down."""
     rng = np.random.default_rng(0)
     corners = mesh.corners.astype(np.float64)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -25,7 +25,7 @@ def grown(mesh, count=96, length=0.2):
 
 
 def shake(frame):
-    """70° to either side at 1.5 Hz, 660°/s, and 5 cm at 3 Hz."""
+    """Return the motion of 70° to either side at 1.5 Hz, 660°/s, and 5 cm at 3 Hz."""
     half = 0.5 * np.radians(70.0) * np.sin(3.0 * np.pi * frame * FRAME)
     way = np.array([0.05 * np.sin(6.0 * np.pi * frame * FRAME), 0.0, 0.0])
     return RigidMotion(np.array([0.0, 0.0, np.sin(half), np.cos(half)]), NECK, way)

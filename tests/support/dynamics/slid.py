@@ -12,7 +12,7 @@ from tests.support.dynamics.stepped import largest_move
 
 
 class Slid:
-    """`at(value)`: points (S, P, 3) of hair in a `Groom` with a style one of whose settings has that value.
+    """Hair in a `Groom` with a style, one setting of which varies; `at(value)` returns points (S, P, 3).
 
     Results that do not depend on the setting are computed once, so many values take little time.
     """
@@ -39,7 +39,7 @@ class Slid:
         return points.numpy()
 
     def _plain_strands(self, binding):
-        """A copy of the strands of a binding without styles."""
+        """Return a copy of the strands of a binding without styles."""
         if id(binding) not in self._plain:
             self._plain[id(binding)] = following.follow_guides(binding, self._hair.guides).points
         return wp.clone(self._plain[id(binding)])

@@ -68,7 +68,7 @@ def stepped(
 
 
 def straight_strands(count=1, length=0.2, point_count=41, spacing=0.01):
-    """(S, P, 3): strands that stand up from a row of roots."""
+    """Return (S, P, 3): strands that stand up from a row of roots."""
     points = np.zeros((count, point_count, 3), np.float32)
     points[:, :, 0] = spacing * np.arange(count)[:, None]
     points[:, :, 2] = np.linspace(0.0, length, point_count)
@@ -76,7 +76,7 @@ def straight_strands(count=1, length=0.2, point_count=41, spacing=0.01):
 
 
 def curved_strands(rng, count=64, length=0.2, point_count=41):
-    """(S, P, 3): smooth strands that bend and wind, from roots near the origin."""
+    """Return (S, P, 3): smooth strands that bend and wind, from roots near the origin."""
     s = np.linspace(0.0, 1.0, point_count)
     angle = rng.uniform(-2.0, 2.0, (count, 1)) * s + rng.uniform(0.0, 1.0, (count, 1))
     around = rng.uniform(-3.0, 3.0, (count, 1)) * s + rng.uniform(0.0, 6.0, (count, 1))
@@ -87,11 +87,11 @@ def curved_strands(rng, count=64, length=0.2, point_count=41):
 
 
 def rotation(rng):
-    """(3, 3): a random rotation."""
+    """Return (3, 3): a random rotation."""
     matrix, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     return matrix * np.linalg.det(matrix)
 
 
 def largest_move(points, others):
-    """[m] between the same points of two arrays."""
+    """Return the largest distance [m] between the same points of two arrays."""
     return np.linalg.norm(points.astype(np.float64) - others, axis=-1).max()

@@ -61,12 +61,12 @@ class Archive:
 
 
 def read(path):
-    """The `Archive` of a file."""
+    """Return the `Archive` of a file."""
     return _Reader(path.read_bytes()).archive()
 
 
 def objects(archive):
-    """{path: Object} of a whole archive."""
+    """Return {path: Object} of a whole archive."""
 
     def below(children, path):
         for name, child in children.items():
@@ -221,7 +221,7 @@ class _Reader:
         return Property(form, found_metadata, kind, extent, samples, [times[0] + step * n for n in range(count)])
 
     def sample(self, address, dtype, extent):
-        """An array (N,) or (N, extent), or a list of str."""
+        """Return an array (N,) or (N, extent), or a list of str."""
         content = self.content(address)
         assert not content or (len(content) > 16 and any(content[:16])), "no digest"
         content = content[16:]

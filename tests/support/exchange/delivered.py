@@ -47,7 +47,7 @@ def without_addon(path, folder, times):
 
 
 def _exported(path, frames):
-    """{frame: (N, 3)} of the curves Hair of a USD file, in the coordinates of their object."""
+    """Return {frame: (N, 3)} of the curves Hair of a USD file, in the coordinates of their object."""
     bpy.utils.expose_bundled_modules()
     from pxr import Usd, UsdGeom
 

@@ -36,7 +36,7 @@ def widths(curves_object):
 
 
 def shape(archive, name):
-    """The geometry of an object of the archive: {name: Property}, with its parameters."""
+    """Return {name: Property} of the geometry of an object of the archive, with its parameters."""
     (path,) = (p for p in alembic_reader.objects(archive) if p.endswith(f"/{name}Shape"))
     found = alembic_reader.objects(archive)[path].properties[".geom"].children
     return found | found[".arbGeomParams"].children
@@ -65,11 +65,11 @@ def bake(folder):
 
 @pytest.fixture
 def twisted(hair):
-    """Hair of a sphere that is turned, moved, scaled and twisted, and its guides."""
+    """Return hair of a sphere that is turned, moved, scaled and twisted, and its guides."""
     return twist(hair)
 
 
 @pytest.fixture
 def baked(hair, tmp_path):
-    """Guides that simulate on a sphere that swings, with their frames baked."""
+    """Return guides that simulate on a swinging sphere, with baked frames."""
     return bake(tmp_path)

@@ -22,7 +22,7 @@ def use(*chosen, **options):
 
 
 def world(curves_object):
-    """(N, 3) float64: all points in the world as Blender shows them, after modifiers."""
+    """Return (N, 3) float64: all points in the world as Blender shows them, after modifiers."""
     evaluated = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get())
     geometry = evaluated.evaluated_geometry()
     points = np.empty((len(geometry.curves.points), 3), np.float32)
@@ -37,7 +37,7 @@ def stored(curves_object):
 
 
 def lines_on(sphere, rng, count=60, least=2, most=12, lift=0.0):
-    """Polylines out of the unit sphere of an object, in the world, each with its own number of points."""
+    """Return polylines that start on the unit sphere of an object, in the world, each with its own number of points."""
     matrix = np.array(sphere.matrix_world)
     for _ in range(count):
         direction = rng.normal(size=3)
@@ -48,7 +48,7 @@ def lines_on(sphere, rng, count=60, least=2, most=12, lift=0.0):
 
 
 def curves_object(lines, name="Imported", kind="POLY"):
-    """An object of curves through polylines (P, 3)."""
+    """Return an object of curves through polylines (P, 3)."""
     datablock = bpy.data.hair_curves.new(name)
     datablock.add_curves([len(line) for line in lines])
     datablock.set_types(type=kind)

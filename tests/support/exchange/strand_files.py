@@ -18,7 +18,7 @@ def lines(count=6, rng=None, points=None):
 
 
 def hair(strands, widths=None, colors=None, text=b"", default=1.0):
-    """HAIR: arrays of segments and points; of thickness and colors if given."""
+    """Return a HAIR file: arrays of segments and points; of thickness and colors if given."""
     arrays = 3 + (0 if widths is None else 4) + (0 if colors is None else 16)
     total = sum(len(one) for one in strands)
     data = b"HAIR" + struct.pack("<4I", len(strands), total, arrays, 0)
@@ -30,13 +30,13 @@ def hair(strands, widths=None, colors=None, text=b"", default=1.0):
 
 
 def data(strands):
-    """HairSalon: a count, then the points."""
+    """Return a HairSalon file: a count, then the points."""
     parts = [struct.pack("<i", len(one)) + one.astype("<f4").tobytes() for one in strands]
     return struct.pack("<i", len(strands)) + b"".join(parts)
 
 
 def bin_file(strands):
-    """CT2Hair: as HairSalon, with a direction and a label at each point."""
+    """Return a CT2Hair file: as HairSalon, with a direction and a label at each point."""
     parts = []
     for one in strands:
         rows = np.column_stack([one, np.ones((len(one), 3)), np.zeros(len(one))]).astype("<f4")
@@ -45,7 +45,7 @@ def bin_file(strands):
 
 
 def tfx(strands, root_uvs=None):
-    """TressFX 4: as many strands as have the number of points of the first."""
+    """Return a TressFX 4 file of the strands with as many points as the first."""
     strands = [one for one in strands if len(one) == len(strands[0])]
     uv_place = 160 + 16 * len(strands) * len(strands[0])
     head = struct.pack(
@@ -56,7 +56,7 @@ def tfx(strands, root_uvs=None):
 
 
 def ply(strands, widths=None, order="little"):
-    """PLY as hairutil writes it: vertices with a color, and strands with their numbers of segments."""
+    """Return a PLY file as hairutil writes it: vertices with a color, and strands with their numbers of segments."""
     sign = "<" if order == "little" else ">"
     total = sum(len(one) for one in strands)
     kind = [(name, f"{sign}f4") for name in "xyz"] + [(name, "u1") for name in ("red", "green", "blue")]
@@ -74,7 +74,7 @@ def ply(strands, widths=None, order="little"):
 
 
 def ply_text(strands):
-    """PLY as text, with the radius of each vertex."""
+    """Return a PLY file as text, with the radius of each vertex."""
     head = f"ply\nformat ascii 1.0\nelement vertex {sum(len(one) for one in strands)}\n"
     head += "".join(f"property float {axis}\n" for axis in ("x", "y", "z", "radius"))
     head += f"element strand {len(strands)}\nproperty ushort nsegs\nend_header\n"
@@ -83,7 +83,7 @@ def ply_text(strands):
 
 
 def ply_lists(strands):
-    """PLY whose polylines list their vertices."""
+    """Return a PLY file whose polylines list their vertices."""
     head = f"ply\nformat binary_little_endian 1.0\nelement vertex {sum(len(one) for one in strands)}\n"
     head += "".join(f"property double {axis}\n" for axis in "xyz")
     head += f"element polyline {len(strands)}\nproperty list uchar int vertex_indices\nend_header\n"
@@ -95,7 +95,7 @@ def ply_lists(strands):
 
 
 def ply_edges(strands, rng=None):
-    """PLY of vertices and edges; rng: to shuffle the edges."""
+    """Return a PLY file of vertices and edges; rng: to shuffle the edges."""
     edges = edges_of(strands)
     if rng is not None:
         edges = rng.permutation(edges)
@@ -112,7 +112,7 @@ def edges_of(strands):
 
 
 def obj(strands, is_edges=False):
-    """OBJ: a line for each strand, or for each edge."""
+    """Return an OBJ file with a line for each strand, or for each edge."""
     rows = [f"v {x} {y} {z}\n" for x, y, z in np.concatenate(strands)]
     starts = 1 + np.cumsum([0, *(len(one) for one in strands)])
     found = edges_of(strands) + 1 if is_edges else [range(s, s + len(o)) for s, o in zip(starts, strands, strict=False)]
@@ -120,7 +120,7 @@ def obj(strands, is_edges=False):
 
 
 def npz(strands, name="positions", **others):
-    """Ragged arrays: points of all strands and their counts."""
+    """Return ragged arrays: points of all strands and their counts."""
     stream = io.BytesIO()
     counts = np.array([len(one) for one in strands])
     np.savez(stream, **{name: np.concatenate(strands)}, counts=counts, **others)

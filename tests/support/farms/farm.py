@@ -81,14 +81,14 @@ def wait_for(found, seconds, pause=0.2):
 
 
 def processes_with(variable, value):
-    """Ids of processes in whose environment a variable has a value."""
+    """Return the ids of processes in whose environment a variable has a value."""
     for process in filter(str.isdigit, os.listdir("/proc")):
         if f"{variable}={value}" in _words(f"/proc/{process}/environ"):
             yield int(process)
 
 
 def arguments_of(process):
-    """The words of a process's command; none if it has ended."""
+    """Return the words of a process's command; none if it has ended."""
     return _words(f"/proc/{process}/cmdline")
 
 
@@ -100,7 +100,7 @@ def _words(path):
 
 
 def parents_up_to(process, program):
-    """Ids of a process's parent, of that one's, and so on, up to the one of some program."""
+    """Return the ids of a process's parent and further ancestors, up to the one of a program."""
     parents = []
     while not parents or Path(f"/proc/{parents[-1]}/comm").read_text().strip() != program:
         state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()

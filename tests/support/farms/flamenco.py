@@ -62,12 +62,12 @@ class Manager:
         return self.ask("jobs", job | more)
 
     def tasks(self, job):
-        """The tasks of a job with their commands, in order."""
+        """Return the tasks of a job with their commands, in order."""
         found = self.ask(f"jobs/{job['id']}/tasks")[1]["tasks"]
         return [self.ask(f"tasks/{task['id']}")[1] for task in found]
 
     def status(self, job):
-        """The status of a job."""
+        """Return the status of a job."""
         return self.ask(f"jobs/{job['id']}")[1]["status"]
 
     def wait(self, job, seconds=300):
@@ -82,14 +82,14 @@ class Manager:
 
 
 def identity_of(job):
-    """`compiled`'s options for a job that a manager has made."""
+    """Return the options of `compiled` for a job that a manager has made."""
     created = datetime.datetime.fromisoformat(job["created"][:19] + "+00:00")
     return {"created": created.isoformat(), "identity": job["id"][:4]}
 
 
 @contextlib.contextmanager
 def manager(folder, blender):
-    """A `Manager` with the job type, whose workers use a `blender`."""
+    """Context with a `Manager` that has the job type, whose workers use a `blender`."""
     (port,) = farm.free_ports(1)
     (folder / "scripts").mkdir()
     shutil.copy(SCRIPT, folder / "scripts")

@@ -41,7 +41,7 @@ PartitionName=farm Nodes=ALL Default=YES State=UP MaxTime=INFINITE
 
 @contextlib.contextmanager
 def cluster(folder):
-    """Context with two nodes: {node: process of its daemon} and the environment for Slurm's commands."""
+    """Context with {node: process of its daemon} of two nodes, and the environment for Slurm's commands."""
     (folder / "munge").mkdir(mode=0o700)
     for name in ("state", *NODES):
         (folder / name).mkdir()

@@ -44,7 +44,7 @@ def strings_of_classes():
 
 
 def properties_of(cls):
-    """RNA of the properties that a class itself declares."""
+    """Return the RNA properties that a class itself declares."""
     rna = cls.bl_rna
     if issubclass(cls, bpy.types.Operator):
         category, name = cls.bl_idname.split(".")
@@ -76,7 +76,7 @@ class _Read:
 
 @cache
 def _read():
-    """{path: `_Read`} of all sources, which take seconds to parse."""
+    """Return {path: `_Read`} of all sources, which take seconds to parse."""
     found = {}
     for path in ADDON.rglob("*.py"):
         read = found[path] = _Read([], [])

@@ -41,7 +41,7 @@ class Trace:
 
     @property
     def returns(self):
-        """[(caller, called)]."""
+        """Return [(caller, called)]."""
         order = {file: number for number, file in enumerate(self.files)}
         calls = [call for call in self.calls if call[0] in order and call[1] != LAUNCHING]
         return [(caller, called) for caller, called in calls if order[called] < order[caller]]

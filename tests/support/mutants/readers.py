@@ -139,7 +139,7 @@ def are_curves(found, _whole):
 
 
 def _are_the_arrays(found, whole):
-    """The members of the archive have checksums."""
+    """Check arrays; the members of the archive have checksums."""
     are_curves(found, whole)
     points = {one.points.tobytes() for one in whole.sets}
     assert all(one.points.tobytes() in points for one in found.sets)
@@ -262,7 +262,7 @@ def _picture(path):
 
 
 def readers():
-    """{name: `Reader`}."""
+    """Return {name: `Reader`}."""
     settings = settings_file.text_of(settings_file.to_object(_settings())).encode()
     manifest_data = json.dumps(
         {"format": frame_manifest.FORMAT, "version": 1} | dataclasses.asdict(manifest())

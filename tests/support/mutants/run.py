@@ -27,7 +27,7 @@ MEMORY = 4 * 2**30  # [bytes] in addition to the memory of the process
 
 
 class Hangs(BaseException):
-    """A reader hangs."""
+    """Raised if a reader takes too long."""
 
 
 @contextlib.contextmanager

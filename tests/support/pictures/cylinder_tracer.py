@@ -19,7 +19,7 @@ class Traced(NamedTuple):
 
 
 def trace(theta_d, eta, sigma_a, ray_count):
-    """Rays that come in inclined by theta_d to the normal plane; sigma_a (C,) per radius."""
+    """Trace rays inclined by theta_d to the normal plane; sigma_a (C,) per radius."""
     sigma_a = np.asarray(sigma_a, float)
     # Even steps of the angle of incidence: rays are dense at the rim, where light is bent the most.
     gamma = (np.arange(ray_count) + 0.5) / ray_count * np.pi - 0.5 * np.pi
@@ -50,7 +50,7 @@ def trace(theta_d, eta, sigma_a, ray_count):
 
 
 def fresnel(cos_incident, eta):
-    """Mean reflectance of both polarisations; eta: index beyond the surface over index before it."""
+    """Return the mean reflectance of both polarizations; eta: index beyond the surface over index before it."""
     cos_beyond = np.sqrt(1.0 - (1.0 - cos_incident**2) / eta**2)
     s = (cos_incident - eta * cos_beyond) / (cos_incident + eta * cos_beyond)
     p = (cos_beyond - eta * cos_incident) / (cos_beyond + eta * cos_incident)
@@ -58,7 +58,7 @@ def fresnel(cos_incident, eta):
 
 
 def cell_means(traced, cell_count):
-    """N_R, N_TT, N_TRT (3, cell_count, C): light per radian of phi, averaged over even cells of [0, pi]."""
+    """Return N_R, N_TT, N_TRT (3, cell_count, C): light per radian of phi, averaged over even cells of [0, pi]."""
     means = np.empty((3, cell_count, traced.light.shape[-1]))
     for path in range(3):
         cell = np.minimum((traced.phi[path] / np.pi * cell_count).astype(int), cell_count - 1)
@@ -70,7 +70,7 @@ def cell_means(traced, cell_count):
 
 
 def energies(traced):
-    """½ int A dh of R, TT, TRT, (3, C)."""
+    """Return ½ int A dh of R, TT, TRT, (3, C)."""
     return 0.5 * np.einsum("pnc,n->pc", traced.light, traced.dh)
 
 
@@ -89,5 +89,5 @@ def _refract(direction, normal, eta):
 
 
 def _azimuth(direction):
-    """Angle in the xy plane from the light's side (+x), [0, pi]."""
+    """Return the angle in the xy plane from the light's side (+x), [0, pi]."""
     return np.abs(np.arctan2(direction[:, 1], direction[:, 0]))

@@ -14,7 +14,7 @@ def texels(texture, count, each):
 
 
 def places(on_gpu):
-    """(S, P, 3) of `StrandsOnGPU`."""
+    """Return the points (S, P, 3) of `StrandsOnGPU`."""
     each = packed_strands.texel_count(on_gpu.point_count)
     return packed_strands.unpack(texels(on_gpu.texture, on_gpu.strand_count, each))
 
@@ -26,7 +26,7 @@ def places_before(on_gpu, count):
 
 
 def radii(on_gpu):
-    """(S, P)."""
+    """Return the radii (S, P)."""
     found = texels(on_gpu.radii_texture, on_gpu.radius_strands, on_gpu.point_count)[..., 0] * on_gpu.radius_unit
     return np.broadcast_to(found, (on_gpu.strand_count, on_gpu.point_count))
 

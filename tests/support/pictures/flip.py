@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The difference that a viewer sees between two pictures, flipped back and forth: LDR-FLIP [Andersson20]."""
+"""The visible difference between two pictures that are flipped back and forth: LDR-FLIP [Andersson20]."""
 
 import numpy as np
 from scipy.ndimage import convolve1d
@@ -17,7 +17,7 @@ _FEATURE_WIDTH, _FEATURE_EXPONENT = 0.082, 0.5  # of edges and points, in degree
 
 
 def flip(reference, other):
-    """(H, W) errors between 0 and 1 of two (H, W, 3) pictures in sRGB display values between 0 and 1."""
+    """Return (H, W) errors between 0 and 1 of two (H, W, 3) pictures in sRGB display values between 0 and 1."""
     references, others = (_opponent(_linear(np.clip(one, 0.0, 1.0))) for one in (reference, other))
     color = _color_error(references, others)
     feature = _feature_error(references[..., 0], others[..., 0])
@@ -29,7 +29,7 @@ def _linear(encoded):
 
 
 def _opponent(linear):
-    """YCxCz of linear RGB."""
+    """Return YCxCz of linear RGB."""
     x, y, z = np.moveaxis(linear @ _TO_XYZ.T / _WHITE, -1, 0)
     return np.stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)], axis=-1)
 
@@ -51,7 +51,7 @@ def _color_error(reference, other):
 
 
 def _filtered(opponent):
-    """The picture as the eye resolves it: each channel convolved with its contrast sensitivity."""
+    """Return the picture as the eye resolves it: each channel convolved with its contrast sensitivity."""
     channels = []
     for channel, gaussians in enumerate(_CONTRAST):
         widest = max(width for parts in _CONTRAST for _weight, width in parts)
@@ -72,7 +72,7 @@ def _separable(values, along, across):
 
 
 def _hunt(linear):
-    """L*a*b* with chroma in proportion to lightness, the Hunt effect."""
+    """Return L*a*b* with chroma in proportion to lightness, the Hunt effect."""
     relative = linear @ _TO_XYZ.T / _WHITE
     edge = 6.0 / 29.0
     bent = np.where(relative > edge**3, np.cbrt(relative), relative / (3.0 * edge**2) + 4.0 / 29.0)

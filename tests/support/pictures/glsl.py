@@ -26,7 +26,7 @@ _MAIN = (
 
 
 def source(*names):
-    """The text of shader files with their includes, each file once, without the main that draws hair."""
+    """Return the text of shader files with their includes, each file once, without the main that draws hair."""
     text, seen = [], set()
     for name in names:
         expanded, origins = shaders.expand(name)
@@ -38,12 +38,12 @@ def source(*names):
 
 
 def evaluate(text, returns, expression, *, textures=None, volumes=(), structs="", blocks=None, **inputs):
-    """Values of a GLSL expression, (N,) or (N, components) float32.
+    """Return values of a GLSL expression, (N,) or (N, components) float32.
 
-    text: GLSL before the expression, such as `source("fibre/fibre.glsl")`; returns: the expression's type;
-    inputs: (N,) or (N, 2..4) arrays with their names in the expression, integers as int and others as float or vec;
-    textures: {sampler: GPUTexture}; volumes: samplers that are three-dimensional; structs: declarations of the types of
-    blocks; blocks: uniform blocks, {instance: (type, record)}.
+    text: GLSL before the expression, such as `source("fibre/fibre.glsl")`; returns: the expression's type; inputs: (N,)
+    or (N, 2..4) arrays with their names in the expression, integers as int and others as float or vec; textures:
+    {sampler: GPUTexture}; volumes: samplers that are three-dimensional; structs: declarations of the types of blocks;
+    blocks: uniform blocks, {instance: (type, record)}.
     """
     textures, blocks = textures or {}, blocks or {}
     inputs = {name: np.asarray(values) for name, values in inputs.items()}

@@ -46,7 +46,7 @@ def comb(count, along=(0.0, 0.01, 0.02)):
 
 
 def drawn(hair):
-    """(S, P, 3) in the texture that the shader reads, after a viewport has drawn it."""
+    """Return (S, P, 3) in the texture that the shader reads, after a viewport has drawn it."""
     on_gpu = hair_cache.strands_on_gpu(hair.data)
     hair_cache.choose_makers()
     prepare()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair and its surface as passed to a render engine."""
+"""Hair and its surface as a render engine receives them."""
 
 import contextlib
 
@@ -24,14 +24,14 @@ class _Probe(bpy.types.RenderEngine):
 
 
 def read_points(curves):
-    """(S, P, 3) float32 of evaluated Curves of one point count."""
+    """Return (S, P, 3) float32 of evaluated Curves of one point count."""
     found = np.empty((len(curves.points), 3), np.float32)
     curves.attributes["position"].data.foreach_get("vector", found.ravel())
     return found.reshape(len(curves.curves), -1, 3)
 
 
 def read_mesh(mesh):
-    """The `TriMesh` of an evaluated mesh."""
+    """Return the `TriMesh` of an evaluated mesh."""
     vertices = np.empty((len(mesh.vertices), 3), np.float32)
     mesh.vertices.foreach_get("co", vertices.ravel())
     mesh.calc_loop_triangles()

@@ -18,7 +18,8 @@ def add_orthographic_camera(scene):
 
 
 def rendered(folder, **settings):
-    """{pass: (height, width) or (height, width, channels) float32}, first row at the bottom, of the active view layer.
+    """Return {pass: (height, width) or (height, width, channels) float32}, first row at the bottom, of the active
+    view layer.
 
     The scene is rendered by our engine to an EXR with all its passes; settings: of the scene's `render`, or of its own
     settings of ours.
@@ -52,7 +53,7 @@ def configure(**settings):
 
 
 def read_layers(path):
-    """{view layer: {pass: array}} of a multilayer EXR."""
+    """Return {view layer: {pass: array}} of a multilayer EXR."""
     found = {}
     with OpenEXR.File(str(path), separate_channels=True) as file:
         for part in file.parts:

@@ -7,12 +7,12 @@ import bpy
 
 
 def view3d():
-    """The first `SpaceView3D` of the file."""
+    """Return the first `SpaceView3D` of the file."""
     return next(a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
 
 
 def context_of(space, pointer=1, size=(64, 64)):
-    """A stand-in for the context of a viewport; pointer: of its region."""
+    """Return a stand-in for the context of a viewport; pointer: of its region."""
     context = bpy.context
     return SimpleNamespace(
         space_data=space,

@@ -8,7 +8,7 @@ from hair_addon.core.geometry.mesh import normals, positions
 
 
 def wavy(rng, count=30, point_count=17):
-    """(S, P, 3) float32: strands that bend and twist at random, of segments of different lengths."""
+    """Return (S, P, 3) float32: strands that bend and twist at random, of segments of different lengths."""
     turns = np.cumsum(rng.normal(0.0, 0.25, (count, point_count - 1, 3)), axis=1)
     directions = rng.normal(size=(count, 1, 3)) + turns
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
@@ -29,12 +29,12 @@ def standing(mesh, count, rng, length=0.3, point_count=21, spread=0.4):
 
 
 def segment_lengths(points):
-    """(S, P-1) float64."""
+    """Return (S, P-1) float64 lengths of segments."""
     return np.linalg.norm(np.diff(np.asarray(points, np.float64), axis=1), axis=2)
 
 
 def lengths(points):
-    """(S,) float64."""
+    """Return (S,) float64 lengths of strands."""
     return segment_lengths(points).sum(axis=1)
 
 

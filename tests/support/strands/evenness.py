@@ -47,7 +47,7 @@ def relax(mesh, sites, iterations, density=None, device="cpu", steps_kept=cvt.ST
 
 
 def measure(mesh, sites, density=None, device="cpu"):
-    """`Quality` of sites on a checked mesh for a density (V,) or None."""
+    """Return the `Quality` of sites on a checked mesh for a density (V,) or None."""
     domain = Domain(mesh, len(sites), density, device=device)
     neighbours = sites_on(domain, sites, device)
     total = domain.amounts.sum()

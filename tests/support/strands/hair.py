@@ -5,6 +5,6 @@ from hair_addon.core.grooming import following, groom
 
 
 def generate_hair(mesh, guides, settings, *, device="cpu", **details):
-    """`Strands` (strand_count, P) between guides of P points; arguments as of `groom.bind_hair`."""
+    """Return `Strands` (strand_count, P) between guides of P points; arguments as of `groom.bind_hair`."""
     binding = groom.bind_hair(mesh, guides, settings, device=device, **details)
     return following.follow_guides(binding, guides)

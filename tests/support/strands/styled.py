@@ -13,7 +13,7 @@ from tests.support.meshes import HEAD, flat_grid, read_obj, subdivided_sphere
 
 
 class Groom:
-    """Hair without styles, to which styles are applied: `styled(*styles)` are points (S, P, 3)."""
+    """Hair without styles, to which `styled(*styles)` applies styles and returns points (S, P, 3)."""
 
     def __init__(self, mesh, guide_settings, hair_settings, device=DEVICE, axes=None, **ground):
         self.mesh, self.settings, self.device, self.axes, self.ground = mesh, hair_settings, device, axes, ground
@@ -22,7 +22,7 @@ class Groom:
         self.trees = hair_styles.clump_trees(mesh, self.guides.roots, hair_settings, device=device, **ground)
 
     def rooted(self, roots):
-        """The same groom with strands at other roots."""
+        """Return the same groom with strands at other roots."""
         other = copy(self)
         other.binding = groom.bind_hair(
             self.mesh, self.guides, self.settings, roots=roots, device=self.device, **self.ground
@@ -34,16 +34,16 @@ class Groom:
 
     @property
     def plain(self):
-        """(S, 41, 3): strands without styles."""
+        """Return (S, 41, 3): strands without styles."""
         return following.follow_guides(self.binding, self.guides).numpy()
 
     def bound(self, *styles, inputs=None, point_count=None):
-        """The `Styling` of styles."""
+        """Return the `Styling` of styles."""
         settings = self.settings if point_count is None else replace(self.settings, point_count=point_count)
         return hair_styles.bind_styles(self.binding, self.guides, settings, styles, self.trees, inputs, self.axes)
 
     def styled(self, *styles, inputs=None, point_count=None, guides=None, chosen=None):
-        """(S, P, 3), or (M, P, 3) of some strands."""
+        """Return (S, P, 3), or (M, P, 3) of some strands."""
         guides = self.guides if guides is None else guides
         styling = self.bound(*styles, inputs=inputs, point_count=point_count)
         if styling is None:
@@ -56,7 +56,7 @@ class Groom:
 
 
 def head(strand_count=1500, guide_count=120, device=DEVICE, seed=1, **hair):
-    """Long hair that hangs, on the sample head's upper half; seed: of guides."""
+    """Return long hair that hangs, on the sample head's upper half; seed: of guides."""
     mesh = read_obj(HEAD)
     height = mesh.vertices[:, 2]
     density = (height > np.quantile(height, 0.6)).astype(np.float32)
@@ -65,7 +65,7 @@ def head(strand_count=1500, guide_count=120, device=DEVICE, seed=1, **hair):
 
 
 def beard(strand_count=800, device=DEVICE, seed=1):
-    """Short hair on the sample head's lower third."""
+    """Return short hair on the sample head's lower third."""
     mesh = read_obj(HEAD)
     height = mesh.vertices[:, 2]
     density = (height < np.quantile(height, 0.35)).astype(np.float32)
@@ -74,19 +74,19 @@ def beard(strand_count=800, device=DEVICE, seed=1):
 
 
 def lawn(strand_count=800, device=DEVICE, seed=1):
-    """Strands on a square, each leaning another way."""
+    """Return strands on a square, each leaning another way."""
     guides = GuideSettings(guide_count=60, length=0.15, tilt=0.5, gravity=0.4, seed=seed)
     return Groom(flat_grid(8, 0.3), guides, HairSettings(strand_count=strand_count, radius=4e-5), device)
 
 
 def straight(strand_count=400, length=0.2, size=0.1, device=DEVICE):
-    """Straight strands that stand on a square."""
+    """Return straight strands that stand on a square."""
     guides = GuideSettings(guide_count=40, length=length, length_variation=0.0, tilt=0.0, gravity=0.0)
     return Groom(flat_grid(8, size), guides, HairSettings(strand_count=strand_count, radius=4e-5), device)
 
 
 def ball(strand_count=800, device=DEVICE, seed=1, size=0.5, **hair):
-    """Fur on a sphere; seed: of guides; size: its radius [m]."""
+    """Return fur on a sphere; seed: of guides; size: its radius [m]."""
     guides = GuideSettings(guide_count=60, length=0.6 * size, gravity=0.5, seed=seed)
     return Groom(
         subdivided_sphere(3, size), guides, HairSettings(strand_count=strand_count, radius=1e-3, **hair), device

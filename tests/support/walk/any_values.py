@@ -71,7 +71,7 @@ def groups(owner):
 
 
 def plain(group, declared):
-    """The value of a property as text."""
+    """Return the value of a property as text."""
     read = getattr(group, declared.identifier)
     return repr(read[:] if getattr(declared, "is_array", False) else read)
 
