@@ -17,10 +17,13 @@ from ...core.grooming import guide_layers
 from ...core.grooming.guide_layers import GuideLayers
 from ..data import scene
 from ..data.strands import attributes, curves, layer_attributes
+from ..host.caches import Cache
 from ..host.notices import text_of
 from ..settings import layer_items
 
 _LEAST_PAINT = 1e-5  # smaller changes of masks are rounding
+
+shape_cache = Cache(capacity=4)  # fingerprint → (N, 3) points that layers give
 
 
 def is_outdated(guides: Curves) -> bool:
@@ -31,9 +34,10 @@ def is_outdated(guides: Curves) -> bool:
     return layer_items.is_reweighed(state) or is_edited(guides)
 
 
-def is_edited(guides: Curves) -> bool:
-    """Whether points of guides differ from what their layers give."""
-    return guides.vellus.layered != geometry.fingerprint.fingerprint(curves.read_points(guides))
+def is_edited(guides: Curves, points: np.ndarray | None = None) -> bool:
+    """Whether points (N, 3) of guides, read if they are not given, differ from what their layers give."""
+    points = curves.read_points(guides) if points is None else points
+    return guides.vellus.layered != geometry.fingerprint.fingerprint(points)
 
 
 def update(guides: Curves, depsgraph: Depsgraph) -> bool:
@@ -42,28 +46,49 @@ def update(guides: Curves, depsgraph: Depsgraph) -> bool:
     Returns whether points were written. Points that the active layer cannot have, because it is hidden or has no weight
     there, return to where layers put them; the reason becomes the status of the guides.
     """
-    if not is_outdated(guides):
+    state = guides.vellus
+    if not len(state.layers) or attributes.is_from_library(guides):
         return False
-    state, points = guides.vellus, curves.read_points(guides)
-    identities = layer_items.identities_of(state)
+    points = curves.read_points(guides)
+    is_combed = is_edited(guides, points)
+    if not is_combed and not layer_items.is_reweighed(state):
+        return False
     had_status = bool(state.status)
     state.status = ""
-    layers = read(guides, depsgraph, is_shown=True)
-    is_recorded = is_edited(guides) and np.isfinite(points).all()
-    if is_recorded:
-        layers, refusal = _recorded(layers, state, points)
+    layers, shape = read(guides, depsgraph, is_shown=True), None
+    if is_combed and np.isfinite(points).all():
+        shape = _shape(guides, layers)
+        is_other = guide_layers.is_other(layers, points, shape)
+        before, (layers, refusal) = layers, _recorded(layers, state, points, shape)
+        shape = guide_layers.composed_again(layers, shape, is_other)
         if had_status:
             read(guides, depsgraph)  # reports masks that are still missing
         state.status = " ".join(sentence for sentence in (refusal, state.status) if sentence)
-        layer_attributes.write(guides, layers, identities)
+        _write(guides, layers, before)
     if layer_items.is_reweighed(state):
         layers = read(guides, depsgraph)
         note_shown(guides, depsgraph)
         return show(guides, guide_layers.composed(layers))
-    return show_layers(guides, layers)
+    return show_layers(guides, layers, shape)
 
 
-def _recorded(layers, state, points):
+def _write(guides, layers, before):
+    """Write layers after the active one was recorded; the others have changed only if the base or frames have."""
+    state = guides.vellus
+    identities = layer_items.identities_of(state)
+    if layers.base is not before.base or layers.normals is not before.normals:
+        layer_attributes.write(guides, layers, identities)
+    elif state.active_layer < len(identities):
+        layer_attributes.write_layer(guides, layers, identities[state.active_layer], state.active_layer)
+
+
+def _shape(guides, layers):
+    """Return the points (N, 3) that layers gave when guides were composed."""
+    shape = shape_cache.get(guides.vellus.layered)
+    return shape if shape is not None and len(shape) == len(layers.base) else guide_layers.composed(layers)
+
+
+def _recorded(layers, state, points, shape):
     """Return (`GuideLayers` with edited points in the active layer, refusal or an empty text)."""
     refusal, place = "", state.active_layer
     try:
@@ -76,12 +101,15 @@ def _recorded(layers, state, points):
         weights[0] = 0.0
         found, _changed = guide_layers.recorded(layers.weighted(weights), 0, points)
         return replace(found, weights=layers.weights), refusal
-    return guide_layers.recorded(layers, place, points)[0], refusal
+    return guide_layers.recorded(layers, place, points, shape, in_place=True)[0], refusal
 
 
-def show_layers(guides: Curves, layers: GuideLayers) -> bool:
-    """Write what layers give to guides that differ from it; others keep their exact points. Returns as `show`."""
-    shape, points = guide_layers.composed(layers), curves.read_points(guides)
+def show_layers(guides: Curves, layers: GuideLayers, shape: np.ndarray | None = None) -> bool:
+    """Write what layers give to guides that differ from it; others keep their exact points. Returns as `show`.
+
+    shape: (N, 3) of the composed points if they are known.
+    """
+    shape, points = guide_layers.composed(layers) if shape is None else shape, curves.read_points(guides)
     is_other = np.repeat(guide_layers.is_other(layers, points, shape), layers.counts)
     return show(guides, np.where(is_other[:, None], shape, points))
 
@@ -98,8 +126,9 @@ def show(guides: Curves, shape: np.ndarray) -> bool:
 
 def note_shape(guides: Curves) -> None:
     """Note that layers give the present points; settings of guides still apply to the base unless it was edited."""
-    state = guides.vellus
-    state.layered = geometry.fingerprint.fingerprint(curves.read_points(guides))
+    state, points = guides.vellus, curves.read_points(guides)
+    state.layered = geometry.fingerprint.fingerprint(points)
+    shape_cache.keep(state.layered, points)
     if state.is_base_grown and not curves.is_hand_made(guides):
         state.written = state.layered
 

@@ -17,6 +17,7 @@ from ..groom.guides import guide_states, outside_guides
 from ..groom.surfaces import edited_faces
 from ..groom.systems import copied_hair
 from ..host import notices
+from ..layers import recording
 from ..render import hair_cache, modified_hair, solid_hair
 from ..render.frames import composite
 from ..render.viewport import live_light, region_pictures, viewport
@@ -56,6 +57,7 @@ COPIES = (
 # Values that are keyed by all of their inputs, or check by themselves whether they are up to date.
 OTHERS = (
     hair_cache.shading_cache,
+    recording.shape_cache,
     scene.faces_cache,
     scene.surface_cache,
     sources.texel_cache,

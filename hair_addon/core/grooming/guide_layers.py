@@ -106,23 +106,35 @@ def composed(layers: GuideLayers) -> np.ndarray:
     return grooming.layer_kernels.compose(layers)
 
 
-def recorded(layers: GuideLayers, active: int, points: np.ndarray) -> tuple[GuideLayers, np.ndarray]:
+def composed_again(layers: GuideLayers, shape: np.ndarray, is_chosen: np.ndarray) -> np.ndarray:
+    """Return the points (N, 3) of guides, where only chosen guides (G,) differ from a known shape (N, 3) float32."""
+    guides = np.flatnonzero(is_chosen).astype(np.int32)
+    return grooming.layer_kernels.compose(layers, guides, shape.copy()) if len(guides) else shape
+
+
+def recorded(
+    layers: GuideLayers, active: int, points: np.ndarray, shape: np.ndarray | None = None, in_place: bool = False
+) -> tuple[GuideLayers, np.ndarray]:
     """Let the layer of index `active` make guides as they were edited; returns the layers and (G,) bool: which changed.
 
-    points: (N, 3) of the edited guides. Other layers stay. A guide whose root has moved takes its base along. Guides
+    points: (N, 3) of the edited guides; shape: (N, 3) float32, the composed points if they are known; in_place: whether
+    the arrays of `layers` may change. Other layers stay. A guide whose root has moved takes its base along. Guides
     where the active layer weighs less than `LEAST_WEIGHT` stay as they are composed.
     """
     points = np.asarray(points, np.float32)
     require_count("edited points", len(points), len(layers.base))
     require_indices("layers", np.array([active]), len(layers.turns))
     starts = geometry.strands.curve_offsets(layers.counts)
-    layers = _rooted(layers, points, starts)
-    is_changed = is_other(layers, points, composed(layers)) & (layers.weights[active] >= LEAST_WEIGHT)
+    layers, is_moved = _rooted(layers, points, starts)
+    shape = composed(layers) if shape is None else composed_again(layers, shape, is_moved)
+    is_changed = is_other(layers, points, shape) & (layers.weights[active] >= LEAST_WEIGHT)
     guides = np.flatnonzero(is_changed).astype(np.int32)
     if not len(guides):
         return layers, is_changed
-    turns, stretches = grooming.layer_kernels.record(layers, active, points, guides)
-    return replace(layers, turns=turns, stretches=stretches), is_changed
+    if not in_place:
+        layers = replace(layers, turns=layers.turns.copy(), stretches=layers.stretches.copy())
+    grooming.layer_kernels.record(layers, active, points, guides)
+    return layers, is_changed
 
 
 def is_other(layers: GuideLayers, points: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -210,16 +222,21 @@ def merged(layers: GuideLayers, lower: int) -> GuideLayers:
 
 
 def _rooted(layers, points, starts):
-    """Return layers whose base begins where edited guides do; new guides without a base take the edited points."""
+    """Return (layers whose base begins where edited guides do, (G,) bool: guides whose base or frame has changed).
+
+    New guides without a base take the edited points.
+    """
     has_points = np.asarray(layers.counts) > 0
-    firsts = starts[:-1][has_points]
+    firsts, lasts = starts[:-1][has_points], starts[1:][has_points] - 1
     shifts = np.zeros((len(layers.counts), 3), np.float32)
     shifts[has_points] = points[firsts] - layers.base[firsts]
     is_new = np.zeros(len(layers.counts), bool)
-    if len(layers.base):
-        is_new[has_points] = ~np.logical_or.reduceat(layers.base.any(axis=1), firsts)
+    is_new[has_points] = ~(layers.base[firsts].any(axis=1) | layers.base[lasts].any(axis=1))
+    for guide in np.flatnonzero(is_new):
+        is_new[guide] = not layers.base[starts[guide] : starts[guide + 1]].any()
     normals, tangents, base = layers.normals, layers.tangents, layers.base
-    if shifts.any():
+    is_moved = is_new | shifts.any(axis=1)
+    if is_moved.any():
         base = base + np.repeat(shifts, layers.counts, axis=0)
     if is_new.any():
         of_new = np.repeat(is_new, layers.counts)
@@ -232,7 +249,7 @@ def _rooted(layers, points, starts):
         normals, tangents = normals.copy(), tangents.copy()
         normals[no_axes] = (0.0, 0.0, 1.0)
         tangents[no_axes] = (1.0, 0.0, 0.0)
-    return replace(layers, base=base, normals=normals, tangents=tangents)
+    return replace(layers, base=base, normals=normals, tangents=tangents), is_moved | no_axes
 
 
 def _unit(vectors):

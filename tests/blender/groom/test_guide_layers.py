@@ -9,6 +9,7 @@ from mathutils import Matrix
 from hair_addon import api
 from hair_addon.blender.data.strands import curves
 from hair_addon.core.errors import HairError
+from hair_addon.core.grooming import layer_kernels
 from tests.support.reading import points, write_points
 
 
@@ -74,6 +75,28 @@ def test_combing_is_recorded_and_a_weight_takes_it_back(layered):
     set_weight(layered, 0, 1.0)
     np.testing.assert_allclose(points(layered), shape, atol=1e-6)
     np.testing.assert_allclose(points(bpy.data.objects["Hair"]), combed_hair, atol=1e-5)
+
+
+def test_a_stroke_composes_only_the_guides_that_it_combs(layered, monkeypatch):
+    comb(layered)
+    api.add_layer(layered)
+    update()
+    counted, compose = [], layer_kernels.compose
+
+    def counting(layers, guides=None, out=None):
+        counted.append(len(layers.counts) if guides is None else len(guides))
+        return compose(layers, guides, out)
+
+    monkeypatch.setattr(layer_kernels, "compose", counting)
+    shape, combed = points(layered), points(layered)
+    combed[:2] = leaned(shape[:2], (1.0, 0.0, 0.0))
+    write_points(layered, combed)
+    layered.data.update_tag()
+    update()
+    assert sum(counted) == 2
+    assert np.array_equal(points(layered), combed)
+    set_weight(layered, 1, 0.0)
+    np.testing.assert_allclose(points(layered), shape, atol=1e-6)
 
 
 def test_the_first_layer_takes_the_present_combing(hair):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Layers of guides restore recorded combing, keep lengths at any weight, and follow their guides."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -82,6 +83,88 @@ def test_any_layer_can_be_recorded_below_others(combed, active):
         assert np.array_equal(again.turns[other], layers.turns[other])
     is_same = np.repeat(~is_changed, layers.counts)
     assert np.array_equal(again.turns[:, is_same], layers.turns[:, is_same])
+
+
+def _turns(axes_and_angles):
+    """(..., 3, 3) matrices of rotation vectors (..., 3)."""
+    angles = np.linalg.norm(axes_and_angles, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(axes_and_angles / np.where(angles[..., 0] > 0.0, angles[..., 0], 1.0), -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    return np.eye(3) + np.sin(angles) * cross + (1.0 - np.cos(angles)) * cross @ cross
+
+
+def _composed_in_double_precision(layers):
+    """(N, 3): the formula of guide_layers.py, guide by guide."""
+    sines = np.linalg.norm(layers.turns[..., 1:].astype(np.float64), axis=-1)
+    angles = 2.0 * np.arctan2(sines, layers.turns[..., 0]) / np.where(sines > 0.0, sines, 1.0)
+    found = layers.base.astype(np.float64)
+    for guide, (first, end) in enumerate(pairwise(curve_offsets(layers.counts))):
+        weights = layers.weights[:, guide].astype(np.float64)
+        steps = np.diff(layers.base[first:end].astype(np.float64), axis=0)
+        tangent, before = (axes[guide].astype(np.float64) for axes in (layers.tangents, layers.normals))
+        for place, step in enumerate(steps, first + 1):
+            length = np.linalg.norm(step)
+            direction = step / length
+            tangent = tangent - tangent @ direction / (1.0 + before @ direction) * (before + direction)
+            frame = np.stack([tangent, np.cross(direction, tangent), direction], axis=1)
+            for layer, weight in enumerate(weights):
+                axis = layers.turns[layer, place, 1:].astype(np.float64)
+                frame = frame @ _turns(weight * angles[layer, place] * axis)
+            length *= np.exp(weights @ layers.stretches[:, place])
+            found[place] = found[place - 1] + length * frame[:, 2]
+            before = direction
+    return found
+
+
+@pytest.mark.parametrize("weights", [1.0, 0.4, 1.7, "mixed"])
+def test_composing_follows_the_formula_to_a_millionth_of_the_length(combed, weights):
+    layers, _points = combed
+    rng = np.random.default_rng(3)
+    stretches = (0.3 * rng.normal(size=layers.stretches.shape)).astype(np.float32)
+    shares = rng.choice([0.0, 0.5, 1.0, 2.0], layers.weights.shape) if weights == "mixed" else weights
+    layers = replace(layers, stretches=stretches).weighted(np.broadcast_to(shares, layers.weights.shape))
+    expected = _composed_in_double_precision(layers)
+    longest = _lengths(expected, layers.counts).max()
+    np.testing.assert_allclose(guide_layers.composed(layers), expected, atol=1e-6 * longest)
+
+
+def test_a_guide_is_the_same_bit_for_bit_beside_any_others(combed):
+    layers, points = combed
+    rng = np.random.default_rng(4)
+    weights = rng.choice([0.0, 0.5, 1.0], layers.weights.shape)
+    weights[:, 24:48] = 1.0  # blocks of guides with whole turns alone
+    layers = layers.weighted(weights)
+    edited = _combed(points, layers.counts, np.array([0.5, 0.0, 1.5]), np.array([0.0, 0.9, 0.3]))
+    again, _changed = guide_layers.recorded(layers, 1, edited)
+    chosen = rng.permutation(len(layers.counts))[:21]
+    starts = curve_offsets(layers.counts)
+    of_points = np.concatenate([np.arange(starts[guide], starts[guide + 1]) for guide in chosen])
+    few = layer_transfer.chosen_guides(layers, chosen)
+    assert np.array_equal(guide_layers.composed(few), guide_layers.composed(layers)[of_points])
+    few_again, _changed = guide_layers.recorded(few, 1, edited[of_points])
+    assert np.array_equal(few_again.turns, again.turns[:, of_points])
+    assert np.array_equal(few_again.stretches, again.stretches[:, of_points])
+
+
+def test_recording_with_the_known_shape_is_the_same(combed):
+    layers, points = combed
+    edited = _combed(points, layers.counts, np.array([0.5, 0.0, 1.5]), np.array([0.0, 0.9, 0.3]))
+    firsts = curve_offsets(layers.counts)[:-1]
+    shape = guide_layers.composed(layers)
+    moved = slice(firsts[3], firsts[4])
+    edited[moved] = shape[moved] + np.float32(0.25)  # a guide that is moved with its root
+    again, is_changed = guide_layers.recorded(layers, 1, edited)
+    same, is_same_changed = guide_layers.recorded(layers, 1, edited, shape)
+    assert np.array_equal(is_changed, is_same_changed)
+    for name in ("base", "turns", "stretches"):
+        assert np.array_equal(getattr(again, name), getattr(same, name))
+    is_other = guide_layers.is_other(layers, edited, shape)
+    full = guide_layers.composed(again)
+    partly = guide_layers.composed_again(again, shape, is_other)
+    assert 0 < is_other.sum() < len(is_other)
+    assert np.array_equal(partly[np.repeat(is_other, layers.counts)], full[np.repeat(is_other, layers.counts)])
+    assert np.array_equal(partly[~np.repeat(is_other, layers.counts)], shape[~np.repeat(is_other, layers.counts)])
 
 
 def test_zero_weights_are_the_base_bit_for_bit(combed):

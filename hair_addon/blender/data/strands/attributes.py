@@ -108,6 +108,15 @@ def read(curves, name, data_type, domain):
     return values[:, 0] if width == 1 else values
 
 
+def read_into(curves, name, data_type, domain, out):
+    """Read float values into a contiguous array, which stays unchanged without an attribute of this type and domain."""
+    if not has(curves, name, data_type, domain):
+        return
+    attribute = curves.attributes[name]
+    if len(attribute.data):
+        attribute.data.foreach_get(LAYOUTS[data_type][0], out.ravel())
+
+
 def repeats(values, row):
     """Whether values (N,) repeat a row; compared in blocks that fit the CPU caches."""
     some = np.tile(row, 4096)

@@ -25,22 +25,31 @@ def read(datablock, identities, weights):
 
     def values(name, data_type, domain, shape):
         found = attributes.read(datablock, name, data_type, domain)
-        if found is None:
-            return np.zeros(shape, np.float32)
-        return np.where(np.isfinite(found), found, np.float32(0.0)).reshape(shape)
+        return np.zeros(shape, np.float32) if found is None else _finite(found).reshape(shape)
 
     base = values(_BASE, "FLOAT_VECTOR", "POINT", (point_count, 3))
     axes = (values(name, "FLOAT_VECTOR", "CURVE", (len(counts), 3)) for name in (_NORMAL, _TANGENT))
-    turns = [values(_turn(i), "QUATERNION", "POINT", (point_count, 4)) for i in identities]
-    stretches = [values(_stretch(i), "FLOAT", "POINT", (point_count,)) for i in identities]
+    turns = np.zeros((len(identities), point_count, 4), np.float32)
+    stretches = np.zeros((len(identities), point_count), np.float32)
+    for place, identity in enumerate(identities):
+        attributes.read_into(datablock, _turn(identity), "QUATERNION", "POINT", turns[place])
+        attributes.read_into(datablock, _stretch(identity), "FLOAT", "POINT", stretches[place])
     return GuideLayers(
         base,
         counts,
         *axes,
-        np.array(turns, np.float32).reshape(len(identities), point_count, 4),
-        np.array(stretches, np.float32).reshape(len(identities), point_count),
+        _finite(turns),
+        _finite(stretches),
         np.asarray(weights, np.float32).reshape(len(identities), len(counts)),
     )
+
+
+def _finite(values):
+    """Return values with zeros for those that are not finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        if np.isfinite(values.sum()):  # a sum of others is not finite
+            return values
+    return np.where(np.isfinite(values), values, np.float32(0.0))
 
 
 def write(datablock, layers, identities):
