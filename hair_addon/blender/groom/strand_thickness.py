@@ -37,12 +37,15 @@ def read(hair: Curves, bound: BoundHair) -> tuple[np.ndarray | None, str]:
     if item is None or not map_items.is_set(item):
         return None, status
     try:
-        settings = map_items.settings_of(item)
-        ramp = ramps.map_samples(item, False)
-        found = sources.varied_numbers(strands_of(hair, bound), settings, item.image, 1.0, _FACTOR, ramp)
+        return factors(strands_of(hair, bound), item), status
     except HairError as error:
         return None, str(error)
-    return found.astype(np.float32), status
+
+
+def factors(strands: sources.Strands, item: map_items.VellusMap) -> np.ndarray:
+    """(S,) float32 factors of the radii of strands by a map. Raises `HairError` if its source is missing."""
+    settings, ramp = map_items.settings_of(item), ramps.map_samples(item, False)
+    return sources.varied_numbers(strands, settings, item.image, 1.0, _FACTOR, ramp).astype(np.float32)
 
 
 def apply(hair: Curves, bound: BoundHair) -> None:

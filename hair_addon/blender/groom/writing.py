@@ -13,7 +13,7 @@ from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
 from ..data import guide_map_readers, scene, surface_space
 from ..data.maps import ramps, strand_maps
-from ..data.strands import attributes, curves, curves_objects, kept_shapes, stored_roots
+from ..data.strands import attributes, curves, curves_objects, kept_shapes, kept_widths, stored_roots
 from ..data.surfaces import Surface, cage_of
 from ..host.notices import name_of
 from ..layers import carried_layers
@@ -101,6 +101,7 @@ def write_hair(target: Curves) -> None:
         state.thickness_key = ramps.digest(state.thickness_ramp)
         size_fitting.keep(target, bound.fits)
         kept_shapes.forget(target)
+        kept_widths.forget(target)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
         binding, radii = bound.binding, bound.radii
         normals = binding.normals.numpy()

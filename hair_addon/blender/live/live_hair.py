@@ -22,7 +22,7 @@ from ..groom import (
     strand_thickness,
     writing,
 )
-from ..groom.foreign import kept_following
+from ..groom.foreign import kept_following, kept_thickness
 from ..groom.styles import painted_masks
 from ..host import running
 from ..host.notices import text_of
@@ -127,7 +127,7 @@ def regenerate(hair, depsgraph):
     if curves.follows_library(hair) and simulated_guides.is_shown(hair.vellus.guide_curves):
         _follow_linked(hair, depsgraph)
         return
-    if curves.is_hand_made(hair) and follow(hair, depsgraph):
+    if curves.is_hand_made(hair) and _follow_kept(hair, depsgraph):
         return
     if not running.has_window():
         pipeline.evaluate(hair, depsgraph)
@@ -157,6 +157,17 @@ def regenerate(hair, depsgraph):
         return
     events.strands_computed(hair)
     write_soon(hair)
+
+
+def _follow_kept(hair, depsgraph):
+    """Let kept hair follow its guides and the map of its thickness; returns whether either has changed it."""
+    has_moved = follow(hair, depsgraph)
+    if has_moved and hair.vellus.status:  # it cannot follow
+        return True
+    if not kept_thickness.follow(hair):
+        return has_moved
+    events.strands_computed(hair)
+    return True
 
 
 def _is_reweighed(hair, depsgraph):

@@ -208,7 +208,8 @@ def follow_ramps():
             continue
         if state.thickness_ramp is not None:
             _own_ramp(state, "thickness_ramp", owners)
-            if not curves.is_combed(hair) and ramps.digest(state.thickness_ramp) != state.thickness_key:
+            is_other = ramps.digest(state.thickness_ramp) != state.thickness_key
+            if is_other and (curves.is_hand_made(hair) or not curves.is_combed(hair)):
                 state.is_stale = True
         for item in state.maps:
             if item.ramp_tree is None:

@@ -218,8 +218,14 @@ def read_radii(curves):
     return attributes.valid_radii(radii)
 
 
+OWN_RADIUS = "own_radius"  # attribute of `kept_widths`
+
+
 def widen(curves, change):
     """Scale radii, or Blender's default radius if curves have none, as an `Affine` scales widths."""
+    own = attributes.read(curves, OWN_RADIUS, "FLOAT", "POINT")
+    if own is not None and len(own):
+        attributes.write(curves, OWN_RADIUS, "FLOAT", "POINT", change.widths(own))
     radii = attributes.read(curves, "radius", "FLOAT", "POINT")
     if radii is None and change.preserves_widths:
         return

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         joined_curves,
         kept_following,
         kept_hair,
+        kept_thickness,
         particle_hair,
     )
 else:

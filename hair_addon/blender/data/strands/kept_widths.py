@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Radii that kept hair came with, stored while a map or a curve changes them."""
+
+import numpy as np
+
+from . import attributes, curves
+
+
+def are_kept(hair):
+    """Whether kept hair stores the radii that it came with."""
+    return attributes.has(hair, curves.OWN_RADIUS, "FLOAT", "POINT")
+
+
+def own(hair):
+    """(N,) float32 radii that hair came with; the present ones of points that were added since."""
+    present = curves.read_radii(hair)
+    found = attributes.read(hair, curves.OWN_RADIUS, "FLOAT", "POINT")
+    if found is None:
+        return present
+    found = attributes.valid_radii(found)
+    return np.where(found > 0.0, found, present)
+
+
+def change(hair, radii):
+    """Write (N,) radii, and keep those that hair came with."""
+    attributes.write(hair, curves.OWN_RADIUS, "FLOAT", "POINT", own(hair))
+    attributes.write(hair, "radius", "FLOAT", "POINT", radii)
+
+
+def restore(hair):
+    """Give hair the radii that it came with."""
+    attributes.write(hair, "radius", "FLOAT", "POINT", own(hair))
+    forget(hair)
+
+
+def forget(hair):
+    """Remove the radii that hair came with; its present ones stay."""
+    if are_kept(hair):
+        hair.attributes.remove(hair.attributes[curves.OWN_RADIUS])
