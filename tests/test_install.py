@@ -83,7 +83,8 @@ def test_zip_holds_what_blender_runs_and_nothing_else(extension):
     assert {name.split("/")[0] for name in names} == {
         "__init__.py", "LICENSE", "blender_manifest.toml", "hair_addon", "kernels", "manual", "shaders", "wheels",
     }  # fmt: skip
-    assert not [name for name in names if "__pycache__" in name or "/." in name or name.endswith(".blend")]
+    assert not [name for name in names if "__pycache__" in name or "/." in name]
+    assert [name for name in names if name.endswith(".blend")] == ["hair_addon/blender/data/strands/follow_nodes.blend"]
     # Warp compiles kernels from their source, and the shaders are read as files.
     for folder in ("hair_addon", "shaders"):
         sources = [path for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix != ".pyc"]

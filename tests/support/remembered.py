@@ -4,12 +4,9 @@
 import dataclasses
 import hashlib
 from functools import lru_cache
-from pathlib import Path
 
-import bpy
 import numpy as np
 
-from hair_addon.blender.data.strands import follow_nodes
 from hair_addon.core.placement import cvt
 from hair_addon.core.shading.tables import albedo, dual_scattering, lookup_tables
 
@@ -58,28 +55,11 @@ def _digest(value):
     return total.digest()
 
 
-_new_group = follow_nodes._new_group
-
-
-def new_group():
-    """Call `follow_nodes._new_group`, or append its result for an earlier file, which takes a twentieth of the time."""
-    path = Path(bpy.app.tempdir) / "follow_nodes.blend"
-    if not path.exists():
-        group = _new_group()
-        bpy.data.libraries.write(str(path), {group}, fake_user=True)
-        return group
-    known = set(bpy.data.libraries)
-    with bpy.data.libraries.load(str(path)) as (there, here):
-        here.node_groups = there.node_groups
-    bpy.data.batch_remove(set(bpy.data.libraries) - known)
-    return here.node_groups[0]
-
-
 # {(module, name): the function that is called instead}.
 REMEMBERED = {
     (module, name): lru_cache(64)(getattr(module, name))
     for module, name in ((lookup_tables, "bake"), (dual_scattering, "bake"), (albedo, "azimuthal_moments"))
-} | {(cvt, "place"): place, (follow_nodes, "_new_group"): new_group}
+} | {(cvt, "place"): place}
 
 
 def remember(patch):

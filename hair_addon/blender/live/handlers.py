@@ -362,8 +362,13 @@ def before_saving(*_args):
 
 
 @persistent
-def after_import(*_args):
-    """Make names of styles and layers readable for Blender's rename operators; show hair that was saved hidden."""
+def after_import(context=None, *_args):
+    """Make names of styles and layers readable for Blender's rename operators; show hair that was saved hidden.
+
+    context: Blender's list of what was imported, None for a whole file: nodes alone bring no hair.
+    """
+    if context is not None and all(item.id_type == "NODETREE" for item in context.import_items):
+        return
     _show_hidden()
     file_changes.accept_state()
     for hair in _of_kind("HAIR"):

@@ -281,3 +281,60 @@ def test_guides_that_were_told_other_roots_are_carried_from_there(sphere):
     drawn = drawn_points(guides)
     events.strands_computed(guides.data)
     np.testing.assert_array_equal(drawn, drawn_points(guides))
+
+
+def content(group):
+    """Return a node group's sockets, nodes with settings and values, and links, as plain values."""
+    ignored = {"bl_rna", "rna_type", "inputs", "outputs", "internal_links", "panel_states", "dimensions"}
+
+    def plain(value):
+        if isinstance(value, bpy.types.bpy_prop_collection):
+            return [(item.name, getattr(item, "data_type", None)) for item in value]
+        if isinstance(value, bpy.types.bpy_struct):
+            return type(value).__name__
+        return value if isinstance(value, (str, int, float, bool, type(None))) else tuple(value)
+
+    def settings(struct):
+        names = {name for name in struct.bl_rna.properties.keys() if name not in ignored}
+        return {name: plain(getattr(struct, name)) for name in sorted(names)}
+
+    numbers = {node.name: number for number, node in enumerate(group.nodes)}
+    return (
+        [(item.identifier, item.name, item.socket_type, item.in_out) for item in group.interface.items_tree],
+        [settings(node) for node in group.nodes],
+        [[plain(getattr(s, "default_value", None)) for s in node.inputs] for node in group.nodes],
+        {
+            (
+                numbers[one.from_node.name],
+                one.from_socket.identifier,
+                numbers[one.to_node.name],
+                one.to_socket.identifier,
+            )
+            for one in group.links
+        },
+        (dict(group), group.is_modifier, group.interface.items_tree["Hidden"].hide_in_modifier),
+    )
+
+
+def test_the_file_holds_the_nodes_that_the_code_builds(scene):
+    """Otherwise `python tools/write_nodes.py` writes it again."""
+    read, built = content(follow_nodes._appended()), content(follow_nodes.build())
+    for part, expected in zip(read, built, strict=True):
+        assert part == expected
+
+
+def test_reading_the_nodes_leaves_no_library_and_no_user(scene):
+    known = set(bpy.data.libraries)
+    group = follow_nodes._appended()
+    assert set(bpy.data.libraries) == known and group.library is None
+    assert (group.users, group.use_fake_user) == (0, False)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"BLENDER-v502 and no more"])
+def test_nodes_are_built_where_their_file_cannot_be_read(scene, monkeypatch, tmp_path, content):
+    path = tmp_path / "nodes.blend"
+    if content is not None:
+        path.write_bytes(content)
+    monkeypatch.setattr(follow_nodes, "_FILE", path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert follow_nodes._carries(follow_nodes._group())
