@@ -9,12 +9,12 @@ from ....core.errors import HairError
 from ....core.files import frame_cache
 from ....core.grooming import cost
 from ....core.params import declared
+from ... import io
 from ...data.strands import curves, delivered_hair
 from ...groom.dynamics import dynamics_notes, frame_folders, guide_baking, guide_simulation
 from ...groom.selection import guides_of
 from ...groom.transfer import groom_settings
 from ...host import memory, scene_time
-from ...io import delivery
 from ...live import simulated_hair
 from ...settings import properties
 from ...settings.translations import report_text
@@ -134,7 +134,7 @@ Blender without Vellus show the same hair"""
 
     def work(self, context):
         guides = guides_of(context.object)
-        return (yield from delivery.delivering(guides, delivery.path_of(guides), context.scene))
+        return (yield from io.delivery.delivering(guides, io.delivery.path_of(guides), context.scene))
 
     def message(self, made):
         values = {"first": made.first, "last": made.last, "file": made.path.name}
@@ -158,7 +158,7 @@ class VELLUS_OT_remove_delivery(HairOperator, bpy.types.Operator):
         return guides is not None and any(map(delivered_hair.is_delivered, curves.followers(guides)))
 
     def change(self, context):
-        delivery.take_off(guides_of(context.object))
+        io.delivery.take_off(guides_of(context.object))
 
 
 class VELLUS_OT_apply_dynamics_preset(HairOperator, bpy.types.Operator):

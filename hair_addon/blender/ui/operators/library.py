@@ -6,11 +6,11 @@ from pathlib import Path
 import bpy
 
 from ....core.errors import HairError
+from ... import io
 from ...groom.selection import hair_of, make_active, object_of, surface_of
 from ...groom.transfer import library_groom
 from ...host import paths
 from ...host.notices import name_of
-from ...io import groom_library
 from ...settings import asset_libraries, properties
 from ...settings.translations import report_text
 from .base.file_browser import BrowsedOperator
@@ -45,10 +45,10 @@ class VELLUS_OT_save_groom(LongOperator, bpy.types.Operator):
     def work(self, context):
         hair = hair_of(context.object)
         folder = asset_libraries.folder_of(self.library or asset_libraries.first_name())
-        path = groom_library.path_of(folder, self.name or name_of(hair))
+        path = io.groom_library.path_of(folder, self.name or name_of(hair))
         if path.exists() and not self.overwrites:
             raise HairError("{path} exists: choose another name, or turn on Overwrite.", path=path)
-        return groom_library.saving(hair, path, self.name, self.catalog)
+        return io.groom_library.saving(hair, path, self.name, self.catalog)
 
     def message(self, made):
         return "Groom saved to {path}", {"path": made}
@@ -102,7 +102,7 @@ class VELLUS_OT_apply_groom(BrowsedOperator, bpy.types.Operator):
 
     def work(self, context):
         found = asset_libraries.referenced(self) or (paths.resolve(self.filepath), self.name)
-        groom = groom_library.read(*found)
+        groom = io.groom_library.read(*found)
         surface, depsgraph = surface_of(context.object), context.evaluated_depsgraph_get()
         return library_groom.adding_groom(surface, groom, depsgraph, self.method)
 

@@ -8,11 +8,11 @@ from ....core.errors import HairError
 from ....core.files import settings_file
 from ....core.files.export_settings import ENDINGS, ExportSettings
 from ....core.long_work import Stage
+from ... import io
 from ...groom.selection import hair_of, make_active, object_of
 from ...groom.transfer import groom_settings
 from ...host import paths
 from ...host.notices import text_of
-from ...io import groom_export, groom_sources, hair_cards, hair_meshes
 from ...settings import properties, setting_properties
 from ...settings.translations import error_text, interface_text
 from .. import setting_rows
@@ -112,7 +112,7 @@ class VELLUS_OT_export_groom(BrowsedOperator, bpy.types.Operator):
         path = paths.resolve(self.filepath)
         path = path if path.suffix else path.with_suffix(".abc")
         settings = setting_properties.to_settings(self, ExportSettings)
-        return groom_export.exporting(path, groom_sources.hair_on(context.object), settings, context.scene)
+        return io.groom_export.exporting(path, io.groom_sources.hair_on(context.object), settings, context.scene)
 
     def after(self, context, made):
         for note in made.notes:
@@ -138,7 +138,7 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
         setting_rows.mesh_rows(self.layout, self.properties, CardSettings)
         setting_rows.row(self.layout, self.properties, "folder")
         settings = setting_properties.to_settings(self.properties, CardSettings)
-        for index, level in enumerate(settings.levels(hair_meshes.strand_count(hair_of(context.object)))):
+        for index, level in enumerate(settings.levels(io.hair_meshes.strand_count(hair_of(context.object)))):
             counts = {"cards": level.card_count, "triangles": level.triangle_count, "size": level.texture_size}
             text = interface_text(
                 "Level {level}: {cards} cards, {triangles:,} triangles, {size} px", level=index, **counts
@@ -152,7 +152,7 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
         folder = text_of(self, "folder")
         place = paths.resolve(folder) if folder else None
         settings = setting_properties.to_settings(self, CardSettings)
-        return hair_cards.making_cards(hair_of(context.object), settings, place)
+        return io.hair_cards.making_cards(hair_of(context.object), settings, place)
 
     def after(self, context, made):
         for note in made[0].notes:
@@ -174,17 +174,17 @@ class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):
     def draw(self, context):
         setting_rows.mesh_rows(self.layout, self.properties, TubeSettings)
         settings = setting_properties.to_settings(self.properties, TubeSettings)
-        strands = hair_meshes.strand_count(hair_of(context.object))
+        strands = io.hair_meshes.strand_count(hair_of(context.object))
         counts = {"tubes": settings.count_of(strands), "triangles": settings.triangle_count(strands)}
         text = interface_text("{tubes:,} tubes, {triangles:,} triangles", **counts)
         self.layout.label(text=text, translate=False)
 
     def seconds(self, context):
-        strands = hair_meshes.strand_count(hair_of(context.object))
+        strands = io.hair_meshes.strand_count(hair_of(context.object))
         return 5e-6 * self._settings().triangle_count(strands)
 
     def work(self, context):
-        return hair_meshes.making_tubes(hair_of(context.object), self._settings())
+        return io.hair_meshes.making_tubes(hair_of(context.object), self._settings())
 
     def after(self, context, made):
         for note in made.notes:

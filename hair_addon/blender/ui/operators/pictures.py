@@ -7,10 +7,10 @@ from ....core.grooming import cost
 from ....core.imaging.pixel_sampling import FRAME_FIELDS, MOST_DRAWN, PictureSettings
 from ....core.long_work import Stage
 from ....core.shading.tables import lookup_tables
+from ... import io
 from ...groom.selection import drawn_with, hair_of
 from ...host import paths
 from ...host.datablocks import Remembered
-from ...io import table_files
 from ...materials import looks
 from ...render import offscreen
 from ...render.frames import composite
@@ -67,7 +67,7 @@ class VELLUS_OT_bake_tables(BrowsedOperator, bpy.types.Operator):
         hair = Remembered(hair_of(context.object))
         settings = setting_properties.to_settings(self, lookup_tables.Settings)
         folder, named = paths.resolve(self.directory), self.directory
-        yield from table_files.baking_tables(settings, folder)
+        yield from io.table_files.baking_tables(settings, folder)
         target = hair.find()
         if target is not None:
             target.vellus.table_folder = named
