@@ -19,10 +19,10 @@ __all__ = ["MapSettings", "clear_map", "maps_of", "set_map", "set_thickness_curv
 def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any) -> MapSettings:
     """Vary a setting of hair Curves by a map, which replaces the setting's present map; returns the map.
 
-    setting: such as "look.color" or "look.roughness"; source: an image, or "image:NAME", "group:NAME" of a vertex
-    group, "attribute:NAME" of the surface, "curves:NAME" of an attribute of the hair's own curves, "strand" or "clump"
-    for random numbers; changes: fields of `MapSettings`: uv, low, high, is_inverted, amount, seed, ramp. ramp: a
-    curve of the map's values such as "0:0 0.3:1 1:1", or a color ramp "0:0.1/0.05/0 1:1/0.8/0.5" that gives the colors.
+    setting: such as "look.color", or "guides.length" of its guides; source: an image, or "image:NAME", "group:NAME" of
+    a vertex group, "attribute:NAME" of the surface, "curves:NAME" of an attribute of the hair's own curves, "strand" or
+    "clump" for random numbers; changes: fields of `MapSettings`: uv, low, high, is_inverted, amount, seed, ramp. ramp:
+    a curve of the map's values such as "0:0 0.3:1 1:1", or a color ramp "0:0.1/0/0 1:1/0.8/0.5" that gives the colors.
 
     >>> coat = bpy.data.images.new("Coat", 8, 8)
     >>> hair = bpy.data.objects["Hair"].data
@@ -30,7 +30,7 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
     >>> api.set_map(hair, "look.color", coat).source
     'Coat'
     """
-    target = _editable(hair)
+    target = _editable(hair, setting)
     if isinstance(source, str):
         kind, name = varied_settings.parsed_source(source)
     elif getattr(getattr(source, "bl_rna", None), "identifier", "") == "Image":
@@ -45,12 +45,12 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
 
 
 def maps_of(hair: Curves) -> tuple[MapSettings, ...]:
-    """Return the maps of hair Curves.
+    """Return the maps of hair Curves and of their guides.
 
     >>> [each.setting for each in api.maps_of(bpy.data.objects["Hair"])]
     ['look.color']
     """
-    return blender.settings.map_items.maps_of(blender.data.arguments.curves_of(hair, "HAIR").vellus)
+    return blender.groom.transfer.groom_settings.maps_of(blender.data.arguments.curves_of(hair, "HAIR"))
 
 
 def clear_map(hair: Curves, setting: str) -> bool:
@@ -60,7 +60,7 @@ def clear_map(hair: Curves, setting: str) -> bool:
     True
     """
     varied_settings.require_varied(setting)
-    return blender.settings.map_items.remove(_editable(hair).vellus, setting)
+    return blender.settings.map_items.remove(_editable(hair, setting).vellus, setting)
 
 
 def set_thickness_curve(hair: Curves, curve: str = "") -> None:
@@ -90,7 +90,10 @@ def thickness_curve_of(hair: Curves) -> str:
     return blender.settings.ramp_nodes.text_of(blender.data.arguments.curves_of(hair, "HAIR").vellus.thickness_ramp)
 
 
-def _editable(hair):
+def _editable(hair, setting=""):
+    """Return the Curves that have a setting: the hair, or its guides. Raises `HairError`."""
     target = blender.data.arguments.curves_of(hair, "HAIR")
+    if varied_settings.is_of_guides(setting):
+        target = blender.groom.pipeline.inputs_of(target)[0]
     blender.data.strands.curves.require_editable(target)
     return target

@@ -163,7 +163,7 @@ def _keep_curves(given, surface, settings, file_axes, console):
         console.warn(f"The guides reproduce the strands to {error:.1f}% (95%: {high:.1f}%) of their length.")
     if found.motion is not None:
         _play(given, made, found, console)
-    blender.settings.map_items.assign(made.hair.vellus, settings.maps)
+    blender.groom.transfer.groom_settings.assign_maps(made.hair, settings.maps)
     blender.groom.transfer.groom_settings.assign_thickness_curve(made.hair, settings.thickness_curve)
     blender.groom.transfer.groom_settings.assign_look(made.hair, settings.appearance)
     blender.groom.transfer.groom_settings.assign_dynamics(made.guides, settings.dynamics)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         strand_lengths,
         strand_thickness,
         styled_hair,
+        varied_guides,
         writing,
     )
 else:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core import dynamics
+from ...core import dynamics, geometry
 from ...core.errors import HairError
 from ...core.geometry.faces.uv_maps import Texture
 from ...core.geometry.mesh import SurfacePoints
@@ -16,6 +16,7 @@ from ...core.long_work import Progress, part_of
 from ..data.surfaces import Surface
 from ..settings import preferences
 from ..settings.translations import error_text
+from .varied_guides import VariedGuides
 
 HANGING = 0.5  # least gravity of new hair that hangs, as on a dome; less gives standing fur
 _QUICK = 1.0  # [s] limit for draping new hair
@@ -52,10 +53,14 @@ def grow(
     flow: np.ndarray | None,
     progress: Progress,
     roots: SurfacePoints | None = None,
+    varied: VariedGuides | None = None,
 ) -> GrownGuides:
     """Return the `GrownGuides` of completed settings; mask: (density, texture), flow and roots as in
-    `groom.distribute_guides`. Guides that cannot be draped keep their grown shape. Raises `HairError`.
+    `groom.distribute_guides`; varied: by maps. Guides that cannot be draped keep their grown shape. Raises `HairError`.
     """
+    status = "" if varied is None else varied.status
+    if varied is not None and not varied.maps:
+        varied = None
     density, texture = mask
     device = preferences.device()
     guides = groom.distribute_guides(
@@ -68,11 +73,15 @@ def grow(
         roots=roots,
         flow=flow,
         drawn_on=surface.drawn_on,
+        varied=None if varied is None else varied.values,
         device=device,
         progress=part_of(progress, 0.0, _GROWN) if settings.drape else progress,
     )
     if not settings.drape:
-        return GrownGuides(guides)
+        return GrownGuides(guides, status)
+    if varied is not None:  # some may be longer than the setting
+        longest = float(geometry.strands.lengths(guides.numpy()).max(initial=0.0))
+        settings = replace(settings, length=max(groom_defaults.known(settings.length), longest))
     try:
         settled = dynamics.draped_growth.settled(
             guides,
@@ -85,4 +94,4 @@ def grow(
         )
     except HairError as error:
         return GrownGuides(guides, error_text(error))
-    return GrownGuides(settled)
+    return GrownGuides(settled, status)

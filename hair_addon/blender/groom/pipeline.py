@@ -36,6 +36,7 @@ from . import (
     size_fitting,
     strand_thickness,
     styled_hair,
+    varied_guides,
     writing,
 )
 from .bindings import BoundHair
@@ -75,12 +76,13 @@ def distributing_guides(
     roots = reused_roots.of(target, surface, key, settings.guide_count) if keeps_roots else None
     flow = drawn_lines.read(surface_object, surface, settings.flow_lines, depsgraph)
     flow_key = drawn_lines.key(surface_object, settings.flow_lines, depsgraph)
+    varied = varied_guides.read(target, surface_object, surface, settings)
     place, target, device = Remembered(surface_object), Remembered(target), preferences.device()
     shown = scene.shown_surface(surface_object, surface)
 
     def compute(progress):
         laid_flow = drawn_lines.at_rest(flow, shown, surface, device)
-        return grown_guides.grow(surface, settings, mask, laid_flow, progress, roots)
+        return grown_guides.grow(surface, settings, mask, laid_flow, progress, roots, varied)
 
     grown = yield compute
     return writing.write_guides(target.find(), place.find(), surface, grown, settings, key, flow_key, sized.fits)

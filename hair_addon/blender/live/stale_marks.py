@@ -179,9 +179,15 @@ def follow_images(target, depsgraph):
             _mark(target)
 
 
+def _mapped():
+    """The hair and guides whose settings vary by maps; combed guides do not change with their settings."""
+    found = [datablock for datablock in bpy.data.hair_curves if len(datablock.vellus.maps)]
+    return [one for one in found if one.vellus.kind == "HAIR" or not curves.is_combed(one)]
+
+
 def follow_mapped_images(images):
     """Mark hair whose settings vary by any of some images, which may have been painted."""
-    for datablock in bpy.data.hair_curves if images else ():
+    for datablock in _mapped() if images else ():
         for item in datablock.vellus.maps:
             if item.kind == "IMAGE" and item.image in images:
                 marks.mark_changed_map(item)
@@ -189,7 +195,7 @@ def follow_mapped_images(images):
 
 def follow_mapped_surfaces(surfaces):
     """Mark hair whose settings vary by weights or attributes of any of some surfaces, which may have been painted."""
-    for datablock in bpy.data.hair_curves if surfaces else ():
+    for datablock in _mapped() if surfaces else ():
         if datablock.surface in surfaces:
             for item in datablock.vellus.maps:
                 if item.kind in {"GROUP", "ATTRIBUTE", "IMAGE"}:
@@ -197,16 +203,14 @@ def follow_mapped_surfaces(surfaces):
 
 
 def follow_ramps():
-    """Mark hair with an edited ramp of the thickness or of a map, which Blender does not report.
+    """Mark hair and guides with an edited ramp of the thickness or of a map, which Blender does not report.
 
     A copy of hair gets ramps of its own.
     """
     owners = {}
     for hair in bpy.data.hair_curves:
         state = hair.vellus
-        if state.kind != "HAIR":
-            continue
-        if state.thickness_ramp is not None:
+        if state.kind == "HAIR" and state.thickness_ramp is not None:
             _own_ramp(state, "thickness_ramp", owners)
             is_other = ramps.digest(state.thickness_ramp) != state.thickness_key
             if is_other and (curves.is_hand_made(hair) or not curves.is_combed(hair)):
@@ -218,7 +222,8 @@ def follow_ramps():
             key = ramp_nodes.text_of(item.ramp_tree)
             if key != item.ramp_key and hair.is_editable:
                 item.ramp_key = key
-                marks.mark_changed_map(item)
+                if state.kind == "HAIR" or not curves.is_combed(hair):
+                    marks.mark_changed_map(item)
 
 
 def _own_ramp(owner, name, owners):

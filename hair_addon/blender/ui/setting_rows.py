@@ -132,7 +132,7 @@ def growth_rows(layout, owner):
     search_row(layout, owner, "flow_lines", bpy.data, "objects")
     angle = layout.column()
     angle.active = owner.drape or bool(text_of(owner, "flow_lines"))
-    row(angle, owner, "lift")
+    rows(angle, owner, GuideSettings, ("lift",))
 
 
 def placement_rows(layout, owner):

@@ -67,10 +67,11 @@ def lay(
     return FlowLines(starts, ends, np.repeat(_reaches(lines, step), counts), step)
 
 
-def axes(lines: FlowLines, places: np.ndarray, normals: np.ndarray, lift: float) -> np.ndarray:
+def axes(lines: FlowLines, places: np.ndarray, normals: np.ndarray, lift: float | np.ndarray) -> np.ndarray:
     """Return the initial unit directions (G, 3) of guides at roots (G, 3) [m] with unit normals (G, 3).
 
-    lift: angle [rad] to the surface near lines, in [0, π/2]; far from lines guides start along their normals.
+    lift: angle [rad] to the surface near lines, in [0, π/2], possibly (G,); far from lines guides start along their
+    normals.
     """
     normals = normals.astype(np.float64)
     mean, share = _mean_directions(lines, places.astype(np.float64))

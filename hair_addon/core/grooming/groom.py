@@ -7,9 +7,9 @@ imported late.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -78,6 +78,7 @@ class GuideSettings(Settings):
         soft_high=1.0,
         unit="LENGTH",
         subtype="DISTANCE",
+        may_vary=True,
     )
     length_variation: float = param(
         0.2,
@@ -94,9 +95,15 @@ class GuideSettings(Settings):
         high=math.radians(90.0),
         unit="ROTATION",
         subtype="ANGLE",
+        may_vary=True,
     )
     gravity: float | None = param_from_surface(
-        0.75, "Bend the guides toward the ground; higher values bend them more", low=0.0, high=1.0, subtype="FACTOR"
+        0.75,
+        "Bend the guides toward the ground; higher values bend them more",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
     )
     flow_lines: str = param(
         "", "Curve object on the surface; guides near its curves begin in their direction, from start to end"
@@ -108,8 +115,12 @@ class GuideSettings(Settings):
         high=math.radians(90.0),
         unit="ROTATION",
         subtype="ANGLE",
+        may_vary=True,
     )
     drape: bool = param(False, "Let the guides fall as they grow until they rest on the surface; takes up to a second")
+
+
+VARIED = ("length", "tilt", "gravity", "lift")  # settings of guides that may differ between guides
 
 
 @dataclass(frozen=True)
@@ -239,6 +250,7 @@ def distribute_guides(
     roots: SurfacePoints | None = None,
     flow: np.ndarray | None = None,
     drawn_on: np.ndarray | None = None,
+    varied: Callable[[SurfacePoints], Mapping[str, np.ndarray]] | None = None,
     device: str = "cpu",
     progress: Progress = no_progress,
 ) -> Strands:
@@ -249,7 +261,8 @@ def distribute_guides(
     mirror: for symmetric guides; shape: `TriMesh` of which `mesh` is a rotated and uniformly scaled copy, mirrored
     across the X axis: guides are placed on it, and thus in the same places for any rotation and scale, None for `mesh`;
     roots: existing `SurfacePoints` of guides, None to place them; flow: (L, 2, 3) segments [m] of flow lines, and
-    drawn_on (V, 3): as lines and drawn_on of `bind_hair`; progress(step, part): callback, may raise to cancel. Raises
+    drawn_on (V, 3): as lines and drawn_on of `bind_hair`; varied: returns {setting: (G,)} in place of settings in
+    `VARIED` for guides with roots (G), or None; progress(step, part): callback, may raise to cancel. Raises
     `HairError`.
     """
     check_mesh(mesh)
@@ -274,19 +287,18 @@ def distribute_guides(
             progress=lambda part: relaxing("Spreading guides", part),
         )
     progress("Growing guides", 0.9)
+    values: dict[str, Any] = {name: groom_defaults.known(getattr(settings, name)) for name in VARIED}
+    values |= {} if varied is None else varied(roots)
     controls = grooming.guide_growth.grow(
         mesh,
         roots,
-        length=groom_defaults.known(settings.length),
         length_variation=settings.length_variation,
-        tilt=settings.tilt,
-        gravity=groom_defaults.known(settings.gravity),
         flow=None if flow is None else grooming.flow_lines.lay(mesh, flow, device, drawn_on),
         is_draped=settings.drape,
-        lift=settings.lift,
         seed=settings.seed,
         control_point_count=CONTROL_POINT_COUNT,
         device=device,
+        **values,
     )
     if settings.symmetric:
         controls = grooming.guide_growth.mirrored(controls, positions(mesh, roots), mirror)

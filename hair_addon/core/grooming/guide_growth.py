@@ -30,15 +30,15 @@ def grow(
     mesh: TriMesh,
     roots: SurfacePoints,
     *,
-    length: float,
+    length: float | np.ndarray,
     length_variation: float,
-    tilt: float,
-    gravity: float,
+    tilt: float | np.ndarray,
+    gravity: float | np.ndarray,
     seed: int,
     control_point_count: int,
     flow: flow_lines.FlowLines | None = None,
     is_draped: bool = False,
-    lift: float = 0.5 * np.pi,
+    lift: float | np.ndarray = 0.5 * np.pi,
     device: wp.DeviceLike = "cpu",
 ) -> np.ndarray:
     """Return control points (G, control_point_count, 3) float32 [m] of guides on a checked mesh.
@@ -47,7 +47,8 @@ def grow(
     largest random angle to the initial direction, which is the smooth normal without flow and is_draped; gravity in
     [0, 1]: 0 for none, at 1 tips point nearly straight down (-Z); flow: lines along which guides start, at the angle
     lift [rad] to the surface, or None; is_draped: whether guides fall after growth; without flow they start downhill at
-    the same angle (`downhill`). Guides bend with constant length, and slide over the surface instead of entering it.
+    the same angle (`downhill`). Length, tilt, gravity and lift may be arrays (G,), a value for each guide. Guides bend
+    with constant length, and slide over the surface instead of entering it.
     """
     random = np.random.Generator(np.random.PCG64(seed)).random((len(roots), 3))
     root_normals = normals(mesh, roots)
@@ -72,7 +73,7 @@ def grow(
             wp.array(directions, dtype=wp.vec3, device=device),
             wp.array(lengths, dtype=float, device=device),
             wp.array(rises, dtype=float, device=device),
-            gravity,
+            wp.array(np.broadcast_to(np.float32(gravity), len(roots)), dtype=float, device=device),
         ],
         outputs=[path],
         device=device,
@@ -82,11 +83,11 @@ def grow(
     return controls_through(_along(path.numpy(), abscissae))
 
 
-def downhill(root_normals: np.ndarray, lift: float, gravity: float) -> np.ndarray:
+def downhill(root_normals: np.ndarray, lift: float | np.ndarray, gravity: float | np.ndarray) -> np.ndarray:
     """Return the initial unit directions (G, 3) of draped guides.
 
     Neighbors agree, so hair parts only at a summit, like the whorl of a scalp. root_normals: unit (G, 3); lift: angle
-    [rad] to the surface; gravity: as in `grow`. Guides are upright without gravity and on level ground, and at most
+    [rad] to the surface, gravity: as in `grow`. Guides are upright without gravity and on level ground, and at most
     point straight down below an overhang.
     """
     steepest = np.array([0.0, 0.0, -1.0]) + root_normals[:, 2:] * root_normals
@@ -138,7 +139,7 @@ def _march(
     directions: wp.array[wp.vec3],
     lengths: wp.array[float],
     rises: wp.array[float],
-    gravity: float,
+    gravities: wp.array[float],
     # outputs
     out_path: wp.array2d[wp.vec3],
 ):
@@ -151,7 +152,7 @@ def _march(
     out_path[guide, 0] = position
     for i in range(steps):
         # Turn toward straight down: d(angle)/ds = -k sin(angle), like the moment of gravity.
-        bend = TURNING * gravity / float(steps)
+        bend = TURNING * gravities[guide] / float(steps)
         direction = wp.normalize(direction + bend * (DOWN - wp.dot(direction, DOWN) * direction))
         ahead = position + step * direction
         # The wanted height rises from the root up to the clearance.

@@ -5,12 +5,13 @@ from functools import cache
 from typing import Any
 
 from ..errors import HairError
-from ..grooming.groom import HairSettings
+from ..grooming.groom import GuideSettings, HairSettings
 from ..params import Param, Settings, declared
 from ..shading.appearance import COLOR_FIELDS, Appearance
 from . import map_settings, ramp_text
 
-SECTIONS = {"look": Appearance, "strands": HairSettings}  # first part of a setting's name → class of settings
+# First part of a setting's name → class of settings.
+SECTIONS = {"look": Appearance, "strands": HairSettings, "guides": GuideSettings}
 
 # Setting → the color parametrization that uses it.
 _PARAMETRIZATION = {f"look.{name}": way for way, names in COLOR_FIELDS.items() for name in names}
@@ -69,6 +70,11 @@ def parsed_source(text: str) -> tuple[str, str]:
 def is_color(setting: str) -> bool:
     """Return whether a setting is a color."""
     return isinstance(all_varied()[setting][0], tuple)
+
+
+def is_of_guides(setting: str) -> bool:
+    """Return whether a setting belongs to guides."""
+    return setting.startswith("guides.")
 
 
 def is_used(setting: str, parametrization: str) -> bool:

@@ -16,7 +16,7 @@ from ...data.strands import curves, drawn_lines, layer_attributes
 from ...host.notices import name_of, text_of
 from ...layers import recording
 from ...settings import layer_items, preferences, setting_properties
-from .. import grown_guides, read_surfaces, size_fitting
+from .. import grown_guides, read_surfaces, size_fitting, varied_guides
 
 
 def add(guides: Curves, depsgraph: Depsgraph, name: str = "") -> str:
@@ -154,7 +154,8 @@ def _grown_base(guides, depsgraph):
     starts, local = curves.curve_offsets(guides), curves.read_points(guides)
     roots = curves.read_roots(guides, surface, surface.from_local(local[starts[:-1]]))
     settings = replace(settings, guide_count=len(roots))
-    grown = grown_guides.grow(surface, settings, mask, laid_flow, no_progress, roots).strands.numpy()
+    varied = varied_guides.read(guides, guides.surface, surface, settings)
+    grown = grown_guides.grow(surface, settings, mask, laid_flow, no_progress, roots, varied).strands.numpy()
     base, counts = np.empty_like(local), np.diff(starts)
     for count in np.unique(counts):
         chosen = np.flatnonzero(counts == count)

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair ↔ all of its settings, as `settings_file.GroomSettings`."""
 
+from collections.abc import Sequence
+
 from bpy.types import Curves, Depsgraph, Object
 
 from ....core.dynamics.rod.settings import DynamicsSettings
 from ....core.files.settings_file import GroomSettings
 from ....core.grooming.groom import GuideSettings
 from ....core.long_work import Work
-from ....core.maps import ramp_text
+from ....core.maps import ramp_text, varied_settings
+from ....core.maps.map_settings import MapSettings
 from ....core.shading.appearance import TABLE_FIELDS, Appearance
 from ...data import scene, whole_changes
 from ...data.strands import curves
@@ -24,7 +27,7 @@ def settings_of(hair: Curves) -> GroomSettings:
     look, tables = properties.own_look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
     styles, names = style_items.styles_of(hair.vellus), style_items.names_of(hair.vellus)
     dynamics = properties.own_dynamics_of(guides.vellus)
-    maps = map_items.maps_of(hair.vellus)
+    maps = maps_of(hair)
     curve = ramp_nodes.text_of(hair.vellus.thickness_ramp)
     return GroomSettings(guide_settings, hair_settings, look, tables, styles, names, dynamics, maps, curve)
 
@@ -108,8 +111,31 @@ def assign_thickness_curve(hair: Curves, text: str) -> None:
         ramp_nodes.remove_unused(before)
 
 
+def maps_of(hair: Curves) -> tuple[MapSettings, ...]:
+    """Return the maps of hair Curves and of their guides. Raises `HairError`."""
+    guides = hair.vellus.guide_curves
+    return (*(() if guides is None else map_items.maps_of(guides.vellus)), *map_items.maps_of(hair.vellus))
+
+
+def assign_maps(hair: Curves, maps: Sequence[MapSettings]) -> None:
+    """Replace the maps of hair Curves and of their guides; combed guides do not change.
+
+    Raises `HairError` before anything changes.
+    """
+    of_guides = [one for one in maps if varied_settings.is_of_guides(one.setting)]
+    for one in maps:
+        varied_settings.require_map(one)
+    guides = hair.vellus.guide_curves
+    if guides is not None and guides.is_editable:
+        was_stale = guides.vellus.is_stale
+        map_items.assign(guides.vellus, of_guides)
+        if curves.is_combed(guides):
+            guides.vellus.is_stale = was_stale
+    map_items.assign(hair.vellus, [one for one in maps if not varied_settings.is_of_guides(one.setting)])
+
+
 def _assign_shading(hair, settings):
     assign_thickness_curve(hair, settings.thickness_curve)
-    map_items.assign(hair.vellus, settings.maps)
+    assign_maps(hair, settings.maps)
     setting_properties.assign(hair.vellus.marschner, settings.tables, skip=TABLE_FIELDS)
     assign_look(hair, settings.appearance)

@@ -7,12 +7,12 @@ from ....core.errors import HairError
 from ....core.maps import varied_settings
 from ...data.maps import ramps
 from ...data.strands.curves import require_editable
-from ...groom.selection import hair_of
+from ...groom.selection import guides_of, hair_of
 from ...groom.styles import painted_maps
 from ...host.notices import name_of
 from ...settings import map_items, properties, ramp_nodes
 from .. import map_rows
-from .base.hair_operator import HairOperator, needs_hair
+from .base.hair_operator import HairOperator, needs_hair, needs_hair_or_guides
 
 
 def setting_property():
@@ -26,7 +26,7 @@ class VELLUS_OT_edit_map(HairOperator, bpy.types.Operator):
     bl_idname = "vellus.edit_map"
     bl_label = "Edit Map"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
-    applies = needs_hair
+    applies = needs_hair_or_guides
     __annotations__ = {"setting": setting_property()}
 
     def invoke(self, context, _event):
@@ -37,18 +37,17 @@ class VELLUS_OT_edit_map(HairOperator, bpy.types.Operator):
 
     def change(self, context):
         """Add a map without a source if the setting has none."""
-        hair = hair_of(context.object)
-        require_editable(hair)
-        varied_settings.require_varied(self.setting)
-        if map_items.item_of(hair.vellus, self.setting) is None:
-            map_items.add(hair.vellus, self.setting)
+        owner = _owner_of(context, self.setting)
+        require_editable(owner)
+        if map_items.item_of(owner.vellus, self.setting) is None:
+            map_items.add(owner.vellus, self.setting)
 
     def draw(self, context):
         """Draw the map."""
-        hair = hair_of(context.object)
-        item = None if hair is None else map_items.item_of(hair.vellus, self.setting)
+        owner = guides_of(context.object) if varied_settings.is_of_guides(self.setting) else hair_of(context.object)
+        item = None if owner is None else map_items.item_of(owner.vellus, self.setting)
         if item is not None:
-            map_rows.draw(self.layout, item, hair)
+            map_rows.draw(self.layout, item, owner)
 
 
 class VELLUS_OT_paint_map(HairOperator, bpy.types.Operator):
@@ -57,17 +56,16 @@ one"""
 
     bl_idname = "vellus.paint_map"
     bl_label = "Paint Map"
-    applies = needs_hair
+    applies = needs_hair_or_guides
     __annotations__ = {"setting": setting_property()}
 
     def change(self, context):
         """Enter the paint mode of the map of the setting."""
-        hair = hair_of(context.object)
-        varied_settings.require_varied(self.setting)
-        item = map_items.item_of(hair.vellus, self.setting)
+        owner = _owner_of(context, self.setting)
+        item = map_items.item_of(owner.vellus, self.setting)
         if item is None:
             raise HairError('The setting "{setting}" has no map to paint: add one first.', setting=self.setting)
-        painted_maps.paint(hair, item, context)
+        painted_maps.paint(owner, item, context)
 
 
 class VELLUS_OT_add_ramp(HairOperator, bpy.types.Operator):
@@ -106,7 +104,7 @@ class VELLUS_OT_add_map_ramp(HairOperator, bpy.types.Operator):
 
     bl_idname = "vellus.add_map_ramp"
     bl_label = "Add Ramp"
-    applies = needs_hair
+    applies = needs_hair_or_guides
     __annotations__ = {"setting": setting_property()}
 
     def change(self, context):
@@ -121,7 +119,7 @@ class VELLUS_OT_remove_map_ramp(HairOperator, bpy.types.Operator):
 
     bl_idname = "vellus.remove_map_ramp"
     bl_label = "Remove Ramp"
-    applies = needs_hair
+    applies = needs_hair_or_guides
     __annotations__ = {"setting": setting_property()}
 
     def change(self, context):
@@ -131,14 +129,22 @@ class VELLUS_OT_remove_map_ramp(HairOperator, bpy.types.Operator):
 
 
 def _editable_map(context, setting):
-    """Return (hair Curves, item of the map of a setting). Raises `HairError`."""
-    hair = hair_of(context.object)
-    require_editable(hair)
-    varied_settings.require_varied(setting)
-    item = map_items.item_of(hair.vellus, setting)
+    """Return (Curves that have a setting, item of its map). Raises `HairError`."""
+    owner = _owner_of(context, setting)
+    require_editable(owner)
+    item = map_items.item_of(owner.vellus, setting)
     if item is None:
         raise HairError('The setting "{setting}" has no map: add one first.', setting=setting)
-    return hair, item
+    return owner, item
+
+
+def _owner_of(context, setting):
+    """Return the active hair or guides, whichever have a setting that may vary. Raises `HairError`."""
+    varied_settings.require_varied(setting)
+    owner = guides_of(context.object) if varied_settings.is_of_guides(setting) else hair_of(context.object)
+    if owner is None:
+        raise HairError("Select hair or guides.")
+    return owner
 
 
 def _first_ramp(hair, item):
@@ -154,15 +160,14 @@ class VELLUS_OT_remove_map(HairOperator, bpy.types.Operator):
 
     bl_idname = "vellus.remove_map"
     bl_label = "Remove Map"
-    applies = needs_hair
+    applies = needs_hair_or_guides
     __annotations__ = {"setting": setting_property()}
 
     def change(self, context):
         """Remove the map of the setting."""
-        hair = hair_of(context.object)
-        require_editable(hair)
-        varied_settings.require_varied(self.setting)
-        map_items.remove(hair.vellus, self.setting)
+        owner = _owner_of(context, self.setting)
+        require_editable(owner)
+        map_items.remove(owner.vellus, self.setting)
 
 
 CLASSES = (

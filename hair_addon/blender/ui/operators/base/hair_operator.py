@@ -21,6 +21,13 @@ def needs_guides(cls, context):
     return guides_of(context.object) is not None
 
 
+@classmethod
+def needs_hair_or_guides(cls, context):
+    """`applies` of operators on settings of the active hair or of its guides."""
+    cls.poll_message_set("Select hair or guides.")
+    return hair_of(context.object) is not None or guides_of(context.object) is not None
+
+
 class HairOperator:
     """Mixin of operators that implement `change`, which raises `HairError` before anything is changed."""
 
