@@ -20,6 +20,6 @@ def add(verbs):
 
 
 def run(given, console):
-    """Render the world of a file."""
+    """Render a panorama of a file's world."""
     blender.io.pictures.world_panorama.render(given.input, given.frame, given.out)
     console.result({"panorama": given.out}, "")

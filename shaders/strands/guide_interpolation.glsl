@@ -41,10 +41,10 @@ float faded(float first, float per_range, float value)
   return x * x * (3.0 - 2.0 * x);
 }
 
-// Remaining fraction of a guide's weight by how much its directions and the logarithm of its length differ from the nearest
-// guide's. facing: least cosine between their directions; apart: difference of logarithms; limits: the cosine at which the
-// weight is zero, 1 / the range of cosines over which it fades, the difference of logarithms at which it is zero, and
-// 1 / the range over which it fades, the last half of that difference.
+// Factor of a guide's weight, which falls as its directions and its length differ from those of the nearest guide.
+// facing: least cosine between their directions; apart: difference of the logarithms of their lengths; limits: the cosine
+// at which the factor is zero, 1 / the range of cosines over which it fades, the difference of logarithms at which it is
+// zero, and 1 / the range over which it fades, which is the last half of that difference.
 float limited_part(float facing, float apart, vec4 limits)
 {
   return faded(limits.x, limits.y, facing) * (1.0 - faded(0.5 * limits.z, limits.w, apart));

@@ -41,7 +41,7 @@ class VellusLayer(bpy.types.PropertyGroup):
         ),
         "weight": bpy.props.FloatProperty(
             name="Layer Weight",
-            description="How far the layer turns and stretches guides: at 0.5 half as far, at 2 twice as far",
+            description="Factor of the turning and stretching of guides by the layer: 0.5 halves it, 2 doubles it",
             translation_context=CONTEXT,
             min=0.0,
             max=2.0,

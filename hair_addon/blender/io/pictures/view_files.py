@@ -11,7 +11,7 @@ _OF_STEREO = {"left", "right"}  # names of the views that Blender renders for st
 
 
 def files_of(path):
-    """Return the files of a frame of the open scene; path: without view suffix. Raises `HairError`."""
+    """Return the paths of a frame's files, one per view; path: without view suffix. Raises `HairError`."""
     path = Path(path)
     return [path.with_name(f"{path.stem}{suffix}{path.suffix}") for suffix in _suffixes(path)]
 
