@@ -2,6 +2,7 @@
 """Operators that fail halfway, or refuse, leave the file and its folder unchanged."""
 
 import contextlib
+import functools
 import sys
 from pathlib import Path
 
@@ -237,22 +238,27 @@ class Fault:
         sys.settrace(self._before)
 
     def _see(self, frame, _event, _argument):
-        path = frame.f_code.co_filename
-        if (
-            whole_changes._open
-            and path.startswith(PACKAGE)
-            and not path.endswith("whole_changes.py")
-            and not called_back(frame)
-        ):
+        if whole_changes._open and owner_of(frame.f_code.co_filename) == "changing" and not called_back(frame):
             self.count += 1
             if self.count == self.number:
                 raise Broken
 
 
+@functools.cache
+def owner_of(path):
+    """Return what a file of code belongs to: "test", "called back" by Blender, "changing" files, "other"."""
+    if "tests" in path:
+        return "test"
+    if "/live/" in path or "/settings/" in path:
+        return "called back"
+    is_changing = path.startswith(PACKAGE) and not path.endswith("whole_changes.py")
+    return "changing" if is_changing else "other"
+
+
 def called_back(frame):
     """Whether Blender has called the running function, as it only prints errors of handlers and property functions."""
-    while frame is not None and "tests" not in frame.f_code.co_filename:
-        if "/live/" in frame.f_code.co_filename or "/settings/" in frame.f_code.co_filename:
+    while frame is not None and (owner := owner_of(frame.f_code.co_filename)) != "test":
+        if owner == "called back":
             return True
         frame = frame.f_back
     return False

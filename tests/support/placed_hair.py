@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair on surfaces with any transform, and the law of its place: hair moves with its surface."""
 
+import functools
+import tempfile
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -23,14 +26,26 @@ def files_in(folder, add=lambda _body: None):
 
     def file_of(place):
         if place not in files:
-            bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+            bpy.ops.wm.read_homefile(filepath=_grown(place))
             bpy.context.preferences.edit.use_global_undo = True
-            add(grow(place))
+            bpy.context.view_layer.update()
+            add(bpy.data.objects["Body"])
             files[place] = str(folder / f"{len(files)}.blend")
-            bpy.ops.wm.save_as_mainfile(filepath=files[place], copy=True)
+            bpy.ops.wm.save_as_mainfile(filepath=files[place], copy=True, compress=False)  # loads sooner
         return files[place]
 
     return file_of
+
+
+@functools.cache
+def _grown(place):
+    """Return the path of a file with hair on a surface at a place, which is grown once per process."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.preferences.edit.use_global_undo = True
+    grow(place)
+    path = str(Path(tempfile.mkdtemp(dir=bpy.app.tempdir)) / "grown.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, compress=False)
+    return path
 
 
 def add_body():

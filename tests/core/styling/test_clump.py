@@ -163,7 +163,7 @@ def test_sites_are_as_many_as_the_size_says(hair):
 
 def test_progress_of_placing_locks_rises_and_may_stop_it(hair):
     """The progress of placing locks rises and may stop it, which leaves nothing, and later placing is the same."""
-    settings = clump.Settings(size=0.014, levels=3, seed=11)
+    settings = clump.Settings(size=0.03, levels=3, seed=11)
     tree, told = program.tree_settings(settings), []
 
     def stop(step, part):

@@ -11,7 +11,7 @@ from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture, picture_detail
 from tests.support.scenes import even_guides
 
-SIZE = (320, 240)
+SIZE = (160, 120)
 
 
 @pytest.fixture
