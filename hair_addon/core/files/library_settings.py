@@ -13,6 +13,8 @@ S = TypeVar("S", bound=Settings)
 # Settings that name an object or an image of the scene, by section, and those of styles.
 _NAMES_OF_OTHERS = {"guides": ("density_image", "flow_lines"), "hair": ("density_image", "part_lines")}
 _NAMES_OF_OTHERS_IN_STYLES = ("mask_image", "cutter", "target")
+_OTHER_MAPS = ("IMAGE", "CURVES")  # kinds of maps with the name of an image, or of an attribute of strands
+_MASK_MAPS = ("GROUP", "ATTRIBUTE")  # kinds of maps with the name of a mask
 _MASKS = {"guides": ("density_group",), "hair": ("density_group", "region_group")}
 
 
@@ -40,7 +42,9 @@ def alone(settings: GroomSettings) -> tuple[GroomSettings, list[str]]:
         section: _without(getattr(settings, section), names, left) for section, names in _NAMES_OF_OTHERS.items()
     }
     styles = tuple(_without(style, _NAMES_OF_OTHERS_IN_STYLES, left) for style in settings.styles)
-    return replace(settings, **sections, styles=styles), left
+    left += [one.source for one in settings.maps if one.kind in _OTHER_MAPS]
+    maps = tuple(one for one in settings.maps if one.kind not in _OTHER_MAPS)
+    return replace(settings, **sections, styles=styles, maps=maps), left
 
 
 def _without(settings, names, left):
@@ -50,16 +54,23 @@ def _without(settings, names, left):
 
 
 def masks_of(settings: GroomSettings) -> list[str]:
-    """Return the unique names of masks in `GroomSettings`: vertex groups, and attributes of styles."""
+    """Return the unique names of masks in `GroomSettings`: vertex groups, and attributes of styles and maps."""
     found = [getattr(getattr(settings, section), name) for section, names in _MASKS.items() for name in names]
     found += [style.mask for style in settings.styles]
+    found += [one.source for one in settings.maps if one.kind in _MASK_MAPS]
     return list(dict.fromkeys(filter(None, found)))
 
 
 def renamed(settings: GroomSettings, names: Mapping[str, str]) -> GroomSettings:
-    """Return `GroomSettings` with renamed masks; names: {old: new}, "" removes a mask."""
+    """Return `GroomSettings` with renamed masks; names: {old: new}, "" removes a mask, and the maps that it is of."""
+    maps = (
+        replace(one, source=names.get(one.source, one.source)) if one.kind in _MASK_MAPS else one
+        for one in settings.maps
+    )
+    maps = tuple(one for one in maps if one.source or one.kind not in _MASK_MAPS)
     sections = {section: _renamed(getattr(settings, section), masks, names) for section, masks in _MASKS.items()}
-    return replace(settings, **sections, styles=tuple(_renamed(style, ("mask",), names) for style in settings.styles))
+    styles = tuple(_renamed(style, ("mask",), names) for style in settings.styles)
+    return replace(settings, **sections, styles=styles, maps=maps)
 
 
 def _renamed(settings, masks, names):

@@ -259,3 +259,21 @@ def test_names_that_are_no_file_names(groom, tmp_path):
         groom_library.path_of(tmp_path, " . ")
     assert groom_library.path_and_name("C:\\x.blend:Bob") == (type(path)("C:\\x.blend"), "Bob")
     assert groom_library.path_and_name("C:\\x.blend") == (type(path)("C:\\x.blend"), "")
+
+
+def test_maps_of_vertex_groups_come_along(groom, sphere, tmp_path):
+    """A saved groom has the maps of vertex groups, with the group, and their ramps; maps of images are left out."""
+    hair = groom[1]
+    sphere.vertex_groups.new(name="short").add(list(range(40)), 1.0, "REPLACE")
+    wanted = [api.set_map(hair, "guides.length", "group:short"), api.set_map(hair, "look.melanin", "clump")]
+    wanted.append(api.set_map(hair, "strands.thickness", "group:short", ramp="0:0.5 1:1"))
+    api.set_map(hair, "look.roughness", bpy.data.images.new("Coat", 4, 4))
+    update()
+    file = api.save_groom(hair, tmp_path, name="Mapped", catalog="", picture=PICTURE)
+    sphere.vertex_groups.remove(sphere.vertex_groups["short"])
+    guides, other = api.apply_groom(sphere, file)
+    assert {*api.maps_of(other)} == {*wanted}
+    assert "short" in sphere.vertex_groups
+    update()
+    assert (guides.vellus.status, other.vellus.status, other.vellus.shading_status) == ("", "", "")
+    np.testing.assert_allclose(api.points(guides), api.points(groom[0]), atol=1e-6)

@@ -11,6 +11,7 @@ from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh, positions
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.grooming.groom_passage import carried_weights, passage
 from hair_addon.core.grooming.groom_transfer import TransferSurface
+from hair_addon.core.maps.map_settings import MapSettings
 from hair_addon.core.styling import clump, trim
 from tests.support.meshes import subdivided_sphere
 
@@ -102,3 +103,15 @@ def test_settings_follow_the_size_of_the_surface_and_forget_the_scene():
     assert (left, alone.guides.flow_lines, alone.styles[1].cutter) == (["Lines", "Knife"], "", "")
     assert library_settings.masks_of(settings) == ["scalp", "top"]
     assert library_settings.masks_of(library_settings.renamed(settings, {"top": "top.001"})) == ["scalp", "top.001"]
+
+
+def test_maps_are_renamed_with_their_masks_and_leave_images_behind():
+    """Maps of masks follow their names; maps of images and of strands' attributes do not leave the scene."""
+    kinds = {"look.color": ("IMAGE", "Coat"), "look.tint": ("CURVES", "top"), "strands.thickness": ("GROUP", "top")}
+    kinds |= {"guides.length": ("ATTRIBUTE", "long"), "look.melanin": ("CLUMP", "")}
+    maps = tuple(MapSettings(setting=name, kind=kind, source=source) for name, (kind, source) in kinds.items())
+    alone, left = library_settings.alone(GroomSettings(maps=maps))
+    assert left == ["Coat", "top"]
+    assert library_settings.masks_of(alone) == ["top", "long"]
+    found = library_settings.renamed(alone, {"top": "top.001", "long": ""})
+    assert {one.setting: one.source for one in found.maps} == {"strands.thickness": "top.001", "look.melanin": ""}

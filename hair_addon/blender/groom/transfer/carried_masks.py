@@ -20,6 +20,8 @@ def read(guides: Curves, hair: Curves | None, target: Object, depsgraph: Depsgra
     source = guides.surface
     names = [text_of(guides.vellus.guides, "density_group")]
     names += [text_of(item, "mask") for item in guides.vellus.layers]
+    for mapped in (guides, *([] if hair is None else [hair])):
+        names += [text_of(item, "source") for item in mapped.vellus.maps if item.kind == "GROUP"]
     if hair is not None:
         names += [text_of(hair.vellus.hair, name) for name in ("density_group", "region_group")]
         names += [style_items.masks_of(item)[0] for item in hair.vellus.styles]

@@ -239,3 +239,15 @@ def test_undo_and_redo(hair):
     assert len(bpy.data.hair_curves) == count - 2
     bpy.ops.ed.redo()
     assert len(bpy.data.hair_curves) == count
+
+
+def test_groups_of_maps_are_transferred(hair, sphere):
+    """The other mesh gets the vertex groups of the maps of hair and guides, and the hair has these maps."""
+    sphere.vertex_groups.new(name="short").add(list(range(60)), 1.0, "REPLACE")
+    wanted = {api.set_map(hair, "strands.thickness", "group:short"), api.set_map(hair, "guides.tilt", "group:short")}
+    update()
+    target = other_sphere()
+    made, _guides = transfer(target, hair)
+    assert "short" in target.vertex_groups
+    assert {*api.maps_of(made)} == wanted
+    assert made.data.vellus.status == ""
