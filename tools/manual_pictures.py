@@ -6,7 +6,8 @@ of each panel in a sidebar of `SIDEBAR_WIDTH`. With the name `windows`, also bui
 window for each kind of active object, to look for labels that are cut. The name `five_minutes` writes only
 README's pictures, docs/five_minutes/*.png, cut from the windows of `tests/desktop/manual/first_minutes.py`;
 `curly_hair` writes those of the page Curly Hair, from `tests/desktop/manual/curly_hair.py`; `shading_modes` writes a
-sheet of Blender's shading modes, from `tests/desktop/manual/shading_modes.py`.
+sheet of Blender's shading modes, from `tests/desktop/manual/shading_modes.py`; `film_strip` writes the steps from the
+default cube to a render, from `tests/desktop/manual/film_strip.py`.
 """
 
 import shutil
@@ -41,6 +42,10 @@ SHADING_COLUMNS = (
 )
 SHADING_PART, SHADING_WINDOW, SHADING_TILE = (60, 80, 690, 500), (900, 600), (224, 149)
 SHADING_SAMPLES, SHADING_STRANDS = 8, 30_000
+
+# Steps of the film strip; (left, top, right, bottom) pixels of its window; strands.
+STRIP, STRIP_PART, STRIP_TILE = ("cube", "hair", "combed", "orbit", "at_rest", "f12"), (60, 80, 690, 500), (320, 213)
+STRIP_STRANDS = 30_000
 
 # (left, top, right, bottom) pixels of its window: the 3D view with the top of its sidebar; and the size it is shown in.
 SEEN_PART = (190, 60, 1310, 807)
@@ -78,6 +83,8 @@ def start():
         return take_curly_hair(blender, extension, folder / "curly_hair")
     if sys.argv[1:] == ["shading_modes"]:
         return take_shading_modes(blender, extension, folder / "shading_modes")
+    if sys.argv[1:] == ["film_strip"]:
+        return take_film_strip(blender, extension, folder / "film_strip")
     if len(sys.argv) == 1 or not (folder / "head.blend").exists():
         save_sample(folder / "head.blend")
     arguments = [extension, folder / "head.blend", *sys.argv[1:]]
@@ -122,6 +129,22 @@ def take_shading_modes(blender, extension, folder):
     return 0
 
 
+def take_film_strip(blender, extension, folder):
+    """Write the film strip in two rows; returns the exit status."""
+    import numpy as np
+
+    more, size = (SAMPLES, STRIP_STRANDS), SHADING_WINDOW
+    if error := take_walk(blender, "manual/film_strip", ["all"], extension, folder, *more, size=size):
+        return error
+    left, top, right, bottom = STRIP_PART
+    seen = [read(folder / f"strip_{name}.png") for name in STRIP]
+    seen = [picture[top:bottom, left:right] if len(picture) > bottom else picture for picture in seen]
+    seen = [scaled(picture, STRIP_TILE) for picture in seen]
+    rows = [np.concatenate(seen[first : first + 3], axis=1) for first in (0, 3)]
+    write(MANUAL / "film_strip.jpg", np.concatenate(rows))
+    return 0
+
+
 def write_sheet(folder, path):
     """Write the sheet of shading modes from the pictures in a folder: a model in each row."""
     import numpy as np
@@ -159,6 +182,20 @@ def read(path):
     image.pixels.foreach_get(pixels.ravel())
     bpy.data.images.remove(image)
     return pixels[::-1]
+
+
+def scaled(pixels, size):
+    """Return a picture in another size (width, height)."""
+    import bpy
+    import numpy as np
+
+    image = bpy.data.images.new("Scaled", pixels.shape[1], pixels.shape[0], float_buffer=True)
+    image.pixels.foreach_set(np.ascontiguousarray(pixels[::-1]).ravel())
+    image.scale(*size)
+    found = np.empty((*size[::-1], 4), np.float32)
+    image.pixels.foreach_get(found.ravel())
+    bpy.data.images.remove(image)
+    return found[::-1]
 
 
 def write(path, pixels, size=None):

@@ -100,7 +100,7 @@ def rig(sphere):
 
 
 def test_chains_hang_on_the_strongest_bone_and_the_rig_is_as_before(hair):
-    """Posing the bone moves pieces with it rigidly; the artist's armature has no other bones, and undo removes ours."""
+    """Posing the bone moves pieces with it rigidly; the artist's armature has no other bones."""
     sphere = bpy.data.objects["Sphere"]
     armature = rig(sphere)
     armature.pose.bones["head"].rotation_mode = "XYZ"
@@ -151,6 +151,19 @@ def test_springs_in_files_stand_where_the_chains_stand(hair, tmp_path, is_rigged
         local = sphere.matrix_world.inverted() @ Vector((center[0], -center[2], center[1]))
         assert local.length < 1.0
         assert (np.linalg.norm(joints[:, 1:] - center, axis=2) >= its["radius"] + reach - 1e-4).all()
+
+
+def test_chains_of_long_names_are_made_while_guides_are_combed(hair, tmp_path):
+    """Hair with the longest name has weights on all bones, and the guides stay in Sculpt Mode."""
+    hair.name = "Ä" * 31  # 62 bytes
+    guides = bpy.data.objects["Guides"]
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.object.mode_set(mode="SCULPT_CURVES")
+    made = chained("tubes", hair)
+    assert guides.mode == "SCULPT_CURVES" and bpy.context.view_layer.objects.active == guides
+    bones = {bone.name for bone in made.parent.data.bones if bone.use_deform}
+    assert {group.name for group in made.vertex_groups} == bones and len(bones) == CHAINS * BONES + 1
+    assert len(bpy.data.scenes) == 1
 
 
 def test_without_chains_files_have_no_springs(hair, tmp_path):

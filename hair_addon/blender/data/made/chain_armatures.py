@@ -18,6 +18,7 @@ from . import armature_weights
 
 _SPHERES = "vellus_spheres"  # property of the armature: center and radius of each, in its coordinates
 _END = 0.1  # length of the last bone, relative to the one before
+_NAME_BYTES = 50  # of the hair's name in names of bones, which have at most 63
 _HIT_RADIUS = 0.05  # relative to the length of a bone
 
 
@@ -58,10 +59,9 @@ def new(name, joints, surface_object, surface, collection):
     """
     armature = bpy.data.armatures.new(f"{name} Bones")
     armature_object = bpy.data.objects.new(armature.name, armature)
-    root, names = (
-        f"{name}_root",
-        [[f"{name}_{i + 1:03}_{j + 1:02}" for j in range(len(c) - 1)] for i, c in enumerate(joints)],
-    )
+    start = name.encode()[:_NAME_BYTES].decode(errors="ignore")
+    root = f"{start}_root"
+    names = [[f"{start}_{i + 1:03}_{j + 1:02}" for j in range(len(chain) - 1)] for i, chain in enumerate(joints)]
     _add_bones(armature_object, joints, root, names)
     collection.objects.link(armature_object)
     _parent(armature_object, surface_object, joints[:, 0])
