@@ -43,9 +43,9 @@ SHADING_COLUMNS = (
 SHADING_PART, SHADING_WINDOW, SHADING_TILE = (60, 80, 690, 500), (900, 600), (224, 149)
 SHADING_SAMPLES, SHADING_STRANDS = 8, 30_000
 
-# Steps of the film strip; (left, top, right, bottom) pixels of its window; strands.
-STRIP, STRIP_PART, STRIP_TILE = ("cube", "hair", "combed", "orbit", "at_rest", "f12"), (60, 80, 690, 500), (320, 213)
-STRIP_STRANDS = 30_000
+# Steps of the film strip; (left, top, right, bottom) pixels of its window; samples and strands.
+STRIP, STRIP_PART, STRIP_TILE = ("cube", "hair", "combed", "orbit", "at_rest", "f12"), (60, 125, 690, 447), (320, 164)
+STRIP_SAMPLES, STRIP_STRANDS = 16, 30_000
 
 # (left, top, right, bottom) pixels of its window: the 3D view with the top of its sidebar; and the size it is shown in.
 SEEN_PART = (190, 60, 1310, 807)
@@ -130,19 +130,27 @@ def take_shading_modes(blender, extension, folder):
 
 
 def take_film_strip(blender, extension, folder):
-    """Write the film strip in two rows; returns the exit status."""
-    import numpy as np
-
-    more, size = (SAMPLES, STRIP_STRANDS), SHADING_WINDOW
+    """Write the film strip; returns the exit status."""
+    more, size = (STRIP_SAMPLES, STRIP_STRANDS), SHADING_WINDOW
     if error := take_walk(blender, "manual/film_strip", ["all"], extension, folder, *more, size=size):
         return error
-    left, top, right, bottom = STRIP_PART
-    seen = [read(folder / f"strip_{name}.png") for name in STRIP]
-    seen = [picture[top:bottom, left:right] if len(picture) > bottom else picture for picture in seen]
-    seen = [scaled(picture, STRIP_TILE) for picture in seen]
-    rows = [np.concatenate(seen[first : first + 3], axis=1) for first in (0, 3)]
-    write(MANUAL / "film_strip.jpg", np.concatenate(rows))
+    write_strip(folder, MANUAL / "film_strip.jpg")
     return 0
+
+
+def write_strip(folder, path):
+    """Write the film strip from the pictures in a folder, in two rows."""
+    import numpy as np
+
+    left, top, right, bottom = STRIP_PART
+    seen = []
+    for name in STRIP:
+        picture = read(folder / f"strip_{name}.png")
+        # The render has the size of the 3D view, which is at the window's left, above the timeline.
+        above = 27 if name == "f12" else 0
+        seen.append(scaled(picture[top - above : bottom - above, left:right], STRIP_TILE))
+    rows = [np.concatenate(seen[first : first + 3], axis=1) for first in (0, 3)]
+    write(path, np.concatenate(rows))
 
 
 def write_sheet(folder, path):

@@ -55,14 +55,15 @@ def hair():
     if not MORE:
         refine_to(SAMPLES)
     space = viewport()[0].spaces.active
-    space.overlay.show_extras = space.show_gizmo = space.show_region_toolbar = False
+    space.overlay.show_extras = space.overlay.show_cursor = space.show_gizmo = space.show_region_toolbar = False
+    space.region_3d.view_distance = 7.0
     yield
     note("cube")
     with in_viewport():
         bpy.ops.vellus.add_hair("INVOKE_DEFAULT")
     yield from wait_for(lambda: of_kind("HAIR") is not None)
     of_kind("HAIR").data.vellus.hair.strand_count = STRAND_COUNT
-    yield from wait(1.0)
+    yield
     note("first_picture", 1)
     note("hair")
 
@@ -72,7 +73,7 @@ def comb():
     with in_viewport():
         bpy.ops.vellus.comb_guides()
     yield from wait(1.0)
-    bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 120
+    bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 250
     roots = places(curve_points(of_kind("GUIDES"))[::41])
     middle, width = roots.mean(axis=0), 0.5 * np.ptp(roots[:, 0])
     for aside in (-0.6, -0.2, 0.2, 0.6):
@@ -82,6 +83,7 @@ def comb():
     note("combed")
     with in_viewport():
         bpy.ops.object.mode_set(mode="OBJECT")
+        bpy.ops.vellus.select_hair()
     yield
 
 
