@@ -48,6 +48,7 @@ SLOW = {
     "five_minutes": "tools/manual_pictures.py five_minutes",
     "curly_hair": "tools/manual_pictures.py curly_hair",
     "shading_modes": "tools/manual_pictures.py shading_modes",
+    "film_strip": "tools/manual_pictures.py film_strip",
     "panels": "tools/manual_pictures.py",
 }
 
@@ -82,6 +83,7 @@ OTHERS = {
     "five_minutes": ("five_minutes/*.png",),
     "curly_hair": ("manual/curly_*.png",),
     "shading_modes": ("manual/shading_modes.jpg",),
+    "film_strip": ("manual/film_strip.jpg",),
     "panels": tuple(
         f"manual/{name}.png"
         for name in (
