@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The environment as an equirectangular image: each texel is the mean over its area of the source.
+// The environment as an equirectangular image: each texel is the mean of the source over the texel's area.
 
 #include "light/environment.glsl"
 

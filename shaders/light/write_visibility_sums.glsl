@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Adds visibility to the sums of the directions before: needs the images seen_*.
+// Adds visibility to the sums over earlier directions; needs the images seen_*.
 
 void put_seen(ivec2 cell, Seen sums)
 {

@@ -58,8 +58,8 @@ class VellusLayer(bpy.types.PropertyGroup):
             update=mark_shown,
         ),
         "identity": bpy.props.IntProperty(description="Number of the layer in names of attributes", options={"HIDDEN"}),
-        "shown_weight": bpy.props.FloatProperty(description="Weight in the present guides", options={"HIDDEN"}),
-        "shown_mask": bpy.props.StringProperty(description="Mask in the present guides", options={"HIDDEN"}),
+        "shown_weight": bpy.props.FloatProperty(description="Weight in the current guides", options={"HIDDEN"}),
+        "shown_mask": bpy.props.StringProperty(description="Mask in the current guides", options={"HIDDEN"}),
         "is_painted": bpy.props.BoolProperty(
             description="Whether the mask was painted since guides were composed", options={"HIDDEN"}
         ),

@@ -265,7 +265,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     )
     keeps_outside: bpy.props.BoolProperty(
         name="Keep Outside",
-        description="Keep combed guides outside of the surface as it is posed: strokes and edits push their points out",
+        description="Keep combed guides outside of the posed surface: each stroke or edit pushes their points out",
         translation_context=CONTEXT,
         default=True,
         options=_NOT_KEYED,

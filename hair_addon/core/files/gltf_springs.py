@@ -40,7 +40,7 @@ def add(path: Path, springs: list[Springs]) -> None:
 
 
 def _read(path):
-    """(the JSON of a file as a dictionary, its further chunks as bytes)."""
+    """Return (the JSON of a file as a dictionary, its other chunks as bytes)."""
     content = path.read_bytes()
     length, _kind = _CHUNK.unpack_from(content, _HEADER.size)
     start = _HEADER.size + _CHUNK.size
@@ -86,7 +86,7 @@ def _joint(springs):
 
 
 def _below(nodes, root):
-    """All nodes below one, by index."""
+    """Return the indices of all nodes below a node."""
     found = list(nodes[root].get("children", []))
     for index in found:
         found += nodes[index].get("children", [])

@@ -12,7 +12,7 @@ from ..kernels import native_code, parallel
 from ..kernels.parallel import Rows
 from .guide_layers import GuideLayers
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _WIDTH = 8  # guides of a thread

@@ -9,7 +9,7 @@ import warp as wp
 
 from ..kernels import native_code
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 NUMBERS = 8  # per guide

@@ -18,7 +18,7 @@ from ..kernels.parallel import Rows
 from .guide_weights import GuideWeights, frame
 from .hair_binding import HairBinding
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _HOLD = 1.0  # damping, as a factor of a guide's own weight in the normal equations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Neighbouring guides of each strand and their weights  ([Report12] section 2.4, Eq. 8-9).
+"""Neighboring guides of each strand and their weights  ([Report12] section 2.4, Eq. 8-9).
 
 A strand with its root at q blends the k guides nearest to it. With r_j the distance from q to guide j's root and r'
 that to the nearest excluded guide, the weight is the Gaussian of Eq. 9, reduced to zero by a second factor:
@@ -26,7 +26,7 @@ from ..kernels.checks import require_count
 from ..kernels.parallel import Rows
 from . import cpu_weights, part_lines
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 STRETCH = 1.25

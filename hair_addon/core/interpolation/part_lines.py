@@ -23,7 +23,7 @@ from ..geometry.mesh import TriMesh, positions
 from ..kernels import kernel_cache
 from ..kernels.checks import require_count, require_indices
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 PIECES = 64  # pieces of a line per longest side of the surface, when it is laid on the surface

@@ -13,7 +13,7 @@ from ..geometry.closest_point import SurfaceQuery, normal_and_offset
 from ..kernels import parallel
 from ..kernels.checks import require_count
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+# No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _LEAST_AMOUNT = wp.constant(0.05)  # amount from which guides keep the full clearance

@@ -90,7 +90,7 @@ def write_slides(curves, slides):
 
 
 def slides(curves):
-    """(S, 3) float32 slides stored by `write_slides`, or None."""
+    """Return the (S, 3) float32 slides stored by `write_slides`, or None."""
     return attributes.read(curves, SLIDE, "FLOAT_VECTOR", "CURVE")
 
 

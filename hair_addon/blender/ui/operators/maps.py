@@ -69,7 +69,7 @@ one"""
 
 
 class VELLUS_OT_add_ramp(HairOperator, bpy.types.Operator):
-    """Set the thickness from root to tip by a curve, which begins as the present thickness"""
+    """Set the thickness from root to tip by a curve, which begins as the current thickness"""
 
     bl_idname = "vellus.add_ramp"
     bl_label = "Thickness Curve"

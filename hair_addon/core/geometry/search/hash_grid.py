@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Neighbour search: the sorted spatial hash of [Report12] section 2.4 [Teschner03], as `wp.HashGrid` builds it.
+"""Neighbor search: the sorted spatial hash of [Report12] section 2.4 [Teschner03], as `wp.HashGrid` builds it.
 
 Warp's grid visits all 27 cells around a query, each once (the report's 26 omit the query's own cell).
 """

@@ -110,7 +110,7 @@ def _radius(line, along, settings):
 
 
 def _bun(tie, start, normal, reach, settings):
-    """Return points (M, 3) of spirals on a ball that rests on the surface, forth and back, each other one inside."""
+    """Return points (M, 3) of spirals on a ball that rests on the surface, back and forth, every second one inside."""
     side = start - normal * (start @ normal)
     side = unit(side) if np.linalg.norm(side) > 0.1 else unit(np.cross(normal, np.eye(3)[np.abs(normal).argmin()]))
     other = np.cross(normal, side)

@@ -272,7 +272,7 @@ def smooth_ratios(
 
 
 def _smooth(sums, path_count, origin):
-    """Return Return `smooth_ratios` as an array on the device."""
+    """Return `smooth_ratios` as an array on the device."""
     levels, shifts, first = [sums], [], np.array(origin[::-1])
     while max(levels[-1].shape[:3]) > 1:
         # Two voxels on both sides of the world's origin would never merge.
