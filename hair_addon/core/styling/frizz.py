@@ -61,9 +61,15 @@ class Settings(ProfiledSettings):
         subtype="DISTANCE",
         precision=4,
     )
-    octaves: int = param(2, "Number of octaves of noise; each has half the wavelength of the previous octave", low=1, high=MOST_OCTAVES)
+    octaves: int = param(
+        2, "Number of octaves of noise; each has half the wavelength of the previous octave", low=1, high=MOST_OCTAVES
+    )
     gain: float = param(
-        0.5, "Amplitude of each octave as a fraction of the previous octave's amplitude", low=0.0, high=1.0, subtype="FACTOR"
+        0.5,
+        "Amplitude of each octave as a fraction of the previous octave's amplitude",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
     )
     coherence: float = param(
         0.0, "How alike neighboring strands move; at 0 each has noise of its own", low=0.0, high=1.0, subtype="FACTOR"
