@@ -53,13 +53,13 @@ def zip_path(target: str) -> Path:
 
 
 def wheels_of(target: str) -> list[Path]:
-    """The manifest's wheels that run on one platform."""
+    """Return the manifest's wheels that run on one platform."""
     wheels = [ROOT / wheel for wheel in manifest()["wheels"]]
     return [wheel for wheel in wheels if wheel.name.endswith(PLATFORM_TAGS[target])]
 
 
 def lock_entry(package: str) -> str:
-    """The lines of requirements.lock that pin one package, hashes included."""
+    """Return the lines of requirements.lock that pin one package, hashes included."""
     lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
     entry = re.search(rf"^{re.escape(package)}==(?:.*\\\n)*.*\n", lock, re.MULTILINE)
     if entry is None:
@@ -100,7 +100,9 @@ def fetch(wheel: Path) -> None:
 
 
 def kernel_folder(is_for_tests: bool = False) -> Path:
-    """The folder for `compiled_kernels` of the sources as they are; for tests, the complete one where it exists."""
+    """Return the folder for `compiled_kernels` of the sources as they are; for tests, the complete one where it
+    exists.
+    """
     folder = ROOT / "build" / "kernels" / compile_kernels.sources_digest()[:16]
     return folder.with_name(f"{folder.name}-tests") if is_for_tests and not folder.exists() else folder
 

@@ -101,7 +101,7 @@ def _inherited():
 
 
 def find_or_install():
-    """The `DesktopBlender` of this machine, installed if it is not there yet. Raises `Unavailable`."""
+    """Return the `DesktopBlender` of this machine, installed if it is not there yet. Raises `Unavailable`."""
     place = Path(os.environ.get(VARIABLE, DEFAULT_FOLDER))
     if place.is_file():
         missing = [tool for tool in ("xvfb-run", "import") if shutil.which(tool) is None]
@@ -165,7 +165,7 @@ def _call(command, environment):
 
 
 def _inside(folder, command, shared):
-    """A command with `folder` as its root, where it sees the folders `shared` at their own paths.
+    """Return a command with `folder` as its root, where it sees the folders `shared` at their own paths.
 
     Its mounts are private, and removed when it ends.
     """

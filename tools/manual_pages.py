@@ -38,7 +38,7 @@ code {{ background: #eee; }}
 
 
 def to_html(text):
-    """A page of Markdown as HTML: headings carry anchors, links lead to the HTML pages."""
+    """Return a page of Markdown as HTML: headings carry anchors, links lead to the HTML pages."""
     body = markdown.markdown(text, extensions=["toc", "tables"], output_format="html")
     body = re.sub(r'(href="[\w./-]+)\.md(["#])', r"\1.html\2", body)
     title = re.search(r"^# (.*)$", text, re.MULTILINE)[1]

@@ -388,7 +388,7 @@ def take_looks(window):
 
 
 def take_redo(window):
-    """The redo panel of strands, opened by a click on its header."""
+    """Show the redo panel of strands, opened by a click on its header."""
     import bpy
 
     settings = {"strand_count": 5000, "density_group": "scalp"}
@@ -406,7 +406,7 @@ def take_redo(window):
 
 
 def take_foreign(window):
-    """The Surface panel while curves not made by Vellus are active."""
+    """Show the Surface panel while curves not made by Vellus are active."""
     import bpy
 
     window.run(bpy.ops.object.curves_random_add)
@@ -416,7 +416,7 @@ def take_foreign(window):
 
 
 def take_rendering(window):
-    """The Render properties with Vellus as the engine."""
+    """Show the Render properties with Vellus as the engine."""
     import bpy
 
     bpy.context.scene.render.engine = "VELLUS"

@@ -27,7 +27,7 @@ SHADERS = {
 
 
 def text_of(name: str) -> str:
-    """The text of a file of shaders/."""
+    """Return the text of a file of shaders/."""
     file = inspect.getsourcefile(SHADERS[name][0].func)
     source = Path(file).relative_to(ROOT / "hair_addon").as_posix()
     head = (

@@ -81,12 +81,12 @@ def main():
 
 
 def mean(picture):
-    """(3,) mean color of the hair in a premultiplied picture (H, W, 4)."""
+    """Return (3,) mean color of the hair in a premultiplied picture (H, W, 4)."""
     return picture[..., :3].sum(axis=(0, 1)) / picture[..., 3].sum()
 
 
 def ratio(by_cycles, by_vellus):
-    """(3,) mean color by Vellus, relative to that by Cycles."""
+    """Return (3,) mean color by Vellus, relative to that by Cycles."""
     return mean(by_vellus) / mean(by_cycles)
 
 
@@ -144,7 +144,9 @@ class Stage:
         head_object.is_holdout = True
 
     def by_cycles(self, color, light, out, reuse=None):
-        """(H, W, 4) linear premultiplied pixels of the hair, path traced; written to a folder, or found in another."""
+        """Return (H, W, 4) linear premultiplied pixels of the hair, path traced; written to a folder, or found in
+        another.
+        """
         name = f"{color}_{light}.exr"
         found = reuse / name if reuse else None
         if found is None or not found.is_file():
@@ -158,12 +160,12 @@ class Stage:
         return pixels.reshape(HEIGHT, WIDTH, 4)
 
     def by_vellus(self):
-        """(H, W, 4) linear premultiplied pixels of the hair, as a render has them."""
+        """Return (H, W, 4) linear premultiplied pixels of the hair, as a render has them."""
         return api.draw(width=WIDTH, height=HEIGHT, samples_per_side=SAMPLES_PER_SIDE, is_transparent=True)
 
 
 def studio_image(width=512, height=256):
-    """A picture of a studio by longitude and latitude: a dim room, three soft lamps."""
+    """Return a picture of a studio by longitude and latitude: a dim room, three soft lamps."""
     longitude = 180.0 - 360.0 * (np.arange(width) + 0.5) / width
     latitude = 180.0 * (np.arange(height) + 0.5) / height - 90.0
     room = 0.12 + 0.10 * np.sin(np.radians(latitude))

@@ -55,7 +55,7 @@ def main():
 
 
 def draw_part_line(skull):
-    """A poly line on the head where its guides are parted, from the forehead to the nape."""
+    """Return a poly line on the head where its guides are parted, from the forehead to the nape."""
     data = bpy.data.curves.new("Part Line", "CURVE")
     data.dimensions = "3D"
     spline = data.splines.new("POLY")
@@ -76,12 +76,12 @@ def draw_part_line(skull):
 
 
 def strands_of(datablock):
-    """(S, P, 3) float32."""
+    """Return (S, P, 3) float32."""
     return curves.read_points(datablock).reshape(len(datablock.curves), -1, 3)
 
 
 def native_strands(guides, skull):
-    """(S, P, 3) by Blender's node group as it comes, where the guides grow, and about as many."""
+    """Return (S, P, 3) by Blender's node group as it comes, where the guides grow, and about as many."""
     folder = bpy.utils.system_resource("DATAFILES", path="assets/nodes")
     with bpy.data.libraries.load(os.path.join(folder, "procedural_hair_node_assets.blend"), link=False) as (_, wanted):
         wanted.node_groups = ["Interpolate Hair Curves"]
@@ -107,13 +107,13 @@ def native_strands(guides, skull):
 
 
 def is_near(strands):
-    """(S,) bool: whether strands are rooted beside the parting, on top of the head."""
+    """Return (S,) bool: whether strands are rooted beside the parting, on top of the head."""
     roots = strands[:, 0]
     return (np.abs(roots[:, 0] - head.PARTING) < NEAR) & (roots[:, 2] > 0.8)
 
 
 def strays(strands, combed):
-    """(S,) bool: strands near the parting that lean to its sides by less than half of what guides there do."""
+    """Return (S,) bool: strands near the parting that lean to its sides by less than half of what guides there do."""
 
     def lean(these):
         arm = these[:, these.shape[1] // 4] - these[:, 0]
@@ -147,7 +147,7 @@ def light():
 
 
 def picture(strands, stray, skull):
-    """(SIDE, SIDE, 3) uint8, the top row first: strands, those that stray in orange."""
+    """Return (SIDE, SIDE, 3) uint8, the top row first: strands, those that stray in orange."""
     data = bpy.data.hair_curves.new("Picture")
     data.add_curves([strands.shape[1]] * len(strands))
     data.set_types(type="POLY")

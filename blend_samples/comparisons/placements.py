@@ -49,7 +49,7 @@ def main():
 
 
 def _poisson_disks(skull):
-    """(n, 3): Blender's node on the scalp, the distance halved to and fro until nearly as many come."""
+    """Return (n, 3): Blender's node on the scalp, the distance halved to and fro until nearly as many come."""
     group = bpy.data.node_groups.new("Poisson", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -104,7 +104,7 @@ def _light():
 
 
 def _picture(places):
-    """(SIDE, SIDE, 3) uint8, the top row first: the head with a dot at each place."""
+    """Return (SIDE, SIDE, 3) uint8, the top row first: the head with a dot at each place."""
     corners, faces = _ball()
     vertices = (places[:, None] + DOT * corners).reshape(-1, 3)
     every = (np.arange(len(places))[:, None, None] * len(corners) + faces).reshape(-1, 3)
@@ -123,7 +123,7 @@ def _picture(places):
 
 
 def _ball():
-    """(V, 3) vertices and (F, 3) triangles of a ball of radius 1."""
+    """Return (V, 3) vertices and (F, 3) triangles of a ball of radius 1."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=1.0)
     ball = bpy.context.object
     vertices = np.array([vertex.co for vertex in ball.data.vertices])

@@ -61,7 +61,7 @@ def _hair(rng, area):
 
 
 def _direction(rng, least_z):
-    """A unit vector, a list, evenly distributed above a height."""
+    """Return a unit vector, a list, evenly distributed above a height."""
     z, turn = rng.uniform(least_z, 1.0), rng.uniform(0.0, 2.0 * math.pi)
     across = math.sqrt(1.0 - z * z)
     return [round(across * math.cos(turn), 4), round(across * math.sin(turn), 4), round(z, 4)]
@@ -214,7 +214,9 @@ def _set_world(values):
 
 
 def _studio(room, lamps, width=512, height=256):
-    """A picture by longitude and latitude [degrees]: a room that is brighter above, and lamps with soft borders."""
+    """Return a picture by longitude and latitude [degrees]: a room that is brighter above, and lamps with soft
+    borders.
+    """
     longitude = 180.0 - 360.0 * (np.arange(width) + 0.5) / width
     latitude = 180.0 * (np.arange(height) + 0.5) / height - 90.0
     pixels = np.ones((height, width, 4), np.float32)

@@ -109,7 +109,7 @@ def choose_device(name):
 
 
 def by_cycles(values, curves, options):
-    """(H, W, 4) linear premultiplied pixels of the hair, path traced, or kept from an earlier run."""
+    """Return (H, W, 4) linear premultiplied pixels of the hair, path traced, or kept from an earlier run."""
     path = options.references / f"{values['seed']}_{key(values, options)}.npy"
     extent = hair_extent(curves)
     kept = path.with_suffix(".json")
@@ -125,7 +125,7 @@ def by_cycles(values, curves, options):
 
 
 def path_traced(path, options):
-    """(H, W, 4) linear premultiplied pixels of the scene by Cycles; path: of a file that is deleted again."""
+    """Return (H, W, 4) linear premultiplied pixels of the scene by Cycles; path: of a file that is deleted again."""
     blender_scene = bpy.context.scene
     render, cycles = blender_scene.render, blender_scene.cycles
     render.engine, render.film_transparent = "CYCLES", True
@@ -149,7 +149,7 @@ def path_traced(path, options):
 
 
 def key(values, options):
-    """A key of a reference: the scene's values and the sampling."""
+    """Return a key of a reference: the scene's values and the sampling."""
     return hashlib.sha256(json.dumps([_VERSION, values, options.size, options.samples]).encode()).hexdigest()[:16]
 
 
@@ -160,7 +160,7 @@ def hair_extent(curves):
 
 
 def between(first, second):
-    """The largest difference of two extents in a mean or a spread [m]; infinite for other numbers of points."""
+    """Return the largest difference of two extents in a mean or a spread [m]; infinite for other numbers of points."""
     if [one[0] for one in first] != [one[0] for one in second]:
         return math.inf
     return max(float(np.abs(np.subtract(one[1:], other[1:])).max()) for one, other in zip(first, second, strict=True))
@@ -177,12 +177,12 @@ def kept_or_drawn(seed, options):
 
 
 def by_vellus(size):
-    """(H, W, 4) linear premultiplied pixels of the hair, as a render has them."""
+    """Return (H, W, 4) linear premultiplied pixels of the hair, as a render has them."""
     return api.draw(width=size, height=size, samples_per_side=4, is_transparent=True)
 
 
 def line(row):
-    """A scene in one line."""
+    """Return a scene in one line."""
     values = row["scene"]
     hair = ", ".join(
         " ".join(
@@ -203,7 +203,7 @@ def line(row):
 
 
 def summary(rows):
-    """The distribution of the largest deviations in a channel."""
+    """Return the distribution of the largest deviations in a channel."""
     deviations = np.array([row["deviation"] for row in rows])
     structures = np.array([row["structure"] for row in rows])
     return (

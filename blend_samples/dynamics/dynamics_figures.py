@@ -52,14 +52,14 @@ def figures_of(guides, skull, last):
 
 
 def guide_points(guides, frame):
-    """(G, P, 3) float64 [m] in the world: baked guides in the scene's frame."""
+    """Return (G, P, 3) float64 [m] in the world: baked guides in the scene's frame."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     pose = guide_poses.read(guides.data, depsgraph, 1.0)
     return pose.to_world(frame_folders.frames_of(guides.data).points_at(frame))
 
 
 def heights(points, skull):
-    """(N,) [m] of points (N, 3) in the world over the head, negative inside; infinite below its neck."""
+    """Return (N,) [m] of points (N, 3) in the world over the head, negative inside; infinite below its neck."""
     tree = BVHTree.FromObject(skull, bpy.context.evaluated_depsgraph_get())
     back = skull.matrix_world.inverted()
     found = np.full(len(points), np.inf)

@@ -43,7 +43,7 @@ def make(head_file, out):
 
 
 def turned(time):
-    """The head's angle [radians] at a time [s]: to the side, and back."""
+    """Return the head's angle [radians] at a time [s]: to the side, and back."""
     angle = 0.0
     for start, degrees in TURNS:
         part = float(np.clip((time - start) / TURN_SECONDS, 0.0, 1.0))

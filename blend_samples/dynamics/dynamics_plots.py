@@ -68,7 +68,7 @@ def arcs():
 
 
 def chain():
-    """The tip of a chain in its first mode, and implicit Euler's own damping exp(-ω² h t / 2) of it."""
+    """Return the tip of a chain in its first mode, and implicit Euler's own damping exp(-ω² h t / 2) of it."""
     groom = line(CHAIN, 25, (0.0, 0.0, -1.0))
     swung = groom.copy()
     swung[..., 0] = 0.02 * CHAIN * j0(2.404826 * np.sqrt(1.0 + groom[..., 2] / CHAIN))

@@ -60,7 +60,7 @@ def see_from(location, target, lens):
 
 
 def objects():
-    """The objects of head, guides and hair in the open file."""
+    """Return the objects of head, guides and hair in the open file."""
     return tuple(bpy.data.objects[name] for name in ("Head", "Guides", "Hair"))
 
 
@@ -78,7 +78,7 @@ def turn(skull, axis, angle, last):
 
 
 def shaking(degrees=20.0, rate=3.0, seconds=1.0):
-    """An angle of time: a shake that begins and ends smoothly."""
+    """Return an angle of time: a shake that begins and ends smoothly."""
 
     def angle(time):
         strength = np.clip(6.0 * min(time, seconds - time), 0.0, 1.0)
@@ -96,14 +96,14 @@ def bake(guides, last, folder):
 
 
 def drawn(frame):
-    """(height, width, 3) uint8: the scene in a frame, the top row first."""
+    """Return (height, width, 3) uint8: the scene in a frame, the top row first."""
     bpy.context.scene.frame_set(frame)
     render = bpy.context.scene.render
     return picture_files.drawn(render.resolution_x, render.resolution_y, sample_count=SAMPLE_COUNT)
 
 
 def strands_of(guides):
-    """(G, P, 3) float32: combed guides, local."""
+    """Return (G, P, 3) float32: combed guides, local."""
     return curves.read_points(guides.data).reshape(len(guides.data.curves), -1, 3)
 
 

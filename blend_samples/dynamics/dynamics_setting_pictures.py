@@ -35,7 +35,7 @@ POINTS = 41
 
 
 def still(_time):
-    """A root that stays."""
+    """Return a root that stays."""
     return np.zeros(3)
 
 
@@ -60,20 +60,20 @@ class Experiment:
 
 
 def straight(length, direction, root=(0.0, 0.0, 0.0)):
-    """(1, P, 3): a straight strand."""
+    """Return (1, P, 3): a straight strand."""
     along = np.linspace(0.0, length, POINTS)[:, None]
     return (np.array(root) + along * np.array(direction) / np.linalg.norm(direction))[None]
 
 
 def curl(length=0.15, turns=5, radius=0.012):
-    """(1, P, 3): a curl that hangs."""
+    """Return (1, P, 3): a curl that hangs."""
     along = np.linspace(0.0, length, POINTS)
     angle, wide = 2.0 * np.pi * turns * along / length, radius * np.minimum(1.0, 12.0 * along / length)
     return np.stack([wide * np.sin(angle), wide * (1.0 - np.cos(angle)), -along], axis=-1)[None]
 
 
 def ball(radius, center):
-    """(vertices, triangles) of a sphere, and what it fills in the picture."""
+    """Return (vertices, triangles) of a sphere, and what it fills in the picture."""
     rows, columns = 24, 48
     polar, around = np.meshgrid(np.linspace(0.0, np.pi, rows + 1), np.linspace(0.0, 2.0 * np.pi, columns + 1)[:-1])
     sphere = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1)
@@ -96,7 +96,7 @@ def _in_disk(radius, center):
 
 
 def slope(angle):
-    """A square that rises along Y under the strands, and None as it fills the whole picture."""
+    """Return a square that rises along Y under the strands, and None as it fills the whole picture."""
     rise = math.tan(angle)
     corners = np.array([[x, y, y * rise] for x, y in ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))])
     return corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), None
@@ -130,7 +130,7 @@ OVER_BALL = Experiment(
 
 
 def sideways(time):
-    """The way of a root that is carried to the right by 8 cm in a third of a second."""
+    """Return the way of a root that is carried to the right by 8 cm in a third of a second."""
     part = float(np.clip(3.0 * time, 0.0, 1.0))
     return np.array([0.08 * part**2 * (3.0 - 2.0 * part), 0.0, 0.0])
 
@@ -191,7 +191,7 @@ def draw(setting, caption, values, experiment, path):
 
 
 def _written(setting, value):
-    """A value as its picture's caption has it."""
+    """Return a value as its picture's caption has it."""
     if isinstance(value, bool):
         return "on" if value else "off"
     shown = 1e3 * value if setting == "collision_distance" else value
@@ -199,7 +199,7 @@ def _written(setting, value):
 
 
 def moments_of(experiment, settings):
-    """[(G, P, 3)] of the moments of an experiment; of all frames where the tip is traced."""
+    """Return [(G, P, 3)] of the moments of an experiment; of all frames where the tip is traced."""
     grooms = np.asarray(experiment.grooms, float)
     turns = np.tile(IDENTITY, (len(grooms), 1))
     obstacles = ()
@@ -220,7 +220,7 @@ def moments_of(experiment, settings):
 
 
 def drawn(experiment, found):
-    """(HEIGHT, WIDTH, 3) uint8: the strands of successive moments."""
+    """Return (HEIGHT, WIDTH, 3) uint8: the strands of successive moments."""
     left, bottom, height = experiment.limits
     up = (0.0, math.cos(experiment.slant), math.sin(experiment.slant))
     view = np.array([(1.0, 0.0, 0.0), up]).T

@@ -94,7 +94,9 @@ def blow():
 
 
 def gust(time):
-    """The wind at a time as a part of its mean: it begins in half a second, swells and abates, and ends after two."""
+    """Return the wind at a time as a part of its mean: it begins in half a second, swells and abates, and ends after
+    two.
+    """
     swell = 1.0 + 0.5 * math.sin(2.0 * math.pi * 0.9 * time) + 0.2 * math.sin(2.0 * math.pi * 2.3 * time)
     return swell * float(np.clip(2.0 * time, 0.0, 1.0) * np.clip(3.0 * (2.0 - time), 0.0, 1.0))
 

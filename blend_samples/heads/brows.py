@@ -48,7 +48,7 @@ def build(head_object, openings):
 
 
 def guides_on_skin(head_object):
-    """(G, P, 3) guides of both brows, whose roots are on the skin."""
+    """Return (G, P, 3) guides of both brows, whose roots are on the skin."""
     skin = BVHTree.FromObject(head_object, bpy.context.evaluated_depsgraph_get())
     lines = np.concatenate([_brow(skin, side)[1].reshape(-1, _POINTS, 3) for side in (1.0, -1.0)])
     lines[:, 0] += (lines[:, 1] - lines[:, 0]) * (_DEPTH / np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1))[:, None]
@@ -56,7 +56,7 @@ def guides_on_skin(head_object):
 
 
 def _brow(skin, side):
-    """(grid (R, C, 3) of roots, their (R, C, P, 3) guides) of the brow on a side."""
+    """Return (grid (R, C, 3) of roots, their (R, C, P, 3) guides) of the brow on a side."""
     roots, guides = [], []
     for row in np.linspace(-1.0, 1.0, _BROW_ROWS):
         # Its inner end is round, and its upper border begins last.
@@ -74,13 +74,13 @@ def _brow(skin, side):
 
 
 def _on_skin(skin, x, height):
-    """(point, normal) of the face at a place as seen from the front."""
+    """Return (point, normal) of the face at a place as seen from the front."""
     point, normal, _face, _distance = skin.ray_cast(Vector((x, -1.0, height)), Vector((0.0, 1.0, 0.0)))
     return np.array(point), np.array(normal)
 
 
 def _lying(skin, root, normal, side, turn, length):
-    """(P, 3): a hair that leaves the skin and lies down along it."""
+    """Return (P, 3): a hair that leaves the skin and lies down along it."""
     points = [root - _DEPTH * normal]
     for step in range(1, _POINTS):
         part = step / (_POINTS - 1)
@@ -93,7 +93,7 @@ def _lying(skin, root, normal, side, turn, length):
 
 
 def _lashes(opening):
-    """The same of the lashes of an eye's upper and lower lid."""
+    """Yield the same of the lashes of an eye's upper and lower lid."""
     center = opening.center
     for border, length, lift in ((opening.upper, _UPPER_LASH, 1.0), (opening.lower, _LOWER_LASH, -0.55)):
         place = np.linspace(0.10, 0.97, _LASH_STEPS) * (len(border) - 1)
@@ -109,7 +109,7 @@ def _lashes(opening):
 
 
 def _lash(root, length, fan, lift):
-    """(P, 3): a lash that leaves its lid forward and curls away from the eye; fan: to the side, from -½ to ½."""
+    """Return (P, 3): a lash that leaves its lid forward and curls away from the eye; fan: to the side, from -½ to ½."""
     points = [root]
     for step in range(1, _POINTS):
         part = step / (_POINTS - 1)
@@ -144,7 +144,7 @@ def _hair(name, parts, head_object, color, roughness, **settings):
 
 
 def _patch(name, grids, head_object):
-    """A mesh of the grids of roots: hair grows on it, and no picture shows it."""
+    """Return a mesh of the grids of roots: hair grows on it, and no picture shows it."""
     vertices, faces = [], []
     for grid in grids:
         rows, columns, _xyz = grid.shape

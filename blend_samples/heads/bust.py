@@ -31,7 +31,7 @@ _SECTIONS = np.array(
 
 
 def build(head_object):
-    """The object `Bust`, a child of the head."""
+    """Return the object `Bust`, a child of the head."""
     turn = 2.0 * np.pi * np.arange(_SEGMENTS) / _SEGMENTS
     cosine, sine = np.cos(turn), np.sin(turn)
     rings = []

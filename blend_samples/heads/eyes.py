@@ -38,7 +38,7 @@ class Opening:
 
 
 def openings(head_object, step=0.0005):
-    """The `Opening` on the left (+X) and on the right: where rays from the front fall behind the lids."""
+    """Return the `Opening` on the left (+X) and on the right: where rays from the front fall behind the lids."""
     surface = BVHTree.FromObject(head_object, bpy.context.evaluated_depsgraph_get())
     return tuple(_opening(surface, side, step) for side in (1.0, -1.0))
 
@@ -74,7 +74,7 @@ def build(head_object, target):
 
 
 def _center(opening):
-    """(3,) of an eyeball that nearly touches the lids from behind."""
+    """Return (3,) of an eyeball that nearly touches the lids from behind."""
     middle = opening.center
     border = np.concatenate([opening.upper, opening.lower])
     across = np.hypot(border[:, 0] - middle[0], border[:, 2] - middle[2])
@@ -83,7 +83,7 @@ def _center(opening):
 
 
 def _axes(gaze):
-    """(3, 3): right, up and gaze of an eye, as rows."""
+    """Return (3, 3): right, up and gaze of an eye, as rows."""
     forward = gaze / np.linalg.norm(gaze)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -91,7 +91,7 @@ def _axes(gaze):
 
 
 def _ball(center, axes):
-    """(rings of (3,) local points as radius and height, ...) of an eyeball: vertices, faces, UVs, slots."""
+    """Return (rings of (3,) local points as radius and height, ...) of an eyeball: vertices, faces, UVs, slots."""
     limbus = np.sqrt(RADIUS**2 - IRIS_RADIUS**2)
     radii = IRIS_RADIUS * _IRIS_RINGS
     is_pupil = radii < PUPIL_RADIUS
@@ -109,7 +109,7 @@ def _ball(center, axes):
 
 
 def _cornea(center, axes):
-    """The same of the clear cap over the iris."""
+    """Return the same of the clear cap over the iris."""
     radii = IRIS_RADIUS * _CORNEA_RINGS
     sphere = np.sqrt(RADIUS**2 - radii**2)
     # A bump that leaves the eyeball's sphere smoothly.
@@ -119,7 +119,7 @@ def _cornea(center, axes):
 
 
 def _lid(opening, center):
-    """The same of the lids' inner border, a strip from their edge to the eyeball: no gap is dark."""
+    """Return the same of the lids' inner border, a strip from their edge to the eyeball: no gap is dark."""
     edge = np.concatenate([opening.upper, opening.lower[::-1]])
     edge = (np.roll(edge, 1, axis=0) + edge + np.roll(edge, -1, axis=0)) / 3.0
     outward = edge - edge.mean(axis=0)
@@ -136,7 +136,7 @@ def _lid(opening, center):
 
 
 def _revolved(center, axes, profile, places, slots):
-    """(vertices, faces, UVs of vertices, slots of faces) of a profile of (radius, height) [m] about the gaze.
+    """Return (vertices, faces, UVs of vertices, slots of faces) of a profile of (radius, height) [m] about the gaze.
 
     places: radius of each ring in the image; slots: (number of rings, slot before, slot after it).
     """
@@ -155,7 +155,7 @@ def _revolved(center, axes, profile, places, slots):
 
 
 def _object(name, parts, head_object, materials):
-    """A child of the head, of parts as `_revolved` returns them."""
+    """Return a child of the head, of parts as `_revolved` returns them."""
     starts = np.cumsum([0] + [len(vertices) for vertices, *_ in parts])
     vertices = np.concatenate([part[0] for part in parts])
     faces = np.concatenate([part[1] + start for part, start in zip(parts, starts[:-1], strict=True)])
@@ -205,7 +205,9 @@ def _lid_material():
 
 
 def eye_image():
-    """An image of an eye by distance and azimuth from its pupil: iris with its fibers, sclera, shadow of the lid."""
+    """Return an image of an eye by distance and azimuth from its pupil: iris with its fibers, sclera, shadow of the
+    lid.
+    """
     x, y = np.meshgrid(*[2.0 * (np.arange(_IMAGE_SIZE) + 0.5) / _IMAGE_SIZE - 1.0] * 2)
     distance, azimuth = np.hypot(x, y), np.arctan2(y, x)
     iris = distance / _IRIS_PART

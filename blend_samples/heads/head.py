@@ -68,12 +68,12 @@ def _add_scalp(head):
 
 
 def above_hairline(positions):
-    """(N, 3) places on the head [m] → (N,) heights above the hairline as it is seen from the side."""
+    """Return (N, 3) places on the head [m] → (N,) heights above the hairline as it is seen from the side."""
     return positions[:, 2] - np.interp(positions[:, 1], _HAIRLINE[:, 0], _HAIRLINE[:, 1])
 
 
 def skin():
-    """The head's material."""
+    """Return the head's material."""
     material = bpy.data.materials.new("Skin")
     color = (0.52, 0.31, 0.22, 1.0)
     material.diffuse_color = color
@@ -156,7 +156,9 @@ def comb(guides, head):
 
 
 def _combed(strand, surface):
-    """(P, 3) points of the same length as before: from the root sideways and back, then down, clear of the skin."""
+    """Return (P, 3) points of the same length as before: from the root sideways and back, then down, clear of the
+    skin.
+    """
     step = float(np.linalg.norm(np.diff(strand, axis=0), axis=1).mean())
     position = Vector(strand[0])
     _near, normal, _face, _distance = surface.find_nearest(position)

@@ -126,14 +126,16 @@ def _comb(guides, solids, seed):
 
 
 def _lengths(roots, rng):
-    """(S,) [m]: shorter at the hairline, and none like its neighbors."""
+    """Return (S,) [m]: shorter at the hairline, and none like its neighbors."""
     inside = np.clip(head.above_hairline(roots) / _HAIRLINE_REACH, 0.0, 1.0)
     part = _HAIRLINE_LENGTH + (1.0 - _HAIRLINE_LENGTH) * np.sqrt(inside)
     return LENGTH * part * rng.uniform(0.88, 1.06, len(roots))
 
 
 def _combed(root, length, surfaces):
-    """(P, 3) points from a root [m]: off the face, round the head, then down in front of the shoulder or behind it."""
+    """Return (P, 3) points from a root [m]: off the face, round the head, then down in front of the shoulder or
+    behind it.
+    """
     step = length / (_STEPS - 1)
     position = Vector(root)
     _near, normal, _face, _distance = surfaces[0].find_nearest(position)
@@ -163,14 +165,16 @@ def _combed(root, length, surfaces):
 
 
 def _clear_of(surface, position, clearance, slide, sideways=1.0):
-    """A place at least this far [m] from a surface: pushed along its normal, sideways by this part, and along slide."""
+    """Return a place at least this far [m] from a surface: pushed along its normal, sideways by this part, and along
+    slide.
+    """
     near, normal, _face, _distance = surface.find_nearest(position)
     push = max(0.0, clearance - (position - near).dot(normal))
     return position + push * (Vector((sideways * normal.x, normal.y, normal.z)) + slide)
 
 
 def _clear_of_ear(position):
-    """A place behind an ear or above it, where it would be on it."""
+    """Return a place behind an ear or above it, where it would be on it."""
     center = Vector((math.copysign(_EAR[0].x, position.x), _EAR[0].y, _EAR[0].z))
     part = Vector((position - center)[axis] / _EAR[1][axis] for axis in range(3))
     inside = 1.0 - part.length
@@ -180,7 +184,7 @@ def _clear_of_ear(position):
 
 
 def _smoothed(points, passes=3):
-    """The same points with softer bends; both ends stay."""
+    """Return the same points with softer bends; both ends stay."""
     for _pass in range(passes):
         points[1:-1] = 0.25 * points[:-2] + 0.5 * points[1:-1] + 0.25 * points[2:]
     return points
@@ -212,7 +216,7 @@ def light():
 
 
 def _distance_to(camera, place):
-    """[m] along the view."""
+    """Return [m] along the view."""
     forward = camera.rotation_euler.to_matrix() @ Vector((0.0, 0.0, -1.0))
     return forward.dot(place - camera.location)
 

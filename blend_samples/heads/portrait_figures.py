@@ -71,7 +71,7 @@ def main():
 
 
 def _luminance(path):
-    """(height, width) linear luminance of the display, first row at the bottom."""
+    """Return (height, width) linear luminance of the display, first row at the bottom."""
     image = bpy.data.images.load(str(path.resolve()))
     pixels = np.empty((image.size[1], image.size[0], image.channels), np.float32)
     image.pixels.foreach_get(pixels.ravel())
@@ -91,7 +91,7 @@ def _projected(points, shape):
 
 
 def _surface_depths(solids, shape):
-    """(height, width) depths of surfaces [m], infinite where there is none; of squares of pixels."""
+    """Return (height, width) depths of surfaces [m], infinite where there is none; of squares of pixels."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     trees = [BVHTree.FromObject(solid, depsgraph) for solid in solids]
     camera = bpy.context.scene.camera
@@ -110,7 +110,7 @@ def _surface_depths(solids, shape):
 
 
 def _closed(mask):
-    """A mask without gaps of four pixels."""
+    """Return a mask without gaps of four pixels."""
     return ~_grown(~_grown(mask, 2), 2)
 
 
@@ -123,7 +123,7 @@ def _blurred(values):
 
 
 def _grown(mask, pixels):
-    """A mask and what is this close to it."""
+    """Return a mask and what is this close to it."""
     for _step in range(pixels):
         mask = mask | np.roll(mask, 1, 0) | np.roll(mask, -1, 0) | np.roll(mask, 1, 1) | np.roll(mask, -1, 1)
     return mask

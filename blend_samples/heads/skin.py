@@ -41,7 +41,7 @@ def paint(head_object):
 
 
 def _places(mesh):
-    """(_SIZE, _SIZE, 3) [m]: where each texel of the UV map is, and next to it beyond the map's seams."""
+    """Return (_SIZE, _SIZE, 3) [m]: where each texel of the UV map is, and next to it beyond the map's seams."""
     mesh.calc_loop_triangles()
     loops = np.empty((len(mesh.loop_triangles), 3), np.int32)
     mesh.loop_triangles.foreach_get("loops", loops.ravel())

@@ -35,7 +35,7 @@ class Solid:
         self._query = SurfaceQuery(self.mesh)
 
     def nearest(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(N, 3) places [m] → the nearest points (N, 3) and the smooth normals there (N, 3)."""
+        """Return (N, 3) places [m] → the nearest points (N, 3) and the smooth normals there (N, 3)."""
         found = self._query.nearest(places)
         return positions(self.mesh, found), normals(self.mesh, found)
 
@@ -46,7 +46,7 @@ class Solid:
         return places + push[:, None] * (normal + slide)
 
     def lying(self, places: np.ndarray, height: np.ndarray | float) -> np.ndarray:
-        """The places (N, 3) at a height [m] above the surface that are nearest to places (N, 3)."""
+        """Return the places (N, 3) at a height [m] above the surface that are nearest to places (N, 3)."""
         near, normal = self.nearest(places)
         return near + np.broadcast_to(height, len(places))[:, None] * normal
 
@@ -84,7 +84,7 @@ def cut_at(guides: np.ndarray, is_beyond: np.ndarray) -> np.ndarray:
 
 
 def read(guides: bpy.types.Curves) -> np.ndarray:
-    """(G, P, 3) float32 [m]: the points of guides on an object that is not moved."""
+    """Return (G, P, 3) float32 [m]: the points of guides on an object that is not moved."""
     points = np.empty((len(guides.points), 3), np.float32)
     guides.attributes["position"].data.foreach_get("vector", points.ravel())
     return points.reshape(len(guides.curves), -1, 3)
@@ -98,7 +98,7 @@ def write(guides: bpy.types.Curves, points: np.ndarray) -> None:
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    """(…, 3) of length one."""
+    """Return (…, 3) of length one."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
@@ -109,12 +109,12 @@ def part(value: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 def mixed(first: np.ndarray, second: np.ndarray, share: np.ndarray | float) -> np.ndarray:
-    """(N, 3): from first to second, by shares (N,) or one for all."""
+    """Return (N, 3): from first to second, by shares (N,) or one for all."""
     share = np.asarray(share, np.float64)
     share = share[:, None] if share.ndim else share
     return first + share * (second - first)
 
 
 def columns(*axes: np.ndarray | float) -> np.ndarray:
-    """(N, 3) of x, y and z, each (N,) or a number; (3,) of three numbers."""
+    """Return (N, 3) of x, y and z, each (N,) or a number; (3,) of three numbers."""
     return np.stack(np.broadcast_arrays(*axes), axis=-1).astype(np.float64)

@@ -15,7 +15,7 @@ _BEARD_COVERAGE, _BROW_COVERAGE = 1.1, 0.065  # [m]: radii of all strands
 
 
 def beard(head_object, strand_count):
-    """A full beard of some centimeters, with a moustache."""
+    """Return a full beard of some centimeters, with a moustache."""
     _paint(head_object, "beard", _beard_weights)
     guides = api.distribute_guides(head_object, guide_count=420, density_group="beard", length=0.03)
     roots = combing.read(guides)[:, 0].astype(np.float64)
@@ -54,7 +54,7 @@ def beard(head_object, strand_count):
 
 
 def _beard_weights(places):
-    """(V,) in [0, 1]: how much of a beard grows at places (V, 3) [m] of the head."""
+    """Return (V,) in [0, 1]: how much of a beard grows at places (V, 3) [m] of the head."""
     x, y, z = np.abs(places[:, 0]), places[:, 1], places[:, 2]
     # Its upper border, from the side: a sideburn before the ear, down along the cheek, and up to the moustache.
     upper = np.interp(y, [-0.150, -0.128, -0.110, -0.085, -0.066, -0.056], [0.682, 0.672, 0.668, 0.684, 0.712, 0.728])
@@ -98,7 +98,7 @@ def eyebrows(head_object, strand_count):
 
 
 def _near(places, roots):
-    """(V,) in [0, 1]: 1 at places (V, 3) within half a millimeter of roots (G, 3), 0 beyond two."""
+    """Return (V,) in [0, 1]: 1 at places (V, 3) within half a millimeter of roots (G, 3), 0 beyond two."""
     weights = np.zeros(len(places))
     near = np.flatnonzero(
         (places > roots.min(axis=0) - 0.003).all(axis=1) & (places < roots.max(axis=0) + 0.003).all(axis=1)

@@ -17,7 +17,9 @@ _NOSE, _EYE = np.array([0.0, -0.90, -0.22]), np.array([0.35, -0.72, 0.25])  # in
 
 
 def build():
-    """The monkey in the place of the sample's head, with dark eyes; its object `Head` has the vertex group `fur`."""
+    """Return the monkey in the place of the sample's head, with dark eyes; its object `Head` has the vertex group
+    `fur`.
+    """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_monkey_add(size=2.0)
     monkey = bpy.context.object
@@ -34,7 +36,7 @@ def build():
 
 
 def _eye_distances(places):
-    """(V,) from the middle of the nearer eye, in its radii."""
+    """Return (V,) from the middle of the nearer eye, in its radii."""
     away = np.abs(places) * [1.0, 0.0, 0.0] + places * [0.0, 1.0, 1.0] - _EYE
     return np.linalg.norm(away / 0.29, axis=1)
 
@@ -53,7 +55,7 @@ def _paint_fur(monkey):
 
 
 def _eye_vertices(mesh):
-    """The vertices that no edges join to an ear: eyes are meshes of their own."""
+    """Return the vertices that no edges join to an ear: eyes are meshes of their own."""
     is_head = np.zeros(len(mesh.vertices), bool)
     is_head[max(range(len(mesh.vertices)), key=lambda vertex: mesh.vertices[vertex].co.x)] = True
     edges = np.array([edge.vertices for edge in mesh.edges])
@@ -95,7 +97,7 @@ def short_fur(monkey, strand_count):
 
 
 def long_fur(monkey, strand_count):
-    """A shaggy coat in locks, over a dense undercoat."""
+    """Return a shaggy coat in locks, over a dense undercoat."""
     guides, roots, normals, rng = _placed(monkey, 700)
     near_face = _near_face(roots)
     lengths = (0.010 + 0.052 * near_face) * rng.uniform(0.8, 1.15, len(roots))
@@ -111,7 +113,7 @@ def long_fur(monkey, strand_count):
 
 
 def _placed(monkey, guide_count):
-    """(guide Curves, their roots (G, 3), normals (G, 3), random numbers)."""
+    """Return (guide Curves, their roots (G, 3), normals (G, 3), random numbers)."""
     guides = api.distribute_guides(monkey, guide_count=guide_count, density_group="fur", length=0.02, symmetric=True)
     roots = combing.read(guides)[:, 0].astype(np.float64)
     _near, normals = Solid(monkey).nearest(roots)
@@ -119,7 +121,7 @@ def _placed(monkey, guide_count):
 
 
 def _near_face(roots):
-    """(G,): 0 at the eyes and on the muzzle, 1 away from the face."""
+    """Return (G,): 0 at the eyes and on the muzzle, 1 away from the face."""
     own = (roots - np.array(head.LOOK_AT)) / _SCALE
     eyes = part(_eye_distances(own), 1.0, 2.6)
     muzzle = part(np.linalg.norm(own - _NOSE, axis=1), 0.15, 0.75)

@@ -174,7 +174,7 @@ def braid(head_object, strand_count):
 
 
 def _places_in_tresses(roots):
-    """(G,) angles [rad], radii in [0, 1] and numbers of the tresses in which guides of roots (G, 3) run."""
+    """Return (G,) angles [rad], radii in [0, 1] and numbers of the tresses in which guides of roots (G, 3) run."""
     axis = unit(_TIE - _CENTER)
     across = unit(np.cross(axis, [0.0, 0.0, 1.0]))
     directions = unit(roots - _CENTER)
@@ -186,7 +186,9 @@ def _places_in_tresses(roots):
 
 
 def _to_tie(skull, roots):
-    """(G, _SCALP_STEPS, 3): from roots round the back of the head nearly to the tie, on both sides of the parting."""
+    """Return (G, _SCALP_STEPS, 3): from roots round the back of the head nearly to the tie, on both sides of the
+    parting.
+    """
     middle = np.array([_CENTER[0], -0.06])
     start, end = roots[:, :2] - middle, _TIE[:2] - middle
     side = np.where(roots[:, 0] > _BRAID_PARTING, 1.0, -1.0)
@@ -211,7 +213,7 @@ def _to_tie(skull, roots):
 
 
 def _braided(turn, radius, tress):
-    """(G, STEPS - _SCALP_STEPS, 3): three tresses along the course, then a loose end."""
+    """Return (G, STEPS - _SCALP_STEPS, 3): three tresses along the course, then a loose end."""
     count = combing.STEPS - _SCALP_STEPS
     along = np.linspace(0.0, 1.0, len(_COURSE))
     fine = np.stack([np.interp(np.linspace(0.0, 1.0, 400), along, axis) for axis in _COURSE.T], axis=1)
@@ -241,7 +243,7 @@ def _braided(turn, radius, tress):
 
 
 def _placed(head_object, guide_count, seed=1):
-    """(guide Curves, their roots (G, 3), normals (G, 3), random numbers)."""
+    """Return (guide Curves, their roots (G, 3), normals (G, 3), random numbers)."""
     if _DENSITY_GROUP not in head_object.vertex_groups:
         _add_density(head_object)
     guides = api.distribute_guides(
@@ -263,7 +265,9 @@ def _add_density(head_object):
 
 
 def _long(head_object, longest, volume, is_lifted=False):
-    """(points, guide Curves, roots) of hair to both sides of a parting, behind the ears, and down over the bust."""
+    """Return (points, guide Curves, roots) of hair to both sides of a parting, behind the ears, and down over the
+    bust.
+    """
     guides, roots, normals, rng = _placed(head_object, 460)
     skull, shoulders = Solid(head_object), Solid(bpy.data.objects["Bust"])
     above = np.sqrt(np.clip(head.above_hairline(roots) / 0.030, 0.0, 1.0))
@@ -311,7 +315,7 @@ def _over_ear(places):
 
 
 def _in_ear(places):
-    """(how far places (N, 3) are inside of an ear's ellipsoid (N,), their x (N, 1) from the middle)."""
+    """Return (how far places (N, 3) are inside of an ear's ellipsoid (N,), their x (N, 1) from the middle)."""
     center = np.where(places[:, :1] >= 0.0, _EAR[0], _EAR[0] * [-1.0, 1.0, 1.0])
     return np.maximum(1.0 - np.linalg.norm((places - center) / _EAR[1], axis=1), 0.0), places[:, :1]
 

@@ -33,7 +33,7 @@ _LOCATION = (0.70, -1.28, 0.73)  # [m]: of the camera
 
 
 def dressed_head():
-    """The sample's head with a face and a bust."""
+    """Return the sample's head with a face and a bust."""
     head_object = head.build()
     portrait.dress(head_object)
     return head_object

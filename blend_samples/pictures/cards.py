@@ -70,7 +70,7 @@ def build(strand_count, style):
 
 
 def rendered(sides, sample_count):
-    """The scene by Cycles, from a side."""
+    """Return the scene by Cycles, from a side."""
     for kind, angle in zip(("CAMERA", "LIGHT"), sides, strict=True):
         bpy.data.objects[f"{kind} Pivot"].rotation_euler.z = math.radians(angle)
     return picture_files.drawn(*SIZE, engine="cycles", sample_count=sample_count)

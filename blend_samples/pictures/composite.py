@@ -62,7 +62,7 @@ def build(strand_count, sample_count):
 
 
 def backdrop():
-    """(height, width, 4) linear light: a street at dusk, far out of focus."""
+    """Return (height, width, 4) linear light: a street at dusk, far out of focus."""
     width, height = SIZE
     x, y = np.meshgrid((np.arange(width) + 0.5) / height, (np.arange(height) + 0.5) / height)
     sky, ground = np.array([0.020, 0.030, 0.075]), np.array([0.012, 0.009, 0.010])
@@ -108,7 +108,7 @@ def render(out):
 
 
 def _halved(plane):
-    """(2 H, 2 W) → the means of its blocks."""
+    """Return (2 H, 2 W) → the means of its blocks."""
     height, width = (length // 2 for length in plane.shape)
     return plane[: 2 * height, : 2 * width].reshape(height, 2, width, 2).mean(axis=(1, 3))
 

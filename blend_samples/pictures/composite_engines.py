@@ -69,7 +69,7 @@ def build(options):
 
 
 def _hair_alone(hair_scene):
-    """(height, width, 3) uint8 of the scene that renders hair, over gray, by the view transform of the first."""
+    """Return (height, width, 3) uint8 of the scene that renders hair, over gray, by the view transform of the first."""
     scene = bpy.context.scene
     wanted = scene.view_settings
     hair_scene.view_settings.view_transform, hair_scene.view_settings.look = wanted.view_transform, wanted.look

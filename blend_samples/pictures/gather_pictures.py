@@ -68,7 +68,7 @@ def grow(skull):
 
 
 def add_lines(lines):
-    """A curve object of straight segments through places [m]."""
+    """Return a curve object of straight segments through places [m]."""
     data = bpy.data.curves.new("Ties", "CURVE")
     data.dimensions = "3D"
     for line in lines:

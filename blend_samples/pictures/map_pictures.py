@@ -47,7 +47,7 @@ def main():
 
 
 def row(make, given):
-    """A map, and its hair by Vellus and by Cycles, side by side."""
+    """Return a map, and its hair by Vellus and by Cycles, side by side."""
     shown = make(given.strands)
     bpy.context.view_layer.update()
     by_vellus = picture_files.drawn(*SIZE, sample_count=given.samples)
@@ -59,7 +59,7 @@ def row(make, given):
 
 
 def tiger(strands):
-    """A coat of stripes on the monkey, with a cream muzzle."""
+    """Return a coat of stripes on the monkey, with a cream muzzle."""
     monkey = fur_grooms.build()
     hair = fur_grooms.short_fur(monkey, int(60_000 * strands))
     project_from_the_front(monkey)
@@ -104,7 +104,7 @@ def bleached(strands):
 
 
 def beard(strands):
-    """A beard that thins out over the cheeks: shorter and thinner strands."""
+    """Return a beard that thins out over the cheeks: shorter and thinner strands."""
     head_object = ten_grooms.dressed_head()
     hair = face_grooms.beard(head_object, int(12_000 * strands))
     places = places_of(head_object)
@@ -121,7 +121,7 @@ ROWS = {"tiger": tiger, "fade": fade, "beard": beard, "bleached": bleached}
 
 
 def begin_map(hair, setting, kind):
-    """The map that the button beside a setting adds."""
+    """Return the map that the button beside a setting adds."""
     bpy.context.view_layer.objects.active = next(o for o in bpy.data.objects if o.data == hair)
     bpy.ops.vellus.edit_map(setting=setting)
     item = next(item for item in hair.vellus.maps if item.setting == setting)
@@ -130,7 +130,9 @@ def begin_map(hair, setting, kind):
 
 
 def paint(hair, setting, kind, stroke):
-    """The map of which *Paint* makes the source, painted by a function of the map in the paint mode that it enters."""
+    """Return the map of which *Paint* makes the source, painted by a function of the map in the paint mode that it
+    enters.
+    """
     item = begin_map(hair, setting, kind)
     bpy.ops.vellus.paint_map(setting=setting)
     stroke(item)
@@ -157,7 +159,7 @@ def paint_weights(surface, name, weights):
 
 
 def places_of(surface):
-    """(V, 3) [m] of the vertices of a mesh object."""
+    """Return (V, 3) [m] of the vertices of a mesh object."""
     return np.array([vertex.co for vertex in surface.data.vertices])
 
 
@@ -185,13 +187,13 @@ def stripes():
 
 
 def encoded(colors):
-    """(…, 3) uint8 of scene-linear colors."""
+    """Return (…, 3) uint8 of scene-linear colors."""
     values = np.where(colors <= 0.0031308, 12.92 * colors, 1.055 * np.maximum(colors, 1e-9) ** (1.0 / 2.4) - 0.055)
     return np.round(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)
 
 
 def framed(pixels):
-    """A square picture in the size of the others, on their background."""
+    """Return a square picture in the size of the others, on their background."""
     side = SIZE[0] - 8
     places = np.linspace(0, len(pixels) - 1, side).astype(int)
     found = np.full((SIZE[1], SIZE[0], 3), picture_files.BACKGROUND, np.uint8)
@@ -224,7 +226,7 @@ def seen_weights(surface, name):
 
 
 def entry_weight(vertex, group):
-    """The weight of a vertex in the group with an index."""
+    """Return the weight of a vertex in the group with an index."""
     return next((entry.weight for entry in vertex.groups if entry.group == group), 0.0)
 
 

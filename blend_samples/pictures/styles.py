@@ -94,7 +94,7 @@ def _drawn_wet(hair, wetness):
 
 
 def drawn():
-    """The scene, in the gallery's size."""
+    """Return the scene, in the gallery's size."""
     return picture_files.drawn(*SIZE, sample_count=SAMPLE_COUNT)
 
 

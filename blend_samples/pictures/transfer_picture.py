@@ -70,7 +70,7 @@ def main():
 
 
 def dressed_head():
-    """The sample's head with a face and a bust, in an empty scene."""
+    """Return the sample's head with a face and a bust, in an empty scene."""
     made = head.build()
     portrait.dress(made)
     return made

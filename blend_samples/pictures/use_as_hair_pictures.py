@@ -54,7 +54,7 @@ def main():
 
 
 def curves_of(points):
-    """An object of curves (S, P, 3) that Vellus did not make, 0.2 mm thick."""
+    """Return an object of curves (S, P, 3) that Vellus did not make, 0.2 mm thick."""
     datablock = bpy.data.hair_curves.new("Imported")
     datablock.add_curves([points.shape[1]] * len(points))
     datablock.set_types(type="POLY")

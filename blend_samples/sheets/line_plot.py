@@ -21,7 +21,7 @@ class Canvas:
         self._image = np.full((_FINER * height, _FINER * width, 3), BACKGROUND, np.uint8)
 
     def place(self, point):
-        """(x, y) pixels of a point, from the top left."""
+        """Return (x, y) pixels of a point, from the top left."""
         x, y = (np.asarray(point, float) - self._low) / (self._high - self._low)
         return x * self.width, (1.0 - y) * self.height
 
@@ -41,7 +41,7 @@ class Canvas:
         self._image[is_inside(x, y)] = color
 
     def pixels(self):
-        """(height, width, 3) uint8."""
+        """Return (height, width, 3) uint8."""
         shape = self.height, _FINER, self.width, _FINER, 3
         return np.round(self._image.reshape(shape).mean(axis=(1, 3))).astype(np.uint8)
 
@@ -68,7 +68,7 @@ class Plot(Canvas):
         self._legend.append((label, color))
 
     def drawn(self):
-        """(pixels (H, W, 3) uint8, words of `picture_files.write`)."""
+        """Return (pixels (H, W, 3) uint8, words of `picture_files.write`)."""
         pixels = np.full((TOP + self.height + BOTTOM, LEFT + self.width + RIGHT, 3), BACKGROUND, np.uint8)
         pixels[TOP - 1 : TOP + self.height + 1, LEFT - 1 : LEFT + self.width + 1] = AXIS
         pixels[TOP : TOP + self.height, LEFT : LEFT + self.width] = self.pixels()

@@ -28,7 +28,7 @@ _FORMATS = {
 
 
 def read(path):
-    """A picture of a file."""
+    """Return a picture of a file."""
     image = bpy.data.images.load(str(path), check_existing=False)
     pixels = np.empty((image.size[1], image.size[0], image.channels), np.float32)
     image.pixels.foreach_get(pixels.ravel())
@@ -37,18 +37,18 @@ def read(path):
 
 
 def drawn(width, height, **settings):
-    """The scene through its camera; settings: of `api.render`."""
+    """Return the scene through its camera; settings: of `api.render`."""
     return _written(lambda path: api.render(path, width=width, height=height, **settings))
 
 
 def drawn_at_once(width, height, samples_per_side):
-    """The same by the operator *Render Picture*."""
+    """Return the same by the operator *Render Picture*."""
     size = {"width": width, "height": height, "samples_per_side": samples_per_side}
     return _written(lambda path: bpy.ops.vellus.render_picture(filepath=str(path), **size))
 
 
 def rendered(scene=None):
-    """The scene, the context's by default, by its engine in its size."""
+    """Return the scene, the context's by default, by its engine in its size."""
     scene = scene or bpy.context.scene
 
     def render(path):
@@ -66,7 +66,7 @@ def _written(write):
 
 
 def below_caption(picture, height=CAPTION):
-    """A picture with room for words above it."""
+    """Return a picture with room for words above it."""
     return np.concatenate([np.full((height, picture.shape[1], 3), BACKGROUND, np.uint8), picture])
 
 
@@ -77,7 +77,7 @@ def rows(pictures, columns):
 
 
 def scaled(picture, width):
-    """A picture at another width [pixels] with the same proportions."""
+    """Return a picture at another width [pixels] with the same proportions."""
     height = round(picture.shape[0] * width / picture.shape[1])
     image = bpy.data.images.new("Scaled", picture.shape[1], picture.shape[0])
     opaque = np.dstack([picture / np.float32(255.0), np.ones(picture.shape[:2], np.float32)])

@@ -11,17 +11,17 @@ _GREY = 0.22  # display value that the mean of the first picture is brought to
 
 
 def mean(picture):
-    """(3,) mean color of the hair in a premultiplied picture (H, W, 4)."""
+    """Return (3,) mean color of the hair in a premultiplied picture (H, W, 4)."""
     return picture[..., :3].sum(axis=(0, 1)) / max(float(picture[..., 3].sum()), 1e-9)
 
 
 def ratio(reference, picture):
-    """(3,) mean color of a picture, relative to that of a reference; one where both are black."""
+    """Return (3,) mean color of a picture, relative to that of a reference; one where both are black."""
     return (mean(picture) + _BLACK) / (mean(reference) + _BLACK)
 
 
 def deviation(reference, picture):
-    """The largest deviation of `ratio` from one in a channel."""
+    """Return the largest deviation of `ratio` from one in a channel."""
     return float(np.abs(ratio(reference, picture) - 1.0).max())
 
 
@@ -52,7 +52,7 @@ def _exposure(reference):
 
 
 def _displayed(picture, exposure):
-    """(H, W, 3) from 0 to 1: premultiplied light over black, as sRGB with a soft shoulder."""
+    """Return (H, W, 3) from 0 to 1: premultiplied light over black, as sRGB with a soft shoulder."""
     light = np.maximum(picture[..., :3], 0.0) * exposure
     light = light * (1.0 + light / 9.0) / (1.0 + light)  # white at three times the middle of the curve
     return np.where(light < 0.0031308, 12.92 * light, 1.055 * np.power(np.maximum(light, 1e-9), 1 / 2.4) - 0.055).clip(

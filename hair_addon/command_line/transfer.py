@@ -56,7 +56,7 @@ def run(given, console):
 
 
 def _hair(given):
-    """The hair Curves to copy. Raises `HairError`."""
+    """Return the hair Curves to copy. Raises `HairError`."""
     every = blender.io.groom_sources.all_hair()
     named = {blender.host.notices.name_of(hair): hair for hair in every}
     if given.hair and given.hair not in named:

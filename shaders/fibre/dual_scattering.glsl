@@ -24,7 +24,7 @@ float direct_part(float count)
   return exp(-count);
 }
 
-// Attenuation by each and reflectance by all of infinitely many strands.
+// Attenuation by each strand of infinitely many, and reflectance of all strands together.
 void deep_hair(vec3 a_f, vec3 a_b, out vec3 attenuation, out vec3 reflectance)
 {
   vec3 lost = vec3(1.0) - a_f;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Longitudinal scattering of a rough fibre: [DEon11] with the roughness of [Chiang16].
+// Longitudinal scattering of a rough fiber: [DEon11] with the roughness of [Chiang16].
 
 #include "fibre/fibre.glsl"
 #include "fibre/scattering_kernel.glsl"

@@ -8,7 +8,7 @@ int thread_index()
   return group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
 }
 
-// All arrays of a kernel follow each other in three textures, by kind.
+// All arrays of a kernel are in three textures, one for each type of number, one array after another.
 ivec2 element_texel(int index)
 {
   return ivec2(index & (ROW - 1), index / ROW);

@@ -38,7 +38,7 @@ bool is_flipped;
 float least;
 float slope;
 // The clump center of the strand, whose normal is the reference of the frames shared by all strands of a clump. A strand
-// without a center is its own.
+// without a center is its own center.
 int centre;
 vec3 centre_normal;
 int lock;  // its identity

@@ -78,7 +78,7 @@ def shown_code():
 
 @pytest.fixture
 def scalp(sphere):
-    """The sphere under another name, before a camera."""
+    """Return the sphere under another name, before a camera."""
     sphere.name = "Scalp"
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = (0.0, -6.0, 0.0), (math.pi / 2, 0.0, 0.0)

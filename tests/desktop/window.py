@@ -28,7 +28,7 @@ def install(path):
 
 
 def addon():
-    """The package `blender` of the add-on that is installed."""
+    """Return the package `blender` of the add-on that is installed."""
     return sys.modules[f"{MODULE}.hair_addon.blender"]
 
 

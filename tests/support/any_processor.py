@@ -27,7 +27,7 @@ from tests.support.strands.styled import Groom
 
 
 def laws():
-    """{group: sizes at which a strand differs from the same strand in another group}; all empty if correct."""
+    """Return {group: sizes at which a strand differs from the same strand in another group}; all empty if correct."""
     names = "TWO CLUMPS", "STACK", "STACK, masked", "simulated"
     return {name: list(strand_groups.all_groups()[name].different()) for name in names}
 

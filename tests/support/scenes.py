@@ -69,7 +69,7 @@ def add_hair():
 
 @pytest.fixture(scope="session")
 def scene_files(blender, tmp_path_factory):
-    """{stage or "empty": a file}, which loads in 8 ms; creating the scene takes up to 40 ms.
+    """Return {stage or "empty": a file}, which loads in 8 ms; creating the scene takes up to 40 ms.
 
     All contain the nodes that deform hair, which take 17 ms to append. Their pictures are drawn with dual scattering,
     which is faster; tests of the light grid select it.
@@ -114,7 +114,7 @@ def set_world_maps(patch, size, least_strands, map_count):
 
 @pytest.fixture
 def scene(scene_files, request, monkeypatch):
-    """An empty scene with undo; preferences, which take longer to load, are those of the process.
+    """Return an empty scene with undo; preferences, which take longer to load, are those of the process.
 
     The nodes that deform hair are in memory, as after deleting hair; use `read_homefile` for a scene without them. The
     data of the test's other fixtures of this file is loaded already, as in an opened file. The maps of world light are
@@ -140,7 +140,7 @@ def made_anew():
 
 @pytest.fixture
 def sphere(scene):
-    """A sphere of one meter with a UV map and a vertex group `top` on its upper half; active."""
+    """Return a sphere of one meter with a UV map and a vertex group `top` on its upper half; active."""
     if "Sphere" not in bpy.data.objects:
         add_sphere()
     sphere = bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
@@ -178,7 +178,9 @@ def hair(guides):
 
 @pytest.fixture
 def arm(scene):
-    """A cylinder of 4 m along X, bent by its second bone from straight in frame 1 to a right angle in frame 11."""
+    """Return a cylinder of 4 m along X, bent by its second bone from straight in frame 1 to a right angle in frame
+    11.
+    """
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=24, size=2.0)
     arm = bpy.context.object
     for vertex in arm.data.vertices:
@@ -233,7 +235,7 @@ def fine_world(scene, monkeypatch):
 
 @pytest.fixture
 def lit(hair, coarse_shadows):
-    """The sphere with hair, a camera in front of it and a sun behind the camera."""
+    """Return the sphere with hair, a camera in front of it and a sun behind the camera."""
     blender_scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = (0.0, -8.0, 0.0), (math.pi / 2, 0.0, 0.0)
@@ -247,7 +249,7 @@ def lit(hair, coarse_shadows):
 
 @pytest.fixture
 def blender_scene(scene):
-    """The empty scene, for tests that import a module named `scene`."""
+    """Return the empty scene, for tests that import a module named `scene`."""
     return scene
 
 
@@ -263,7 +265,7 @@ def thin(lit):
 
 @pytest.fixture
 def head(sphere):
-    """The sphere, turned, moved and scaled."""
+    """Return the sphere, turned, moved and scaled."""
     sphere.location, sphere.rotation_euler, sphere.scale = (1.0, 2.0, 3.0), (0.3, 0.2, 0.5), (2.0, 2.0, 2.0)
     bpy.context.view_layer.update()
     return sphere
@@ -297,7 +299,7 @@ def waved(hair):
 
 @pytest.fixture
 def window(scene):
-    """The context of a window, whose timers are counted."""
+    """Return the context of a window, whose timers are counted."""
     timers = []
     manager = SimpleNamespace(
         event_timer_add=lambda seconds, window: timers.append(seconds) or "timer",

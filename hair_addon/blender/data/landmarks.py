@@ -12,7 +12,7 @@ _PREFIX = "landmark"
 
 
 def read(surface_object, surface, depsgraph):
-    """{name: (3,) float64 [m]} in the coordinates of a `Surface` at rest.
+    """Return {name: (3,) float64 [m]} in the coordinates of a `Surface` at rest.
 
     A vertex group is at the weighted mean of its vertices, an empty at its origin. Blender's numeric suffixes of names
     are ignored: Landmark nose.001 is Landmark nose.

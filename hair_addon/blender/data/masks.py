@@ -18,18 +18,18 @@ class Mask:
         return bool(self.group or self.image)
 
     def read(self, surface_object, surface, depsgraph):
-        """(V,) weights and the `Texture` on the `Surface` of a mesh object, each None without a name."""
+        """Return (V,) weights and the `Texture` on the `Surface` of a mesh object, each None without a name."""
         weights = scene.read_density(surface_object, surface, depsgraph, self.group)
         return weights, scene.read_texture(surface, self.image)
 
 
 def own(settings):
-    """The `Mask` in `GuideSettings`, `HairSettings`, or properties of the same names."""
+    """Return the `Mask` in `GuideSettings`, `HairSettings`, or properties of the same names."""
     return Mask(_name(settings, "density_group"), _name(settings, "density_image"))
 
 
 def of_strands(settings, guide_settings):
-    """The `Mask` of strands between guides, from `HairSettings` and `GuideSettings`, or properties of them."""
+    """Return the `Mask` of strands between guides, from `HairSettings` and `GuideSettings`, or properties of them."""
     return own(settings) or own(guide_settings)
 
 
@@ -41,7 +41,7 @@ def _name(settings, attribute):
 
 
 def of_curves(target):
-    """The `Mask` of a guide or hair Curves datablock."""
+    """Return the `Mask` of a guide or hair Curves datablock."""
     state = target.vellus
     if state.kind == "GUIDES":
         return own(state.guides)

@@ -54,7 +54,7 @@ def separate_copies(surface_object):
 
 
 def lost_copies(surface_object):
-    """The modifier whose copies cannot be separated, as the mesh is deformed before it, or None."""
+    """Return the modifier whose copies cannot be separated, as the mesh is deformed before it, or None."""
     copying = _copying(surface_object)
     if not copying or _axes(copying) is not None:
         return None
@@ -64,7 +64,7 @@ def lost_copies(surface_object):
 
 
 def _copying(surface_object):
-    """[(index, modifier)] that copy faces."""
+    """Return [(index, modifier)] that copy faces."""
     return [(index, m) for index, m in enumerate(surface_object.modifiers) if m.type in _COPYING and _is_shown(m)]
 
 
@@ -73,7 +73,9 @@ def _is_shown(modifier):
 
 
 def _axes(copying):
-    """(3,) 1.0 for each axis of the object along which modifiers mirror, else 0.0; None if modifiers copy otherwise."""
+    """Return (3,) 1.0 for each axis of the object along which modifiers mirror, else 0.0; None if modifiers copy
+    otherwise.
+    """
     if any(m.type != "MIRROR" or m.mirror_object is not None for _index, m in copying):
         return None
     return tuple(float(any(m.use_axis[axis] for _index, m in copying)) for axis in range(3))
@@ -89,7 +91,7 @@ def _is_ours(modifier):
 
 
 def _group():
-    """The node group of this version, created if the file has none.
+    """Return the node group of this version, created if the file has none.
 
     The rest position of a mirrored vertex is mirrored too; with *Placed* it is the vertex's position.
     """

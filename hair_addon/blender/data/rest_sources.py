@@ -33,7 +33,7 @@ def lacks(surface_object, depsgraph):
 
 
 def _sources(surface_object):
-    """The mesh objects that geometry nodes of a surface use, directly or in collections."""
+    """Return the mesh objects that geometry nodes of a surface use, directly or in collections."""
     named, known = set(), set()
     for modifier in surface_object.modifiers:
         if modifier.type == "NODES" and modifier.node_group is not None:

@@ -79,7 +79,7 @@ def read_surface(surface_object, depsgraph):
 
 
 def _loop_uvs(mesh):
-    """(name of the active UV map, (C, 2) float32 of the mesh's corners); ("", None) without one."""
+    """Return (name of the active UV map, (C, 2) float32 of the mesh's corners); ("", None) without one."""
     layer = mesh.uv_layers.active
     if layer is None:
         return "", None
@@ -89,7 +89,7 @@ def _loop_uvs(mesh):
 
 
 def _own_mesh(surface_object, uv_map):
-    """(`Faces`, (C, 2) float32 of the UV map or None) of a mesh before its modifiers; None without faces."""
+    """Return (`Faces`, (C, 2) float32 of the UV map or None) of a mesh before its modifiers; None without faces."""
     mesh = surface_object.data
     if not len(mesh.polygons):
         return None
@@ -102,7 +102,7 @@ def _own_mesh(surface_object, uv_map):
 
 
 def read_own_mesh(surface_object, to_world_axes):
-    """The `TriMesh` of a mesh object before its modifiers, in the axes and scale of a `Surface`."""
+    """Return the `TriMesh` of a mesh object before its modifiers, in the axes and scale of a `Surface`."""
     mesh = surface_object.data
     faces = faces_of(mesh)
     triangles = faces.corner_vertices[triangle_corners(mesh, faces, name_of(surface_object))]
@@ -110,7 +110,8 @@ def read_own_mesh(surface_object, to_world_axes):
 
 
 def shown_surface(surface_object, surface):
-    """The last read `Surface` of an object if the given surface has the faces of its cage; else the given surface.
+    """Return the last read `Surface` of an object if the given surface has the faces of its cage; else the given
+    surface.
 
     Roots that were placed on the cage are stored on it.
     """
@@ -119,13 +120,17 @@ def shown_surface(surface_object, surface):
 
 
 def present_depsgraph():
-    """The evaluated dependency graph of the context's scene and view layer. Raises `HairError` within a driver."""
+    """Return the evaluated dependency graph of the context's scene and view layer. Raises `HairError` within a
+    driver.
+    """
     with scene_time.outside_drivers():
         return bpy.context.evaluated_depsgraph_get()
 
 
 def last_depsgraph():
-    """The dependency graph of the view layer as it is, for functions that handlers call: an update would call these."""
+    """Return the dependency graph of the view layer as it is, for functions that handlers call: an update would call
+    these.
+    """
     return bpy.context.view_layer.depsgraph or present_depsgraph()
 
 
@@ -137,7 +142,7 @@ def triangle_count(surface_object, view_layer):
 
 
 def _rest_positions(mesh, posed):
-    """(V, 3) float32 of the attribute that Blender stores before modifiers; `posed` without it."""
+    """Return (V, 3) float32 of the attribute that Blender stores before modifiers; `posed` without it."""
     attribute = mesh.attributes.get("rest_position")
     if attribute is None or (attribute.data_type, attribute.domain) != ("FLOAT_VECTOR", "POINT") or not len(posed):
         return posed
@@ -147,7 +152,7 @@ def _rest_positions(mesh, posed):
 
 
 def faces_of(mesh):
-    """The `Faces` of a mesh."""
+    """Return the `Faces` of a mesh."""
     return _faces_of_corners(mesh, corner_values(mesh, ".corner_vert"))
 
 
@@ -170,7 +175,7 @@ def cached_faces(mesh_object, mesh):
 
 
 def corner_values(mesh, name):
-    """(C,) int32 of an attribute that each mesh has; two hundred times as fast as `mesh.loops`.
+    """Return (C,) int32 of an attribute that each mesh has; two hundred times as fast as `mesh.loops`.
 
     In Edit Mode the attributes of a mesh without its modifiers belong to the edited mesh, so corners are read from
     `mesh.loops`.
@@ -190,7 +195,7 @@ def _faces_of_corners(mesh, corner_vertices):
 
 
 def triangle_corners(mesh, faces, name):
-    """(F, 3) int32: corners, in `Faces`, of Blender's triangulation of polygons. Raises `HairError`."""
+    """Return (F, 3) int32: corners, in `Faces`, of Blender's triangulation of polygons. Raises `HairError`."""
     if np.diff(faces.starts).max(initial=0) > _MOST_CORNERS:
         sentence = '"{name}" has a face with more than {most} corners: split it into smaller faces.'
         raise HairError(sentence, name=name, most=_MOST_CORNERS)
@@ -201,7 +206,7 @@ def triangle_corners(mesh, faces, name):
 
 
 def vertex_positions(mesh):
-    """(V, 3) float32; also of a mesh without vertices, which has no position attribute."""
+    """Return (V, 3) float32; also of a mesh without vertices, which has no position attribute."""
     vertices = np.empty((len(mesh.vertices), 3), np.float32)
     if mesh.is_editmode:
         mesh.vertices.foreach_get("co", vertices.ravel())
@@ -211,7 +216,7 @@ def vertex_positions(mesh):
 
 
 def evaluated_positions(mesh_object, depsgraph):
-    """(V, 3) float32 of an evaluated mesh object, in local coordinates."""
+    """Return (V, 3) float32 of an evaluated mesh object, in local coordinates."""
     evaluated = mesh_object.evaluated_get(depsgraph)
     if "position" in evaluated.data.attributes or not len(evaluated.data.vertices):
         return vertex_positions(evaluated.data)
@@ -222,7 +227,7 @@ def evaluated_positions(mesh_object, depsgraph):
 
 
 def read_vertex_group(surface_object, depsgraph, name):
-    """(V,) float32 weights of a vertex group on the evaluated mesh, or None for an empty name."""
+    """Return (V,) float32 weights of a vertex group on the evaluated mesh, or None for an empty name."""
     if not name:
         return None
     group = surface_object.vertex_groups.get(name)
@@ -268,7 +273,7 @@ def _read_vertex_weights(surface_object, depsgraph, name):
 
 
 def _at_vertices(mesh, domain, values):
-    """(V,) means of the values (N,) of a domain around each vertex, 0 at vertices without any."""
+    """Return (V,) means of the values (N,) of a domain around each vertex, 0 at vertices without any."""
     if domain == "POINT":
         return values
     if domain == "EDGE":
@@ -327,7 +332,9 @@ def on_surface(surface_object, surface, depsgraph, values, domain):
 
 
 def weights_in_group(mesh, index):
-    """(V,) float32. Blender has no array access to vertex groups; BMesh takes a quarter of the time of vertices."""
+    """Return (V,) float32. Blender has no array access to vertex groups; BMesh takes a quarter of the time of
+    vertices.
+    """
     edited = bmesh.new()
     try:
         edited.from_mesh(mesh, face_normals=False, vertex_normals=False)
@@ -340,7 +347,7 @@ def weights_in_group(mesh, index):
 
 
 def read_texture(surface, name, may_be_black=False):
-    """The `Texture` of an image on a `Surface`, the mean of its color channels; None for an empty name."""
+    """Return the `Texture` of an image on a `Surface`, the mean of its color channels; None for an empty name."""
     values = read_image(name, may_be_black)
     if values is None:
         return None
@@ -351,7 +358,7 @@ def read_texture(surface, name, may_be_black=False):
 
 
 def read_image(name, may_be_black=False):
-    """(height, width) float32, at least zero, the mean of an image's color channels; None for an empty name."""
+    """Return (height, width) float32, at least zero, the mean of an image's color channels; None for an empty name."""
     if not name:
         return None
     image = bpy.data.images.get(name)
@@ -371,7 +378,7 @@ def read_image(name, may_be_black=False):
 
 
 def curves_objects(view_layer, kind, viewport=None):
-    """The visible objects of a view layer with our Curves; kind: GUIDES or HAIR."""
+    """Return the visible objects of a view layer with our Curves; kind: GUIDES or HAIR."""
     return [
         o
         for o in view_layer.objects
@@ -380,7 +387,8 @@ def curves_objects(view_layer, kind, viewport=None):
 
 
 def read_camera(scene, depsgraph, width, height, camera=None, eye=None):
-    """(world to view, view to clip), each (4, 4) float64, of a camera, by default the scene's, for a picture size.
+    """Return (world to view, view to clip), each (4, 4) float64, of a camera, by default the scene's, for a picture
+    size.
 
     eye: (matrix, horizontal shift) of a view of a stereo picture; None: those of the camera. Raises `HairError`.
     """
@@ -413,7 +421,7 @@ def _shift_unit(render, data, width, height):
 
 
 def picture_size(render):
-    """((width, height), (left, bottom, width, height)) of a full picture and of its render region [pixels].
+    """Return ((width, height), (left, bottom, width, height)) of a full picture and of its render region [pixels].
 
     render: a scene's `RenderSettings`, which may have a render region.
     """

@@ -67,7 +67,7 @@ def _levels(modifier, depsgraph):
 
 
 def smooth_positions(rest, faces, corners):
-    """(V, 3) float32 positions of vertices on the smooth surface at rest; `rest` itself if `corners` is 0."""
+    """Return (V, 3) float32 positions of vertices on the smooth surface at rest; `rest` itself if `corners` is 0."""
     if corners == 0:
         return rest
     key = hashlib.blake2b(rest.tobytes(), digest_size=16)

@@ -5,7 +5,7 @@ import bpy
 
 
 def collection_of(surface_object):
-    """A collection of a surface: preferably visible in the view layer, else in the view layer, else any.
+    """Return a collection of a surface: preferably visible in the view layer, else in the view layer, else any.
 
     A mesh may also be in a collection that only lists it, such as one of colliders, which may be hidden, excluded or in
     no scene. The scene's collection if all of these are linked or library overrides, to which Blender adds nothing.
@@ -24,7 +24,7 @@ def _takes_objects(collection):
 
 
 def _layers(layer_collection):
-    """A layer collection and all of its children that are not excluded, recursively."""
+    """Yield a layer collection and all of its children that are not excluded, recursively."""
     yield layer_collection
     for child in layer_collection.children:
         if not child.exclude:

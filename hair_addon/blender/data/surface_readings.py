@@ -53,7 +53,7 @@ class Reading:
 
 
 def surface_of(read, posed, corners, cage_corners, undivided, own=None):
-    """The `Surface` of a `Reading`; corners: (F, 3) of its triangles.
+    """Return the `Surface` of a `Reading`; corners: (F, 3) of its triangles.
 
     own: (`Faces`, (C, 2) UV coordinates or None) of the mesh before its modifiers, if these may subdivide it.
     """
@@ -91,7 +91,7 @@ def _surface(read, posed, corners, cage_corners, undivided, cage):
 
 
 def _cage_of(read, cage_corners, undivided, own):
-    """(`Surface` of the cage, (F,) index of one subdivided face for each of its faces); None if unknown."""
+    """Return (`Surface` of the cage, (F,) index of one subdivided face for each of its faces); None if unknown."""
     faces, first_faces = read.faces, np.arange(len(read.faces.starts) - 1)
     loop_uvs = read.loop_uvs
     own_faces, own_uvs = own or (None, None)
@@ -114,7 +114,7 @@ def _cage_of(read, cage_corners, undivided, own):
 
 
 def _triangle_corners(faces, rest):
-    """(T, 3) int32 corners of the triangulated faces of a cage."""
+    """Return (T, 3) int32 corners of the triangulated faces of a cage."""
     corners, sizes = geometry.faces.cages.triangle_corners(faces, rest), np.diff(faces.starts)
     large = np.flatnonzero(sizes > 4)
     if not len(large):
@@ -134,7 +134,7 @@ def _triangle_corners(faces, rest):
 
 
 def turned_back(corners, faces, undivided):
-    """(T, 3) corners of triangles in their order before the faces, or those of the cage, were flipped."""
+    """Return (T, 3) corners of triangles in their order before the faces, or those of the cage, were flipped."""
     turned = geometry.faces.flipped_faces.turned_cage(faces, undivided) if undivided else None
     if turned is None:
         return corners[_turned_order(faces)]
@@ -145,7 +145,7 @@ def turned_back(corners, faces, undivided):
 
 
 def _turned_order(faces):
-    """(T,) int: the triangles of each face from last to first, which restores the order before a flip."""
+    """Return (T,) int: the triangles of each face from last to first, which restores the order before a flip."""
     counts = np.diff(faces.starts) - 2
     firsts = np.repeat(np.cumsum(counts) - counts, counts)
     return 2 * firsts + np.repeat(counts, counts) - 1 - np.arange(len(firsts))

@@ -18,13 +18,13 @@ _KNOWN_AS = "vellus_known_as"
 
 
 def to_world(an_object, depsgraph=None):
-    """The `Affine` from an object's local coordinates to the world, in a depsgraph's frame if one is given."""
+    """Return the `Affine` from an object's local coordinates to the world, in a depsgraph's frame if one is given."""
     placed = an_object if depsgraph is None else an_object.evaluated_get(depsgraph)
     return Affine.of(placed.matrix_world)
 
 
 def between(an_object, surface_object):
-    """The `Affine` from an object's local coordinates to those of a surface."""
+    """Return the `Affine` from an object's local coordinates to those of a surface."""
     return to_world(surface_object).inverse @ to_world(an_object)
 
 
@@ -59,7 +59,7 @@ def has_other_surface(curves):
 
 
 def surface_before(curves):
-    """The object that Curves stand on, even if another was picked since; None if deleted or unknown."""
+    """Return the object that Curves stand on, even if another was picked since; None if deleted or unknown."""
     if not has_other_surface(curves):
         return curves.surface
     stored = curves[_STORED_SURFACE]
@@ -67,25 +67,27 @@ def surface_before(curves):
 
 
 def _stored_surface(stored):
-    """The object stored by `keep_surface`, a reference that follows renaming; None if deleted, or in older files."""
+    """Return the object stored by `keep_surface`, a reference that follows renaming; None if deleted, or in older
+    files.
+    """
     found = stored.get("surface")
     return found if isinstance(found, bpy.types.Object) else None
 
 
 def rest_before(curves):
-    """(V, 3) float32 vertices of the surface that `keep_surface` stored, or None."""
+    """Return (V, 3) float32 vertices of the surface that `keep_surface` stored, or None."""
     stored = curves.get(_STORED_SURFACE)
     return None if stored is None else np.array(stored["rest"], np.float32).reshape(-1, 3)
 
 
 def vertex_count_before(curves):
-    """The number of vertices of the surface that `keep_surface` stored, or None."""
+    """Return the number of vertices of the surface that `keep_surface` stored, or None."""
     stored = curves.get(_STORED_SURFACE)
     return None if stored is None else len(stored["rest"]) // 3
 
 
 def to_world_before(curves):
-    """The `Affine` that was stored with the surface; None in files of older versions."""
+    """Return the `Affine` that was stored with the surface; None in files of older versions."""
     stored = curves.get(_STORED_SURFACE)
     if stored is None or len(stored.get("to_world", ())) != 16:
         return None
@@ -93,7 +95,7 @@ def to_world_before(curves):
 
 
 def applied(curves):
-    """The `Affine` from the local coordinates in which strands were made to the current local coordinates."""
+    """Return the `Affine` from the local coordinates in which strands were made to the current local coordinates."""
     stored = curves.get(_APPLIED)
     found = Affine.identity() if stored is None or len(stored.get("matrix", ())) != 16 else Affine.of(stored["matrix"])
     return found if found.is_valid else Affine.identity()
@@ -115,7 +117,8 @@ def note_applied(curves, change, rest_before=None, vertices=None):
 
 
 def made_on(curves, rest):
-    """The exact (V, 3) rest positions when strands were made, if `applied` leads from them to `rest`; else None.
+    """Return the exact (V, 3) rest positions when strands were made, if `applied` leads from them to `rest`; else
+    None.
 
     Random distributions over a surface depend on their exact values.
     """
@@ -135,7 +138,7 @@ def note_same(curves, before, now):
 
 
 def known_as(curves, digest):
-    """The original digest, before any `note_same`, of data with a digest now."""
+    """Return the original digest, before any `note_same`, of data with a digest now."""
     found = curves.get(_KNOWN_AS, {}).get(digest, digest)
     return found if isinstance(found, str) else digest
 
@@ -150,7 +153,7 @@ def is_turned(surface_object):
 
 
 def _turns(curves):
-    """The number of mirroring scales that were applied to the surface of Curves."""
+    """Return the number of mirroring scales that were applied to the surface of Curves."""
     turns = curves.get(_APPLIED, {}).get("turns")
     return turns if isinstance(turns, int) else int(applied(curves).is_mirroring)
 

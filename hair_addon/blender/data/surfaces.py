@@ -53,11 +53,11 @@ class Surface:
         return np.linalg.inv(self.to_world_axes)
 
     def to_local(self, points):
-        """(S, P, 3) points of strands → float32 local coordinates."""
+        """Return (S, P, 3) points of strands → float32 local coordinates."""
         return geometry.transform.transformed(points, self.to_local_axes)
 
     def from_local(self, positions):
-        """(..., 3) local coordinates → float32 in this space."""
+        """Return (..., 3) local coordinates → float32 in this space."""
         return transformed(positions, self.to_world_axes)
 
     @property
@@ -137,7 +137,7 @@ class Surface:
         return {}
 
     def turning(self, vertices):
-        """The `VertexRotations` of vertices, indices in any shape, cached for all poses. Raises `HairError`."""
+        """Return the `VertexRotations` of vertices, indices in any shape, cached for all poses. Raises `HairError`."""
         require_indices("vertices", vertices, len(self.rest))
         is_chosen = np.zeros(len(self.rest), bool)
         is_chosen[vertices] = True
@@ -207,12 +207,14 @@ class Surface:
         return TriMesh(-rest if self.is_mirrored != applied.is_mirroring else rest, self.mesh.triangles)
 
     def root_vertices(self, points):
-        """(N, 3) int32 vertices of the triangles of surface points, in Blender's order of corners."""
+        """Return (N, 3) int32 vertices of the triangles of surface points, in Blender's order of corners."""
         vertices = self.mesh.triangles.take(points.triangle, axis=0)  # a third of the time of indexing
         return np.ascontiguousarray(vertices[:, [0, 2, 1]]) if self.is_mirrored else vertices
 
     def places(self, points):
-        """(N, 3) int32 vertices and (N, 3) float32 barycentric coordinates of points, in Blender's order of corners."""
+        """Return (N, 3) int32 vertices and (N, 3) float32 barycentric coordinates of points, in Blender's order of
+        corners.
+        """
         return self.root_vertices(points), self.swap_winding(points).barycentric
 
     @property
@@ -277,22 +279,24 @@ class Surface:
         return int(self.cage_vertices.max()) + 1 if is_divided else len(self.rest)
 
     def points_at(self, polygons, vertices, barycentric):
-        """(`SurfacePoints`, (N,) bool: whether invalid) of places, as from `places`, in `triangulated` polygons."""
+        """Return (`SurfacePoints`, (N,) bool: whether invalid) of places, as from `places`, in `triangulated`
+        polygons.
+        """
         return geometry.faces.face_places.on_triangles(self.mesh, self.triangulated, polygons, vertices, barycentric)
 
     def to_local_normals(self, normals):
-        """(N, 3) unit normals → unit normals in local coordinates, by the inverse transpose of `to_local`."""
+        """Return (N, 3) unit normals → unit normals in local coordinates, by the inverse transpose of `to_local`."""
         if np.array_equal(self.to_world_axes, np.eye(3)):
             return normals
         local = normals @ self.to_world_axes.astype(np.float32)
         return local / np.linalg.norm(local, axis=-1, keepdims=True)
 
     def identities(self, roots):
-        """(S,) int32 identities and (S,) float32 random numbers in [0, 1), independent of the other strands."""
+        """Return (S,) int32 identities and (S,) float32 random numbers in [0, 1), independent of the other strands."""
         return geometry.root_frames.identities(roots, self.has_flipped_winding)
 
     def uvs(self, points):
-        """(N, 2) float32 UV coordinates of surface points; zeros without a UV map."""
+        """Return (N, 2) float32 UV coordinates of surface points; zeros without a UV map."""
         if self.corner_uvs is None:
             return np.zeros((len(points), 2), np.float32)
         of_corners = self.corner_uvs.take(points.triangle, axis=0)
@@ -317,12 +321,12 @@ _HALF = 16  # hexadecimal digits of each half of a topology
 
 
 def cage_of(topology):
-    """The half of a `Surface.topology` that subdivision does not change."""
+    """Return the half of a `Surface.topology` that subdivision does not change."""
     return topology[:_HALF]
 
 
 def faces_of(topology):
-    """The half of a `Surface.topology` of the faces that stored roots refer to."""
+    """Return the half of a `Surface.topology` of the faces that stored roots refer to."""
     return topology[_HALF:]
 
 
@@ -334,7 +338,7 @@ def _half_key(*arrays):
 
 
 def transformed(positions, matrix):
-    """(..., 3) float32 positions transformed by a (3, 3) matrix; the same array for the identity."""
+    """Return (..., 3) float32 positions transformed by a (3, 3) matrix; the same array for the identity."""
     if np.array_equal(matrix, np.eye(3)):
         return np.asarray(positions, np.float32)
     return np.asarray(positions, np.float32) @ matrix.T.astype(np.float32)

@@ -20,7 +20,7 @@ def show_thin(blender_scene):
 
 
 def state_of(blender_scene):
-    """(Whether `show_thin` has handled a scene, its hair shape type)."""
+    """Return (Whether `show_thin` has handled a scene, its hair shape type)."""
     return _SET in blender_scene, blender_scene.render.hair_type
 
 

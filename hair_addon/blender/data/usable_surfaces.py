@@ -69,7 +69,7 @@ def _is_inside_out(mesh):
 
 
 def inside_out_warning(mesh_object):
-    """(sentence, values) for scripts and commands if a mesh is inside out, else None."""
+    """Return (sentence, values) for scripts and commands if a mesh is inside out, else None."""
     if not is_inside_out(mesh_object):
         return None
     return '"{name}" is inside out: hair grows inward. Flip the normals of its mesh.', {"name": name_of(mesh_object)}

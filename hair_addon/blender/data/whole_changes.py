@@ -97,7 +97,7 @@ def backup_copies() -> set[int]:
 
 
 def _next(steps, answer):
-    """(the next step, None), or (None, the result)."""
+    """Return (the next step, None), or (None, the result)."""
     try:
         return steps.send(answer), None
     except StopIteration as end:
@@ -153,7 +153,7 @@ class _Change:
         self._copies[curves_object.session_uid] = saved
 
     def copies(self):
-        """The session UIDs of the copies that may still be needed, and of their data."""
+        """Return the session UIDs of the copies that may still be needed, and of their data."""
         return {uid for saved in self._copies.values() for uid in (saved.uid, saved.data)}
 
     def end(self):
@@ -209,14 +209,14 @@ class _Change:
 
 
 def _datablocks():
-    """{session UID: datablock} of the open file."""
+    """Return {session UID: datablock} of the open file."""
     collections = (p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION")
     kinds = (getattr(bpy.data, kind) for kind in collections if kind not in _NOT_OURS)
     return {one.session_uid: one for kind in kinds for one in kind}
 
 
 def _owners(given):
-    """The objects and Curves among arguments, with their data, guides and surfaces."""
+    """Return the objects and Curves among arguments, with their data, guides and surfaces."""
     listed = [one for value in given for one in (value if isinstance(value, list | tuple) else [value])]
     found: list[ID] = []
     waiting = [one for one in listed if isinstance(one, Object | Curves)]
@@ -233,7 +233,7 @@ def _owners(given):
 
 
 def _state_of(owner):
-    """The parts of a datablock that `_restore` compares."""
+    """Return the parts of a datablock that `_restore` compares."""
     if isinstance(owner, Object):
         return {
             "vertex_groups": [name_of(group) for group in owner.vertex_groups],

@@ -78,7 +78,7 @@ class Renewal:
 
 
 def _places(hair, receivers, through):
-    """[(`uniforms.VIEW` record, {sampler: texture})] of the receivers: strands, then surfaces."""
+    """Return [(`uniforms.VIEW` record, {sampler: texture})] of the receivers: strands, then surfaces."""
     views = [_view_of_strands(strands, to_world) for strands, to_world in hair]
     views += [_view_of_surface(surface) for surface in receivers]
     of_surfaces = through[densest([strands for strands, _ in hair])] if hair else (1.0, np.zeros(3))
@@ -95,7 +95,7 @@ def _split(textures, hair_count):
 
 
 def _steps(hair):
-    """The `drawing.Steps` of the maps; hair: [(StrandsOnGPU, object to world)]."""
+    """Return the `drawing.Steps` of the maps; hair: [(StrandsOnGPU, object to world)]."""
     if not hair:
         return drawing.Steps()
     texel = 2.0 * drawing.bounding_sphere(hair)[1] / _SIZE

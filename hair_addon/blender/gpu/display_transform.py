@@ -37,7 +37,7 @@ class DisplayTransform:
 
     @classmethod
     def of(cls, scene, part=viewport_shading.ALL):
-        """The settings of a scene; part: those of them that Blender applies to a viewport."""
+        """Return the settings of a scene; part: those of them that Blender applies to a viewport."""
         view = scene.view_settings
         look = "" if view.look == "None" else view.look
         space = bpy.data.colorspace.working_space
@@ -47,7 +47,7 @@ class DisplayTransform:
         return cls(display, view.view_transform, look, view.gamma if part == viewport_shading.ALL else 1.0, space)
 
     def table(self):
-        """(SIZE, SIZE, SIZE, 3) float32 display colors in [0, 1], red running fastest."""
+        """Return (SIZE, SIZE, SIZE, 3) float32 display colors in [0, 1], red running fastest."""
         axis = linear_at(np.linspace(0.0, 1.0, SIZE)).astype(np.float32)
         blue, green, red = np.meshgrid(axis, axis, axis, indexing="ij")
         colors = np.ascontiguousarray(np.stack([red, green, blue], axis=-1).reshape(-1, 3))
@@ -65,7 +65,7 @@ def linear_at(places):
 
 
 def apply(transform, colors):
-    """(N, 3) scene-linear float32 → (N, 3) display colors, by Blender's OpenColorIO configuration.
+    """Return (N, 3) scene-linear float32 → (N, 3) display colors, by Blender's OpenColorIO configuration.
 
     If OpenColorIO is missing or lacks the transform: by the Standard view for sRGB, with a message on the console.
     """
@@ -86,7 +86,7 @@ def apply(transform, colors):
 
 
 def _processor(ocio, transform):
-    """The processor as in Blender: the look in scene-linear colors, then the view, then the scene's gamma."""
+    """Return the processor as in Blender: the look in scene-linear colors, then the view, then the scene's gamma."""
     path = os.environ.get("OCIO") or Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")
     config = ocio.Config.CreateFromFile(str(path))
     steps = ocio.GroupTransform()

@@ -39,7 +39,7 @@ ALONE = threading.RLock()
 
 
 def view_record(world_to_view, view_to_clip, height, least_width=0.0):
-    """A `uniforms.VIEW` record of a camera.
+    """Return a `uniforms.VIEW` record of a camera.
 
     world_to_view, view_to_clip: (4, 4); height: of the picture [pixels]; least_width: minimum width of strands
     [pixels].
@@ -60,12 +60,12 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
 
 
 def pass_shift(turn):
-    """(2,) jitter [samples] of a pass, up to one half: a low-discrepancy sequence [Roberts18]."""
+    """Return (2,) jitter [samples] of a pass, up to one half: a low-discrepancy sequence [Roberts18]."""
     return np.modf(turn * np.array([0.75487767, 0.56984029]) + 0.5)[0] - 0.5
 
 
 def pass_record(world_to_view, view_to_clip, size, turn=0, tile=None):
-    """The `view_record` of a pass over a picture; each pass moves the samples.
+    """Return the `view_record` of a pass over a picture; each pass moves the samples.
 
     size: (width, height) of the picture [samples]; turn: index of the pass, which is moved by `pass_shift`; tile:
     (left, bottom, width, height) [samples] of the part that is drawn.
@@ -91,7 +91,7 @@ def scale_of(object_to_world):
 
 
 def bounding_sphere(hair):
-    """(3,) center and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)].
+    """Return (3,) center and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)].
 
     The radius is positive, also for hair that is scaled to a point.
     """
@@ -116,7 +116,7 @@ def tight_sphere(hair):
 
 
 def strand_record(strands, view, object_to_world, steps=_ALL):
-    """A `uniforms.VIEW` record, completed for `StrandsOnGPU` at a place (4, 4)."""
+    """Return a `uniforms.VIEW` record, completed for `StrandsOnGPU` at a place (4, 4)."""
     record = view.copy()
     record["object_to_world"] = object_to_world.T
     record["object_to_clip"] = object_to_world.T @ view["world_to_clip"]  # both transposed
@@ -138,7 +138,9 @@ _LARGEST_PART = 32_768
 
 @functools.cache
 def _parts(strand_count):
-    """(size, stride) of the fewest equal parts of strands; the stride, near size times the golden ratio, visits all."""
+    """Return (size, stride) of the fewest equal parts of strands; the stride, near size times the golden ratio,
+    visits all.
+    """
     size = strand_count // -(-strand_count // _LARGEST_PART)
     stride = round(0.61803399 * size)
     while math.gcd(stride, size) != 1:
@@ -165,7 +167,7 @@ def draw_strip(strands, program, record, lights, samplers=None, clip_planes=None
 
 
 def strand_samplers(strands):
-    """{sampler: texture} of `StrandsOnGPU` for programs that draw them."""
+    """Return {sampler: texture} of `StrandsOnGPU` for programs that draw them."""
     return {"strands": strands.texture, "strand_radii": strands.radii_texture}
 
 

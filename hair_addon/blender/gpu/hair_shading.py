@@ -86,7 +86,9 @@ class MixedShading:
 
 
 def mixed(driest, wettest, wetness, wetness_range):
-    """The `MixedShading` of two `Shading`s for strands with (S,) wetness; wetness_range: wetness of the two looks."""
+    """Return the `MixedShading` of two `Shading`s for strands with (S,) wetness; wetness_range: wetness of the two
+    looks.
+    """
     return MixedShading(driest, wettest, wetness_range, float(wet_share(wetness, *wetness_range).mean()))
 
 
@@ -95,20 +97,20 @@ def _opacity(forward):
 
 
 def kajiya_kay_shading(settings):
-    """The `Shading` of the Kajiya-Kay model. The cylinder is opaque: half of its scattering is forward."""
+    """Return the `Shading` of the Kajiya-Kay model. The cylinder is opaque: half of its scattering is forward."""
     forward = 0.5 * kajiya_kay.mean_albedo(settings)
     return _shading("fibre/kajiya_kay.comp", {"settings": settings}, {}, forward)
 
 
 def kajiya_kay_strand_shading(settings, variation):
-    """The `Shading` of varied strands, from `kajiya_kay.StrandSettings` and `strand_variation.Settings`."""
+    """Return the `Shading` of varied strands, from `kajiya_kay.StrandSettings` and `strand_variation.Settings`."""
     forward = 0.5 * kajiya_kay.mean_albedo_of_strands(settings, strand_variation.sample_sigma_a(variation))
     blocks = {"settings": settings, "variation": variation}
     return _shading("fibre/kajiya_kay_varied.comp", blocks, {}, forward, is_varied=True)
 
 
 def marschner_shading(tables):
-    """The `Shading` of the Marschner model, from baked `lookup_tables.Tables`."""
+    """Return the `Shading` of the Marschner model, from baked `lookup_tables.Tables`."""
     file, names = _TABLES[tables.settings.mode]
     arrays = {f"{name}_table": getattr(tables, name) for name in names}
     forward, backward = albedo.mean_parts(tables.lobes, tables.settings)
@@ -121,21 +123,22 @@ def marschner_shading(tables):
 
 
 def marschner_strand_shading(tables):
-    """The `Shading` of the Marschner model for varied strands, from `strand_tables.StrandTables`."""
+    """Return the `Shading` of the Marschner model for varied strands, from `strand_tables.StrandTables`."""
     deep = _deep(tables.settings, tables.forward, tables.backward)
     shading = _shading(*_sliced(tables), *deep, is_varied=True)
     return replace(shading, fibre=_fibre(tables.settings, tables.variation))
 
 
 def kajiya_kay_look_shading(settings, variation, sigma_a):
-    """The `Shading` of strands with looks of their own; sigma_a (..., 3): of some of them."""
+    """Return the `Shading` of strands with looks of their own; sigma_a (..., 3): of some of them."""
     forward = 0.5 * kajiya_kay.mean_albedo_of_strands(settings, sigma_a)
     blocks = {"settings": settings, "variation": variation}
     return _shading("fibre/kajiya_kay_varied.comp", blocks, {}, forward, is_varied=True, is_mapped=True)
 
 
 def marschner_look_shading(tables):
-    """A function of sigma_a (..., 3) of some strands that returns the `Shading` of strands with looks of their own.
+    """Return a function of sigma_a (..., 3) of some strands that returns the `Shading` of strands with looks of
+    their own.
 
     tables: `look_tables.LookTables`; the given strands define the light that strands pass on to others.
     """
@@ -150,7 +153,9 @@ def marschner_look_shading(tables):
 
 
 def _sliced(tables):
-    """(file, blocks, tables) of `_shading` for strands whose absorptions differ; tables: with slices of absorptions."""
+    """Return (file, blocks, tables) of `_shading` for strands whose absorptions differ; tables: with slices of
+    absorptions.
+    """
     slices = tables.slices
     blocks = {"settings": tables.settings, "variation": tables.variation, "slices": slices.range}
     arrays = {"return_slices": tables.returned, "n_slices": slices.n}
@@ -167,7 +172,9 @@ def _fibre(settings, variation):
 
 
 def _deep(settings, forward, backward):
-    """(fraction passed on by one strand, reflectance) in deep hair; forward, backward: (3,) scattered by a strand."""
+    """Return (fraction passed on by one strand, reflectance) in deep hair; forward, backward: (3,) scattered by a
+    strand.
+    """
     if settings.mode != "energy":
         return forward, np.zeros(3)
     attenuation, reflectance = dual_scattering.deep_hair(forward, backward)
@@ -175,7 +182,9 @@ def _deep(settings, forward, backward):
 
 
 def _shading(file, blocks, arrays, forward, reflectance=(0.0, 0.0, 0.0), is_varied=False, is_mapped=False):
-    """The `Shading` of a .comp with blocks {instance: settings} and tables {sampler: (H, W, C) or (D, H, W, C)}."""
+    """Return the `Shading` of a .comp with blocks {instance: settings} and tables {sampler: (H, W, C) or (D, H, W,
+    C)}.
+    """
     kinds = [(name, "FLOAT_2D" if array.ndim == 3 else "FLOAT_3D") for name, array in arrays.items()]
     if is_varied:
         kinds.append(("strand_looks" if is_mapped else "strand_randoms", "FLOAT_2D"))

@@ -130,7 +130,7 @@ def _append(parts, texture, values):
 
 
 def _texture(parts, texture_format, channels):
-    """A texture of all elements in rows of TEXTURE_WIDTH."""
+    """Return a texture of all elements in rows of TEXTURE_WIDTH."""
     texels = np.concatenate([np.zeros((0, channels), np.float32), *parts])
     height = max(-(-len(texels) // TEXTURE_WIDTH), 1)
     texels = np.pad(texels, ((0, height * TEXTURE_WIDTH - len(texels)), (0, 0)))
@@ -145,7 +145,7 @@ def _empty(count, kind):
 
 
 def _read(image, count, kind):
-    """The first `count` elements of an image."""
+    """Return the first `count` elements of an image."""
     channels = _FORMATS[_TEXTURE_OF[kind]][1]
     texels = np.array(image.read(), np.float32).reshape(-1, channels)[:count]
     if _TEXTURE_OF[kind] == "words":

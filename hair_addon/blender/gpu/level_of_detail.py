@@ -18,7 +18,7 @@ _LEAST_STRANDS, _LEAST_POINTS = 10_000, 9
 
 
 def steps_of(strands, view, object_to_world, part=1.0):
-    """The `drawing.Steps` that suffice for `StrandsOnGPU` in a view.
+    """Return the `drawing.Steps` that suffice for `StrandsOnGPU` in a view.
 
     view: a `uniforms.VIEW` record; object_to_world: (4, 4); part: maximum fraction of all strands.
     """

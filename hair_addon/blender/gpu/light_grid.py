@@ -13,7 +13,7 @@ none_cache = Cache(capacity=1)
 
 
 def upload(means):
-    """A texture of (Z, Y, X, 4) `voxel_means.shares`, linear between voxels, whose sides avoid powers of two."""
+    """Return a texture of (Z, Y, X, 4) `voxel_means.shares`, linear between voxels, whose sides avoid powers of two."""
     beside = avoid_powers_of_two(means.shape[:3]) - means.shape[:3]
     texels = np.clip(means, -_GREATEST, _GREATEST).astype(np.float32, copy=False)
     texels = np.pad(texels, [*((0, more) for more in beside), (0, 0)], mode="edge")
@@ -25,5 +25,5 @@ def upload(means):
 
 
 def none():
-    """A neutral texture for pictures without a grid."""
+    """Return a neutral texture for pictures without a grid."""
     return none_cache.get("none", lambda: upload(np.array([[[[0.0, 0.0, 0.0, 1.0]]]])))

@@ -30,7 +30,7 @@ NO_LIGHTS = np.zeros(0, uniforms.LIGHT.dtype), []  # the result of `read_lights`
 
 
 def read_lights(depsgraph, for_render):
-    """((N,) `uniforms.LIGHT` records of all visible lights, or of all rendered lights; (N,) links).
+    """Return ((N,) `uniforms.LIGHT` records of all visible lights, or of all rendered lights; (N,) links).
 
     The links are from `light_linking.read_links`. Lights with non-finite values are skipped with a message.
     """
@@ -141,14 +141,14 @@ class World:
 
 
 def world_of_hdri(hdri):
-    """The `World` of a `viewport_shading.Hdri`. Raises `HairError`."""
+    """Return the `World` of a `viewport_shading.Hdri`. Raises `HairError`."""
     to_image = np.eye(4)
     to_image[:3, :3] = hdri.to_image
     return World(np.full(3, hdri.strength), image_of(hdri.path), to_image)
 
 
 def read_world(scene, view_layer=None, waits=True):
-    """The `World` of a scene, or of a view layer that overrides it.
+    """Return the `World` of a scene, or of a view layer that overrides it.
 
     Cycles renders nodes that Vellus does not read as a panorama; waits: for that panorama. Else the world has its
     viewport color meanwhile, and with a message if Cycles cannot render it. A world with non-finite values is black,
@@ -167,7 +167,9 @@ def read_world(scene, view_layer=None, waits=True):
 
 
 def _read_world(world, scene_frame):
-    """The `World` of nodes that are a background of one color or one environment texture; None for other nodes."""
+    """Return the `World` of nodes that are a background of one color or one environment texture; None for other
+    nodes.
+    """
     background = shown_shader(world.node_tree, ["BACKGROUND"])
     if background is None:
         return World(np.array(world.color))
@@ -198,7 +200,9 @@ def _is_shown(shader, tree):
 
 
 def _panorama_of(world, time, waits):
-    """The `World` of a panorama that Cycles renders of a world at a time [frames]; the last panorama meanwhile."""
+    """Return the `World` of a panorama that Cycles renders of a world at a time [frames]; the last panorama
+    meanwhile.
+    """
     try:
         path = world_panoramas.file_of(world, time, waits)
     except HairError as error:
@@ -230,7 +234,7 @@ def _load_frame(image, user, scene_frame):
 
 
 def _mapping(vector):
-    """(4, 4) from world directions to those of a texture's `ShaderInput`; None if other nodes compute them."""
+    """Return (4, 4) from world directions to those of a texture's `ShaderInput`; None if other nodes compute them."""
     found, output = vector.source()
     if found is None:
         return None if vector.socket.is_linked else np.eye(4)

@@ -40,7 +40,9 @@ class SceneLights:
     lamps: np.ndarray
 
     def lit(self, receivers):
-        """(R,) `uniforms.LIGHTS`, for each `Receiver`: without unlinked lights, and with `rest` as ambient light."""
+        """Return (R,) `uniforms.LIGHTS`, for each `Receiver`: without unlinked lights, and with `rest` as ambient
+        light.
+        """
         records = np.repeat(self.record[None], len(receivers))
         for record, receiver in zip(records, receivers, strict=True):
             is_linked = np.array([links.has(receiver.owner) for links, _blockers in self.links], bool)
@@ -75,7 +77,7 @@ class SceneLights:
 
 
 def gather(found, links, world, receivers):
-    """The `SceneLights` of the lights and links of `lights.read_lights`, and of a `World`.
+    """Return the `SceneLights` of the lights and links of `lights.read_lights`, and of a `World`.
 
     receivers: of the hair, by which the importance of lights is computed.
     """
@@ -110,7 +112,9 @@ _STUDIO_COUNT = 2
 
 
 def of_studio(found, ambient):
-    """The `SceneLights` of Solid shading; found, ambient: from `studio_lights.lamps_of`. They light everything."""
+    """Return the `SceneLights` of Solid shading; found, ambient: from `studio_lights.lamps_of`. They light
+    everything.
+    """
     importance = found["power"][:, :3].mean(axis=1)
     order = np.argsort(-importance, kind="stable")
     found, one_by_one = found[order], lamps.shares(importance[order], _STUDIO_COUNT)
@@ -126,7 +130,7 @@ def of_studio(found, ambient):
 
 
 def _importance(found, links, receivers):
-    """(N,) the greatest irradiance of the receivers, averaged over the channels."""
+    """Return (N,) the greatest irradiance of the receivers, averaged over the channels."""
     if not receivers:
         return found["power"][:, :3].mean(axis=1)
     importance = np.zeros(len(found))
@@ -139,13 +143,15 @@ def _importance(found, links, receivers):
 
 
 def places_of_hair(points, to_world):
-    """(P, 3) places [m]: a subset of the (S, N, 3) points of strands, transformed by `to_world` (4, 4)."""
+    """Return (P, 3) places [m]: a subset of the (S, N, 3) points of strands, transformed by `to_world` (4, 4)."""
     some = points[:: -(-len(points) // _PLACES), :: max((points.shape[1] - 1) // 2, 1)].reshape(-1, 3)
     return some @ to_world[:3, :3].T + to_world[:3, 3]
 
 
 def places_on_surface(vertices, triangles, to_world):
-    """(P, 3) places [m]: a subset of the corners (N,) of triangles with (V, 3) vertices, transformed by `to_world`."""
+    """Return (P, 3) places [m]: a subset of the corners (N,) of triangles with (V, 3) vertices, transformed by
+    `to_world`.
+    """
     some = vertices[triangles[:: -(-len(triangles) // _PLACES)]].astype(float)
     return some @ to_world[:3, :3].T + to_world[:3, 3]
 

@@ -246,7 +246,7 @@ class ShadowMaps:
 
 
 def _steady(sphere, before):
-    """The sphere (center, radius) to aim maps at for hair within `sphere`; before: the previous sphere."""
+    """Return the sphere (center, radius) to aim maps at for hair within `sphere`; before: the previous sphere."""
     apart = float(np.linalg.norm(sphere[0] - before[0]))
     if apart + sphere[1] <= before[1] * (1.0 + 1e-6) and before[1] <= _LOOSEST * sphere[1]:
         return before
@@ -279,7 +279,7 @@ def _array(size, layer_count, texture_format):
 
 
 def _aim(light, hair, loose, size):
-    """The view of a light that contains the hair, also written into the light; None without an axis.
+    """Return the view of a light that contains the hair, also written into the light; None without an axis.
 
     loose: (center, radius) of a sphere around the hair; lights inside of it use a tight sphere. The view of a light in
     or next to both contains everything up to `_WIDEST` off its axis.
@@ -308,7 +308,8 @@ def _aim(light, hair, loose, size):
 
 
 def _aim_wide(light, centre, radius, size):
-    """The view of a light that contains a sphere, also written into the light; a smaller sphere if the light is inside.
+    """Return the view of a light that contains a sphere, also written into the light; a smaller sphere if the light
+    is inside.
 
     None for a light at the sphere's center.
     """
@@ -342,7 +343,7 @@ def _blur_of(light, size):
 
 
 def _look_at(eye, forward):
-    """(4, 4) world to view of a camera at `eye` that looks along a unit vector, -Z of the view."""
+    """Return (4, 4) world to view of a camera at `eye` that looks along a unit vector, -Z of the view."""
     helper = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
     right = np.cross(forward, helper)
     right /= np.linalg.norm(right)
@@ -353,12 +354,16 @@ def _look_at(eye, forward):
 
 
 def _orthographic(radius):
-    """(4, 4) view to clip of a cube around a sphere two radii ahead, with depth range for casters in front of it."""
+    """Return (4, 4) view to clip of a cube around a sphere two radii ahead, with depth range for casters in front of
+    it.
+    """
     return np.array([[1 / radius, 0, 0, 0], [0, 1 / radius, 0, 0], [0, 0, -0.1 / radius, -0.8], [0, 0, 0, 1.0]])
 
 
 def _perspective(radius, distance):
-    """(4, 4) view to clip of a cone around a sphere, at most `_WIDEST`, with depth range for casters in front of it."""
+    """Return (4, 4) view to clip of a cone around a sphere, at most `_WIDEST`, with depth range for casters in front
+    of it.
+    """
     sine = min(radius / max(distance, radius), np.sin(_WIDEST))
     cotangent = np.sqrt(1.0 - sine**2) / sine
     near, far = _NEAREST * 2.0 * radius, distance + 4.0 * radius

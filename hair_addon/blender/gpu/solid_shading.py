@@ -31,7 +31,7 @@ PLAIN = Solid()
 
 
 def shown_as(shading, solid):
-    """A `Shading` or `MixedShading` as it is shown by a `Solid`; the same object for the same arguments."""
+    """Return a `Shading` or `MixedShading` as it is shown by a `Solid`; the same object for the same arguments."""
     if solid == PLAIN:
         return shading
     return shading_cache.get((id(shading), solid), lambda: (shading, _made(shading, solid)))[1]
@@ -58,7 +58,7 @@ def _made(shading, solid):
 
 
 def tint_texture(tints, row_strands):
-    """A texture of (S, 3) tints, `row_strands` per row, as `strand_textures.numbers_texture`."""
+    """Return a texture of (S, 3) tints, `row_strands` per row, as `strand_textures.numbers_texture`."""
     texels = np.ones((-(-len(tints) // row_strands), row_strands, 4), np.float32)
     texels.reshape(-1, 4)[: len(tints), :3] = tints
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())

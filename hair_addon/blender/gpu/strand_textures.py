@@ -97,7 +97,7 @@ class StrandsOnGPU:
         return self.lengthenings[point_count]
 
     def points_that_show(self, part: float) -> int:
-        """The least number of evenly chosen points with which strands are shorter by at most this fraction.
+        """Return the least number of evenly chosen points with which strands are shorter by at most this fraction.
 
         All points if only the GPU has the current points.
         """
@@ -111,7 +111,7 @@ class StrandsOnGPU:
 
 
 def upload_strands(points, radii, randoms=None, wetness=None, looks=None):
-    """(S, P, 3) points and (S, P) radii, float32, in one coordinate system → `StrandsOnGPU`.
+    """Return (S, P, 3) points and (S, P) radii, float32, in one coordinate system → `StrandsOnGPU`.
 
     randoms: (S,) numbers in [0, 1] for variation, None: all strands are average; wetness: (S,) in [0, 1], None if
     strands do not differ; looks: `StrandLooks` (S,), None without maps.
@@ -178,14 +178,14 @@ def _farthest(points, centre):
 
 
 def numbers_texture(values, row_strands):
-    """A texture with one number per strand, `row_strands` per row; values: (S,)."""
+    """Return a texture with one number per strand, `row_strands` per row; values: (S,)."""
     numbers = np.zeros((-(-len(values) // row_strands), row_strands), np.float32)
     numbers.ravel()[: len(values)] = values
     return driver_textures.new_texture(numbers.shape[::-1], "R32F", numbers)
 
 
 def pairs_texture(values, row_strands):
-    """A texture with two numbers per strand, `row_strands` per row; values: (S, 2)."""
+    """Return a texture with two numbers per strand, `row_strands` per row; values: (S, 2)."""
     pairs = np.zeros((-(-len(values) // row_strands), row_strands, 2), np.float32)
     pairs.reshape(-1, 2)[: len(values)] = values
     return driver_textures.new_texture(pairs.shape[1::-1], "RG32F", pairs)
@@ -197,7 +197,7 @@ def row_strands_of(point_count, others=0):
 
 
 def packed_texture(points, row_strands):
-    """A texture of packed (S, P, 3) points, `row_strands` whole strands per row."""
+    """Return a texture of packed (S, P, 3) points, `row_strands` whole strands per row."""
     strand_count, point_count, _xyz = points.shape
     texel_count, row_count = geometry.packed_strands.texel_count(point_count), -(-strand_count // row_strands)
     texels = np.empty((row_count * row_strands, texel_count, 2), np.float32)
@@ -239,7 +239,7 @@ def with_radii(strands, radii):
 
 
 def _radii_texture(radii, row_strands):
-    """(texture, number of strands, unit): (S, P) radii in two bytes each; a single strand if all are equal."""
+    """Return (texture, number of strands, unit): (S, P) radii in two bytes each; a single strand if all are equal."""
     strand_count, point_count = radii.shape
     if (radii == radii[:1]).all():
         return _texture("R32F", point_count, np.ascontiguousarray(radii[:1], np.float32)), 1, 1.0
@@ -271,7 +271,7 @@ def _texture(texture_format, width, texels):
 
 
 def like(texture):
-    """An undefined texture of the same size for other strands."""
+    """Return an undefined texture of the same size for other strands."""
     return driver_textures.new_texture((texture.width, texture.height), "RG32F")
 
 
@@ -352,7 +352,7 @@ def _no_rows(strands):
 
 @shaders.cached
 def _move_program():
-    """The compute program that writes the points of some strands into the texture of all."""
+    """Return the compute program that writes the points of some strands into the texture of all."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_MOVE_GROUP_SIZE)
     info.sampler(0, "FLOAT_2D", "moved_strands")
@@ -365,7 +365,7 @@ def _move_program():
 
 @shaders.cached
 def _keep_program():
-    """The compute program that copies strands. Metal cannot read from images of this format that it writes."""
+    """Return the compute program that copies strands. Metal cannot read from images of this format that it writes."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_MOVE_GROUP_SIZE)
     for slot, name in enumerate(("strands", "listed")):
@@ -382,5 +382,5 @@ def vertex_count(strand_count, drawn_points):
 
 
 def bare_vertices(count, primitive="TRI_STRIP"):
-    """A batch of vertices without attributes."""
+    """Return a batch of vertices without attributes."""
     return gpu.types.GPUBatch(type=primitive, buf=gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), count))

@@ -25,7 +25,7 @@ texture_cache = Cache(capacity=8)  # (StudioImage, whether as a matcap) → text
 
 
 def lamps_of(lights, has_highlights):
-    """((N,) `uniforms.LIGHT` records, (3,) ambient radiance) of `viewport_shading.StudioLight`s.
+    """Return ((N,) `uniforms.LIGHT` records, (3,) ambient radiance) of `viewport_shading.StudioLight`s.
 
     A diffuse surface of albedo 1 that faces a light has its diffuse color as radiance: the irradiance is pi times the
     color. A light with softness w reaches a surface at an angle a by max(cos(a) + w, 0) / (1 + w)², which has the total
@@ -65,16 +65,16 @@ class StudioImage:
         return next(iter(self.layers.values())).shape[1::-1]
 
     def panorama(self):
-        """The texture of the first layer, which repeats."""
+        """Return the texture of the first layer, which repeats."""
         return texture_cache.get((self, False), lambda: _texture(next(iter(self.layers.values())), "REPEAT"))
 
     def matcap(self):
-        """The texture of a matcap: its highlights above its diffuse light."""
+        """Return the texture of a matcap: its highlights above its diffuse light."""
         return texture_cache.get((self, True), lambda: _texture(_stacked(self.layers), "EXTEND"))
 
 
 def image_of(path):
-    """The `StudioImage` of a file. Raises `HairError` if it is missing."""
+    """Return the `StudioImage` of a file. Raises `HairError` if it is missing."""
     try:
         return StudioImage(path, Path(path).stat().st_mtime_ns)
     except OSError as error:

@@ -44,7 +44,8 @@ def shade(surface, parts, first_triangle, view, lights, samplers, buffer, pictur
 
 
 def stride_over(count):
-    """The least stride, from the golden section of `count` on, that visits each of `count` rows once, wrapping around.
+    """Return the least stride, from the golden section of `count` on, that visits each of `count` rows once,
+    wrapping around.
 
     Consecutively visited rows are spread over all rows.
     """
@@ -74,7 +75,7 @@ def draw_data(surface, parts, view, lights, samplers, record):
 
 
 def _of_material(blocks, material):
-    """{sampler: texture} of a material; adds its block to `blocks`."""
+    """Return {sampler: texture} of a material; adds its block to `blocks`."""
     images = {name: _texture(getattr(material, name)) for name in surface_programs.SURFACE_IMAGES}
     blocks["surface"] = uniforms.uniform_buffer(_record(material, images))
     images = {name: white() if texture is None else texture for name, texture in images.items()}
@@ -97,7 +98,7 @@ def _texture(image_map):
 
 @texture_cache.keeping
 def white():
-    """A texture for samplers that are not read."""
+    """Return a texture for samplers that are not read."""
     return gpu.types.GPUTexture((1, 1), format="RGBA8")
 
 

@@ -114,7 +114,7 @@ class SurfaceOnGPU:
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     def bounds_of(self, first: int, count: int) -> np.ndarray:
-        """(2, 3) least and greatest coordinates of a range of corners."""
+        """Return (2, 3) least and greatest coordinates of a range of corners."""
         if (first, count) not in self._bounds:
             places = self.vertices[self.corners.vertices[first : first + count]]
             self._bounds[first, count] = np.stack([places.min(axis=0), places.max(axis=0)])
@@ -125,7 +125,7 @@ class SurfaceOnGPU:
         return {}
 
     def placed(self, view: np.ndarray) -> np.ndarray:
-        """A copy of a `uniforms.VIEW` record with the surface's transform and layout."""
+        """Return a copy of a `uniforms.VIEW` record with the surface's transform and layout."""
         record = view.copy()
         record["object_to_world"] = self.to_world.T
         record["row_strands"] = self.row_vertices
@@ -136,7 +136,7 @@ class SurfaceOnGPU:
 def upload_surface(
     vertices, triangles, normals=None, has_vertex_normals=True, uvs=None, colors=(), to_world=None, known=None
 ):
-    """(V, 3) float32 vertices and (3 F,) vertex indices of triangles → `SurfaceOnGPU`. Raises `HairError`.
+    """Return (V, 3) float32 vertices and (3 F,) vertex indices of triangles → `SurfaceOnGPU`. Raises `HairError`.
 
     normals: unit, (V, 3) of vertices, or without has_vertex_normals (3 F, 3) of corners, in the coordinates of
     vertices; None if only depth is drawn; to_world: (4, 4), None: vertices are in world space; uvs: (3 F, 2) or None;
@@ -162,7 +162,9 @@ def upload_surface(
 
 
 def packed_colors(colors):
-    """(N, 3) linear RGB → (N,) float32: square roots in eight bits each, as integers that are exact in floats."""
+    """Return (N, 3) linear RGB → (N,) float32: square roots in eight bits each, as integers that are exact in
+    floats.
+    """
     roots = np.rint(255.0 * np.sqrt(np.clip(colors, 0.0, 1.0)))
     return (roots @ np.array([65536.0, 256.0, 1.0])).astype(np.float32)
 
@@ -173,7 +175,9 @@ def _row_of(count):
 
 
 def _texture_of(vectors, known):
-    """A texture of (N, 3) float32 vectors, three texels each; known: (vectors, texture) to reuse if equal, or None."""
+    """Return a texture of (N, 3) float32 vectors, three texels each; known: (vectors, texture) to reuse if equal, or
+    None.
+    """
     if known is not None and known[0] is not None and np.array_equal(vectors, known[0]):
         return known[1]
     row = _row_of(len(vectors))

@@ -83,12 +83,14 @@ class VisibilityBuffer:
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
     def surfaces(self, background=_NOTHING):
-        """A context with the framebuffer of surfaces bound and cleared."""
+        """Return a context with the framebuffer of surfaces bound and cleared."""
         self._is_color_stale = self._is_numbered = False
         return drawing.cleared(self._surfaces, background)
 
     def hiding(self):
-        """A context with the framebuffer of surfaces that only occlude hair: only depths, `color` stays transparent."""
+        """Return a context with the framebuffer of surfaces that only occlude hair: only depths, `color` stays
+        transparent.
+        """
         self._is_color_stale, self._is_numbered = True, False
         return drawing.cleared(self._hiding, _NOTHING)
 
@@ -179,7 +181,7 @@ class VisibilityBuffer:
             self._is_color_stale = False
 
     def _placed(self, hair, lights, view):
-        """[_Placed] from the arguments of `find_hair`."""
+        """Return [_Placed] from the arguments of `find_hair`."""
         found, first = [], 0
         light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
         for index, (strands, shading, to_world, samplers, steps) in enumerate(hair):
@@ -225,11 +227,11 @@ class VisibilityBuffer:
         return self._parts[texture_format, background]
 
     def part(self, texture_format=scene_programs.PICTURE_FORMAT, background=_NOTHING):
-        """The texture of `surfaces_of_part`."""
+        """Return the texture of `surfaces_of_part`."""
         return self._part(texture_format, background)[1]
 
     def part_by(self, program, texture_format=scene_programs.PICTURE_FORMAT, inputs=None):
-        """The texture of `surfaces_of_part`, filled by a program where the last added hair is nearest.
+        """Return the texture of `surfaces_of_part`, filled by a program where the last added hair is nearest.
 
         inputs: for each hair ({instance: record}, {sampler: texture}) of the program besides the scene's.
         """
@@ -240,7 +242,7 @@ class VisibilityBuffer:
         return texture
 
     def part_of_light(self, lobes, world):
-        """A texture of a part of the light of the last added hair, premultiplied.
+        """Return a texture of a part of the light of the last added hair, premultiplied.
 
         lobes: (4,) factors of R, TT, TRT and all other light from lamps; world: factor of the world's light.
         """

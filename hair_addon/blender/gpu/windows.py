@@ -12,12 +12,12 @@ _IS_FAR = (
 
 
 def corners_of(bounds):
-    """(8, 3) corners of a box; bounds: (2, 3) least and greatest coordinates."""
+    """Return (8, 3) corners of a box; bounds: (2, 3) least and greatest coordinates."""
     return np.where(_IS_FAR, bounds[1], bounds[0])
 
 
 def of_box(bounds, to_clip, size, margin=1.0):
-    """The window of a box with (2, 3) bounds in a picture; size: (width, height) [samples].
+    """Return the window of a box with (2, 3) bounds in a picture; size: (width, height) [samples].
 
     to_clip: (4, 4) from the box's coordinates; margin: around the box [samples].
     """
@@ -26,7 +26,7 @@ def of_box(bounds, to_clip, size, margin=1.0):
 
 
 def of_strands(strands, record, size):
-    """The window of `StrandsOnGPU`; record: of `drawing.strand_record`; size: of the picture [samples]."""
+    """Return the window of `StrandsOnGPU`; record: of `drawing.strand_record`; size: of the picture [samples]."""
     clip = _corners_in_clip(strands.bounds, record["object_to_clip"].T)
     if clip is None:
         return 0, 0, *size
@@ -61,7 +61,7 @@ def drawn_in(window):
 
 
 def _around(clip, size, margin):
-    """The window around (4, 8) corners in clip space."""
+    """Return the window around (4, 8) corners in clip space."""
     places = (0.5 * clip[:2] / clip[3] + 0.5) * np.array(size)[:, None]
     low = np.clip(np.floor(places.min(axis=1) - margin), 0, size).astype(int)
     high = np.clip(np.ceil(places.max(axis=1) + margin), 0, size).astype(int)
@@ -69,7 +69,7 @@ def _around(clip, size, margin):
 
 
 def _corners_in_clip(bounds, to_clip):
-    """(4, 8) corners of a box in clip space; None if any part is behind the viewer."""
+    """Return (4, 8) corners of a box in clip space; None if any part is behind the viewer."""
     clip = np.asarray(to_clip, np.float64) @ np.append(corners_of(bounds), np.ones((8, 1)), axis=1).T
     return clip if (clip[2] + clip[3]).min() > 0.0 and clip[3].min() > 0.0 else None
 

@@ -31,7 +31,7 @@ class _ImageLight:
 
 
 def light_of(world):
-    """([`environment.Lobe`, ...], (6, 3) mean radiance of the sides) of a `lights.World`."""
+    """Return ([`environment.Lobe`, ...], (6, 3) mean radiance of the sides) of a `lights.World`."""
     if world.image is None:
         return [], np.broadcast_to(world.color, (6, 3))
     if isinstance(world.image, StudioImage):
@@ -55,7 +55,7 @@ def _light_of_studio(world):
 
 
 def picture_of(world):
-    """(H, W, 3) radiance of a `lights.World`, in the projection of core/imaging/environment.py."""
+    """Return (H, W, 3) radiance of a `lights.World`, in the projection of core/imaging/environment.py."""
     if world.image is None:
         return np.asarray(world.color, float).reshape(1, 1, 3)
     return _unrolled(world)
@@ -82,7 +82,7 @@ def draw_background(world, view, width, height):
 
 
 def _unrolled(world):
-    """(H, W, 3) radiance for `environment.split`."""
+    """Return (H, W, 3) radiance for `environment.split`."""
     width, height = 2 * _HEIGHT, _HEIGHT
     record = _record(world, width, height)
     record["taps"] = np.clip(-(-max(world.image.size) // width), 2, _MOST_TAPS)

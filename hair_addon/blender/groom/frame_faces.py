@@ -35,7 +35,7 @@ def note(surfaces: Collection[Object], depsgraph: Depsgraph) -> None:
 
 
 def differs_by_frame(datablock: Curves, surface: Surface) -> bool:
-    """Whether a surface differs from the one that Curves are rooted on because of the frame, not because of an edit."""
+    """Whether a surface differs from the surface that Curves are rooted on because of the frame, not of an edit."""
     return count_cache.get(_key(datablock)) == (len(surface.rest), len(surface.mesh.triangles))
 
 

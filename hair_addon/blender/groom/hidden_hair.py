@@ -100,7 +100,7 @@ def _show_others():
 
 
 def _users():
-    """{Curves: [objects]}, empty for Curves without objects."""
+    """Return {Curves: [objects]}, empty for Curves without objects."""
     found = defaultdict(list)
     for user in bpy.data.objects:
         if user.type == "CURVES":

@@ -419,7 +419,7 @@ def require_uncombed(target: Curves) -> None:
 
 
 def inputs_of(target: Curves) -> tuple[Curves, HairSettings]:
-    """(guide Curves, `HairSettings`) of a hair Curves datablock. Raises `HairError`."""
+    """Return (guide Curves, `HairSettings`) of a hair Curves datablock. Raises `HairError`."""
     state = target.vellus
     if state.guide_curves is None:
         raise HairError('"{name}" has no guides: pick them in the Strands panel.', name=name_of(target))

@@ -23,7 +23,7 @@ SETTING = "strands.strand_length"
 def read(
     hair: Curves | None, surface_object: Object | None, surface: Surface, styles: Sequence[StyleSettings]
 ) -> tuple[sources.Source | None, str]:
-    """(`Source` of the map of the length of hair, a sentence about a missing source); None without a map.
+    """Return (`Source` of the map of the length of hair, a sentence about a missing source); None without a map.
 
     hair: None if it is new; styles: of the hair.
     """

@@ -17,7 +17,7 @@ _FACTOR = Param("", low=0.0, high=1e3)
 
 
 def strands_of(hair: Curves, bound: BoundHair) -> sources.Strands:
-    """The `Strands` of bound hair, which may be unwritten, for its maps."""
+    """Return the `Strands` of bound hair, which may be unwritten, for its maps."""
     clumps = bound.styles.clumps
     identities, randoms = bound.binding.identities
     return sources.Strands(
@@ -32,7 +32,9 @@ def strands_of(hair: Curves, bound: BoundHair) -> sources.Strands:
 
 
 def read(hair: Curves, bound: BoundHair) -> tuple[np.ndarray | None, str]:
-    """(factors (S,) float32 of radii, a sentence about a missing source of the hair's maps); None without a map."""
+    """Return (factors (S,) float32 of radii, a sentence about a missing source of the hair's maps); None without a
+    map.
+    """
     item, status = map_items.item_of(hair.vellus, SETTING), bound.styles.read.map_status
     if item is None or not map_items.is_set(item):
         return None, status
@@ -43,7 +45,7 @@ def read(hair: Curves, bound: BoundHair) -> tuple[np.ndarray | None, str]:
 
 
 def factors(strands: sources.Strands, item: map_items.VellusMap) -> np.ndarray:
-    """(S,) float32 factors of the radii of strands by a map. Raises `HairError` if its source is missing."""
+    """Return (S,) float32 factors of the radii of strands by a map. Raises `HairError` if its source is missing."""
     settings, ramp = map_items.settings_of(item), ramps.map_samples(item, False)
     return sources.varied_numbers(strands, settings, item.image, 1.0, _FACTOR, ramp).astype(np.float32)
 

@@ -76,7 +76,7 @@ def _own_bytes():
 
 
 def share_of_free(byte_count: float) -> float:
-    """The fraction of the free memory that `byte_count` bytes take; 0 if free memory is unknown."""
+    """Return the fraction of the free memory that `byte_count` bytes take; 0 if free memory is unknown."""
     free = free_bytes()
     return 0.0 if free is None else byte_count / max(free, 1)
 

@@ -20,7 +20,7 @@ def say(sentence):
 
 
 def name_of(owner):
-    """The name of a datablock; a readable replacement if it is not valid UTF-8, as in a damaged file."""
+    """Return the name of a datablock; a readable replacement if it is not valid UTF-8, as in a damaged file."""
     try:
         return owner.name
     except UnicodeDecodeError:
@@ -28,7 +28,7 @@ def name_of(owner):
 
 
 def text_of(owner, name):
-    """A text property of data; empty if it is not valid UTF-8, as in a damaged file."""
+    """Return a text property of data; empty if it is not valid UTF-8, as in a damaged file."""
     try:
         return getattr(owner, name)
     except UnicodeDecodeError:

@@ -44,7 +44,7 @@ class OtherProcess:
             self._end()
 
     def complaint(self):
-        """The last line of its errors; empty if there is none."""
+        """Return the last line of its errors; empty if there is none."""
         lines = self._errors.read_text("utf-8", "replace").split("\n")
         return next((line.strip() for line in reversed(lines) if line.strip()), "")
 

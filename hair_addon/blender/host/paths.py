@@ -43,7 +43,8 @@ def names_other_computer(path):
 
 
 def from_open_file(library):
-    """The path of a `bpy.types.Library` relative to the open file's folder, so that a project can be moved as a whole.
+    """Return the path of a `bpy.types.Library` relative to the open file's folder, so that a project can be moved as
+    a whole.
 
     Absolute if the file was never saved or the library is on another drive.
     """
@@ -52,13 +53,13 @@ def from_open_file(library):
 
 
 def of_library(library):
-    """The file of a `bpy.types.Library` as an absolute `Path` with links of its folder resolved."""
+    """Return the file of a `bpy.types.Library` as an absolute `Path` with links of its folder resolved."""
     file = Path(bpy.path.abspath(library.filepath))
     return file.parent.resolve() / file.name
 
 
 def relative(path, folder):
-    """A path relative to a folder, with forward slashes; absolute if it is on another drive."""
+    """Return a path relative to a folder, with forward slashes; absolute if it is on another drive."""
     with contextlib.suppress(ValueError):
         path = os.path.relpath(path, folder)
     return Path(path).as_posix()

@@ -25,7 +25,7 @@ def is_rendering():
 
 
 def job():
-    """The `Job` that runs now, or None."""
+    """Return the `Job` that runs now, or None."""
     return _job
 
 

@@ -55,7 +55,7 @@ def _of_mac():
 
 @functools.cache
 def _host():
-    """The Mach host port; cached, as each call would create another right to it."""
+    """Return the Mach host port; cached, as each call would create another right to it."""
     return _library(None).mach_host_self()
 
 

@@ -136,7 +136,7 @@ class Pieces:
             self._chains = chain_armatures.new(read.name, joints, self._surface_object, read.surface, self._collection)
 
     def new_object(self, name, made, material, piece_count, vertices_across):
-        """A new mesh object of a `PolygonMesh` of equal pieces, with as many vertices across at each place."""
+        """Return a new mesh object of a `PolygonMesh` of equal pieces, with as many vertices across at each place."""
         if self._chains is None:
             local = self._read.local(made)
             mesh_object = made_meshes.new_object(name, local, self._surface_object, self._collection, material)

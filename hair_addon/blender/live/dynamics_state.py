@@ -83,7 +83,7 @@ def check_animation(guides, frame, blender_scene, depsgraph):
 
 
 def _changes(guides):
-    """{frame: changed part of the animation} of the current bake."""
+    """Return {frame: changed part of the animation} of the current bake."""
     baked, known = frame_folders.frames_of(guides), change_cache.get(guides.session_uid)
     if known is None or known[0] is not baked:
         known = change_cache.keep(guides.session_uid, (baked, {}))
@@ -91,12 +91,12 @@ def _changes(guides):
 
 
 def _first_change(guides):
-    """(frame, changed part of the animation) of the first changed frame that was shown, or None."""
+    """Return (frame, changed part of the animation) of the first changed frame that was shown, or None."""
     return min(_changes(guides).items(), default=None)
 
 
 def _inputs(guides, blender_scene):
-    """The inputs of `guide_baking.key_of`, which are fast to read."""
+    """Return the inputs of `guide_baking.key_of`, which are fast to read."""
     state, rate = guides.vellus, scene_time.animation_rate(blender_scene)
     units = blender_scene.unit_settings.scale_length
     parted = guide_regions.parting_keys(guides)

@@ -80,6 +80,6 @@ def _is_done():
 
 
 def _stamp():
-    """The file with the version of the add-on that was set up last."""
+    """Return the file with the version of the add-on that was set up last."""
     folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="setup", create=True)
     return Path(folder) / "version"

@@ -127,7 +127,7 @@ def after_depsgraph_update(scene, depsgraph):
 
 
 def _surfaces():
-    """The objects that strands grow on."""
+    """Return the objects that strands grow on."""
     return {datablock.surface for datablock in bpy.data.hair_curves} - {None}
 
 
@@ -140,7 +140,7 @@ def _is_only_carried(update, deformed):
 
 
 def _painted(reports):
-    """The mesh objects in a paint mode whose colors or weights may have changed."""
+    """Return the mesh objects in a paint mode whose colors or weights may have changed."""
     found = {o for o in updates.deformed(reports) if o.mode in {"WEIGHT_PAINT", "VERTEX_PAINT"}}
     if not any(report.is_of(bpy.types.Image) for report in reports):
         return found

@@ -87,7 +87,7 @@ def _record_after_pause():
 
 
 def with_layers():
-    """The guides of this file that have layers."""
+    """Return the guides of this file that have layers."""
     found = [c for c in bpy.data.hair_curves if c.vellus.kind == "GUIDES" and len(c.vellus.layers)]
     return [guides for guides in found if not attributes.is_from_library(guides)]
 

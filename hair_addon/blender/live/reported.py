@@ -39,12 +39,12 @@ def note_points(guide_curves, points):
 
 
 def former_points_of(guide_curves):
-    """(N, 3) local points of guides before they moved the last time, or None."""
+    """Return (N, 3) local points of guides before they moved the last time, or None."""
     return former_cache.get(guide_curves.session_uid)
 
 
 def points_of(guide_curves):
-    """(N, 3) local points of guides, as last read by `have_guides_moved`."""
+    """Return (N, 3) local points of guides, as last read by `have_guides_moved`."""
     return guide_cache.get(guide_curves.session_uid)
 
 
@@ -56,5 +56,5 @@ def remember_places():
 
 
 def place_before(datablock):
-    """The `Affine` of the surface of Curves at the last update, or None."""
+    """Return the `Affine` of the surface of Curves at the last update, or None."""
     return place_cache.get(datablock.session_uid)

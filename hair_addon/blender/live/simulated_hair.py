@@ -197,7 +197,7 @@ def _play(guides, blender_scene, depsgraph):
 
 
 def _played_now(guides):
-    """The `_Played` of guides in this session; None if the guides have changed, so that they begin again."""
+    """Return the `_Played` of guides in this session; None if the guides have changed, so that they begin again."""
     played = played_cache.get(guides.session_uid)
     settings = properties.dynamics_of(guides.vellus)
     if played is None or played.simulated.is_of(guides, settings):

@@ -160,7 +160,7 @@ def _parts_by(hair, changed, transformed):
 
 
 def images_of(target):
-    """The names of the images that mask guides or hair; hair does not include its guides' image."""
+    """Return the names of the images that mask guides or hair; hair does not include its guides' image."""
     state = target.vellus
     if state.kind == "GUIDES":
         return {text_of(state.guides, "density_image")} - {""}
@@ -180,7 +180,7 @@ def follow_images(target, depsgraph):
 
 
 def _mapped():
-    """The hair and guides whose settings vary by maps; combed guides do not change with their settings."""
+    """Return the hair and guides whose settings vary by maps; combed guides do not change with their settings."""
     found = [datablock for datablock in bpy.data.hair_curves if len(datablock.vellus.maps)]
     return [one for one in found if one.vellus.kind == "HAIR" or not curves.is_combed(one)]
 

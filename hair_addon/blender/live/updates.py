@@ -50,7 +50,7 @@ class _Present:
         self._depsgraph, self._known = depsgraph, {}
 
     def original_of(self, evaluated):
-        """The original of an evaluated datablock; None if it was deleted."""
+        """Return the original of an evaluated datablock; None if it was deleted."""
         name = _collection_of(type(evaluated))
         if name is None:
             return None
@@ -62,18 +62,18 @@ class _Present:
 
 @cache
 def _collection_of(kind):
-    """The name of the collection in `bpy.data` for datablocks of a type, or None."""
+    """Return the name of the collection in `bpy.data` for datablocks of a type, or None."""
     held = {p.fixed_type.identifier: p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"}
     return next((held[base.__name__] for base in kind.__mro__ if base.__name__ in held), None)
 
 
 def originals(updates: list[Update], is_geometry: bool = False, is_transform: bool = False) -> list[bpy.types.ID]:
-    """The datablocks reported with any of the given kinds of change."""
+    """Return the datablocks reported with any of the given kinds of change."""
     wanted = (u for u in updates if (is_geometry and u.is_geometry) or (is_transform and u.is_transform))
     return [update.datablock for update in wanted if update.datablock is not None]
 
 
 def deformed(updates: list[Update]) -> set[bpy.types.Object]:
-    """The mesh objects whose evaluated shape may have changed."""
+    """Return the mesh objects whose evaluated shape may have changed."""
     changed = (u.datablock for u in updates if u.is_geometry and u.is_of(bpy.types.Object) and u.datablock is not None)
     return {one for one in changed if one.type == "MESH"}

@@ -32,7 +32,7 @@ _LAYERED, _BEHIND, _UNSTRETCHED = 1.7, 0.4, 1.2
 
 
 def new_material(name, look, images=None):
-    """A new material of hair with a look; images: {map: image} of cards, None for a plain color."""
+    """Return a new material of hair with a look; images: {map: image} of cards, None for a plain color."""
     material = bpy.data.materials.new(name)
     color = (*appearance.mean_color(look), 1.0)
     material.diffuse_color = color
@@ -120,7 +120,7 @@ def _let_through(tree, shader, albedo, nodes):
 
 
 def _albedo(tree, color, forward, height):
-    """The socket of R / (R + (1 - t) (1 - R)² / 4) for a color's socket R."""
+    """Return the socket of R / (R + (1 - t) (1 - R)² / 4) for a color's socket R."""
     missing, square, total, albedo = (tree.nodes.new("ShaderNodeVectorMath") for _ in range(4))
     for column, node in enumerate((missing, square, total, albedo)):
         node.location = (-740.0 + 160.0 * column, height)

@@ -152,7 +152,7 @@ def _build(tree, wanted, links):
 
 
 def _values(variation, falloff):
-    """{node: {input: value}}: `strand_variation.strand_sigma_a` and `pigment.color_from_falloff`."""
+    """Return {node: {input: value}}: `strand_variation.strand_sigma_a` and `pigment.color_from_falloff`."""
     melanin, random_color = variation.melanin, variation.random_color
     return {
         "Factor": {1: 2.0 * random_color, 2: 1.0 - random_color},
@@ -192,5 +192,5 @@ def _output(node, key):
 
 
 def _by_identifier(sockets, key):
-    """A socket by its index or its identifier: disabled sockets cannot be looked up by name."""
+    """Return a socket by its index or its identifier: disabled sockets cannot be looked up by name."""
     return sockets[key] if isinstance(key, int) else next(socket for socket in sockets if socket.identifier == key)

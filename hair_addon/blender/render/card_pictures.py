@@ -45,7 +45,9 @@ class CardPicture:
         return [range(row, min(row + self._strip, self._size)) for row in range(0, self._size, self._strip)]
 
     def segments(self, rows, turn):
-        """((rows · PER_SIDE, size · PER_SIDE) visible segment in each sample of a pass, (2,) jitter of the samples)."""
+        """Return ((rows · PER_SIDE, size · PER_SIDE) visible segment in each sample of a pass, (2,) jitter of the
+        samples).
+        """
         tile = (0, rows.start * PER_SIDE, self._side, len(rows) * PER_SIDE)
         with drawing.ALONE:
             buffer = VisibilityBuffer(*tile[2:])

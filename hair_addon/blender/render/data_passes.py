@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Passes of data of what is nearest in each sample: position, mist, normal, and colors without light."""
+"""Passes of data of the nearest surface or strand in each sample: position, mist, normal, and colors without light."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ DENOISING = ("Noisy Image", "Denoising Albedo", "Denoising Normal")
 def draw(drawn, name, world_to_view, view, buffer):
     """Return a texture of a pass out of `KINDS` for the `VisibilityBuffer` that a `DrawnScene` was drawn into.
 
-    world_to_view: (4, 4) of the camera, without its lens. Mist is what it lets through; alpha is one in samples with
+    world_to_view: (4, 4) of the camera, without its lens. Mist is the fraction of light that it lets through; alpha is one in samples with
     hair or a surface other than holdouts.
     """
     record = _record(drawn.mist, name, world_to_view)
@@ -42,7 +42,7 @@ def draw(drawn, name, world_to_view, view, buffer):
 
 
 def _of_hair(record, root_uvs):
-    """({instance: record}, {sampler: texture}) of a hair; root_uvs: its texture, or None."""
+    """Return ({instance: record}, {sampler: texture}) of a hair; root_uvs: its texture, or None."""
     own = record.copy()
     own["has_uvs"] = root_uvs is not None
     return {"data": own}, {"root_uvs": root_uvs or surface_shading.white()}

@@ -163,13 +163,13 @@ def read(
 
 
 def _surface_uids(places):
-    """{session_uid} of the objects that hair grows on."""
+    """Return {session_uid} of the objects that hair grows on."""
     surfaces = {place.hair_object.data.surface for place in places} - {None}
     return {surface.session_uid for surface in surfaces}
 
 
 def relit(drawn, blender_scene, view_layer, depsgraph, light, maps=None, is_wide=False):
-    """A `DrawnScene` in a viewport with another light; light: a `viewport_shading.ViewportLight`.
+    """Return a `DrawnScene` in a viewport with another light; light: a `viewport_shading.ViewportLight`.
 
     maps: `ShadowMaps` that may be drawn again; is_wide: whether Vellus draws all of the viewport.
     """
@@ -183,7 +183,7 @@ def relit(drawn, blender_scene, view_layer, depsgraph, light, maps=None, is_wide
 
 
 def _world_of(light, blender_scene, view_layer, waits=False):
-    """The `World` of a viewport's light; waits: as of `lights.read_world`."""
+    """Return the `World` of a viewport's light; waits: as of `lights.read_world`."""
     if light.hdri is not None:
         return blender_lights.world_of_hdri(light.hdri)
     if light.has_world and light.kind == viewport_shading.SCENE:
@@ -192,7 +192,7 @@ def _world_of(light, blender_scene, view_layer, waits=False):
 
 
 def _lamps_of(light, depsgraph, for_render, world, hair_receivers):
-    """The `SceneLights` of a viewport's light and `World`."""
+    """Return the `SceneLights` of a viewport's light and `World`."""
     if light.kind != viewport_shading.SCENE:
         found, ambient = studio_lights.lamps_of(light.lights, light.has_highlights)
         return scene_lights.of_studio(found, world.color + ambient)
@@ -211,7 +211,9 @@ def _fit(maps, lamps, is_wide):
 
 
 def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
-    """A `DrawnScene` lit by `SceneLights`, with their shadow maps; are_made: whether a GPU makes or carries hair."""
+    """Return a `DrawnScene` lit by `SceneLights`, with their shadow maps; are_made: whether a GPU makes or carries
+    hair.
+    """
     placed, solid = _placed(drawn.hair), _blocking(drawn)
     hair_owners = [receiver.owner for receiver in hair_receivers]
     steps = _DRAFT_STEPS if is_draft and not are_made else _SHADOW_STEPS
@@ -224,7 +226,7 @@ def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
 
 
 def with_lamps(drawn, lamps):
-    """A `DrawnScene` of a render with other `SceneLights` that have its shadow maps."""
+    """Return a `DrawnScene` of a render with other `SceneLights` that have its shadow maps."""
     return _with_lamps(drawn, lamps, _hair_receivers(drawn.hair, [owner[1::-1] for owner in drawn.owners]))
 
 
@@ -236,7 +238,9 @@ def _with_lamps(drawn, lamps, hair_receivers):
 
 
 def _sphere_around_hair(drawn):
-    """(center, radius) of a sphere around all surfaces, or those near hair; None if maps of hair contain them all."""
+    """Return (center, radius) of a sphere around all surfaces, or those near hair; None if maps of hair contain them
+    all.
+    """
     surfaces = {*_blocking(drawn), *_receiving(drawn)}
     if not surfaces:
         return None
@@ -254,7 +258,9 @@ def _sphere_around_hair(drawn):
 
 
 def _hair_receivers(hair, owners):
-    """[`Receiver`] of hair; owners: (session UID of the instancer, or of the object, session UID of the object)."""
+    """Return [`Receiver`] of hair; owners: (session UID of the instancer, or of the object, session UID of the
+    object).
+    """
     return [
         scene_lights.Receiver(owner, scene_lights.places_of_hair(strands.points, to_world))
         for (strands, _shading, to_world, *_), owner in zip(hair, owners, strict=True)
@@ -302,7 +308,7 @@ _SURROUNDINGS = ("surfaces", "clear", "receivers", "surface_owners", "blockers")
 
 
 def _upload(meshes, is_shaded, has_paths):
-    """{name of `_SURROUNDINGS`: value} of `DrawnMesh`es.
+    """Return {name of `_SURROUNDINGS`: value} of `DrawnMesh`es.
 
     is_shaded: whether Vellus shades surfaces; has_paths: whether light paths may be traced against them.
     """
@@ -326,7 +332,7 @@ def _upload(meshes, is_shaded, has_paths):
 
 
 def _on_gpu(mesh):
-    """The `SurfaceOnGPU` of a `DrawnMesh`; unchanged data of the object's last `SurfaceOnGPU` is reused."""
+    """Return the `SurfaceOnGPU` of a `DrawnMesh`; unchanged data of the object's last `SurfaceOnGPU` is reused."""
     key, cache = (mesh.owner[0], mesh.is_clear), surface_textures.surface_cache
     return cache.keep(
         key,
@@ -348,12 +354,12 @@ def _placed(hair):
 
 
 def _blocking(drawn):
-    """[`SurfaceOnGPU`] that block light."""
+    """Return [`SurfaceOnGPU`] that block light."""
     return [blocker.surface for blocker in drawn.blockers]
 
 
 def _receiving(drawn):
-    """[`SurfaceOnGPU`] that are lit, in the order of `DrawnScene.surface_visibility`."""
+    """Return [`SurfaceOnGPU`] that are lit, in the order of `DrawnScene.surface_visibility`."""
     return [surface for surface, _parts in (*drawn.surfaces, *drawn.clear)]
 
 
@@ -406,7 +412,7 @@ def _read_rendered_hair(depsgraph, known, refused, noted):
 
 
 def _read_hair(places, viewport, refused, shown, depsgraph):
-    """(hair of a `DrawnScene`, the `HairPlace` of each) for all places whose hair can be drawn."""
+    """Return (hair of a `DrawnScene`, the `HairPlace` of each) for all places whose hair can be drawn."""
     hair, drawn_places = [], []
     for place in places:
         datablock = place.hair_object.data
@@ -429,7 +435,7 @@ def _read_hair(places, viewport, refused, shown, depsgraph):
 
 
 def _drawn_hair(hair_object, depsgraph, is_viewport, shown):
-    """(`StrandsOnGPU`, shading) of an object, as Blender evaluates it if an artist has added modifiers."""
+    """Return (`StrandsOnGPU`, shading) of an object, as Blender evaluates it if an artist has added modifiers."""
     is_modified, datablock = modified_hair.is_modified(hair_object), hair_object.data
     if is_modified:
         strands = modified_hair.strands_on_gpu(hair_object, depsgraph)

@@ -41,7 +41,7 @@ LOBES = {
 
 
 def channels_of(name):
-    """(names of channels, type) of a pass in Blender's terms."""
+    """Return (names of channels, type) of a pass in Blender's terms."""
     if mattes.is_matte(name):
         return ("RGBA", "COLOR") if name.startswith("Crypto") else ("X", "VALUE")
     return _CHANNELS.get(name, ("RGB", "COLOR"))
@@ -136,7 +136,7 @@ class Film:
         return self.pass_count * self._per_side**2
 
     def _picture(self, name, drawn, view, world_to_view):
-        """The samples of a pass, as a texture; world_to_view: of the camera without its lens."""
+        """Return the samples of a pass, as a texture; world_to_view: of the camera without its lens."""
         if name == "Combined":
             return self.samples.color
         if name in self.groups:
@@ -182,7 +182,7 @@ class Film:
             drawing.cover(program)
 
     def read(self):
-        """{pass: (height, width, channels) float32}, bottom row first: means over the samples, least depths.
+        """Return {pass: (height, width, channels) float32}, bottom row first: means over the samples, least depths.
 
         "Position" is that of the nearest sample, and as a fourth channel its distance, `FAR` without one.
         """
@@ -214,7 +214,7 @@ class Film:
 
 
 def _weights_texture(weights):
-    """A texture with two rows of weights, for x and for y."""
+    """Return a texture with two rows of weights, for x and for y."""
     texels = np.array(weights, np.float32)
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
     return gpu.types.GPUTexture(texels.shape[::-1], format="R32F", data=data)

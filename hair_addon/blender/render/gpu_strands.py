@@ -172,7 +172,7 @@ def are_equal(values: np.ndarray | None, others: np.ndarray | None) -> bool:
 
 
 def _followed(bound):
-    """(G, P, 3) guides that strands follow, to which styles may be applied."""
+    """Return (G, P, 3) guides that strands follow, to which styles may be applied."""
     styling = bound.styles.styling
     return (bound.guides if styling is None else styling.guides(bound.guides)).numpy()
 

@@ -78,7 +78,9 @@ def drawn_strands(datablock, is_viewport=True):
 
 
 def places_of(datablock):
-    """(root vertices, barycentric coordinates), each (S, 3), of the strands of `strands_on_gpu`; None without roots."""
+    """Return (root vertices, barycentric coordinates), each (S, 3), of the strands of `strands_on_gpu`; None without
+    roots.
+    """
     cached = _strands_of(datablock.session_uid)
     return cached and cached.places
 
@@ -145,7 +147,7 @@ def _carried(cached, pose, chosen=slice(None)):
 
 
 def _pose_of(surface_object):
-    """The `Pose` of a surface, None without a surface. Raises `HairError`."""
+    """Return the `Pose` of a surface, None without a surface. Raises `HairError`."""
     if surface_object is None:
         return None
     depsgraph = bpy.context.evaluated_depsgraph_get
@@ -162,7 +164,7 @@ def drawn_bytes(datablock):
 
 
 def note_of(datablock):
-    """The `HairError` about strands of a Curves datablock that viewports do not draw, or None."""
+    """Return the `HairError` about strands of a Curves datablock that viewports do not draw, or None."""
     cached = strand_cache.get(datablock.session_uid)
     return refused_strands.error_of(cached) or getattr(cached, "note", None)
 
@@ -224,7 +226,7 @@ def choose_makers():
 
 
 def _strands_of(session_uid):
-    """The `_CachedStrands` of a datablock; None if there are none or they were refused."""
+    """Return the `_CachedStrands` of a datablock; None if there are none or they were refused."""
     cached = strand_cache.get(session_uid)
     return None if isinstance(cached, Refused) else cached
 
@@ -309,7 +311,7 @@ def _read_shown(datablock):
 
 
 def _read(datablock, bound, shown):
-    """The current `_CachedStrands` of a datablock, or of its binding.
+    """Return the current `_CachedStrands` of a datablock, or of its binding.
 
     shown: the `BoundHair` whose points are used, which may lack the styles of `bound`.
     """
@@ -333,12 +335,14 @@ def _read(datablock, bound, shown):
 
 
 def _unwritten_looks(datablock, bound):
-    """The `StrandLooks` of bound hair that is not written yet."""
+    """Return the `StrandLooks` of bound hair that is not written yet."""
     return strand_maps.looks_of(datablock, strand_thickness.strands_of(datablock, bound))[0]
 
 
 def _radii_of(datablock, bound, count):
-    """(S, P) radii of bound hair; those of its datablock, which others may have changed, unless it has newer ones."""
+    """Return (S, P) radii of bound hair; those of its datablock, which others may have changed, unless it has newer
+    ones.
+    """
     radii = bound.radii
     shape = count, radii.shape[-1]
     if bound.is_written or bound.has_moved_only:
@@ -360,7 +364,8 @@ def _shown_strands(datablock):
 
 @memory_as_sentence()
 def shading_of(datablock, strands=None, is_neutral=False):
-    """The `Shading` of a hair Curves datablock, or a `MixedShading` if strands differ in wetness. Raises `HairError`.
+    """Return the `Shading` of a hair Curves datablock, or a `MixedShading` if strands differ in wetness. Raises
+    `HairError`.
 
     strands: its `StrandsOnGPU`; is_neutral: of strands to be tinted, in place of the look's color.
     """
@@ -400,7 +405,7 @@ def _shading_of_look(state, look, looks=None):
 
 
 def _shading_of_looks(state, look, variation, looks):
-    """The `Shading` of strands with `StrandLooks`."""
+    """Return the `Shading` of strands with `StrandLooks`."""
     some = strand_looks.sample_sigma_a(look, looks)
     if state.model == "KAJIYA_KAY":
         settings = appearance.kajiya_kay_strand_settings(look)
@@ -423,7 +428,7 @@ def _cached_shading(settings, make):
 
 
 def _tables(settings, folder):
-    """The tables of these settings: from the folder if its settings match, else from the cache, else baked."""
+    """Return the tables of these settings: from the folder if its settings match, else from the cache, else baked."""
     path = _usable(folder) if folder else None
     if path is not None and path.is_dir():
         tables = table_exr.read_tables(path)
@@ -436,7 +441,7 @@ def _tables(settings, folder):
 
 
 def _usable(folder):
-    """A folder in a file's settings as a `Path`; None, with a message, if nothing may be read from it."""
+    """Return a folder in a file's settings as a `Path`; None, with a message, if nothing may be read from it."""
     try:
         return paths.resolve(folder)
     except HairError as error:
@@ -445,7 +450,7 @@ def _usable(folder):
 
 
 def cache_folder():
-    """The user's folder of baked tables, shared by all files; None if Vellus does not run as an extension."""
+    """Return the user's folder of baked tables, shared by all files; None if Vellus does not run as an extension."""
     if not preferences.is_extension():
         return None  # run from a checkout
     # Empty if Blender could not create the folder, which it reports on the console.

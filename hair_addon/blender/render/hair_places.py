@@ -34,7 +34,7 @@ class _Instance:
 
 
 def hair_places(view_layer, viewport, instances):
-    """[`HairPlace`] of a view layer's visible hair and of instances from `read_instances`.
+    """Return [`HairPlace`] of a view layer's visible hair and of instances from `read_instances`.
 
     viewport: the 3D viewport whose visibility settings apply, None for those of renders.
     """

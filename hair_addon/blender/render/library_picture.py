@@ -31,7 +31,7 @@ _WORLD = (0.030, 0.033, 0.038, 1.0)
 
 
 def draw(hair_object: bpy.types.Object, points: np.ndarray) -> np.ndarray:
-    """(SIZE, SIZE, 4) float32, sRGB, bottom row first: hair, its surface and meshes parented to the surface.
+    """Return (SIZE, SIZE, 4) float32, sRGB, bottom row first: hair, its surface and meshes parented to the surface.
 
     points: (N, 3) [m] of the hair in the world. Raises `HairError` if nothing can be drawn.
     """

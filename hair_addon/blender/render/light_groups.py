@@ -23,7 +23,7 @@ def is_of_group(name):
 
 
 def lit(drawn, passes):
-    """{pass: `DrawnScene`} of each pass of a light group and of `REST`, without passes that have no light.
+    """Return {pass: `DrawnScene`} of each pass of a light group and of `REST`, without passes that have no light.
 
     passes: names, with groups in the order of the view layer.
     """
@@ -39,7 +39,7 @@ def _has_light(drawn):
 
 
 def _of_group(drawn, group):
-    """A `DrawnScene` with the light of one group, numbered as by `lights.group_of`."""
+    """Return a `DrawnScene` with the light of one group, numbered as by `lights.group_of`."""
     lamps, has_world = drawn.lamps, drawn.world.group == group
     record, rest = lamps.record.copy(), lamps.rest.copy()
     for lights in (record["light"], rest):
@@ -53,7 +53,7 @@ def _of_group(drawn, group):
 
 
 def fitted(groups, picture):
-    """{pass: (H, W, 3)} of groups, changed so that they sum to a picture (H, W, 3), if any of them has light.
+    """Return {pass: (H, W, 3)} of groups, changed so that they sum to a picture (H, W, 3), if any of them has light.
 
     Groups differ from the picture by the noise of paths and by rounding.
     """

@@ -31,7 +31,8 @@ def path_count(blender_scene, size):
 
 
 def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_progress):
-    """A `DrawnScene` whose hair is lit by `count` paths through a grid, for a view with these (4, 4) matrices.
+    """Return a `DrawnScene` whose hair is lit by `count` paths through a grid, for a view with these (4, 4)
+    matrices.
 
     Returns the scene unchanged, for dual scattering of all hair, if `count` is 0, no hair with an area is in view, no
     path starts in sight, hair is too large for its width, any light is linked, or any hair is not shaded by the
@@ -74,14 +75,15 @@ def obstacle(drawn):
 
 
 def strands_of(drawn):
-    """([`strand_grid.Strands`] of the hair of a `DrawnScene`, settings of all looks)."""
+    """Return ([`strand_grid.Strands`] of the hair of a `DrawnScene`, settings of all looks)."""
     fibres = [layer.fibre[0] for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers]
     firsts = np.cumsum([0, *(len(shading.layers) for _strands, shading, *_ in drawn.hair)])
     return [_strands_of(*hair[:3], first) for hair, first in zip(drawn.hair, firsts[:-1], strict=True)], fibres
 
 
 def lit_by(drawn, grid, textures, part=1.0, shift=0.0):
-    """A `DrawnScene` whose hair is lit by textures of `light_grid.upload`, one for each hair, over a `StrandGrid`.
+    """Return a `DrawnScene` whose hair is lit by textures of `light_grid.upload`, one for each hair, over a
+    `StrandGrid`.
 
     part: how much of this light replaces dual scattering, from 0 to 1; shift: (3,) motion of the hair since the grid
     was built [m].
@@ -97,7 +99,9 @@ def lit_by(drawn, grid, textures, part=1.0, shift=0.0):
 
 
 def window_of(hair, world_to_view, view_to_clip):
-    """(low, high) corners (2,) in clip space of the part of a picture that contains all hair; None if outside."""
+    """Return (low, high) corners (2,) in clip space of the part of a picture that contains all hair; None if
+    outside.
+    """
     world_to_clip = np.asarray(view_to_clip, float) @ np.asarray(world_to_view, float)
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in hair])
     box = centre + radius * (2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1.0)

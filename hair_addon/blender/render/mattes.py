@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mattes of objects, materials and assets: labels of what is nearest in each sample, and their names in Blender."""
+"""Mattes of objects, materials and assets: labels of the nearest objects in each sample, and their names in Blender."""
 
 from dataclasses import dataclass
 
@@ -106,7 +106,7 @@ class Labels:
         return arrays
 
     def _indices(self, mattes, kind):
-        """Return (H, W, 1) pass indices of what covers most of each pixel."""
+        """Return (H, W, 1) pass indices of the objects or materials that cover most of each pixel."""
         indices = np.zeros(max(self.things, default=0) + 1, np.float32)
         for label, thing in self.things.items():
             indices[label] = getattr(thing, kind)

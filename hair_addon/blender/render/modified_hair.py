@@ -32,7 +32,7 @@ def is_modified(hair_object: bpy.types.Object) -> bool:
 
 
 def strands_on_gpu(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> StrandsOnGPU:
-    """The evaluated strands of an object; only changes are uploaded.
+    """Return the evaluated strands of an object; only changes are uploaded.
 
     Raises `HairError` if modifiers leave no strands.
     """
@@ -51,7 +51,9 @@ def strands_on_gpu(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 
 
 def places(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple | None:
-    """(root vertices, barycentric coordinates), each (S, 3), of evaluated strands; None if modifiers drop them."""
+    """Return (root vertices, barycentric coordinates), each (S, 3), of evaluated strands; None if modifiers drop
+    them.
+    """
     return stored_roots.places(hair_object.evaluated_get(depsgraph).data, np.inf)
 
 

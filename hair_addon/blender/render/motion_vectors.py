@@ -47,7 +47,7 @@ def _is_unmoved(hair, other):
 
 
 def _combed(before, now):
-    """The `strand_textures.Moved` from one place of hair to the other; None unless it is the only change."""
+    """Return the `strand_textures.Moved` from one place of hair to the other; None unless it is the only change."""
     moved = now[3]
     is_next = moved is not None and moved.turn == 1 + (before[3].turn if before[3] else 0)
     return moved if is_next and before[0] is now[0] else None
@@ -63,7 +63,7 @@ class Motion:
     size: tuple
 
     def hair(self, owner):
-        """(record, samplers) of a hair; hair without a counterpart of the same shape has no motion."""
+        """Return (record, samplers) of a hair; hair without a counterpart of the same shape has no motion."""
         now = self.now.hair[owner]
         before, after = (other.hair.get(owner, now) for other in (self.before, self.after))
         before, after = (place if place[1] == now[1] else now for place in (before, after))
@@ -79,7 +79,7 @@ class Motion:
         return record, {**samplers, "moved_rows": rows, "moved_points": points}
 
     def surface(self, owner):
-        """(record, samplers) of a surface."""
+        """Return (record, samplers) of a surface."""
         now = self.now.surfaces[owner]
         before, after = (other.surfaces.get(owner, now) for other in (self.before, self.after))
         before, after = (place if place[1] == now[1] else now for place in (before, after))
@@ -126,7 +126,7 @@ def places(drawn, world_to_view, view_to_clip):
 
 
 def _unique(owners):
-    """[(owner, index among items with the same owner)]: unique keys, as an object may own several instances."""
+    """Return [(owner, index among items with the same owner)]: unique keys, as an object may own several instances."""
     counts = Counter()
     keys = []
     for owner in owners:

@@ -20,7 +20,7 @@ from . import drawn_scene, film, light_paths
 
 
 def draw_picture(settings, drawn=None, lens_passes=None):
-    """(height, width, 4) float32 of the context's scene: scene-linear, premultiplied, bottom row first.
+    """Return (height, width, 4) float32 of the context's scene: scene-linear, premultiplied, bottom row first.
 
     settings: `PictureSettings` without `FRAME_FIELDS`; drawn: the `DrawnScene` of the context's scene, None: read here;
     lens_passes: with depth of field, the minimum number of points on the lens, None: one for each sample. Raises

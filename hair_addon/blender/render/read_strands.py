@@ -85,7 +85,7 @@ def read_root_uvs(datablock: Any, is_sound: np.ndarray | None) -> np.ndarray | N
 
 
 def _are_sound(points, counts):
-    """(N,) bool: whether all points of a curve are valid; None if all are. points: (M, 3), curve after curve."""
+    """Return (N,) bool: whether all points of a curve are valid; None if all are. points: (M, 3), curve after curve."""
     flat = points.ravel()
     # A small sum of squares proves that all points are valid, in a tenth of the time.
     with np.errstate(over="ignore", invalid="ignore"):

@@ -35,5 +35,5 @@ def show_in_panels() -> None:
 
 
 def error_of(cached: object) -> HairError | None:
-    """The error of a value in `hair_cache.strand_cache`, or None."""
+    """Return the error of a value in `hair_cache.strand_cache`, or None."""
     return cached.error if isinstance(cached, Refused) else None

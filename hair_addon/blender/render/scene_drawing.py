@@ -157,7 +157,7 @@ def _draw_by_lights(drawn, view, fragment, is_left_out=None):
 
 
 def light_of(drawn, solid):
-    """(`uniforms.LIGHTS` records, {sampler: texture} dictionaries) of all solid, or all clear surfaces."""
+    """Return (`uniforms.LIGHTS` records, {sampler: texture} dictionaries) of all solid, or all clear surfaces."""
     count = len(drawn.surfaces)
     of_all = [drawn.lights] * len(drawn.surface_visibility) if drawn.surface_lights is None else drawn.surface_lights
     chosen = slice(count) if solid else slice(count, None)
@@ -192,7 +192,7 @@ _NEARER = 1e-5
 
 
 def _nearer(view):
-    """A view record in which everything is slightly nearer."""
+    """Return a view record in which everything is slightly nearer."""
     record = view.copy()
     record["world_to_clip"][:, 2] -= _NEARER * record["world_to_clip"][:, 3]  # transposed
     return record

@@ -53,7 +53,7 @@ def draw(drawn, camera, window, count, turn):
 
 
 def _samples(view_to_clip, window, count):
-    """((width, height) of a picture [samples], (left, bottom, width, height) of the window in it)."""
+    """Return ((width, height) of a picture [samples], (left, bottom, width, height) of the window in it)."""
     parts = 0.5 * (window[1] - window[0])
     aspect = abs(view_to_clip[1, 1] / view_to_clip[0, 0])
     height = (count / (parts[0] * parts[1] * aspect)) ** 0.5

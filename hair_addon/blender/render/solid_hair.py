@@ -35,7 +35,7 @@ def has_root_colors(shown):
 
 
 def strand_tints(shown, hair_object, depsgraph, strands, places):
-    """The texture of colors of `StrandsOnGPU` by their roots, or None; places: as of `root_colors.at_roots`."""
+    """Return the texture of colors of `StrandsOnGPU` by their roots, or None; places: as of `root_colors.at_roots`."""
     kind = shown.color.kind
     colors = root_colors.at_roots(hair_object, depsgraph, kind, places, strands.points[:, 0])
     if colors is None:
@@ -49,7 +49,7 @@ def strand_tints(shown, hair_object, depsgraph, strands, places):
 
 
 def shown_as(shading, shown, hair_object, tints=None):
-    """The `Shading` of an object's hair as a `ViewportShading` shows it; tints: from `strand_tints`.
+    """Return the `Shading` of an object's hair as a `ViewportShading` shows it; tints: from `strand_tints`.
 
     Raises `HairError`.
     """

@@ -80,7 +80,7 @@ def _values(state):
 
 
 def _groups(state):
-    """{key in `_values`: property group}."""
+    """Return {key in `_values`: property group}."""
     groups = {name: getattr(state, name) for name in _GROUPS}
     return groups | {_key(item): style_items.group_of(item) for item in state.styles}
 

@@ -70,12 +70,12 @@ CLASSES = (VellusLayer,)
 
 
 def names_of(state):
-    """The names of layers, from bottom to top; state: `VellusCurves` of guides."""
+    """Return the names of layers, from bottom to top; state: `VellusCurves` of guides."""
     return tuple(text_of(item, "name") for item in state.layers)
 
 
 def identities_of(state):
-    """The identities of layers, from bottom to top, which their attributes are named by."""
+    """Return the identities of layers, from bottom to top, which their attributes are named by."""
     return tuple(item.identity for item in state.layers)
 
 
@@ -85,7 +85,7 @@ def active_of(state):
 
 
 def wanted(item):
-    """(weight, mask) that an item sets."""
+    """Return (weight, mask) that an item sets."""
     return (item.weight if item.is_on else 0.0), text_of(item, "mask")
 
 

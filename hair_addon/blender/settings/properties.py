@@ -391,7 +391,7 @@ def group_of(group_class):
 
 
 def only_files(pattern):
-    """The `filter_glob` property of a file browser."""
+    """Return the `filter_glob` property of a file browser."""
     return bpy.props.StringProperty(default=pattern, options={"HIDDEN"})
 
 
@@ -407,7 +407,9 @@ def hidden_text():
 
 
 def choice(name, description, labels, tooltips=None):
-    """An enumeration that is not a setting; labels: {identifier: label}; tooltips: {identifier: tooltip}, or None."""
+    """Return an enumeration that is not a setting; labels: {identifier: label}; tooltips: {identifier: tooltip}, or
+    None.
+    """
     items = [(identifier, label, (tooltips or {}).get(identifier, "")) for identifier, label in labels.items()]
     return bpy.props.EnumProperty(name=name, description=description, items=items, translation_context=CONTEXT)
 
@@ -430,12 +432,12 @@ def _mesh_names(_owner, context, typed):
 
 
 def switch(name, description, default):
-    """A boolean that is not a setting."""
+    """Return a boolean that is not a setting."""
     return bpy.props.BoolProperty(name=name, description=description, default=default, translation_context=CONTEXT)
 
 
 def count(name, description, default):
-    """A positive integer that is not a setting."""
+    """Return a positive integer that is not a setting."""
     return bpy.props.IntProperty(
         name=name, description=description, default=default, min=1, soft_max=100, translation_context=CONTEXT
     )

@@ -86,7 +86,7 @@ def _coarse_property(name, details):
 
 
 def _diameter_property(radius, name, description, details, update):
-    """A radius shown as a diameter in millimeters, independent of the scene's units."""
+    """Return a radius shown as a diameter in millimeters, independent of the scene's units."""
     low, high = (_millimeters_of(limit) for limit in (_limits(details, False)["min"], details.high))
     common = {"name": _title(label_of(name, details)), "description": description, "translation_context": CONTEXT}
     common |= {"unit": "CAMERA", "min": low, "max": high, "soft_max": 1e3, "step": 1, "precision": 3}
@@ -124,7 +124,7 @@ def _unit_length():
 
 
 def _title(label):
-    """A label in Blender's title case: Melanin Redness, IOR, Samples per Side."""
+    """Return a label in Blender's title case: Melanin Redness, IOR, Samples per Side."""
     return " ".join(word if word in _SMALL_WORDS else word[:1].upper() + word[1:] for word in label.split())
 
 
@@ -241,7 +241,7 @@ def assign(owner, settings, skip=(), fits=()):
 
 
 def values_of(owner, names):
-    """{name: value} of an operator's or group's properties, for comparison."""
+    """Return {name: value} of an operator's or group's properties, for comparison."""
     values = {name: text_of(owner, name) for name in names}  # any value may be text
     return {n: value[:] if isinstance(value, bpy.types.bpy_prop_array) else value for n, value in values.items()}
 

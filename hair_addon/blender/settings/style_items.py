@@ -60,22 +60,22 @@ CLASSES = (*_GROUPS.values(), VellusStyle)
 
 
 def group_of(item):
-    """The property group with an item's settings."""
+    """Return the property group with an item's settings."""
     return getattr(item, item.kind.lower())
 
 
 def settings_of(item):
-    """The `StyleSettings` of an item. Raises `HairError`."""
+    """Return the `StyleSettings` of an item. Raises `HairError`."""
     return setting_properties.to_settings(group_of(item), KINDS[item.kind])
 
 
 def styles_of(state):
-    """The `StyleSettings` of a hair's styles in order, disabled ones too; state: its `VellusCurves`."""
+    """Return the `StyleSettings` of a hair's styles in order, disabled ones too; state: its `VellusCurves`."""
     return tuple(settings_of(item) for item in state.styles)
 
 
 def names_of(state):
-    """The names of a hair's styles in order."""
+    """Return the names of a hair's styles in order."""
     return tuple(text_of(item, "name") for item in state.styles)
 
 
@@ -102,7 +102,7 @@ def active_of(state):
 
 
 def wetness_of(state):
-    """The amount of the wettest enabled style, from 0 to 1."""
+    """Return the amount of the wettest enabled style, from 0 to 1."""
     return max((item.wet.amount for item in state.styles if item.kind == "WET" and item.wet.is_on), default=0.0)
 
 
@@ -235,5 +235,5 @@ def _follow(state, names, order):
 
 
 def values_of(item):
-    """{name: value} of an item's settings, for comparison."""
+    """Return {name: value} of an item's settings, for comparison."""
     return setting_properties.values_of(group_of(item), [name for name, *_ in declared(KINDS[item.kind])])

@@ -56,7 +56,7 @@ class View:
         self._picture = hair_picture.HairPicture(size, per_side)
 
     def turned(self, angle):
-        """The camera, turned around the world's Z axis."""
+        """Return the camera, turned around the world's Z axis."""
         turn = np.eye(4)
         turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
         return self.camera[0] @ turn, self.camera[1]
@@ -79,7 +79,7 @@ class View:
 
 
 def differences(picture, other):
-    """(mean of pixels, mean of blocks of 12 × 12) differences, as parts of the mean light."""
+    """Return (mean of pixels, mean of blocks of 12 × 12) differences, as parts of the mean light."""
     scale, side = other.mean(), 12
     change = picture - other
     height, width = (length // side * side for length in change.shape[:2])

@@ -30,7 +30,7 @@ def make(kind, hair, **settings):
 
 
 def places(mesh_object):
-    """(V, 3) evaluated vertices in the world."""
+    """Return (V, 3) evaluated vertices in the world."""
     update()
     mesh = mesh_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     found = np.empty((len(mesh.vertices), 3), np.float32)
@@ -84,7 +84,7 @@ def test_bones_move_tips_and_leave_roots(hair, kind):
 
 
 def rig(sphere):
-    """An armature with a bone that moves the lower half and one that moves the rest."""
+    """Return an armature with a bone that moves the lower half and one that moves the rest."""
     armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.scene.collection.objects.link(armature)
     bpy.context.view_layer.objects.active = armature

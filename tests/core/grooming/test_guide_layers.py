@@ -86,7 +86,7 @@ def test_any_layer_can_be_recorded_below_others(combed, active):
 
 
 def _turns(axes_and_angles):
-    """(..., 3, 3) matrices of rotation vectors (..., 3)."""
+    """Return (..., 3, 3) matrices of rotation vectors (..., 3)."""
     angles = np.linalg.norm(axes_and_angles, axis=-1)[..., None, None]
     x, y, z = np.moveaxis(axes_and_angles / np.where(angles[..., 0] > 0.0, angles[..., 0], 1.0), -1, 0)
     zero = np.zeros_like(x)
@@ -95,7 +95,7 @@ def _turns(axes_and_angles):
 
 
 def _composed_in_double_precision(layers):
-    """(N, 3): the formula of guide_layers.py, guide by guide."""
+    """Return (N, 3): the formula of guide_layers.py, guide by guide."""
     sines = np.linalg.norm(layers.turns[..., 1:].astype(np.float64), axis=-1)
     angles = 2.0 * np.arctan2(sines, layers.turns[..., 0]) / np.where(sines > 0.0, sines, 1.0)
     found = layers.base.astype(np.float64)

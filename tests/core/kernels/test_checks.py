@@ -32,7 +32,7 @@ def vectors(*shape):
 
 @pytest.fixture(scope="module")
 def groomed():
-    """(guides, binding) on the square."""
+    """Return (guides, binding) on the square."""
     guides = groom.distribute_guides(SQUARE, GuideSettings(guide_count=12, length=0.2), device=DEVICE)
     return guides, groom.bind_hair(SQUARE, guides, HairSettings(strand_count=50), device=DEVICE)
 

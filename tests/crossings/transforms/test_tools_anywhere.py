@@ -40,7 +40,7 @@ def _add_cutter(body):
 
 
 def after_tool(path, tool, values, is_applied):
-    """Return what is seen after a tool in a file."""
+    """Return the visible hair and surface after a tool in a file."""
     bpy.ops.wm.read_homefile(filepath=path)
     bpy.context.view_layer.update()
     size = placed_hair.world_scale(bpy.data.objects["Body"])

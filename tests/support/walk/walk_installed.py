@@ -147,7 +147,7 @@ def _draw_coarse_shadows():
 
 
 def _examples(api):
-    """The doctests of the functions of `api`, file by file."""
+    """Yield the doctests of the functions of `api`, file by file."""
     modules = [importlib.import_module(f"{api.__name__}.{name}") for name in API_FILES]
     for module in modules:
         found = doctest.DocTestFinder(exclude_empty=True).find(module, "api")

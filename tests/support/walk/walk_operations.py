@@ -49,7 +49,7 @@ GUIDE_TOOLS += ["smooth_guides", "lift_guides", "attract_guides", "push_outside"
 
 
 class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
-    """An artist; the state is Blender's own."""
+    """An artist whose state is Blender's own data."""
 
     def __init__(self):
         super().__init__()

@@ -104,7 +104,7 @@ def style(hair):
 
 
 def drawn_line():
-    """A line beside the sphere's pole."""
+    """Return a line beside the sphere's pole."""
     curve = bpy.data.curves.new("QQQQline", "CURVE")
     curve.dimensions = "3D"
     curve.splines.new("POLY").points.add(1)

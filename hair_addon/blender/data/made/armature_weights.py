@@ -12,7 +12,7 @@ _LEAST = 1e-4  # smaller weights are ignored
 
 
 def armatures_of(mesh_object):
-    """The Armature modifiers of a mesh object that deform it by vertex groups."""
+    """Return the Armature modifiers of a mesh object that deform it by vertex groups."""
     return [m for m in mesh_object.modifiers if m.type == "ARMATURE" and m.object and m.use_vertex_groups]
 
 
@@ -39,7 +39,8 @@ def bind(mesh_object, surface_object, piece_size):
 
 
 def strongest_bone(surface_object, places):
-    """(armature object, bone name) that move a surface most at places (N, 3), or (None, "") without an armature.
+    """Return (armature object, bone name) that move a surface most at places (N, 3), or (None, "") without an
+    armature.
 
     places: around the surface's origin, in world axes.
     """
@@ -58,7 +59,7 @@ def _bone_names(surface_object):
 
 
 def _weights_at(places, surface_object, names):
-    """(N, K) weights of the surface nearest to local places (N, 3); each row sums to one or is zero."""
+    """Return (N, K) weights of the surface nearest to local places (N, 3); each row sums to one or is zero."""
     depsgraph = scene.present_depsgraph()
     surface = scene.read_surface(surface_object, depsgraph)
     weights = np.stack([scene.read_vertex_group(surface_object, depsgraph, name) for name in names], axis=1)
@@ -81,7 +82,7 @@ def _add(mesh_object, names, weights, piece_size, modifiers):
 
 
 def _poses(places, weights, names, mesh_object, surface_object):
-    """(N, 4, 3) rows x, y, z and origin of the pose's affine map of each piece, measured with four points."""
+    """Return (N, 4, 3) rows x, y, z and origin of the pose's affine map of each piece, measured with four points."""
     span = max(float(np.ptp(places, axis=0).max()), *surface_object.dimensions, 1e-6)
     corners = np.concatenate([span * np.eye(3), np.zeros((1, 3))]).astype(np.float32)
     probe = bpy.data.meshes.new("Probe")

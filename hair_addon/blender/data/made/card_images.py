@@ -12,7 +12,9 @@ from ...host.notices import name_of
 
 
 def new_images(name, maps):
-    """{map: image} of `texels.maps`, neither packed nor saved; "color" includes alpha. name: prefix of image names."""
+    """Return {map: image} of `texels.maps`, neither packed nor saved; "color" includes alpha. name: prefix of image
+    names.
+    """
     pixels = {"color": np.dstack([texels.srgb(maps["color"]), maps["alpha"]])}
     pixels |= {kind: maps[kind] for kind in texels.MAPS if kind != "color"}
     return {kind: _new_image(f"{name} {kind}", kind, values) for kind, values in pixels.items()}
@@ -39,7 +41,7 @@ def files_of_others(name, folder):
 
 
 def _new_image(name, kind, values):
-    """A new image with 8 bits per channel of (n, n), (n, n, 3) or (n, n, 4) values from 0 to 1."""
+    """Return a new image with 8 bits per channel of (n, n), (n, n, 3) or (n, n, 4) values from 0 to 1."""
     size = len(values)
     image = bpy.data.images.new(name, size, size, alpha=kind == "color")
     image.file_format = "PNG"

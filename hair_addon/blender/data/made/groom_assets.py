@@ -12,7 +12,7 @@ _UV_MAP = "UVMap"
 
 
 def surface_object(name, mesh, corner_uvs, masks):
-    """A new mesh object of a `TriMesh`, not linked to a scene.
+    """Return a new mesh object of a `TriMesh`, not linked to a scene.
 
     corner_uvs: (F, 3, 2), None for no UV map; masks: {name: (V,) weights}, which become vertex groups.
     """
@@ -28,7 +28,7 @@ def surface_object(name, mesh, corner_uvs, masks):
 
 
 def read_surface(owner):
-    """(`TriMesh`, (F, 3, 2) UV coordinates of corners or None) of a mesh object, without its modifiers."""
+    """Return (`TriMesh`, (F, 3, 2) UV coordinates of corners or None) of a mesh object, without its modifiers."""
     mesh = owner.data
     faces = scene.faces_of(mesh)
     corners = scene.triangle_corners(mesh, faces, name_of(owner))
@@ -48,7 +48,7 @@ def set_picture(datablock, pixels):
 
 
 def read_picture(datablock):
-    """(height, width, 4) float32 of a datablock's preview, or None."""
+    """Return (height, width, 4) float32 of a datablock's preview, or None."""
     preview = datablock.preview
     if preview is None or not all(preview.image_size):
         return None
@@ -59,7 +59,7 @@ def read_picture(datablock):
 
 
 def read_pixels(image):
-    """(height, width, 4) float32 of an image with an alpha channel, bottom row first."""
+    """Return (height, width, 4) float32 of an image with an alpha channel, bottom row first."""
     width, height = image.size
     pixels = np.empty((height, width, image.channels), np.float32)
     image.pixels.foreach_get(pixels.ravel())

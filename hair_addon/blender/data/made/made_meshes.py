@@ -10,14 +10,14 @@ UV_MAP = "UVMap"
 
 
 def new_collection(name, surface_object):
-    """A new collection in the collection of a surface."""
+    """Return a new collection in the collection of a surface."""
     collection = bpy.data.collections.new(name)
     surface_collections.collection_of(surface_object).children.link(collection)
     return collection
 
 
 def new_object(name, source, surface_object, collection, material):
-    """A new mesh object of a `PolygonMesh` in a surface's local coordinates, a child of the surface."""
+    """Return a new mesh object of a `PolygonMesh` in a surface's local coordinates, a child of the surface."""
     mesh = bpy.data.meshes.new(name)
     faces = source.faces
     mesh.vertices.add(len(source.vertices))

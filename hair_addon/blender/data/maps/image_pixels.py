@@ -32,7 +32,7 @@ converted_cache = Cache(capacity=4)
 
 
 def read(image, is_color):
-    """{UDIM tile, or None without tiles: (H, W, C) float32 masks or colors of an image}. Raises `HairError`."""
+    """Return {UDIM tile, or None without tiles: (H, W, C) float32 masks or colors of an image}. Raises `HairError`."""
     if image.source != "TILED" and _may_be_painted(image):
         return {None: _pixels_of(image, image, is_color, is_painted=True)}
     key, digest = (image.session_uid, is_color), _digest(image)

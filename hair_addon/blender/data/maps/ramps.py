@@ -12,12 +12,12 @@ SAMPLES = 256
 
 
 def new_ramp(name, end):
-    """A new node group whose curve decreases linearly from 1 at the root to `end` at the tip."""
+    """Return a new node group whose curve decreases linearly from 1 at the root to `end` at the tip."""
     return ramp_nodes.new_tree(name, f"0:1 1:{end}")
 
 
 def samples(tree) -> np.ndarray | None:
-    """(`SAMPLES`,) float32 values of the curve of a node group, in [0, 1]; None without a curve."""
+    """Return (`SAMPLES`,) float32 values of the curve of a node group, in [0, 1]; None without a curve."""
     node = node_of(tree)
     if node is None or ramp_nodes.is_color(node):
         return None
@@ -28,7 +28,9 @@ def samples(tree) -> np.ndarray | None:
 
 
 def map_samples(item, is_color: bool) -> np.ndarray | None:
-    """(`SAMPLES`, 1) of the curve of a map, or (`SAMPLES`, 4) colors multiplied by alpha; None without such a ramp."""
+    """Return (`SAMPLES`, 1) of the curve of a map, or (`SAMPLES`, 4) colors multiplied by alpha; None without such a
+    ramp.
+    """
     node = node_of(item.ramp_tree)
     if node is None or ramp_nodes.is_color(node) != is_color:
         return None

@@ -40,7 +40,7 @@ class Strands:
 
 
 def stored_strands(hair):
-    """The `Strands` of hair Curves as they are stored. Raises `HairError`."""
+    """Return the `Strands` of hair Curves as they are stored. Raises `HairError`."""
     surface, roots = None, None
     if hair.surface is not None:
         surface = scene.read_surface(hair.surface, scene.last_depsgraph())
@@ -83,7 +83,7 @@ class Source:
         return how if self.ramp is None else replace(how, is_inverted=False)
 
     def values(self, roots, identities: np.ndarray, clumps: np.ndarray | None) -> np.ndarray:
-        """(S, 1) masks or (S, 4) colors with alpha of strands; NaN where the map has none.
+        """Return (S, 1) masks or (S, 4) colors with alpha of strands; NaN where the map has none.
 
         roots, identities, clumps: as of `Strands`.
         """
@@ -138,7 +138,7 @@ class Source:
 
 
 def masks(strands: Strands, settings: MapSettings, image) -> np.ndarray:
-    """(S,) float32 masks of a map; NaN where it has no value. Raises `HairError` if its source is missing.
+    """Return (S,) float32 masks of a map; NaN where it has no value. Raises `HairError` if its source is missing.
 
     image: of a map of the kind IMAGE.
     """
@@ -148,7 +148,7 @@ def masks(strands: Strands, settings: MapSettings, image) -> np.ndarray:
 def varied_numbers(
     strands: Strands, settings: MapSettings, image, value: float, details: Param, ramp: np.ndarray | None = None
 ) -> np.ndarray:
-    """(S,) float64 of a setting with a value by its map. Raises `HairError` if the source is missing.
+    """Return (S,) float64 of a setting with a value by its map. Raises `HairError` if the source is missing.
 
     ramp: (N, 1) of `ramps.map_samples`.
     """
@@ -159,13 +159,13 @@ def varied_numbers(
 def varied_colors(
     strands: Strands, settings: MapSettings, image, value: tuple, details: Param, ramp: np.ndarray | None = None
 ) -> np.ndarray:
-    """(S, 3) float64 of a color by its map, as `varied_numbers`; ramp: (N, 4)."""
+    """Return (S, 3) float64 of a color by its map, as `varied_numbers`; ramp: (N, 4)."""
     found, how = _of_strands(strands, settings, image, ramp is None, ramp)
     return combination.varied_color(value, *pixels.unpremultiplied(found), how, details)
 
 
 def _of_strands(strands, settings, image, is_color=False, ramp=None):
-    """(values of strands, their `Combination`)."""
+    """Return (values of strands, their `Combination`)."""
     if settings.kind == "CLUMP" and strands.clumps is None:
         raise HairError("There are no clumps for a random map: add the style Clump.")
     if settings.kind in _ON_SURFACE and strands.roots is None:
@@ -181,7 +181,9 @@ _ON_SURFACE = ("IMAGE", "GROUP", "ATTRIBUTE")
 
 
 def read(hair, surface_object, surface, settings: MapSettings, image, is_color=False, ramp=None) -> Source:
-    """The `Source` of a map of hair Curves on the `Surface` of an object. Raises `HairError` if it is missing."""
+    """Return the `Source` of a map of hair Curves on the `Surface` of an object. Raises `HairError` if it is
+    missing.
+    """
     found = _read(hair, surface_object, surface, settings, image, is_color)
     return found if ramp is None else replace(found, ramp=ramp)
 
@@ -242,7 +244,7 @@ texel_cache = Cache(capacity=16)
 
 
 def _corner_uvs(surface_object, surface, name):
-    """(F, 3, 2) float32 of a UV map by name; empty: the active UV map."""
+    """Return (F, 3, 2) float32 of a UV map by name; empty: the active UV map."""
     if not name or name == surface.uv_map:
         if surface.corner_uvs is None:
             raise HairError('"{name}" has no UV map for the images of its hair: create one.', name=surface.name)
@@ -254,7 +256,7 @@ def _corner_uvs(surface_object, surface, name):
 
 
 def _of_group(surface_object, surface, name):
-    """(F, 3, 1) float32 weights of a vertex group."""
+    """Return (F, 3, 1) float32 weights of a vertex group."""
     if surface_object.vertex_groups.get(name) is None:
         sentence = '"{name}" has no vertex group "{group}": pick another group.'
         raise HairError(sentence, name=surface.name, group=name)
@@ -272,7 +274,7 @@ def _of_attribute(surface_object, surface, name):
 
 
 def _of_curves(hair, name):
-    """(S, C) of an attribute of hair Curves; on points, its values at the roots."""
+    """Return (S, C) of an attribute of hair Curves; on points, its values at the roots."""
     attribute = hair.attributes.get(name)
     if attribute is None or attribute.data_type not in attributes.LAYOUTS:
         sentence = '"{name}" has no attribute "{attribute}" of numbers or colors: pick another attribute.'
@@ -289,7 +291,7 @@ def _values(attribute):
 
 
 def _corner_values(surface_object, surface, name):
-    """(F, 3, C) float32 at the corners of triangles of an attribute on any domain; None without it."""
+    """Return (F, 3, C) float32 at the corners of triangles of an attribute on any domain; None without it."""
     depsgraph = scene.last_depsgraph()
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
@@ -306,7 +308,7 @@ def _corner_values(surface_object, surface, name):
 
 
 def _of_edges(mesh, values):
-    """(V, C) means of the edges at each vertex."""
+    """Return (V, C) means of the edges at each vertex."""
     ends = np.empty(2 * len(mesh.edges), np.int32)
     mesh.edges.foreach_get("vertices", ends)
     found = np.zeros((len(mesh.vertices), values.shape[1]))

@@ -28,7 +28,7 @@ def has_looks(state) -> bool:
 
 
 def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLooks | None, list[HairError]]:
-    """(`StrandLooks` of hair Curves, errors about missing sources); None without maps of the look.
+    """Return (`StrandLooks` of hair Curves, errors about missing sources); None without maps of the look.
 
     strands: that the looks are for; None: those that are stored. A setting with a missing source keeps its value.
     """
@@ -52,7 +52,7 @@ def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLook
 
 
 def _varied(strands, item, value):
-    """(S,) or (S, 3) of a setting by its map."""
+    """Return (S,) or (S, 3) of a setting by its map."""
     settings, details = map_items.settings_of(item), varied_settings.all_varied()[item.setting][1]
     is_color = varied_settings.is_color(item.setting)
     vary = sources.varied_colors if is_color else sources.varied_numbers
@@ -78,7 +78,9 @@ def has(hair) -> bool:
 
 
 def read_looks(hair) -> StrandLooks | None:
-    """The stored `StrandLooks` of Curves, possibly evaluated or linked; None without them. Invalid values are 0."""
+    """Return the stored `StrandLooks` of Curves, possibly evaluated or linked; None without them. Invalid values are
+    0.
+    """
     if not has(hair):
         return None
     found = [attributes.read(hair, name, data_type, "CURVE") for name, data_type in _LAYOUT]

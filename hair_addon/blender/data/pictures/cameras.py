@@ -12,7 +12,7 @@ _LEAST = 1e-5  # minimum of an f-stop and of a distance [m], as in Blender
 
 
 def read_lens(scene, depsgraph, camera=None):
-    """The `Lens` of a camera, by default the scene's; None if everything is in focus."""
+    """Return the `Lens` of a camera, by default the scene's; None if everything is in focus."""
     camera = camera or scene.camera
     if camera is None or camera.type != "CAMERA" or not camera.data.dof.use_dof or camera.data.type == "PANO":
         return None
@@ -49,7 +49,7 @@ def is_panoramic(camera):
 
 
 def read_panorama(blender_scene, camera, size, shift_x=None):
-    """The `Panorama` of an evaluated camera for a picture of this size [pixels]; None if it is not panoramic.
+    """Return the `Panorama` of an evaluated camera for a picture of this size [pixels]; None if it is not panoramic.
 
     shift_x: replaces the camera's value. Raises `HairError`.
     """
@@ -75,7 +75,7 @@ def read_panorama(blender_scene, camera, size, shift_x=None):
 
 
 def _sensor(data, render, size):
-    """(width, height) [mm] of the visible part of the sensor, fitted as in Cycles."""
+    """Return (width, height) [mm] of the visible part of the sensor, fitted as in Cycles."""
     width, height = size[0] * render.pixel_aspect_x, size[1] * render.pixel_aspect_y
     is_horizontal = data.sensor_fit == "HORIZONTAL" or (data.sensor_fit == "AUTO" and width > height)
     length = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
@@ -83,14 +83,14 @@ def _sensor(data, render, size):
 
 
 def _cylinder(data):
-    """(u_min, u_max) angles [rad] and (v_min, v_max) heights divided by the radius."""
+    """Return (u_min, u_max) angles [rad] and (v_min, v_max) heights divided by the radius."""
     radius = max(data.central_cylindrical_radius, 1e-9)
     heights = data.central_cylindrical_range_v_min / radius, data.central_cylindrical_range_v_max / radius
     return (data.central_cylindrical_range_u_min, data.central_cylindrical_range_u_max, *heights)
 
 
 def camera_of_view(blender_scene, camera, view):
-    """The camera of a view; also found in a scene's background set, where Blender does not search.
+    """Return the camera of a view; also found in a scene's background set, where Blender does not search.
 
     camera: the camera found by Blender.
     """

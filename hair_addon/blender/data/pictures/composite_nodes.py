@@ -105,7 +105,7 @@ def _is_hair(node):
 
 
 def _rendered(tree, blender_scene):
-    """The used Render Layers node of a scene; if there are several, the one of `_shown_layer`."""
+    """Return the used Render Layers node of a scene; if there are several, the one of `_shown_layer`."""
     layers = [n for n in tree.nodes if n.bl_idname == "CompositorNodeRLayers" and n.scene == blender_scene]
     used = [node for node in layers if node.outputs["Image"].links]
     if not used:
@@ -114,7 +114,7 @@ def _rendered(tree, blender_scene):
 
 
 def _shown_layer(blender_scene):
-    """The name of the first view layer that is rendered, or of the first if none is."""
+    """Return the name of the first view layer that is rendered, or of the first if none is."""
     layers = blender_scene.view_layers
     return next((layer.name for layer in layers if layer.use), layers[0].name)
 
@@ -139,7 +139,7 @@ def _new_node(tree, name, rendered):
 
 
 def _input(node, key):
-    """A socket by its identifier or name: sockets of a Mix node share their names."""
+    """Return a socket by its identifier or name: sockets of a Mix node share their names."""
     return next(socket for socket in node.inputs if key in {socket.identifier, socket.name})
 
 

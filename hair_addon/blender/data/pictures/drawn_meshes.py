@@ -97,7 +97,8 @@ layout_cache = Cache(capacity=64)  # session_uid of a mesh object → `_Layout`
 
 
 def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=True, has_uvs=False):
-    """A `DrawnMesh` for every mesh, including instances, that a 3D viewport shows as a surface; None: a render.
+    """Return a `DrawnMesh` for every mesh, including instances, that a 3D viewport shows as a surface; None: a
+    render.
 
     is_moving: reuse the last triangulation of polygons if their corners are the same; has_normals: whether normals are
     needed, which Blender computes for each pose, or the session_uids of objects whose normals are; has_uvs: whether
@@ -125,12 +126,12 @@ def split_clear(meshes):
 
 
 def as_holdouts(meshes):
-    """The meshes as holdouts, without clear meshes, which hide nothing."""
+    """Return the meshes as holdouts, without clear meshes, which hide nothing."""
     return [replace(mesh, parts=None) for mesh in meshes if not mesh.is_clear]
 
 
 def owner_of(instance):
-    """A key of a depsgraph instance, the same in every frame."""
+    """Return a key of a depsgraph instance, the same in every frame."""
     parent = instance.parent.original.session_uid if instance.is_instance else 0
     return instance.object.original.session_uid, parent, tuple(instance.persistent_id)
 
@@ -143,12 +144,12 @@ def _is_surface_seen(instance, viewport):
 
 
 def _has(instance, question, view_layer):
-    """A view layer's setting of an instance; as in Cycles, that of the object that places it."""
+    """Return a view layer's setting of an instance; as in Cycles, that of the object that places it."""
     return getattr(placed_by(instance).original, question)(view_layer=view_layer)
 
 
 def _rays_of(instance, view_layer):
-    """{`DrawnMesh` field: value} from the ray visibility of a mesh in a render."""
+    """Return {`DrawnMesh` field: value} from the ray visibility of a mesh in a render."""
     placed = {instance.object, placed_by(instance)}
     is_seen = all(one.visible_camera for one in placed) and not _has(instance, "indirect_only_get", view_layer)
     return {"is_seen": is_seen, "casts_shadow": all(one.visible_shadow for one in placed)}
@@ -168,7 +169,7 @@ def _solid_and_clear(mesh):
 
 
 def _some_parts(mesh, parts):
-    """A `DrawnMesh` with some of a mesh's parts."""
+    """Return a `DrawnMesh` with some of a mesh's parts."""
     corners = np.concatenate([np.arange(first, first + count) for first, count, _material in parts])
     ends = np.cumsum([count for _first, count, _material in parts])
     return replace(
@@ -219,7 +220,7 @@ def _normals(mesh, layout, has_vertex_normals):
 
 
 def _layout(mesh_object, mesh, is_moving):
-    """The `_Layout` of an evaluated mesh; with `is_moving` the previous layout, if it fits."""
+    """Return the `_Layout` of an evaluated mesh; with `is_moving` the previous layout, if it fits."""
     faces, slots = scene.cached_faces(mesh_object.original, mesh), np.zeros(0, np.int32)
     if len(mesh_object.material_slots) > 1:
         slots = np.zeros(len(mesh.polygons), np.int32)
@@ -252,7 +253,8 @@ def _parts(mesh_object, runs, override):
 
 
 def _read_uvs(mesh, loops, parts, has_uvs):
-    """(3 F, 2) float32 UVs of drawn corners, for each part from the UV map of its images; None without UV maps.
+    """Return (3 F, 2) float32 UVs of drawn corners, for each part from the UV map of its images; None without UV
+    maps.
 
     has_uvs: whether parts without images have those of the active UV map.
     """
@@ -271,5 +273,5 @@ def _read_uvs(mesh, loops, parts, has_uvs):
 
 
 def _active_uvs(mesh):
-    """The UV map that renders use, or None."""
+    """Return the UV map that renders use, or None."""
     return next((layer for layer in mesh.uv_layers if layer.active_render), None)

@@ -25,7 +25,9 @@ ALL = Links(frozenset(), frozenset())
 
 
 def read_links(light_object):
-    """(`Links` of the objects that an original light illuminates, `Links` of the objects that cast its shadows)."""
+    """Return (`Links` of the objects that an original light illuminates, `Links` of the objects that cast its
+    shadows).
+    """
     linking = light_object.light_linking
     return _links(linking.receiver_collection), _links(linking.blocker_collection)
 

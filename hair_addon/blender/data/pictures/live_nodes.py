@@ -7,7 +7,9 @@ _VIEWERS = (bpy.types.CompositorNodeViewer, bpy.types.GeometryNodeViewer)
 
 
 def images(owner):
-    """(image, node) of the nodes with an image that contribute to the result of a node tree, or of its owner's tree."""
+    """Return (image, node) of the nodes with an image that contribute to the result of a node tree, or of its
+    owner's tree.
+    """
     tree = owner if isinstance(owner, bpy.types.NodeTree) else owner.node_tree
     if tree is None:
         return []
@@ -20,7 +22,7 @@ def images(owner):
 
 
 def _live(tree):
-    """The nodes from which links lead to an output node other than a viewer; muted nodes are left out."""
+    """Return the nodes from which links lead to an output node other than a viewer; muted nodes are left out."""
     before = {}
     for link in tree.links:
         if not link.is_muted:

@@ -8,7 +8,7 @@ _MASK = 0xFFFFFFFF
 
 
 def color_of(shown_object, color):
-    """(3,) scene-linear color of an object by a `viewport_shading.HairColor`."""
+    """Return (3,) scene-linear color of an object by a `viewport_shading.HairColor`."""
     if color.kind == "SINGLE":
         return color.color
     if color.kind == "OBJECT":
@@ -17,7 +17,9 @@ def color_of(shown_object, color):
 
 
 def random_color(name, library=None):
-    """(3,) scene-linear color that Blender gives an object of this name; library: path of its file if it is linked."""
+    """Return (3,) scene-linear color that Blender gives an object of this name; library: path of its file if it is
+    linked.
+    """
     number = _murmur(b"OB" + name.encode() + b"\0")
     if library:
         number = ((number * 13) & _MASK) ^ _murmur(library.encode() + b"\0")
@@ -40,7 +42,7 @@ def _murmur(data):
 
 
 def _mixed(number):
-    """The last mixing of lookup3 [Jenkins06] for a number and zero."""
+    """Return the last mixing of lookup3 [Jenkins06] for a number and zero."""
     start = (0xDEADBEEF + (2 << 2) + 13) & _MASK
     a, b, c = (start + number) & _MASK, start, start
     c = ((c ^ b) - _turned(b, 14)) & _MASK

@@ -48,7 +48,7 @@ def require(scene: bpy.types.Scene, numbers: Iterable[int]) -> None:
 
 
 def in_short(names: list[str]) -> str:
-    """The first names, and the number of the others, for a sentence."""
+    """Return the first names, and the number of the others, for a sentence."""
     rest = len(names) - MOST_NAMED
     return ", ".join(names[:MOST_NAMED]) + (f" + {rest}" if rest > 0 else "")
 
@@ -62,7 +62,7 @@ def missing(scene: bpy.types.Scene, numbers: Iterable[int]) -> list[str]:
 
 
 def states(scene: bpy.types.Scene) -> dict[str, str]:
-    """{name: state} of all files that a scene reads in any frame, to detect changed files.
+    """Return {name: state} of all files that a scene reads in any frame, to detect changed files.
 
     A state is the size and the time of change [s], or "missing"; for a numbered series a digest of its files' states.
     """
@@ -152,7 +152,7 @@ def _files(reached, numbers) -> Iterator[RenderedFile]:
 
 
 def _image_users(datablock):
-    """(image, its image user, which selects the frame of a sequence) of a datablock's nodes, or of a texture."""
+    """Return (image, its image user, which selects the frame of a sequence) of a datablock's nodes, or of a texture."""
     if isinstance(datablock, bpy.types.ImageTexture):
         return [(datablock.image, datablock.image_user)]
     if not isinstance(datablock, _OWNERS_WITH_NODES):
@@ -199,7 +199,7 @@ def _image_number(user, frame):
 
 
 def _numbered(path, number):
-    """A path with the last number in its name replaced."""
+    """Return a path with the last number in its name replaced."""
     found = list(re.finditer(r"\d+", path.stem))
     if not found:
         return path

@@ -3,7 +3,7 @@
 
 
 def placed_by(instance):
-    """The evaluated object that places an instance: its instancer, or itself."""
+    """Return the evaluated object that places an instance: its instancer, or itself."""
     return instance.parent if instance.is_instance else instance.object
 
 

@@ -36,7 +36,8 @@ corner_cache = Cache(capacity=32)  # session_uid of a hair → `_Corners`
 
 
 def at_roots(hair_object, depsgraph, kind, places, firsts):
-    """(S, 3) float32 scene-linear colors of a hair's surface at its roots; None if the surface has no such colors.
+    """Return (S, 3) float32 scene-linear colors of a hair's surface at its roots; None if the surface has no such
+    colors.
 
     kind: ATTRIBUTE for the active color attribute, TEXTURE for the active image of each material at the active UV map;
     places: (vertices, barycentric coordinates) of the roots, each (S, 3); firsts: (S, 3) local first points of the
@@ -70,7 +71,7 @@ def at_roots(hair_object, depsgraph, kind, places, firsts):
 
 
 def _places_on(surface_object, depsgraph, faces, vertex_count, places, firsts):
-    """(vertices, barycentric) on the evaluated mesh; the nearest where a root is on no face of it."""
+    """Return (vertices, barycentric) on the evaluated mesh; the nearest where a root is on no face of it."""
     if places is None or len(places[0]) != len(firsts):
         places = np.zeros((len(firsts), 3), np.int32), np.zeros((len(firsts), 3), np.float32)
     vertices, barycentric = places[:2]
@@ -87,7 +88,7 @@ def _places_on(surface_object, depsgraph, faces, vertex_count, places, firsts):
 
 
 def _corners(hair_object, faces, vertex_count, vertices):
-    """(S, 3) corners of the polygons with these vertices (S, 3)."""
+    """Return (S, 3) corners of the polygons with these vertices (S, 3)."""
     key = hair_object.session_uid
     known = corner_cache.get(key)
     if known is None or known.faces is not faces or not np.array_equal(known.vertices, vertices):
@@ -98,19 +99,19 @@ def _corners(hair_object, faces, vertex_count, vertices):
 
 
 def _colors_of(attribute):
-    """(N, 3) float32 linear colors of a color attribute."""
+    """Return (N, 3) float32 linear colors of a color attribute."""
     colors = np.empty((len(attribute.data), 4), np.float32)
     attribute.data.foreach_get("color", colors.ravel())
     return colors[:, :3]
 
 
 def _weighed(values, barycentric):
-    """(S, C) from the values (S, 3, C) of three corners."""
+    """Return (S, C) from the values (S, 3, C) of three corners."""
     return np.einsum("scv,sc->sv", values, barycentric).astype(np.float32)
 
 
 def _of_materials(hair_object, evaluated, slots, uvs):
-    """(S, 3) colors of the materials in `slots` (S,) at UVs (S, 2)."""
+    """Return (S, 3) colors of the materials in `slots` (S,) at UVs (S, 2)."""
     colors = np.full((len(uvs), 3), 0.8, np.float32)
     materials = [slot.material for slot in evaluated.material_slots] or [None]
     slots = np.clip(slots, 0, len(materials) - 1)
@@ -128,7 +129,9 @@ def _of_materials(hair_object, evaluated, slots, uvs):
 
 
 def active_image_node(tree):
-    """The node whose image Workbench shows for a material, an Image Texture with pixels; None: its viewport color."""
+    """Return the node whose image Workbench shows for a material, an Image Texture with pixels; None: its viewport
+    color.
+    """
     node = None if tree is None else _active_texture(tree)
     if node is None or node.type != "TEX_IMAGE" or node.image is None or node.image.source not in {"FILE", "GENERATED"}:
         return None
@@ -136,7 +139,7 @@ def active_image_node(tree):
 
 
 def _active_texture(tree):
-    """The active texture node: of the active group, of the tree, of other groups; else the first; or None."""
+    """Return the active texture node: of the active group, of the tree, of other groups; else the first; or None."""
     active, shown = tree.nodes.active, next((node for node in tree.nodes if node.show_texture), None)
     if shown is not None and shown == active:
         return shown
@@ -171,7 +174,7 @@ _FOLD = {
 
 
 def _look_up(pixels, uvs, extension, is_closest):
-    """(S, 3) colors of (H, W, 3) pixels at UVs (S, 2), between four texels, or of the closest."""
+    """Return (S, 3) colors of (H, W, 3) pixels at UVs (S, 2), between four texels, or of the closest."""
     size = np.array(pixels.shape[1::-1])
     uvs = np.where(np.isfinite(uvs) & (np.abs(uvs) < 1e6), uvs, 0.0).astype(np.float64)
     place = uvs * size - (0.0 if is_closest else 0.5)

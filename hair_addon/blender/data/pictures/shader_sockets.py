@@ -21,7 +21,7 @@ class ShaderNode:
         return self.node.type
 
     def __getitem__(self, name):
-        """The `ShaderInput` of a name."""
+        """Return the `ShaderInput` of a name."""
         return ShaderInput(self.node.inputs[name], self.groups)
 
 
@@ -33,12 +33,14 @@ class ShaderInput:
     groups: tuple = ()
 
     def source(self):
-        """(`ShaderNode`, output) that the socket reads; (None, None) for a constant."""
+        """Return (`ShaderNode`, output) that the socket reads; (None, None) for a constant."""
         _end, node, output = self._followed()
         return node, output
 
     def constant(self):
-        """The constant value of the socket, of the socket it is linked to, or of a value node; None for other nodes."""
+        """Return the constant value of the socket, of the socket it is linked to, or of a value node; None for other
+        nodes.
+        """
         end, node, output = self._followed()
         if node is not None and node.type not in {"RGB", "VALUE"}:
             return None
@@ -49,12 +51,14 @@ class ShaderInput:
         return (value,) * len(own) if is_color else _as_number(value)
 
     def value(self):
-        """The constant value; if other nodes compute the value, the socket's default."""
+        """Return the constant value; if other nodes compute the value, the socket's default."""
         found = self.constant()
         return self.socket.default_value if found is None else found
 
     def _followed(self):
-        """(last socket on the way, the linked `ShaderNode`, its output); None for node and output if none is linked."""
+        """Return (last socket on the way, the linked `ShaderNode`, its output); None for node and output if none is
+        linked.
+        """
         socket, groups = self.socket, self.groups
         while (link := _link_of(socket)) is not None:
             node, output = _source_behind(link)
@@ -73,7 +77,7 @@ class ShaderInput:
 
 
 def shown_shader(tree, kinds):
-    """The `ShaderNode` linked to a tree's output, if its type is in `kinds`.
+    """Return the `ShaderNode` linked to a tree's output, if its type is in `kinds`.
 
     Else the first node of the first type, or None.
     """
@@ -95,14 +99,14 @@ def nodes_of(tree, groups=()):
 
 
 def _link_of(socket):
-    """The link that a socket reads; None without one, or if it is part of a cycle."""
+    """Return the link that a socket reads; None without one, or if it is part of a cycle."""
     if not socket.is_linked:
         return None
     return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
 
 
 def _source_behind(link):
-    """(node, output) that a link comes from, through reroutes and muted nodes.
+    """Return (node, output) that a link comes from, through reroutes and muted nodes.
 
     (None, None) if these are not linked: they set no value, as in Cycles.
     """
@@ -113,24 +117,24 @@ def _source_behind(link):
 
 
 def _passed_on(node, output):
-    """The input that a reroute or a muted node passes on to an output, or None."""
+    """Return the input that a reroute or a muted node passes on to an output, or None."""
     if node.type == "REROUTE":
         return node.inputs[0]
     return next((link.from_socket for link in node.internal_links if link.to_socket == output), None)
 
 
 def _inside(group, output):
-    """The input of a group's output node for an output of the group, or None."""
+    """Return the input of a group's output node for an output of the group, or None."""
     nodes = group.node_tree.nodes if group.node_tree else ()
     inside = next((node for node in nodes if node.type == "GROUP_OUTPUT" and node.is_active_output), None)
     return None if inside is None else _of_identifier(inside.inputs, output)
 
 
 def _of_identifier(sockets, other):
-    """The socket with the identifier of another."""
+    """Return the socket with the identifier of another."""
     return next((socket for socket in sockets if socket.identifier == other.identifier), None)
 
 
 def _as_number(value):
-    """A color or a vector as a number, converted as in Blender."""
+    """Return a color or a vector as a number, converted as in Blender."""
     return float(np.dot(LUMINANCE, value)) if len(value) == 4 else float(np.mean(value))

@@ -70,7 +70,8 @@ class SurfaceMaterial:
 
 
 def read_material(material):
-    """The `SurfaceMaterial` of a Blender material; matte with its viewport color without a shader of `_READERS`.
+    """Return the `SurfaceMaterial` of a Blender material; matte with its viewport color without a shader of
+    `_READERS`.
 
     None is a Principled BSDF with default values, as in EEVEE and Cycles.
     """
@@ -132,7 +133,7 @@ def _reflectance(refractive_index, level):
 
 
 def _image_map(shader_input, material, uv_map=""):
-    """The `ImageMap` that is linked to a `ShaderInput`, directly or by one of its channels; or None."""
+    """Return the `ImageMap` that is linked to a `ShaderInput`, directly or by one of its channels; or None."""
     found, output = shader_input.source()
     channels = LUMINANCE
     if found is not None and found.type == "SEPARATE_COLOR" and found.node.mode == "RGB":
@@ -168,7 +169,9 @@ def _is_readable(image, material):
 
 
 def _mapping(vector):
-    """((2, 3) rows, name of the UV map) of a texture's coordinates, a `ShaderInput`; None if they are not UVs."""
+    """Return ((2, 3) rows, name of the UV map) of a texture's coordinates, a `ShaderInput`; None if they are not
+    UVs.
+    """
     found, output = vector.source()
     if found is None:  # a constant set by a group is a single point
         return None if vector.socket.is_linked else (np.eye(2, 3), "")

@@ -116,7 +116,7 @@ BY_SCENE = ViewportShading()  # by the look and the light of the scene
 
 
 def read(viewport, scene, world_to_view):
-    """The `ViewportShading` of a `SpaceView3D` that shows a scene; world_to_view: (4, 4) of the view."""
+    """Return the `ViewportShading` of a `SpaceView3D` that shows a scene; world_to_view: (4, 4) of the view."""
     shading = viewport.shading
     if shading.type == "RENDERED" and scene.render.engine == "BLENDER_WORKBENCH":
         return _solid(scene.display.shading, world_to_view, ALL)
@@ -138,7 +138,7 @@ def _theme_color():
 
 
 def _scene_light(shading, world_to_view):
-    """The `ViewportLight` of Material Preview or Rendered shading."""
+    """Return the `ViewportLight` of Material Preview or Rendered shading."""
     is_rendered = shading.type == "RENDERED"
     has_lights = shading.use_scene_lights_render if is_rendered else shading.use_scene_lights
     has_world = shading.use_scene_world_render if is_rendered else shading.use_scene_world
@@ -152,7 +152,7 @@ def _scene_light(shading, world_to_view):
 
 
 def _view_axes(world_to_view):
-    """(3, 3) from directions of a view to world space."""
+    """Return (3, 3) from directions of a view to world space."""
     return np.linalg.inv(world_to_view[:3, :3])
 
 
@@ -162,7 +162,7 @@ def _solid(shading, world_to_view, management):
 
 
 def _solid_light(shading, world_to_view):
-    """The `ViewportLight` of Solid shading."""
+    """Return the `ViewportLight` of Solid shading."""
     has_highlights, studio = shading.show_specular_highlight, shading.selected_studio_light
     if shading.light == "MATCAP" and studio is not None and studio.type == "MATCAP":
         return ViewportLight(MATCAP, ambient=_EVEN, matcap=studio.path, has_highlights=has_highlights)
@@ -197,7 +197,7 @@ def is_near(light, other):
 
 
 def _turnless(light):
-    """A `ViewportLight` without directions, and whether its HDRI follows the view."""
+    """Return a `ViewportLight` without directions, and whether its HDRI follows the view."""
     hdri = light.hdri
     follows = hdri is not None and bool(hdri.axes)
     return replace(light, lights=(), hdri=hdri and replace(hdri, axes=())), follows
@@ -214,7 +214,7 @@ _FROM_FRONT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 def _to_world(shading, world_to_view):
-    """(3, 3) from the directions of studio lights to world space."""
+    """Return (3, 3) from the directions of studio lights to world space."""
     if not shading.use_world_space_lighting:
         return _view_axes(world_to_view)
     cosine, sine = np.cos(shading.studiolight_rotate_z), np.sin(shading.studiolight_rotate_z)

@@ -62,7 +62,7 @@ class _Rendering:
 
 
 def file_of(world, frame, waits):
-    """The OpenEXR file with the panorama of a world at a frame; None while it is rendered.
+    """Return the OpenEXR file with the panorama of a world at a frame; None while it is rendered.
 
     waits: return only once it is there. Raises `HairError` if it cannot be rendered.
     """
@@ -87,7 +87,9 @@ def file_of(world, frame, waits):
 
 
 def last_of(world):
-    """The last panorama of a world, with other nodes, for views while its next one is rendered; None without one."""
+    """Return the last panorama of a world, with other nodes, for views while its next one is rendered; None without
+    one.
+    """
     path = last_cache.get(world.original.session_uid)
     return path if path is not None and path.is_file() else None
 
@@ -126,7 +128,7 @@ def _running():
 
 
 def _folder():
-    """The folder of panoramas."""
+    """Return the folder of panoramas."""
     if preferences.is_extension():
         folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="worlds", create=True)
         if folder:  # empty if Blender could not create it, which it reports on the console

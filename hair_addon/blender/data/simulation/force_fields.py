@@ -12,7 +12,7 @@ _OF_OTHERS = {"NONE", "BOID", "GUIDE", "FLUID_FLOW"}
 
 
 def read(depsgraph, meters):
-    """(`ForceField`s of the objects in a depsgraph, errors of unsupported force fields).
+    """Return (`ForceField`s of the objects in a depsgraph, errors of unsupported force fields).
 
     meters: per unit of the world.
     """

@@ -47,7 +47,8 @@ def digest_of(guides, blender_scene, depsgraph, settings):
 
 
 def change(baked, now, is_carried=False):
-    """The part of the animation that differs from the digest of a baked frame, SURFACE or SURROUNDINGS, or None.
+    """Return the part of the animation that differs from the digest of a baked frame, SURFACE or SURROUNDINGS, or
+    None.
 
     is_carried: whether the surface's local coordinates have changed since; the first half of the digest is then
     ignored, as also after a change of its level of subdivision. `guide_baking.key_of` detects other faces.
@@ -90,7 +91,7 @@ def _rounded(value):
 
 
 def _vertices(mesh_object, depsgraph, meters):
-    """(V, 3) float64 [m] in the world, of an evaluated mesh object."""
+    """Return (V, 3) float64 [m] in the world, of an evaluated mesh object."""
     local = scene.evaluated_positions(mesh_object, depsgraph)
     matrix = meters * _matrix(mesh_object, depsgraph)
     return local @ matrix[:, :3].T + matrix[:, 3]

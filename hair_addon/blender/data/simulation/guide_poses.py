@@ -61,7 +61,7 @@ class GuidePose:
         return local @ self._polar[1].T
 
     def root_pose(self, start: "GuidePose") -> "dynamics.root_motion.RootPose":
-        """The current `RootPose` of a groom returned by `start.groom`; roots must be those of `start`."""
+        """Return the current `RootPose` of a groom returned by `start.groom`; roots must be those of `start`."""
         vertices, barycentric = self.places
         roots = np.einsum("nc,ncx->nx", barycentric.astype(np.float64), self._rest[vertices])
         size = max(self.pose.surface.extent, 1e-20)
@@ -73,14 +73,14 @@ class GuidePose:
         return dynamics.root_motion.RootPose(self._to_world(posed[:, 0]), turns, _rounded(self.scale / start.scale))
 
     def after(self, change: Affine) -> "GuidePose":
-        """The pose that is the same in the world after an `Affine` was applied to the local coordinates.
+        """Return the pose that is the same in the world after an `Affine` was applied to the local coordinates.
 
         Only use its scale and the axes of its groom, which are in the new coordinates.
         """
         return replace(self, matrix=self.matrix @ change.inverse.matrix)
 
     def turn_to(self, other: "GuidePose") -> np.ndarray:
-        """(4,) rotation x, y, z, w from the axes of `other.groom` to those of `self.groom`."""
+        """Return (4,) rotation x, y, z, w from the axes of `other.groom` to those of `self.groom`."""
         return dynamics.rod.rotations.from_matrices((self._polar[0].T @ other._polar[0])[None])[0]
 
     def to_rest(self, points: np.ndarray) -> np.ndarray:
@@ -89,7 +89,7 @@ class GuidePose:
         return self._slid(self._carried(local.astype(np.float32), is_back=True), -1.0)
 
     def to_world(self, points: np.ndarray) -> np.ndarray:
-        """The inverse of `to_rest`, float64 [m]."""
+        """Return the inverse of `to_rest`, float64 [m]."""
         return self._to_world(self._carried(self._slid(np.ascontiguousarray(points, np.float32), 1.0)))
 
     def _slid(self, points, sign):
@@ -109,7 +109,8 @@ class GuidePose:
 
 
 def _rounded(factor):
-    """A factor rounded to 20 bits, so that rounding in the matrix of a rotating object does not change the scale.
+    """Return a factor rounded to 20 bits, so that rounding in the matrix of a rotating object does not change the
+    scale.
 
     A change of scale would give guides a new rest shape in each frame.
     """
@@ -118,7 +119,7 @@ def _rounded(factor):
 
 
 def read(guides, depsgraph, meters):
-    """The `GuidePose` of guide Curves in a depsgraph; meters: per unit of the world.
+    """Return the `GuidePose` of guide Curves in a depsgraph; meters: per unit of the world.
 
     Raises `HairError` if there is no surface or guides are not rooted on it.
     """
@@ -141,7 +142,7 @@ def read(guides, depsgraph, meters):
 
 
 def _polar(matrix):
-    """(rotation R, P) with R P = matrix; R is proper, so that P mirrors if the matrix does."""
+    """Return (rotation R, P) with R P = matrix; R is proper, so that P mirrors if the matrix does."""
     left, sizes, right = np.linalg.svd(matrix)
     sign = np.sign(np.linalg.det(left @ right))
     return sign * (left @ right), sign * (right.T * sizes) @ right

@@ -26,7 +26,8 @@ def meters_of(blender_scene, settings):
 
 
 def read(blender_scene, depsgraph, settings, guide_pose, surface_object, ways):
-    """The `World` of guides in a depsgraph's frame, and errors of colliders and force fields that are left out.
+    """Return the `World` of guides in a depsgraph's frame, and errors of colliders and force fields that are left
+    out.
 
     guide_pose: their `GuidePose` in that frame; surface_object: their surface; ways: (G, 3) from roots to the next
     points at rest, in local coordinates.
@@ -52,7 +53,7 @@ def read(blender_scene, depsgraph, settings, guide_pose, surface_object, ways):
 
 
 def _facing_hair(surface, corners, ways):
-    """(F, 3) triangles of a `Surface`; those of an open mesh are flipped if hair is behind them."""
+    """Return (F, 3) triangles of a `Surface`; those of an open mesh are flipped if hair is behind them."""
     key = surface.topology, geometry.fingerprint.fingerprint(surface.rest)
     parts = parts_cache.get(key, lambda: dynamics.collision.closed_parts.open_parts(surface.mesh))
     return dynamics.collision.closed_parts.facing_hair(surface.mesh, parts, corners, surface.from_local(ways))
@@ -77,7 +78,7 @@ def require_colliders(settings, depsgraph):
 
 
 def collider_problem(settings):
-    """The `HairError` of a collection of colliders that is missing or has no meshes, or None.
+    """Return the `HairError` of a collection of colliders that is missing or has no meshes, or None.
 
     settings: `DynamicsSettings`, or properties. No geometry is read.
     """
@@ -92,13 +93,13 @@ def collider_problem(settings):
 
 
 def colliders(collection_name):
-    """The mesh objects of the collection of this name."""
+    """Return the mesh objects of the collection of this name."""
     collection = bpy.data.collections.get(collection_name) if collection_name else None
     return [] if collection is None else [o for o in collection.all_objects if o.type == "MESH"]
 
 
 def _read_mesh(mesh_object, depsgraph, meters):
-    """((V, 3) float64 [m] in the world, (F, 3) int32) of an evaluated mesh object. Raises `HairError`."""
+    """Return ((V, 3) float64 [m] in the world, (F, 3) int32) of an evaluated mesh object. Raises `HairError`."""
     surface = scene.read_surface(mesh_object, depsgraph)
     matrix = meters * np.array(mesh_object.evaluated_get(depsgraph).matrix_world, np.float64)[:3]
     return surface.posed @ matrix[:, :3].T + matrix[:, 3], surface.mesh.triangles

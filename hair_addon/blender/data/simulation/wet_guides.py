@@ -14,7 +14,8 @@ from ..strands import stored_roots, style_inputs
 
 
 def of_guides(guides, surface, depsgraph, known, roots=None):
-    """(G,) float32 wetness of simulated guides on a `Surface`, from 0 to 1; None if no mask makes guides differ.
+    """Return (G,) float32 wetness of simulated guides on a `Surface`, from 0 to 1; None if no mask makes guides
+    differ.
 
     known: {mask: (G,) weights} that were read before; missing masks are read and added; roots: `SurfacePoints`, None:
     stored roots. Raises `HairError`.
@@ -31,7 +32,7 @@ def of_guides(guides, surface, depsgraph, known, roots=None):
 
 
 def unkeyed(guides, depsgraph):
-    """(K, G) float32 wetness by each mask, or only its weights if amounts are keyed; None without a mask.
+    """Return (K, G) float32 wetness by each mask, or only its weights if amounts are keyed; None without a mask.
 
     Raises `HairError`.
     """
@@ -45,7 +46,7 @@ def unkeyed(guides, depsgraph):
 
 
 def _weights(guides, surface, depsgraph, key, known, roots=None):
-    """(G,) float32 weights of a mask, cached in `known`."""
+    """Return (G,) float32 weights of a mask, cached in `known`."""
     if key not in known:
         roots = stored_roots.points(guides, surface) if roots is None else roots
         if roots is None:

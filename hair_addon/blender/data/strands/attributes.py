@@ -135,13 +135,13 @@ def valid_radii(radii):
 
 
 def curve_types(curves):
-    """(S,) int8: Blender's type of each curve."""
+    """Return (S,) int8: Blender's type of each curve."""
     types = read(curves, "curve_type", "INT8", "CURVE")
     return np.full(len(curves.curves), CATMULL_ROM, np.int8) if types is None else types
 
 
 def are_smooth(curves):
-    """(S,) bool: which curves are Catmull-Rom splines, as brushes create them."""
+    """Return (S,) bool: which curves are Catmull-Rom splines, as brushes create them."""
     return curve_types(curves) == CATMULL_ROM
 
 

@@ -185,7 +185,7 @@ def _resize(curves, strand_count, point_count):
 
 
 def curve_offsets(curves):
-    """(S+1,) int32: the index of each curve's first point, and the number of points."""
+    """Return (S+1,) int32: the index of each curve's first point, and the number of points."""
     offsets = np.zeros(len(curves.curves) + 1, np.int32)
     if len(curves.curves):
         curves.curve_offset_data.foreach_get("value", offsets)
@@ -193,17 +193,17 @@ def curve_offsets(curves):
 
 
 def point_counts(curves):
-    """(S,) int32: the number of points of each curve."""
+    """Return (S,) int32: the number of points of each curve."""
     return np.diff(curve_offsets(curves))
 
 
 def first_points(curves):
-    """(S, 3) float32: the first point of each curve, in local coordinates."""
+    """Return (S, 3) float32: the first point of each curve, in local coordinates."""
     return read_points(curves)[curve_offsets(curves)[:-1]]
 
 
 def read_points(curves):
-    """(all points, 3) float32 in local coordinates, curve after curve."""
+    """Return (all points, 3) float32 in local coordinates, curve after curve."""
     positions = np.empty((len(curves.points), 3), np.float32)
     if len(positions):
         curves.attributes["position"].data.foreach_get("vector", positions.ravel())
@@ -211,7 +211,7 @@ def read_points(curves):
 
 
 def read_radii(curves):
-    """(all points,) float32 in local units, at least zero; Blender's default if curves have no radii."""
+    """Return (all points,) float32 in local units, at least zero; Blender's default if curves have no radii."""
     radii = attributes.read(curves, "radius", "FLOAT", "POINT")
     if radii is None:
         return np.full(len(curves.points), attributes.RADIUS, np.float32)
@@ -235,7 +235,7 @@ def widen(curves, change):
 
 
 def read_randoms(curves):
-    """(S,) float32 random numbers of strands in [0, 1]; by index for curves without them."""
+    """Return (S,) float32 random numbers of strands in [0, 1]; by index for curves without them."""
     randoms = attributes.read(curves, "strand_random", "FLOAT", "CURVE")
     if randoms is None:
         return strands.random_numbers(len(curves.curves))
@@ -248,7 +248,7 @@ def has_wetness(curves):
 
 
 def read_wetness(curves):
-    """(S,) float32 wetness of strands in [0, 1]; None for curves without it."""
+    """Return (S,) float32 wetness of strands in [0, 1]; None for curves without it."""
     wetness = attributes.read(curves, _WETNESS, "FLOAT", "CURVE")
     return None if wetness is None else np.clip(np.where(np.isfinite(wetness), wetness, np.float32(0.0)), 0.0, 1.0)
 
@@ -348,7 +348,7 @@ def read_shown_guides(curves, surface, device, known=None, local=None):
 
 
 def even_points(points, offsets, are_smooth):
-    """(G, POINT_COUNT, 3) float32 of guides of any point counts; points (N, 3), offsets (G+1,).
+    """Return (G, POINT_COUNT, 3) float32 of guides of any point counts; points (N, 3), offsets (G+1,).
 
     are_smooth: a function that returns whether each guide is smooth, (G,) bool. Guides are resampled unless all have
     POINT_COUNT points.
@@ -359,7 +359,7 @@ def even_points(points, offsets, are_smooth):
 
 
 def even_local_points(curves):
-    """(G, POINT_COUNT, 3) float32 of guides of any point counts, in local coordinates."""
+    """Return (G, POINT_COUNT, 3) float32 of guides of any point counts, in local coordinates."""
     return even_points(read_points(curves), curve_offsets(curves), lambda: attributes.are_smooth(curves))
 
 

@@ -14,14 +14,14 @@ _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shado
 
 
 def new_object(name, surface_object, is_rendered=True):
-    """An empty Curves object on a surface, in the surface's collection."""
+    """Return an empty Curves object on a surface, in the surface's collection."""
     curves = bpy.data.hair_curves.new(name)
     curves.surface = surface_object
     return link_object(name, curves, surface_object, is_rendered)
 
 
 def link_object(name, curves, surface_object, is_rendered=True):
-    """A new object for Curves, a child of their surface and in its collection.
+    """Return a new object for Curves, a child of their surface and in its collection.
 
     is_rendered: whether Cycles and EEVEE show it.
     """
@@ -63,7 +63,7 @@ def show_again(curves_object):
 
 
 def objects_of(curves):
-    """The objects of a Curves datablock."""
+    """Return the objects of a Curves datablock."""
     return [user for user in bpy.data.objects if user.data == curves]
 
 

@@ -16,7 +16,7 @@ _NAME = "Delivered Hair"
 
 
 def modifier_of(hair_object):
-    """The modifier that plays delivered frames; None if hair follows its surface."""
+    """Return the modifier that plays delivered frames; None if hair follows its surface."""
     found = (modifier for modifier in hair_object.modifiers if is_ours(modifier))
     return next(found, None)
 
@@ -39,13 +39,13 @@ def is_delivered(hair):
 
 
 def files_of(hair):
-    """The files that objects of hair Curves play."""
+    """Return the files that objects of hair Curves play."""
     playing = [modifier_of(user) for user in objects_of(hair)]
     return {_absolute(m.cache_file.filepath) for m in playing if m is not None and m.cache_file is not None}
 
 
 def objects_of(hair):
-    """The objects of hair Curves, in all scenes."""
+    """Return the objects of hair Curves, in all scenes."""
     return [user for user in bpy.data.objects if user.type == "CURVES" and user.data == hair]
 
 

@@ -14,7 +14,8 @@ _POINT_LIMIT = 10_000  # as each strand reads all segments
 
 
 def read(surface_object, surface, name, depsgraph):
-    """(L, 2, 3) float64 segments [m] of a curve object, or of a mesh's loose edges, in a `Surface`'s coordinates.
+    """Return (L, 2, 3) float64 segments [m] of a curve object, or of a mesh's loose edges, in a `Surface`'s
+    coordinates.
 
     Lines run from the start to the end of their curves. None for an empty name. Raises `HairError`.
     """
@@ -23,7 +24,8 @@ def read(surface_object, surface, name, depsgraph):
 
 
 def key(surface_object, name, depsgraph):
-    """A digest of the lines that `read` returns, which stays while they move with the surface; empty for none.
+    """Return a digest of the lines that `read` returns, which stays while they move with the surface; empty for
+    none.
 
     Raises `HairError`.
     """
@@ -32,7 +34,7 @@ def key(surface_object, name, depsgraph):
 
 
 def _read_local(surface_object, name, depsgraph):
-    """The segments of `read` in the coordinates of the surface's object."""
+    """Return the segments of `read` in the coordinates of the surface's object."""
     if not name:
         return None
     drawn = bpy.data.objects.get(name)
@@ -54,7 +56,9 @@ def _read_local(surface_object, name, depsgraph):
 
 
 def _to_local(surface_object, drawn):
-    """The transform from an object's coordinates to the surface's; of a child without the rounding of its parent's."""
+    """Return the transform from an object's coordinates to the surface's; of a child without the rounding of its
+    parent's.
+    """
     if drawn.parent == surface_object and drawn.parent_type == "OBJECT" and not drawn.constraints:
         return drawn.matrix_parent_inverse @ drawn.matrix_basis
     return surface_object.matrix_world.inverted_safe() @ drawn.matrix_world
@@ -77,7 +81,7 @@ def have_moved(name, surface_object, changed, transformed):
 
 
 def _read_edges(drawn, depsgraph):
-    """(N, 3) float64 points and (L, 2) loose edges of an evaluated object."""
+    """Return (N, 3) float64 points and (L, 2) loose edges of an evaluated object."""
     evaluated = drawn.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     if mesh is None:  # a curve without a point

@@ -10,7 +10,7 @@ from . import attributes, curves
 
 
 def read_guide_map(hair, guide_count):
-    """(S, k) int32 guides of strands, -1 for none, and (S, k) float32 weights; None if hair stores none.
+    """Return (S, k) int32 guides of strands, -1 for none, and (S, k) float32 weights; None if hair stores none.
 
     Guide indices outside of `guide_count` become -1.
     """
@@ -27,7 +27,7 @@ def read_guide_map(hair, guide_count):
 
 
 def read_root_uvs(datablock):
-    """(S, 2) float32; None if the surface has no UV map or coordinates are not finite."""
+    """Return (S, 2) float32; None if the surface has no UV map or coordinates are not finite."""
     surface = datablock.surface
     if surface is None or surface.type != "MESH" or not surface.data.uv_layers:
         return None
@@ -51,7 +51,7 @@ def read_radii(datablock, point_count):
 
 
 def counts_per_curve(datablock):
-    """(S,) int32: points of each curve in file formats that keep point counts.
+    """Return (S,) int32: points of each curve in file formats that keep point counts.
 
     Polylines keep their points. Catmull-Rom splines with few points are subdivided to at least the point count of
     strands. The counts depend only on the number of points, so they are constant over time.
@@ -61,18 +61,18 @@ def counts_per_curve(datablock):
 
 
 def points_per_curve(datablock):
-    """(N, 3) float32 local points of curves, `counts_per_curve` for each."""
+    """Return (N, 3) float32 local points of curves, `counts_per_curve` for each."""
     return _per_curve(datablock, curves.read_points(datablock))
 
 
 def radii_per_curve(datablock):
-    """(N,) float32 radii in local units, at least zero, of the points of `points_per_curve`."""
+    """Return (N,) float32 radii in local units, at least zero, of the points of `points_per_curve`."""
     radii = _per_curve(datablock, attributes.valid_radii(curves.read_radii(datablock))[:, None])[:, 0]
     return np.maximum(radii, np.float32(0.0))
 
 
 def _lines_of_segments(datablock, counts):
-    """(S,) the number of lines for each segment of a curve."""
+    """Return (S,) the number of lines for each segment of a curve."""
     is_divided = attributes.are_smooth(datablock) & (counts > 2) & (counts < groom.POINT_COUNT)
     return np.where(is_divided, -((1 - groom.POINT_COUNT) // np.maximum(counts - 1, 1)), 1)
 

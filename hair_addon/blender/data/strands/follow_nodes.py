@@ -89,7 +89,7 @@ def _hiding_modifiers(curves_object):
 
 
 def modifier_of(curves_object):
-    """The modifier that deforms an object's strands with their surface; None if an artist has removed it."""
+    """Return the modifier that deforms an object's strands with their surface; None if an artist has removed it."""
     found = (m for m in curves_object.modifiers if m.type == "NODES" and _is_ours(m.node_group))
     return next(found, None)
 
@@ -243,7 +243,7 @@ class _Tree:
         return self._switch(is_combed, curves, deformed, "GEOMETRY")
 
     def _smooth_rest(self, surface, cage_corners, rest):
-        """The surface and each vertex's position on the smooth surface at rest: smooth_surface.py."""
+        """Return the surface and each vertex's position on the smooth surface at rest: smooth_surface.py."""
         by = geometry.smooth_surface
         face_count = self._node("GeometryNodeAttributeDomainSize", {0: surface}).outputs["Face Count"]
         refinement = self._math("DIVIDE", self._math("MULTIPLY", face_count, 4.0), cage_corners)
@@ -262,7 +262,7 @@ class _Tree:
         return surface, smooth_rest
 
     def _with_motion(self, surface, smooth_rest, position):
-        """The surface and each vertex's position and rotated x and y axes."""
+        """Return the surface and each vertex's position and rotated x and y axes."""
         face = self._node("GeometryNodeInputIndex").outputs[0]
         corners = []
         for offset in (0, 1, -1):

@@ -9,7 +9,7 @@ FROZEN = "frozen"
 
 
 def read(datablock):
-    """(N,) bool: which points of guides are frozen; None if none is."""
+    """Return (N,) bool: which points of guides are frozen; None if none is."""
     found = attributes.read(datablock, FROZEN, "BOOLEAN", "POINT")
     return found if found is not None and found.any() else None
 
@@ -25,7 +25,7 @@ def write(datablock, are_frozen):
 
 
 def selected(datablock):
-    """(N,) bool: the points that are selected in Sculpt Mode or Edit Mode; None if all or none are."""
+    """Return (N,) bool: the points that are selected in Sculpt Mode or Edit Mode; None if all or none are."""
     return guide_curves.selected_points(datablock, curves.curve_offsets(datablock))
 
 

@@ -10,7 +10,8 @@ _POINTS, _CURVES = "POINT", "CURVE"
 
 
 def selection(curves, starts):
-    """(S,) float32 in [0, 1]: the selection of each curve, or its most selected point; None if nothing is selected.
+    """Return (S,) float32 in [0, 1]: the selection of each curve, or its most selected point; None if nothing is
+    selected.
 
     starts (S+1,): index of each curve's first point.
     """
@@ -29,7 +30,9 @@ def selection(curves, starts):
 
 
 def selected_points(curves, starts):
-    """(N,) bool: the points that are at least half selected; None if all or none are. starts (S+1,): as above."""
+    """Return (N,) bool: the points that are at least half selected; None if all or none are. starts (S+1,): as
+    above.
+    """
     for data_type in ("BOOLEAN", "FLOAT"):
         for domain in (_POINTS, _CURVES):
             values = attributes.read(curves, _SELECTION, data_type, domain)

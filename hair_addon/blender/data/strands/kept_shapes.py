@@ -13,7 +13,7 @@ _SHAPE = "kept_position"
 
 
 def read(datablock):
-    """(N, 3) float32 points of the kept shape in local coordinates, or None."""
+    """Return (N, 3) float32 points of the kept shape in local coordinates, or None."""
     return attributes.read(datablock, _SHAPE, "FLOAT_VECTOR", "POINT")
 
 

@@ -12,7 +12,7 @@ def are_kept(hair):
 
 
 def own(hair):
-    """(N,) float32 radii that hair came with; the present ones of points that were added since."""
+    """Return (N,) float32 radii that hair came with; the present ones of points that were added since."""
     present = curves.read_radii(hair)
     found = attributes.read(hair, curves.OWN_RADIUS, "FLOAT", "POINT")
     if found is None:
@@ -22,7 +22,7 @@ def own(hair):
 
 
 def change(hair, radii):
-    """Write (N,) radii, and keep those that hair came with."""
+    """Write (N,) radii, and store the original radii of the hair."""
     attributes.write(hair, curves.OWN_RADIUS, "FLOAT", "POINT", own(hair))
     attributes.write(hair, "radius", "FLOAT", "POINT", radii)
 

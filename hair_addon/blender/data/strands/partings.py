@@ -82,7 +82,7 @@ def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):
 
 
 def _whole_numbers(attribute, owner, domains):
-    """(N,) int32. Raises `HairError` for other types and domains."""
+    """Return (N,) int32. Raises `HairError` for other types and domains."""
     if attribute.data_type not in _WHOLE or attribute.domain not in domains:
         sentence = 'The attribute "{attribute}" of "{name}" cannot separate hair: use integers on faces or vertices.'
         if "CURVE" in domains:

@@ -29,7 +29,7 @@ class Pose:
         return {}
 
     def motion_at(self, vertices):
-        """The `SurfaceMotion` from the rest shape at some vertices, an array of indices; None at rest.
+        """Return the `SurfaceMotion` from the rest shape at some vertices, an array of indices; None at rest.
 
         Rotations of other vertices are missing, as many surfaces have fewer roots than vertices.
         """
@@ -95,14 +95,14 @@ class Pose:
 
 
 def read_pose(surface_object, depsgraph):
-    """The `Pose` of a surface in a depsgraph; at rest if it is None or not a mesh."""
+    """Return the `Pose` of a surface in a depsgraph; at rest if it is None or not a mesh."""
     if surface_object is None or surface_object.type != "MESH":
         return Pose(None)
     return pose_of(scene.read_surface(surface_object, depsgraph))
 
 
 def pose_of(surface):
-    """The `Pose` of a `Surface`. Raises `HairError` if it is deformed and has non-finite vertices."""
+    """Return the `Pose` of a `Surface`. Raises `HairError` if it is deformed and has non-finite vertices."""
     if surface.is_deformed:
         require_finite(surface.rest)
         require_finite(surface.posed)

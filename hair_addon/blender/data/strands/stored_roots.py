@@ -150,13 +150,13 @@ def may_start_off_surface(curves):
 
 
 def are_barycentric(coordinates):
-    """(S,) bool: whether rows of (S, 3) are inside a triangle up to rounding; False for NaN."""
+    """Return (S,) bool: whether rows of (S, 3) are inside a triangle up to rounding; False for NaN."""
     is_inside = ((coordinates >= -1e-3) & (coordinates <= 1.0 + 1e-3)).all(axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
         return is_inside & (abs(coordinates.sum(axis=1) - 1.0) < 1e-3)
 
 
 def _vertices(curves):
-    """(S, 3) int32 root vertices in Blender's order of corners; None if they are not stored."""
+    """Return (S, 3) int32 root vertices in Blender's order of corners; None if they are not stored."""
     corners = [attributes.read(curves, name, "INT", "CURVE") for name in VERTICES]
     return None if any(corner is None for corner in corners) else np.stack(corners, axis=1)

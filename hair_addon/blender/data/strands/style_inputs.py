@@ -23,7 +23,7 @@ _NUMBERS = {"FLOAT": ("value", 1), "FLOAT_COLOR": ("color", 4), "BYTE_COLOR": ("
 
 
 def read(surface_object, surface, guide_curves, styles: Sequence[StyleSettings], depsgraph) -> Inputs:
-    """The `Inputs` of styles on a `Surface`; guide_curves: None if there are none yet. Raises `HairError`."""
+    """Return the `Inputs` of styles on a `Surface`; guide_curves: None if there are none yet. Raises `HairError`."""
     active = [settings for settings in styles if has_effect(settings)]
     masks = {key: read_mask(surface_object, surface, guide_curves, key, depsgraph) for key in mask_keys(active)}
     origin = np.array(surface_object.matrix_world.translation, np.float64)
@@ -39,7 +39,7 @@ def read(surface_object, surface, guide_curves, styles: Sequence[StyleSettings],
 
 
 def _matrix_of(name, label):
-    """(4, 4) float64 world matrix of an object. Raises `HairError`."""
+    """Return (4, 4) float64 world matrix of an object. Raises `HairError`."""
     found = bpy.data.objects.get(name)
     if found is None:
         sentence = 'There is no object "{name}" for the style {style}: pick another object, or clear the field.'
@@ -56,7 +56,7 @@ def _z_axis(matrix, name):
 
 
 def read_mask(surface_object, surface, guide_curves, key, depsgraph):
-    """The `Mask` of a `mask_key` on the `Surface` of an object; guide_curves: None if there are none yet.
+    """Return the `Mask` of a `mask_key` on the `Surface` of an object; guide_curves: None if there are none yet.
 
     Raises `HairError`.
     """
@@ -77,7 +77,7 @@ def read_mask(surface_object, surface, guide_curves, key, depsgraph):
 
 
 def _read_surface_attribute(surface_object, surface, name, depsgraph):
-    """(F, 3) float32 at the corners of triangles; None without such an attribute."""
+    """Return (F, 3) float32 at the corners of triangles; None without such an attribute."""
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
@@ -91,7 +91,8 @@ def _read_surface_attribute(surface_object, surface, name, depsgraph):
 
 
 def at_corners(surface_object, surface, depsgraph, values, domain):
-    """(F, 3, …) at the corners of a `Surface`'s triangles, from an evaluated mesh's values (N, …) on a domain.
+    """Return (F, 3, …) at the corners of a `Surface`'s triangles, from an evaluated mesh's values (N, …) on a
+    domain.
 
     domain: POINT, FACE or CORNER. Raises `HairError` if the mesh has changed since the `Surface` was read.
     """
@@ -115,7 +116,7 @@ def require_same(surface_object, is_same):
 
 
 def _numbers(attribute, owner):
-    """(N,) float32 of an attribute: numbers, or the luminance of colors. Raises `HairError`."""
+    """Return (N,) float32 of an attribute: numbers, or the luminance of colors. Raises `HairError`."""
     if attribute.data_type not in _NUMBERS or attribute.domain not in ("POINT", "CORNER", "FACE"):
         sentence = 'The attribute "{attribute}" of "{name}" cannot mask hair: use numbers or colors.'
         raise HairError(sentence, attribute=name_of(attribute), name=owner)
@@ -128,7 +129,7 @@ def _numbers(attribute, owner):
 
 
 def _read_guide_attribute(guide_curves, name):
-    """(G,) float32; None without such an attribute. Raises `HairError` for other types."""
+    """Return (G,) float32; None without such an attribute. Raises `HairError` for other types."""
     if guide_curves.attributes.get(name) is None:
         return None
     values = attributes.read(guide_curves, name, "FLOAT", "CURVE")

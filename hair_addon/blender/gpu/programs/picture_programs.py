@@ -10,27 +10,27 @@ FILM_FORMAT = "RGBA32F"  # of sums of samples
 
 @shaders.cached
 def film_program():
-    """The compute program that adds the samples of `picture` to a film: see picture/film.comp."""
+    """Return the compute program that adds the samples of `picture` to a film: see picture/film.comp."""
     return _film("picture/film.comp", (("picture", "FLOAT_2D"),))
 
 
 @shaders.cached
 def film_depth_program():
-    """The compute program that adds data passes to a film: see picture/film_depth.comp."""
+    """Return the compute program that adds data passes to a film: see picture/film_depth.comp."""
     samplers = (("segments", "UINT_2D"), ("depths", "UINT_2D"))
     return _film("picture/film_depth.comp", samplers, (("VEC4", "view_to_clip"),))
 
 
 @shaders.cached
 def film_position_program():
-    """The compute program of the nearest position in each pixel: see picture/film_position.comp."""
+    """Return the compute program of the nearest position in each pixel: see picture/film_position.comp."""
     samplers = (("picture", "FLOAT_2D"), ("depths", "UINT_2D"))
     return _film("picture/film_position.comp", samplers, (("VEC4", "view_to_clip"),))
 
 
 @shaders.cached
 def film_mattes_program():
-    """The compute program that adds the coverage of pixels by labels: see picture/film_mattes.comp."""
+    """Return the compute program that adds the coverage of pixels by labels: see picture/film_mattes.comp."""
     samplers = (("segments", "UINT_2D"), ("matte_ranges", "FLOAT_2D"))
     names = ("range_count", "range_columns", "slot_count", "layer_columns", "tile_width", "tile_height")
     return _film("picture/film_mattes.comp", samplers, tuple(("INT", name) for name in names))
@@ -49,7 +49,7 @@ def _film(file, samplers, constants=()):
 
 @shaders.cached
 def strand_arrival_program():
-    """The compute program of light visibility from strands: see light/strand_irradiance.comp."""
+    """Return the compute program of light visibility from strands: see light/strand_irradiance.comp."""
     return shaders.compile_compute(scene_programs.strand_samples_info(), "light/strand_irradiance.comp")
 
 
@@ -58,7 +58,7 @@ MOTION_FORMAT = "RGBA32F"  # of motion vectors
 
 @shaders.cached
 def strand_motion_program():
-    """The compute program of motion vectors of strands: see picture/strand_motion.comp."""
+    """Return the compute program of motion vectors of strands: see picture/strand_motion.comp."""
     names = ("strands_before", "strands_after", "moved_rows", "moved_points")
     samplers = tuple((name, "FLOAT_2D") for name in names)
     info = scene_programs.strand_samples_info(uniforms.MOTION.source, samplers, MOTION_FORMAT)
@@ -68,7 +68,7 @@ def strand_motion_program():
 
 @shaders.cached
 def surface_motion_program():
-    """The program of motion vectors of surfaces: see picture/surface_motion.vert."""
+    """Return the program of motion vectors of surfaces: see picture/surface_motion.vert."""
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.VIEW.source + uniforms.MOTION.source)
     info.uniform_buf(0, "View", "view")
@@ -87,7 +87,7 @@ DATA_FORMAT = "RGBA32F"  # of passes of data
 
 @shaders.cached
 def strand_data_program():
-    """The compute program of passes of data of strands: see picture/strand_data.comp."""
+    """Return the compute program of passes of data of strands: see picture/strand_data.comp."""
     info = scene_programs.strand_samples_info(uniforms.DATA.source, (("root_uvs", "FLOAT_2D"),), DATA_FORMAT)
     info.uniform_buf(2, uniforms.DATA.type_name, "data")
     return shaders.compile_compute(info, "picture/strand_data.comp")
@@ -95,7 +95,7 @@ def strand_data_program():
 
 @shaders.cached
 def film_view_program():
-    """The program that shows the mean of a film: see picture/film_view.frag."""
+    """Return the program that shows the mean of a film: see picture/film_view.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("VEC2", "origin")  # [pixels] of the film in the framebuffer
     info.push_constant("FLOAT", "weight_sum")
@@ -108,13 +108,13 @@ BLOCK_SIDE = 8  # pixels: BLOCK_SIDE of shaders/picture/history_blocks.glsl
 
 @shaders.cached
 def blocks_program():
-    """The program for the mean and deviation of each block of pixels: see picture/history_blocks.frag."""
+    """Return the program for the mean and deviation of each block of pixels: see picture/history_blocks.frag."""
     return _filter("picture/history_blocks.frag", ("picture",), (("mean", "VEC4"), ("deviation", "VEC4")), ("weight",))
 
 
 @shaders.cached
 def carry_program():
-    """The program that reprojects the previous picture: see picture/history_carry.frag."""
+    """Return the program that reprojects the previous picture: see picture/history_carry.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.HISTORY.source)
     info.uniform_buf(0, "History", "history")
@@ -129,7 +129,7 @@ def carry_program():
 
 @shaders.cached
 def mix_program():
-    """The program that blends reprojected pixels with the passes so far: see picture/history_mix.frag."""
+    """Return the program that blends reprojected pixels with the passes so far: see picture/history_mix.frag."""
     samplers = ("sums", "carried", "carried_passes")
     return _filter("picture/history_mix.frag", samplers, _PICTURE, ("weight", "pass_count", "part_left"))
 

@@ -47,7 +47,7 @@ def has_image_atomics():
 
 @cached
 def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=()):
-    """The program that draws strips of strands with a .frag; targets: its (output, type), ...
+    """Return the program that draws strips of strands with a .frag; targets: its (output, type), ...
 
     shadow_samplers, samplers: of shadow maps and of other textures.
     """
@@ -60,7 +60,7 @@ def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=()):
 
 @cached
 def guide_program(is_clipped=False):
-    """The program that draws guides as lines: see strands/guides.frag."""
+    """Return the program that draws guides as lines: see strands/guides.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     replaced = _strip(info, (), is_clipped)
     info.push_constant("VEC4", "line_color")
@@ -71,7 +71,7 @@ def guide_program(is_clipped=False):
 
 @cached
 def strip_segments_program(is_clipped):
-    """The program that draws strips of strands as samples of a picture: see visibility/strand_segments.frag."""
+    """Return the program that draws strips of strands as samples of a picture: see visibility/strand_segments.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     replaced = _strip(info, (), is_clipped)
     info.depth_write("ANY")
@@ -101,7 +101,7 @@ RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/visibility/rasterize_
 
 @cached
 def segments_program(is_depth, is_round, is_clipped=False):
-    """The compute program that draws strands as samples of a picture: see visibility/strand_segments.comp."""
+    """Return the compute program that draws strands as samples of a picture: see visibility/strand_segments.comp."""
     images, constants = ("depths", "segments", "seen_runs"), ("first_run", "are_tiles_known")
     defined, samplers = {"IS_DEPTH": is_depth, "IS_ROUND": is_round}, (("farthest_depths", "UINT_2D"),)
     return _walk(
@@ -111,7 +111,7 @@ def segments_program(is_depth, is_round, is_clipped=False):
 
 @cached
 def strand_shadow_program(is_front):
-    """The compute program that draws strands into a deep opacity map: see shadows/strand_shadow.comp."""
+    """Return the compute program that draws strands into a deep opacity map: see shadows/strand_shadow.comp."""
     images, samplers = ("fronts", "backs", "counts"), (("hidden_depth", "FLOAT_2D"),)
     defined = {"IS_FRONT": is_front, "IS_ROUND": False}
     return _walk("shadows/strand_shadow.comp", images, defined, shadow_samplers=("hair_front",), samplers=samplers)
@@ -140,7 +140,7 @@ SAMPLES_OF_THREAD = 8  # SAMPLES_OF_THREAD of shaders/visibility/strand_samples.
 
 @cached
 def shading_program(file, blocks=(), tables=(), is_mapped=False, in_parts=False, is_mixed=False, is_solid=False):
-    """The compute program that shades strands with a model's .comp.
+    """Return the compute program that shades strands with a model's .comp.
 
     blocks: (instance, class of settings), ...; tables: (sampler, type), ...; is_mapped: each strand has a look of its
     own, in the sampler of fibre/mapped_strand.glsl; in_parts: draw a part of the light,
@@ -196,7 +196,7 @@ def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, 
 
 @cached
 def environment_program(fragment):
-    """The program that draws a picture of the world with a .frag."""
+    """Return the program that draws a picture of the world with a .frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.ENVIRONMENT.source)
     info.uniform_buf(0, "Environment", "environment")
@@ -206,7 +206,7 @@ def environment_program(fragment):
 
 @cached
 def resolve_program():
-    """The program that averages blocks of samples_per_side² texels of `picture`."""
+    """Return the program that averages blocks of samples_per_side² texels of `picture`."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("INT", "samples_per_side")
     info.sampler(0, "FLOAT_2D", "picture")
@@ -215,7 +215,7 @@ def resolve_program():
 
 @cached
 def accumulate_program():
-    """The program that adds a pass to the picture of a viewport: see picture/accumulate.frag."""
+    """Return the program that adds a pass to the picture of a viewport: see picture/accumulate.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("INT", "samples_per_side")
     info.push_constant("IVEC2", "first_place")  # origin of the textures in the picture [samples]
@@ -230,7 +230,7 @@ def accumulate_program():
 
 @cached
 def display_program():
-    """The program that shows hair over a viewport: see picture/display.frag."""
+    """Return the program that shows hair over a viewport: see picture/display.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("VEC2", "origin")  # of the picture in the framebuffer [pixels]
     info.push_constant("FLOAT", "exposure")

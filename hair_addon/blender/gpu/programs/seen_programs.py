@@ -23,7 +23,7 @@ _PUT = {"light/write_visibility_sums.glsl": "light/write_visibility_bytes.glsl"}
 
 @shaders.cached
 def visibility_program(texture_format):
-    """The program that sums the visibility of the world from the texels of `places`.
+    """Return the program that sums the visibility of the world from the texels of `places`.
 
     texture_format: `SUMS`, to which directions are added one by one; `BYTES`: all are added at once.
     """
@@ -39,7 +39,7 @@ def visibility_program(texture_format):
 
 @shaders.cached
 def bytes_program():
-    """The program that converts strands' visibility from `SUMS` to `BYTES`."""
+    """Return the program that converts strands' visibility from `SUMS` to `BYTES`."""
     info = _program(BYTES)
     for slot, name in enumerate(scene_programs.VISIBILITY_SAMPLERS):
         info.sampler(slot, "FLOAT_2D", name)

@@ -20,7 +20,7 @@ _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 
 
 def expand(name, replaced=None, texts=None):
-    """(text, lines): the text of a file with every #include expanded once, and each line's (file, number).
+    """Return (text, lines): the text of a file with every #include expanded once, and each line's (file, number).
 
     replaced: {file: the file to include instead, or None for nothing}; texts: {file: text} of generated files.
     """
@@ -78,7 +78,8 @@ error_cache = Cache()  # files of a program, and texts that are generated for it
 
 
 def compile_drawing(info, vertex, fragment, targets=COLOR, replaced=None):
-    """The program of a vertex and a fragment shader; replaced: as for `expand`, of the fragment shader's includes.
+    """Return the program of a vertex and a fragment shader; replaced: as for `expand`, of the fragment shader's
+    includes.
 
     targets: (output, type), ... of the fragment shader. Raises `HairError`.
     """
@@ -92,7 +93,7 @@ def compile_drawing(info, vertex, fragment, targets=COLOR, replaced=None):
 
 
 def compile_compute(info, file, replaced=None, texts=None):
-    """The compute program of a file; replaced, texts: as for `expand`. Raises `HairError`."""
+    """Return the compute program of a file; replaced, texts: as for `expand`. Raises `HairError`."""
     text, lines = expand(file, replaced, texts)
     info.compute_source(text)
     return _create(info, (file,), [], lines, tuple((texts or {}).values()))
@@ -134,7 +135,8 @@ _COMPLAINT = re.compile(r"python_shader\.glsl:(\d+)(?::\d+)?:\s*(.*)")
 
 
 def complaint(log, vertex_lines, fragment_lines):
-    """The first error in a compiler's log as "file:line: message", with the source file's line; None if there is none.
+    """Return the first error in a compiler's log as "file:line: message", with the source file's line; None if there
+    is none.
 
     vertex_lines, fragment_lines: from `expand`.
     """

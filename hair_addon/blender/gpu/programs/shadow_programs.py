@@ -13,33 +13,39 @@ _READ_WRITE = {"READ", "WRITE"}
 
 @shaders.cached
 def rows_program():
-    """The program that finds the ends of each texel's row in `fronts` and `backs`, a deep opacity map's first pass."""
+    """Return the program that finds the ends of each texel's row in `fronts` and `backs`, a deep opacity map's first
+    pass.
+    """
     return _filter("shadows/shadow_rows.comp", "RG32F", {"fronts": "UINT_2D", "backs": "UINT_2D"})
 
 
 @shaders.cached
 def fill_program():
-    """The program that fills gaps of `fronts` and `backs` from the result of `rows_program`, into a layer."""
+    """Return the program that fills gaps of `fronts` and `backs` from the result of `rows_program`, into a layer."""
     samplers = {"fronts": "UINT_2D", "backs": "UINT_2D", "row_ends": "FLOAT_2D"}
     return _filter("shadows/shadow_fill.comp", "RG32F", samplers, in_layer=True)
 
 
 @shaders.cached
 def counts_program():
-    """The program that converts `counts`, a deep opacity map's second pass, into layers, and clears all its images."""
+    """Return the program that converts `counts`, a deep opacity map's second pass, into layers, and clears all its
+    images.
+    """
     images = {"counts": _READ_WRITE, "fronts": _READ_WRITE, "backs": _READ_WRITE}
     return _filter("shadows/shadow_counts.comp", "RGBA16F", {}, in_layer=True, images=images)
 
 
 @shaders.cached
 def hidden_program():
-    """The program that finds the depth behind which the surfaces of `surface_depth` hide strands."""
+    """Return the program that finds the depth behind which the surfaces of `surface_depth` hide strands."""
     return _filter("shadows/shadow_hidden.comp", "R32F", {"surface_depth": "FLOAT_2D_ARRAY"})
 
 
 @shaders.cached
 def moments_program():
-    """The program that blurs `surface_depth` along an axis; is_depth: raw depths, else the result of the first axis."""
+    """Return the program that blurs `surface_depth` along an axis; is_depth: raw depths, else the result of the
+    first axis.
+    """
     constants = (("IVEC2", "along"), ("INT", "taps"), ("INT", "is_depth"), ("FLOAT", "deviation"))
     return _filter(
         "shadows/shadow_moments.comp", "RGBA32F", {"surface_depth": "FLOAT_2D_ARRAY"}, constants, in_layer=True
@@ -47,7 +53,9 @@ def moments_program():
 
 
 def _filter(file, texture_format, samplers, constants=(), in_layer=False, images=None):
-    """The program of a file; texture_format: of `filtered`; in_layer: whether that is an array; images: of integers."""
+    """Return the program of a file; texture_format: of `filtered`; in_layer: whether that is an array; images: of
+    integers.
+    """
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     info.typedef_source(uniforms.LIGHT.source)

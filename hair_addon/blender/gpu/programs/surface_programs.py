@@ -14,7 +14,7 @@ _MATERIAL_SAMPLERS = (*SURFACE_IMAGES, "surface_albedo")
 
 @cached
 def number_program():
-    """The program that draws a surface as samples of a picture: see visibility/triangle_index.vert."""
+    """Return the program that draws a surface as samples of a picture: see visibility/triangle_index.vert."""
     info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("number_varying")
     scene_programs.declare_scene(info, shadow_samplers=(), is_lit=False)
     for slot, name in enumerate(CORNER_SAMPLERS):
@@ -32,7 +32,7 @@ SIDE = 4  # samples along each side of a thread's block: SIDE of shaders/surface
 
 @cached
 def shading_program():
-    """The compute program that shades the samples where a surface is nearest: see surfaces/surface.comp."""
+    """Return the compute program that shades the samples where a surface is nearest: see surfaces/surface.comp."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     for slot, name in enumerate(("segments", "depths"), start=_declare_material(info)):
@@ -46,7 +46,7 @@ def shading_program():
 
 @cached
 def clear_program():
-    """The program that draws a clear surface: see surfaces/clear_surface.frag."""
+    """Return the program that draws a clear surface: see surfaces/clear_surface.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     _declare_material(info)
     info.vertex_out(_lit_varying())
@@ -55,7 +55,7 @@ def clear_program():
 
 @cached
 def data_program():
-    """The program of passes of data of a surface: see picture/surface_data.frag."""
+    """Return the program of passes of data of a surface: see picture/surface_data.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     _declare_material(info, uniforms.DATA.source)
     info.uniform_buf(3, uniforms.DATA.type_name, "data")
@@ -65,7 +65,7 @@ def data_program():
 
 @cached
 def arrival_program(fragment):
-    """The program that measures the light on surfaces with a .frag."""
+    """Return the program that measures the light on surfaces with a .frag."""
     info = gpu.types.GPUShaderCreateInfo()
     _declare_lit(info)
     info.vertex_out(_lit_varying())
@@ -74,7 +74,7 @@ def arrival_program(fragment):
 
 @cached
 def depth_program(fragment="shadows/shadow_surface.frag", is_clipped=False):
-    """The program that draws a surface into a shadow map, or as an occluder.
+    """Return the program that draws a surface into a shadow map, or as an occluder.
 
     is_clipped: apply clipping planes, as in surfaces/occluding_surface.frag.
     """

@@ -50,12 +50,12 @@ class Block:
         self.dtype = np.dtype([*fields, *_gap(end, 16)])
 
     def record(self):
-        """A zeroed record."""
+        """Return a zeroed record."""
         return np.zeros((), self.dtype)
 
 
 def _gap(end, alignment):
-    """[(name, type)] of the padding from an end to the next multiple of an alignment; empty without padding."""
+    """Return [(name, type)] of the padding from an end to the next multiple of an alignment; empty without padding."""
     return [(f"unused_{end}", np.dtype((np.uint8, (-end % alignment,))))] if end % alignment else []
 
 
@@ -279,7 +279,7 @@ def _glsl_type(default, details):
 
 @cache
 def settings_block(settings_class, instance="settings"):
-    """The `Block` of a class of settings, named after its instance: `settings` is a `Settings`.
+    """Return the `Block` of a class of settings, named after its instance: `settings` is a `Settings`.
 
     An enumeration becomes the index of its choice; free text is left out.
     """
@@ -288,7 +288,7 @@ def settings_block(settings_class, instance="settings"):
 
 
 def fill(settings):
-    """The record of `settings_block` with these settings."""
+    """Return the record of `settings_block` with these settings."""
     record = settings_block(type(settings)).record()
     for name, _default, details in declared(type(settings)):
         if name in record.dtype.names:
@@ -299,12 +299,12 @@ def fill(settings):
 
 
 def uniform_buffer(record):
-    """A GPUUniformBuf with the bytes of a record."""
+    """Return a GPUUniformBuf with the bytes of a record."""
     return gpu.types.GPUUniformBuf(bytes_of(record))
 
 
 def clipping_blocks(planes):
-    """{instance: GPUUniformBuf} for programs that are clipped by (6, 4) planes; empty for None."""
+    """Return {instance: GPUUniformBuf} for programs that are clipped by (6, 4) planes; empty for None."""
     if planes is None:
         return {}
     record = CLIPPING.record()
@@ -313,6 +313,6 @@ def clipping_blocks(planes):
 
 
 def bytes_of(record):
-    """A Buffer with the bytes of a record: unsigned bytes are copied unchanged, and there is no raw type."""
+    """Return a Buffer with the bytes of a record: unsigned bytes are copied unchanged, and there is no raw type."""
     data = record.tobytes()
     return gpu.types.Buffer("UBYTE", len(data), data)

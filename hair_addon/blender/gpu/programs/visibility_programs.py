@@ -12,7 +12,7 @@ TILE = 8  # samples along each side of a tile: TILE of shaders/visibility/tile.g
 
 @shaders.cached
 def farthest_depths_program():
-    """The compute program that finds the farthest depth in each tile: see visibility/farthest_depths.comp."""
+    """Return the compute program that finds the farthest depth in each tile: see visibility/farthest_depths.comp."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     info.sampler(0, "UINT_2D", "depths")
@@ -22,7 +22,7 @@ def farthest_depths_program():
 
 @shaders.cached
 def hair_first_program():
-    """The program that excludes surfaces behind hair by depth: see surfaces/hair_in_front.frag."""
+    """Return the program that excludes surfaces behind hair by depth: see surfaces/hair_in_front.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.sampler(0, "UINT_2D", "segments")
     info.depth_write("ANY")
@@ -31,7 +31,7 @@ def hair_first_program():
 
 @shaders.cached
 def fill_program():
-    """The compute program that fills a picture with a color: see picture/fill.comp."""
+    """Return the compute program that fills a picture with a color: see picture/fill.comp."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     info.image(0, scene_programs.PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
@@ -41,7 +41,7 @@ def fill_program():
 
 @shaders.cached
 def no_triangle_program():
-    """The program that clears a visibility buffer's samples: see visibility/clear_samples.frag."""
+    """Return the program that clears a visibility buffer's samples: see visibility/clear_samples.frag."""
     return shaders.compile_drawing(
         gpu.types.GPUShaderCreateInfo(), "picture/cover.vert", "visibility/clear_samples.frag", (("segment", "UINT"),)
     )
@@ -49,7 +49,7 @@ def no_triangle_program():
 
 @shaders.cached
 def surface_blank_program():
-    """The program that blanks samples of surfaces: see surfaces/surface_blank.frag."""
+    """Return the program that blanks samples of surfaces: see surfaces/surface_blank.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.sampler(0, "UINT_2D", "segments")
     return shaders.compile_drawing(info, "picture/cover.vert", "surfaces/surface_blank.frag")
@@ -57,7 +57,9 @@ def surface_blank_program():
 
 @shaders.cached
 def surface_depths_program():
-    """The compute program that converts depths to integers, and clears images: see visibility/surface_depths.comp."""
+    """Return the compute program that converts depths to integers, and clears images: see
+    visibility/surface_depths.comp.
+    """
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     info.sampler(0, "FLOAT_2D", "surface_depth")

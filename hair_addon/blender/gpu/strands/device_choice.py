@@ -21,7 +21,7 @@ _RUNS = 3
 
 @shaders.cached
 def times() -> tuple[float, float]:
-    """Seconds in which the GPU makes some strands, infinite if it cannot, and in which as many are uploaded."""
+    """Seconds that the GPU takes to generate strands, infinite if it cannot, and seconds to upload as many."""
     try:
         maker = _maker()
     except HairError:
@@ -51,7 +51,7 @@ def can_make() -> bool:
 
 
 def _maker():
-    """A maker of strands that follow different guides, like neighbors on a surface."""
+    """Return a maker of strands that follow different guides, like neighbors on a surface."""
     slots = (np.arange(_STRANDS)[:, None] * _GUIDES // _STRANDS + np.arange(_SLOTS)) % _GUIDES
     up = np.tile(np.float32([0.0, 0.0, 1.0]), (_STRANDS, 1))
     weights = np.full(slots.shape, 1.0 / _SLOTS, np.float32)

@@ -34,7 +34,7 @@ class StrandBounds:
         return self.levels[0][0]
 
     def read(self) -> np.ndarray:
-        """(2, 3) float32 least and greatest coordinates; waits until the strands are made."""
+        """Return (2, 3) float32 least and greatest coordinates; waits until the strands are made."""
         program = _join_program()
         program.bind()
         program.uniform_int("share", self.share)
@@ -65,7 +65,7 @@ def _boxes_texture(count):
 
 @shaders.cached
 def _join_program():
-    """The compute program that joins boxes."""
+    """Return the compute program that joins boxes."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_GROUP_SIZE)
     info.sampler(0, "FLOAT_2D", "boxes")

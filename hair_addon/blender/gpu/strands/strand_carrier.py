@@ -72,7 +72,7 @@ def new_carrier(
     turning: "VertexRotations",
     slides: np.ndarray | None = None,
 ) -> StrandCarrier:
-    """The `StrandCarrier` of S strands.
+    """Return the `StrandCarrier` of S strands.
 
     rest: texture of the strands; places: (S, 3) int32 vertices around each root and (S, 3) float32 barycentric
     coordinates; vertices: (V, 3) float32 of the surface at rest; turning: of the vertices around roots; slides: (S, 3)
@@ -100,7 +100,7 @@ def new_carrier(
 
 @shaders.cached
 def _carry_program():
-    """The compute program that deforms strands with their surface."""
+    """Return the compute program that deforms strands with their surface."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_GROUP_SIZE)
     for slot, name in enumerate(("rest", "roots", "vertices")):

@@ -69,7 +69,7 @@ def declare_written(info: gpu.types.GPUShaderCreateInfo, first_slot: int) -> Non
 
 
 def rows_texture(values: np.ndarray, channels: int) -> tuple[gpu.types.GPUTexture, int]:
-    """(texture, rows of values per row of texels) of (N, channels T) float32 values, T texels each."""
+    """Return (texture, rows of values per row of texels) of (N, channels T) float32 values, T texels each."""
     texels = values.shape[1] // channels
     in_row = min(TEXTURE_WIDTH // texels, len(values))
     height = -(-len(values) // in_row)

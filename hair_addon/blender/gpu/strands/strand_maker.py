@@ -78,13 +78,13 @@ class StrandMaker:
         gpu.shader.unbind()
 
     def limited(self, fading: tuple[float, float, float, float], keep_length: float) -> "StrandMaker":
-        """A maker with other `BoundStrands.fading` and `keep_length`: only a record is uploaded."""
+        """Return a maker with other `BoundStrands.fading` and `keep_length`: only a record is uploaded."""
         record = self.record.copy()
         record["limits"], record["keep_length"] = fading, keep_length
         return replace(self, record=record, block=uniforms.uniform_buffer(record))
 
     def weighed(self, bound: "BoundStrands") -> "StrandMaker":
-        """A maker with other guides or weights of the same strands. Raises `HairError` like `new_maker`."""
+        """Return a maker with other guides or weights of the same strands. Raises `HairError` like `new_maker`."""
         require_count("strands", len(bound.roots), int(self.record["strand_count"]))
         require_count("guides", len(bound.guide_normals), int(self.record["guide_count"]))
         record, slot_count = self.record.copy(), bound.indices.shape[1]
@@ -123,7 +123,7 @@ class BoundStrands:
 
 
 def bound_strands(binding: HairBinding) -> BoundStrands:
-    """The `BoundStrands` of a `HairBinding`."""
+    """Return the `BoundStrands` of a `HairBinding`."""
     weights = binding.guide_weights
     arrays = (binding.positions, binding.normals, binding.guide_normals, weights.indices, weights.weights)
     return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
@@ -135,7 +135,7 @@ def programs_of(slot_count: int, is_plain: bool) -> list[tuple]:
 
 
 def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain: bool = False) -> StrandMaker:
-    """The `StrandMaker` of `BoundStrands`, without styles; guides and strands have `point_count` points.
+    """Return the `StrandMaker` of `BoundStrands`, without styles; guides and strands have `point_count` points.
 
     axes: (3, 3), from the coordinates of roots and guides to those of the strands; is_plain: make strands in single
     precision, for styles. Raises `HairError` if counts or indices do not match, or the driver does not support it.
@@ -161,7 +161,7 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain:
 
 
 def _binding_rows(bound):
-    """(S, 4 T) float32, T texels per strand: see shaders/strands/interpolate_strands.comp."""
+    """Return (S, 4 T) float32, T texels per strand: see shaders/strands/interpolate_strands.comp."""
     strand_count, slot_count = bound.indices.shape
     require_count("strands", len(bound.roots), strand_count)
     require_count("normals", len(bound.normals), strand_count)
@@ -188,7 +188,7 @@ def _declared(samplers):
 
 @shaders.cached
 def _segments_program():
-    """The compute program that transforms guides into the frames of their roots."""
+    """Return the compute program that transforms guides into the frames of their roots."""
     info = _declared(("guide_points", "guide_normals"))
     info.image(0, "RGBA32F", "FLOAT_2D", "segments", qualifiers={"WRITE"})
     return shaders.compile_compute(info, "strands/guide_segments.comp")
@@ -196,7 +196,7 @@ def _segments_program():
 
 @shaders.cached
 def _strands_program(slot_count, is_plain):
-    """The compute program that makes strands of `slot_count` guides each; is_plain: as for `new_maker`."""
+    """Return the compute program that makes strands of `slot_count` guides each; is_plain: as for `new_maker`."""
     info = _declared(("bindings", "guide_normals", "segments"))
     info.define("SLOTS", str(slot_count))
     for name in ("first_strand", "some_count"):

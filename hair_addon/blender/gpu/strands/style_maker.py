@@ -119,7 +119,8 @@ class StyleMaker:
         gpu.shader.unbind()
 
     def rebound(self, binding: HairBinding, styling: "Styling") -> "StyleMaker | None":
-        """A maker with other weights or limits of the same strands and clumps; None if strands or clumps differ.
+        """Return a maker with other weights or limits of the same strands and clumps; None if strands or clumps
+        differ.
 
         Raises `HairError` like `new_style_maker`.
         """
@@ -139,7 +140,7 @@ class StyleMaker:
         return replace(self, binding=binding, styling=styling, maker=maker, centre_maker=centre_maker)
 
     def _parts(self, styling):
-        """[(pass, data of its strands, their program)]."""
+        """Return [(pass, data of its strands, their program)]."""
         levels = [(own, level.data, level.steps) for own, level in zip(self.levels, styling.levels, strict=True)]
         return [(self.hair, styling.data, styling.program), *levels]
 
@@ -177,7 +178,7 @@ def maker_of(
     axes: np.ndarray,
     before: StrandMaker | StyleMaker | None = None,
 ) -> StrandMaker | StyleMaker:
-    """The maker of the strands of bound hair, with or without styles; the maker before, if it can be reused.
+    """Return the maker of the strands of bound hair, with or without styles; the maker before, if it can be reused.
 
     before: for strands at the same places. point_count, axes: as for `new_maker`. Raises `HairError` like it.
     """
@@ -194,7 +195,7 @@ def maker_of(
 
 
 def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) -> StyleMaker:
-    """The `StyleMaker` of bound hair and its styles, for which `can_style` must hold.
+    """Return the `StyleMaker` of bound hair and its styles, for which `can_style` must hold.
 
     axes: (3, 3), from the coordinates of roots and guides to those of drawn strands. Raises `HairError` like
     `new_maker`.
@@ -245,13 +246,13 @@ def _put_steps(record, program):
 
 
 def _kinds_of(program):
-    """The kinds of a program's steps, for which the GPU program is compiled."""
+    """Return the kinds of a program's steps, for which the GPU program is compiled."""
     present = set(program.choices[:, 0].tolist())
     return tuple(name for name, kind in kinds.STEP_KINDS.items() if kind in present)
 
 
 def _known(data: "StrandData"):
-    """(texture, strands per row, texels per strand): see shaders/strands/style_strands.comp."""
+    """Return (texture, strands per row, texels per strand): see shaders/strands/style_strands.comp."""
     columns = [data.normals.numpy(), _halves(data.identities.numpy()), data.members.numpy().T, data.masks.numpy().T]
     rows = np.concatenate(columns, axis=1, dtype=np.float32)
     rows = np.pad(rows, ((0, 0), (0, -rows.shape[1] % 4)))
@@ -260,14 +261,14 @@ def _known(data: "StrandData"):
 
 
 def _locks(data):
-    """(texture, centers per row): normal and identity of each in two texels."""
+    """Return (texture, centers per row): normal and identity of each in two texels."""
     identities = _halves(data.centre_identities.numpy())
     rows = np.concatenate([data.centre_normals.numpy(), identities, np.zeros((len(identities), 3))], axis=1)
     return strand_changes.rows_texture(rows.astype(np.float32), 4)
 
 
 def _halves(identities):
-    """(N, 2): high and low 16 bits of (N,) int32, which are exact in single precision."""
+    """Return (N, 2): high and low 16 bits of (N,) int32, which are exact in single precision."""
     bits = identities.astype(np.int32).view(np.uint32)
     return np.stack([bits >> np.uint32(16), bits & np.uint32(0xFFFF)], axis=1)
 
@@ -294,7 +295,7 @@ def _are_alike(styling, other):
 
 @shaders.cached
 def _styles_program(point_count, step_kinds):
-    """The compute program that applies steps of some kinds to strands with `point_count` points."""
+    """Return the compute program that applies steps of some kinds to strands with `point_count` points."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_GROUP_SIZE)
     info.typedef_source(uniforms.STEP.source + uniforms.STYLING.source)

@@ -68,7 +68,7 @@ class VertexTurner:
 
 
 def new_turner(turning: "VertexRotations", rest: np.ndarray) -> VertexTurner:
-    """The `VertexTurner` of a `VertexRotations`; rest: (V, 3) float32, all vertices at rest.
+    """Return the `VertexTurner` of a `VertexRotations`; rest: (V, 3) float32, all vertices at rest.
 
     `rest` differs from the vertices of the `VertexRotations` for a smooth surface. Raises `HairError` if counts do not
     match, the mesh is too large for a texture, or the driver does not support it.
@@ -109,7 +109,7 @@ def new_turner(turning: "VertexRotations", rest: np.ndarray) -> VertexTurner:
 
 
 def _gathered(vertices, needed, values):
-    """The texture of the needed vertices of (V, 3); values: the buffer for the upload."""
+    """Return the texture of the needed vertices of (V, 3); values: the buffer for the upload."""
     flat = values.reshape(-1)
     if isinstance(needed, slice):
         flat[: vertices.size] = vertices.ravel()
@@ -124,7 +124,7 @@ def _gathered(vertices, needed, values):
 
 @shaders.cached
 def _turn_program():
-    """The compute program that computes rotations at vertices."""
+    """Return the compute program that computes rotations at vertices."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_GROUP_SIZE)
     for slot, name in enumerate(("rings", "around", "faces", "now", "rest_places", "smooth_rest")):

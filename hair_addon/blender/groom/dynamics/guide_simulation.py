@@ -273,7 +273,7 @@ def in_meters(settings: DynamicsSettings, meters: float) -> DynamicsSettings:
 
 
 def combed_points(guides: Curves) -> np.ndarray:
-    """(G, POINT_COUNT, 3) float32: guides as combed, local coordinates at rest."""
+    """Return (G, POINT_COUNT, 3) float32: guides as combed, local coordinates at rest."""
     if not len(guides.curves):
         raise HairError('"{name}" has no guides to simulate.', name=guides.name)
     points = curves.even_local_points(guides)

@@ -45,7 +45,7 @@ class HandMade:
     rooted: RootedCurves
 
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
-        """[(sentence, values)] to report to the user."""
+        """Return [(sentence, values)] to report to the user."""
         far = float(self.rooted.distances.max()) * 1000.0
         messages = (
             (

@@ -47,7 +47,7 @@ class KeptHair:
     high_error: float  # 95th percentile of the same errors
 
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
-        """[(sentence, values)] to report to the user."""
+        """Return [(sentence, values)] to report to the user."""
         return HandMade(self.guides, self.hair, self.rooted).notes()
 
 

@@ -83,7 +83,7 @@ def _rounded(settings):
 
 
 def _lengths(guides):
-    """(G,) lengths in local units."""
+    """Return (G,) lengths in local units."""
     offsets, points = curves.curve_offsets(guides), curves.read_points(guides)
     steps = np.linalg.norm(np.diff(points, axis=0, append=points[-1:]), axis=1)
     steps[offsets[1:] - 1] = 0.0  # between curves

@@ -99,7 +99,7 @@ class CombedGuides:
         return self.surface.from_local(posed_strands.carried(self.local[places], pose.motion_at(roots[0]), some))
 
     def posed(self) -> np.ndarray:
-        """(N, 3) float32 [m] points on the surface deformed by shape keys and modifiers."""
+        """Return (N, 3) float32 [m] points on the surface deformed by shape keys and modifiers."""
         pose = posed_strands.pose_of(self.surface)
         if not pose.is_deformed:
             return self.points

@@ -54,7 +54,7 @@ class TransferredGroom:
     has_overlap: bool
 
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
-        """[(sentence, values)] to report to the user."""
+        """Return [(sentence, values)] to report to the user."""
         places, surface = self.places, name_of(self.guides.surface)
         messages: list[tuple[str, dict[str, Any]]] = []
         if places.lost_count:

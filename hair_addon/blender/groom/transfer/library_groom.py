@@ -65,7 +65,7 @@ class Applied:
     left: tuple[str, ...]
 
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
-        """[(sentence, values)] to report to the user."""
+        """Return [(sentence, values)] to report to the user."""
         messages = [
             (self.lost_count, "{count} of {all} guides could not be placed on this surface and were left out.", {}),
             (len(self.left), "Not part of the groom: {names}.", {"names": ", ".join(self.left)}),

@@ -32,7 +32,7 @@ _FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32")}
 
 
 def scene_size():
-    """{"width", "height"} of the open scene's renders [pixels]."""
+    """Return {"width", "height"} of the open scene's renders [pixels]."""
     settings = bpy.context.scene.render
     part = settings.resolution_percentage / 100.0
     return {"width": max(1, int(settings.resolution_x * part)), "height": max(1, int(settings.resolution_y * part))}

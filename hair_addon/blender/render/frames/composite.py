@@ -85,7 +85,7 @@ def _is_ours(hair_scene):
 
 
 def _users_of(hair_scene):
-    """The scenes whose hair a hair scene renders."""
+    """Return the scenes whose hair a hair scene renders."""
     return [one for one in bpy.data.scenes if one.vellus.hair_scene == hair_scene]
 
 

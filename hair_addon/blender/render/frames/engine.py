@@ -158,7 +158,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         return names or [""]
 
     def _camera(self, depsgraph, view, size):
-        """(world to view, view to clip) of a view."""
+        """Return (world to view, view to clip) of a view."""
         camera, eye = self._camera_object(depsgraph, view), None
         if view and camera is not None:
             eye = self.camera_model_matrix(camera), self.camera_shift_x(camera)
@@ -172,7 +172,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         return camera and cameras.camera_of_view(depsgraph.scene, camera.original, view).evaluated_get(depsgraph)
 
     def _frame(self, depsgraph, view, size, window, settings):
-        """The `Frame` or `PanoramicFrame` of a view. Raises `HairError`."""
+        """Return the `Frame` or `PanoramicFrame` of a view. Raises `HairError`."""
         self._camera(depsgraph, view, size)  # raises an error if there is none
         camera = self._camera_object(depsgraph, view)
         shift = self.camera_shift_x(camera) if view and camera.type == "CAMERA" else None
@@ -192,7 +192,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         return PanoramicFrame(panorama, clip, outside, size, window, *settings)
 
     def _others(self, depsgraph, size, views, progress):
-        """{view: [`Places`]} of everything one frame before and one frame after."""
+        """Return {view: [`Places`]} of everything one frame before and one frame after."""
         found = {view: [] for view in views}
         progress(_EVALUATING, 0.0)
         for index in scene_time.visit(depsgraph.scene, [-1.0, 1.0], self.frame_set):

@@ -39,7 +39,7 @@ class FrameProgress:
 
 
 def share_of(depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
-    """(start, end) of a view layer in the bar: Blender renders all enabled view layers one after another."""
+    """Return (start, end) of a view layer in the bar: Blender renders all enabled view layers one after another."""
     scene, layer = depsgraph.scene, depsgraph.view_layer
     names = [one.name for one in scene.view_layers if one.use]
     is_alone = scene.render.use_single_layer and not bpy.app.background

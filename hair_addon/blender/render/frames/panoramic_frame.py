@@ -53,7 +53,7 @@ class PanoramicFrame:
 
 
 def _face_projection(half_width, near, far):
-    """(4, 4) view to clip of a square face; half_width: the tangent of half its angle."""
+    """Return (4, 4) view to clip of a square face; half_width: the tangent of half its angle."""
     matrix = np.zeros((4, 4))
     matrix[0, 0] = matrix[1, 1] = 1.0 / half_width
     matrix[2, 2:] = (far + near) / (near - far), 2.0 * far * near / (near - far)

@@ -117,7 +117,7 @@ class Frame:
         return labels, coverages / np.float32(self._moment_count)
 
     def arrays(self):
-        """{pass: array}: means over the motion steps so far, and the nearest depths and positions."""
+        """Return {pass: array}: means over the motion steps so far, and the nearest depths and positions."""
         found = {n: a if n in _NEAREST else a / np.float32(self._moment_count) for n, a in self._sums.items()}
         if "Position" in found:
             places, distances = np.split(found["Position"], [3], axis=-1)

@@ -52,7 +52,7 @@ def draw(guide_object, view, lights, clip_planes):
 
 
 def _color_of(guides):
-    """The color of all guides of an object: plain, or a hue of its own for each hair system."""
+    """Return the color of all guides of an object: plain, or a hue of its own for each hair system."""
     if guides.vellus.guide_colors != "SYSTEM":
         return _PLAIN
     turn = zlib.crc32(name_of(guides).encode()) / 2**32

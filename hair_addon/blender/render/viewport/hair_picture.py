@@ -172,7 +172,7 @@ class HairPicture:
         return self._pass.hair_near(side * (x - left) + side // 2, side * (y - bottom) + side // 2, side * reach)
 
     def read(self):
-        """(height, width, 4) float32: premultiplied linear light, bottom row first."""
+        """Return (height, width, 4) float32: premultiplied linear light, bottom row first."""
         pixels = self._sum.read_color(0, 0, *self.size, 4, 0, "FLOAT")
         return np.array(pixels, np.float32).reshape(self.size[1], self.size[0], 4) / self.pass_count
 
@@ -182,7 +182,7 @@ class HairPicture:
 
 
 def table_texture(table):
-    """(N, N, N, 3) float32, whose third axis runs along x → a texture with linear interpolation."""
+    """Return (N, N, N, 3) float32, whose third axis runs along x → a texture with linear interpolation."""
     size = len(table)
     texels = np.ones((size, size, size, 4), np.float32)
     texels[..., :3] = table

@@ -94,7 +94,7 @@ class History:
         return self._shown.textures[0] if self._is_carried else None
 
     def read(self):
-        """(height, width, 4) float32 of `picture`, bottom row first."""
+        """Return (height, width, 4) float32 of `picture`, bottom row first."""
         return np.array(self.picture.read(), np.float32).reshape(self.size[1], self.size[0], 4)
 
     def forget(self):

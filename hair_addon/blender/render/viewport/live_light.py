@@ -186,7 +186,7 @@ class _Content:
     radius: float
 
     def part_since(self, before):
-        """The part of the light measured with another `_Content` that is still valid, from 0 to 1."""
+        """Return the part of the light measured with another `_Content` that is still valid, from 0 to 1."""
         if len(self.hair) != len(before.hair):
             return 0.0
         known = _unchanged(self.lights, before.lights)
@@ -239,7 +239,7 @@ def _replaced(content, other):
 
 
 def _content_of(drawn):
-    """The `_Content` of a `DrawnScene`."""
+    """Return the `_Content` of a `DrawnScene`."""
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _, to_world, *_ in drawn.hair])
     places = centre + 0.5 * radius * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     found = drawn.lamps.lamps
@@ -258,7 +258,7 @@ def _content_of(drawn):
 
 
 def _unchanged(values, before):
-    """The part of light that stays valid, from 0 to 1, after numbers have changed."""
+    """Return the part of light that stays valid, from 0 to 1, after numbers have changed."""
     size = max(np.size(values), np.size(before))
     now, then = (np.pad(np.ravel(one).astype(float), (0, size - np.size(one))) for one in (values, before))
     change = np.abs(now - then).sum() / max(np.abs(now).sum(), np.abs(then).sum(), 1e-12)
@@ -343,7 +343,9 @@ class LiveLight:
             self._job.wait()
 
     def lit(self, drawn, camera, count, now, may_follow=True):
-        """A `DrawnScene` lit by the paths followed so far. count: as of `light_paths.path_count`; now: a time [s]."""
+        """Return a `DrawnScene` lit by the paths followed so far. count: as of `light_paths.path_count`; now: a time
+        [s].
+        """
         self.asked = 0
         self._turn_to(drawn, camera, now)
         self._take()
@@ -456,14 +458,14 @@ class LiveLight:
         self._is_done = part == 1.0 and (is_known or self._tried >= light_paths.MOST_TIMES * self._goal)
 
     def _part(self):
-        """The part of the picture's light that is measured light, from 0 to 1."""
+        """Return the part of the picture's light that is measured light, from 0 to 1."""
         if self._known is None:
             return 0.0
         content, part = self._known
         return part if content is self._content else part * self._content.part_since(content)
 
     def _shown(self, drawn):
-        """The scene lit by the measured light: the same object if nothing has changed."""
+        """Return the scene lit by the measured light: the same object if nothing has changed."""
         if self._scene[0] is drawn:
             return self._scene[1]
         found, part = drawn, 0.0 if self.obstacle else self._part()
@@ -475,7 +477,7 @@ class LiveLight:
 
 
 def _grid_of(systems, fibres, device):
-    """The `StrandGrid` of hair; None if paths cannot be followed in it."""
+    """Return the `StrandGrid` of hair; None if paths cannot be followed in it."""
     if not paths.strand_grid.has_area(systems):
         return None
     grid = paths.strand_grid.build(systems, fibres, device=device)

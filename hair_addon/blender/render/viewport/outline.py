@@ -146,13 +146,13 @@ class HairOutline:
 
 
 def _picture(size, texture_format):
-    """(texture, framebuffer) of this size; a framebuffer does not own its texture."""
+    """Return (texture, framebuffer) of this size; a framebuffer does not own its texture."""
     texture = gpu.types.GPUTexture(size, format=texture_format)
     return texture, gpu.types.GPUFrameBuffer(color_slots=texture)
 
 
 def _program(fragment, constants, samplers):
-    """A program that runs a fragment shader on every pixel; constants, samplers: {name: type} in order."""
+    """Return a program that runs a fragment shader on every pixel; constants, samplers: {name: type} in order."""
     info = gpu.types.GPUShaderCreateInfo()
     for name, kind in constants.items():
         info.push_constant(kind, name)

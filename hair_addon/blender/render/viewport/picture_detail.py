@@ -70,7 +70,9 @@ def of_hair(drawn, camera, size, per_side, is_shadowed=False):
 
 
 def _window(drawn, camera, size, is_shadowed):
-    """(left, bottom, width, height) [pixels] of the part of a picture that contains all hair, and its surfaces."""
+    """Return (left, bottom, width, height) [pixels] of the part of a picture that contains all hair, and its
+    surfaces.
+    """
     view = drawing.pass_record(*camera, size)
     found = [
         windows.of_strands(strands, drawing.strand_record(strands, view, to_world), size)
@@ -88,7 +90,7 @@ def _window(drawn, camera, size, is_shadowed):
 
 
 def _tile_around(window, size):
-    """The window with a margin, enlarged to a multiple of the size step, within the picture."""
+    """Return the window with a margin, enlarged to a multiple of the size step, within the picture."""
     placed = []
     for start, length, most in zip(window[:2], window[2:], size, strict=True):
         length = min(-(-(length + 2 * _MARGIN) // _SIZE_STEP) * _SIZE_STEP, most)

@@ -33,7 +33,7 @@ class RegionPicture:
 
 
 def picture_of(region, kind, *options):
-    """The `RegionPicture` of a region, with the picture kind((width, height) [pixels], *options)."""
+    """Return the `RegionPicture` of a region, with the picture kind((width, height) [pixels], *options)."""
     key, options = (region.as_pointer(), kind), ((region.width, region.height), *options)
     known = picture_cache.get(key)
     if known is None or known.options != options:
@@ -43,7 +43,7 @@ def picture_of(region, kind, *options):
 
 
 def known_picture(region, kind):
-    """The last drawn `RegionPicture` of a region, or None."""
+    """Return the last drawn `RegionPicture` of a region, or None."""
     return picture_cache.get((region.as_pointer(), kind))
 
 

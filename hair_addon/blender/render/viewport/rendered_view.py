@@ -32,7 +32,7 @@ def _is_transparent(context, drawn):
 
 
 def _lens(context):
-    """The `Lens` of the camera that a viewport looks through, or None."""
+    """Return the `Lens` of the camera that a viewport looks through, or None."""
     space, region_view = context.space_data, context.region_data
     if region_view.view_perspective != "CAMERA":
         return None

@@ -17,7 +17,8 @@ def has_outlines(context):
 
 
 def outlined(context, drawn, is_see_through=False):
-    """(items of `channels`, style) for `HairOutline.restart` of a `DrawnScene`'s selected hair; None without any.
+    """Return (items of `channels`, style) for `HairOutline.restart` of a `DrawnScene`'s selected hair; None without
+    any.
 
     Hashable. is_see_through: whether lines of occluded hair are as opaque as others.
     """

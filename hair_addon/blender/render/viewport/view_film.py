@@ -60,7 +60,7 @@ class ViewFilm:
         self._film.show(self._history.picture)
 
     def read(self):
-        """(height, width, 4) float32: the mean of the passes so far, bottom row first."""
+        """Return (height, width, 4) float32: the mean of the passes so far, bottom row first."""
         return self._film.read()["Combined"]
 
     def read_shown(self):

@@ -157,7 +157,7 @@ def is_ours(context):
 
 
 def hair_at(context, x, y):
-    """The hair object in the context's viewport at, or a few pixels from, a pixel of its region; or None."""
+    """Return the hair object in the context's viewport at, or a few pixels from, a pixel of its region; or None."""
     region_picture = region_pictures.known_picture(context.region, hair_picture.HairPicture)
     width, height = region_picture.picture.size if region_picture else (0, 0)
     if is_drawn_by_engine(context) or not (0 <= x < width and 0 <= y < height):
@@ -172,7 +172,7 @@ def hair_at(context, x, y):
 
 
 def drawn_scene_of(context):
-    """The `DrawnScene` of the context's viewport, read if something has moved."""
+    """Return the `DrawnScene` of the context's viewport, read if something has moved."""
     viewport = context.space_data
     shading = viewport_shading.read(viewport, context.scene, matrices_of(context.region_data)[0])
     key, shows = viewport.as_pointer(), (is_ours(context), *_visibility_key(viewport), shading.strands)
@@ -205,7 +205,7 @@ def drawn_scene_of(context):
 
 
 def _lit(view, context, light):
-    """The `DrawnScene` of a `_View` in the light of the context's region.
+    """Return the `DrawnScene` of a `_View` in the light of the context's region.
 
     Regions of a viewport, as in a quad view, differ in lights that follow the view. While it turns they follow in
     steps, as each step draws shadow maps.
@@ -233,7 +233,7 @@ def _is_lone(view, region, drawn):
 
 
 def _visibility_key(viewport):
-    """A key of a viewport's settings that affect which objects, and which of their data, are read."""
+    """Return a key of a viewport's settings that affect which objects, and which of their data, are read."""
     return (
         viewport.shading.type == "MATERIAL",
         viewport.local_view is not None,
@@ -268,7 +268,7 @@ def _is_shadowed(context, drawn):
 
 
 def _clip_planes(context):
-    """((x, y, z, w), ... of six planes) of Blender's Clipping Region in Wireframe and Solid shading, or None.
+    """Return ((x, y, z, w), ... of six planes) of Blender's Clipping Region in Wireframe and Solid shading, or None.
 
     World points p with any dot((x, y, z, w), (p, 1)) < 0 are clipped.
     """
@@ -280,7 +280,7 @@ def _clip_planes(context):
 
 
 def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=False, clip_planes=None):
-    """The `RegionPicture` of a region for this scene and view: restarted, with another pass, or unchanged.
+    """Return the `RegionPicture` of a region for this scene and view: restarted, with another pass, or unchanged.
 
     outlined: from `selected_hair.outlined`; is_shadowed, clip_planes: as for `HairPicture.add_pass`.
     """
@@ -302,7 +302,7 @@ def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=Fal
 
 
 def matrices_of(view):
-    """(world to view, view to clip) of a `RegionView3D`, each (4, 4) float64."""
+    """Return (world to view, view to clip) of a `RegionView3D`, each (4, 4) float64."""
     return np.array(view.view_matrix, np.float64), np.array(view.window_matrix, np.float64)
 
 

@@ -60,7 +60,7 @@ class GuideTool(HairOperator):
         return self.message(self.apply(guides_of(context.object), settings, context.evaluated_depsgraph_get()))
 
     def message(self, count):
-        """(sentence, values) of the report."""
+        """Return (sentence, values) of the report."""
         return "{count} guides changed", {"count": count}
 
     def draw(self, context):

@@ -82,7 +82,7 @@ def _draw_tools(layout, context):
 
 
 def _draw_combing_settings(layout, context):
-    """Draw what applies while guides are combed: they stay outside, and hair is shown with its styles."""
+    """Draw the settings for combing guides: whether they stay outside, and whether hair is shown with its styles."""
     hair, guides = hair_of(context.object), guides_of(context.object)
     if guides is None:
         return

@@ -207,7 +207,7 @@ def _split_by_group(curves, parameters, kept) -> Iterator[CurveSet]:
         return None if values is None or len(values) != file_count else values[kept]
 
     def of_all(name):
-        """(C,) int64, or None."""
+        """Return (C,) int64, or None."""
         values = parameters.values(name, "iu")
         if values is None or len(values) not in (1, file_count):
             return None

@@ -10,7 +10,8 @@ LEAF_TRIANGLES = 4
 
 
 def build(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(boxes (2 L, 2, 3) float32, triangles (L, LEAF_TRIANGLES) int32 of each leaf) of triangles (F, 3, 3), F > 0.
+    """Return (boxes (2 L, 2, 3) float32, triangles (L, LEAF_TRIANGLES) int32 of each leaf) of triangles (F, 3, 3), F
+    > 0.
 
     L is a power of two; the last leaves are filled up with a triangle that is in one already. boxes[n]: least and
     greatest coordinates of node n.

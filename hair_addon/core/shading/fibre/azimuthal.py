@@ -18,7 +18,7 @@ def trimmed_logistic(phi: Values, scale: Values) -> np.ndarray:
 
 
 def roughening(edges: np.ndarray, scale: Values) -> np.ndarray:
-    """(W, W) matrix that turns the cell means of a smooth N over phi (..., W) into those of a rough one.
+    """Return (W, W) matrix that turns the cell means of a smooth N over phi (..., W) into those of a rough one.
 
     edges: W + 1 monotone values of phi from 0 to pi or back; scale s [rad].
     """
@@ -26,7 +26,7 @@ def roughening(edges: np.ndarray, scale: Values) -> np.ndarray:
 
 
 def forward_mean(edges: np.ndarray) -> np.ndarray:
-    """(W, W) matrix that averages N over light from around each phi that strands have scattered forward.
+    """Return (W, W) matrix that averages N over light from around each phi that strands have scattered forward.
 
     The weight at a distance x is cos²(x) up to pi / 2. Its mean cosine, 8 / 3 pi or 0.85, is close to that of light
     scattered forward by one fiber, 0.80 to 0.83 for brown to white hair. N^G of [Zinke08] weights the half circle
@@ -41,7 +41,7 @@ def forward_mean(edges: np.ndarray) -> np.ndarray:
 
 
 def _spreading(edges, second_antiderivative):
-    """The matrix of a convolution over the circle with an even density D on [-pi, pi], for means over cells.
+    """Return the matrix of a convolution over the circle with an even density D on [-pi, pi], for means over cells.
 
     N is even in phi, so light comes from both sides. Each element is the exact mean of D over two cells, and each
     column sums to one, which conserves energy. second_antiderivative: G on [0, pi] with G'' = D, G(0) = G'(0) = 0.

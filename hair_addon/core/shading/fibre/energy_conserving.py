@@ -21,7 +21,7 @@ LOBES = (paths.R, paths.TT, paths.TRT, paths.RESIDUAL)
 
 
 def lobes(settings: Settings, roughness: Values | None = None) -> list[tuple[float, Values]]:
-    """[(shift, v)] of the four lobes: center [rad] and variance [rad²] in theta_i + theta_o.
+    """Return [(shift, v)] of the four lobes: center [rad] and variance [rad²] in theta_i + theta_o.
 
     roughness: (...) of varied strands; None: that of the settings.
     """

@@ -111,7 +111,7 @@ def mean_albedo(settings: Settings) -> np.ndarray:
 
 
 def mean_albedo_of_strands(settings: StrandSettings, sigma_a: np.ndarray) -> np.ndarray:
-    """The mean (3,) of `mean_albedo` over strands of `StrandSettings` with absorptions (..., 3)."""
+    """Return the mean (3,) of `mean_albedo` over strands of `StrandSettings` with absorptions (..., 3)."""
     exponent = highlight_exponent((1.0 - settings.coat) * settings.roughness)
     specular = highlight_peak(settings.reflectance, exponent) * kajiya_kay_specular_albedo(exponent)
     return color_from_falloff(sigma_a, settings.falloff).reshape(-1, 3).mean(axis=0) + specular

@@ -164,7 +164,7 @@ def beta_r_of(roughness: Values) -> np.ndarray:
 
 
 def longitudinal_lobes(settings: Settings, beta_r: Values | None = None) -> list[tuple[float, Values]]:
-    """[(alpha, beta)] of R, TT and TRT: center and standard deviation in theta_h.
+    """Return [(alpha, beta)] of R, TT and TRT: center and standard deviation in theta_h.
 
     beta_r: deviation (...) of R on varied strands; None: that of the settings.
     """

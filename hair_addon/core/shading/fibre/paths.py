@@ -42,7 +42,7 @@ def caustic_gamma(eta_prime: Values) -> np.ndarray:
 
 
 def trt_segments(eta_prime: Values) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """[(low, high, slope sign)], each (...): the intervals of gamma in which TRT's exit angle is monotone.
+    """Return [(low, high, slope sign)], each (...): the intervals of gamma in which TRT's exit angle is monotone.
 
     For eta' of 2 and more it is monotone everywhere: the middle interval is the whole range, the others are empty.
     """

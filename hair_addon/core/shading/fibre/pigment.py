@@ -53,7 +53,7 @@ def color_of_scattering(color: ArrayLike, scattering: Values) -> np.ndarray:
 
 
 def color_from_falloff(sigma_a: ArrayLike, falloff: Values) -> np.ndarray:
-    """The color of many fibers of sigma_a (..., 3) by the `color_falloff` of their azimuthal roughness."""
+    """Return the color of many fibers of sigma_a (..., 3) by the `color_falloff` of their azimuthal roughness."""
     return np.exp(-falloff * np.sqrt(sigma_a))
 
 

@@ -213,7 +213,7 @@ class PathSums:
         self._total, self._squares, self.taken = weight * self._total, weight * self._squares, weight * self.taken
 
     def of_systems(self) -> list[wp.array4d[wp.float64]]:
-        """(Z, Y, X, 12) of each system of hair, as of `gather`."""
+        """Return (Z, Y, X, 12) of each system of hair, as of `gather`."""
         return self._sums.of_systems()
 
     def shares(

@@ -261,5 +261,5 @@ def of_seen(medium: Medium, seen: Seen, voxels: wp.array3d[wp.uint8], count: int
 
 
 def _product(seed):
-    """The product of a seed for `_hashed`."""
+    """Return the product of a seed for `_hashed`."""
     return wp.uint64((seed * 0x8CB92BA72F3D8DD7) % 2**64)

@@ -262,7 +262,9 @@ def _measure(
 
 
 def _measured(points, radii, strands):
-    """((3,) least and largest coordinates, largest radius, sum of length × width of segments); no area without any."""
+    """Return ((3,) least and largest coordinates, largest radius, sum of length × width of segments); no area
+    without any.
+    """
     count = len(points)
     if not count:
         return np.zeros(3), np.zeros(3), 0.0, 0.0

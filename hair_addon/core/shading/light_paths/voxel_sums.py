@@ -148,7 +148,7 @@ class VoxelSums:
         self._sums = wp.zeros((rows, CHANNELS), dtype=wp.float64, device=grid.device)
 
     def of_systems(self) -> list[wp.array4d[wp.float64]]:
-        """(Z, Y, X, 12) of each system of hair."""
+        """Return (Z, Y, X, 12) of each system of hair."""
         count = int(np.prod(self._voxels))
         firsts = range(0, len(self._sums), count)
         return [self._sums[first : first + count].reshape((*self._voxels, CHANNELS)) for first in firsts]

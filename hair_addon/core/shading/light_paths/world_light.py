@@ -31,7 +31,7 @@ class World:
 
 
 def world_of(picture: np.ndarray) -> World:
-    """The `World` of a picture (H, W, 3) of radiance, on Warp's current device."""
+    """Return the `World` of a picture (H, W, 3) of radiance, on Warp's current device."""
     picture = np.maximum(np.asarray(picture, np.float64), 0.0)
     height, width = picture.shape[:2]
     edges = np.sin(np.pi * (np.arange(height + 1) / height - 0.5))

@@ -24,12 +24,12 @@ def grown(hair):
 
 
 def shapes():
-    """(G, P, 3) of guides."""
+    """Return (G, P, 3) of guides."""
     return points(bpy.data.objects["Guides"]).copy()
 
 
 def on_halves():
-    """((G,) whether guides are rooted well on the upper half, the same of the lower half)."""
+    """Return ((G,) whether guides are rooted well on the upper half, the same of the lower half)."""
     heights = shapes()[:, 0, 2]
     return heights > 0.3, heights < -0.3
 

@@ -53,7 +53,7 @@ def model(name):
 
 
 def camera():
-    """(world to view, view to clip) of a perspective view of everything from above the front right."""
+    """Return (world to view, view to clip) of a perspective view of everything from above the front right."""
     surface = next(o for o in bpy.data.objects if o.type == "MESH")
     corners = np.array(
         [surface.matrix_world @ Matrix.Translation(corner).to_translation() for corner in surface.bound_box]
