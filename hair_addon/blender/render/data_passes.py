@@ -24,8 +24,8 @@ DENOISING = ("Noisy Image", "Denoising Albedo", "Denoising Normal")
 def draw(drawn, name, world_to_view, view, buffer):
     """Return a texture of a pass out of `KINDS` for the `VisibilityBuffer` that a `DrawnScene` was drawn into.
 
-    world_to_view: (4, 4) of the camera, without its lens. Mist is the fraction of light that it lets through; alpha is one in samples with
-    hair or a surface other than holdouts.
+    world_to_view: (4, 4) of the camera, without its lens. Mist is the fraction of light that it lets through; alpha is
+    one in samples with hair or a surface other than holdouts.
     """
     record = _record(drawn.mist, name, world_to_view)
     surfaces = zip(drawn.surfaces, *scene_drawing.light_of(drawn, solid=True), strict=True)
