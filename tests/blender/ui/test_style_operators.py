@@ -190,6 +190,17 @@ def test_presets_replace_styles_and_leave_the_rest(styled, preset):
     assert after.hair == setting_properties.as_stored(wanted.hair)
 
 
+def test_locks_of_hair_that_is_not_live_are_placed_by_its_update(styled, monkeypatch):
+    state().is_live = False
+    placed, search = [], clump_trees.ClumpTrees.search
+    monkeypatch.setattr(clump_trees.ClumpTrees, "search", lambda *given: placed.append(given) or search(*given))
+    operate(bpy.ops.vellus.apply_style_preset, preset="CURLY")
+    operate(bpy.ops.vellus.add_style, style="CLUMP")
+    assert not placed and state().is_stale
+    operate(bpy.ops.vellus.update_hair)
+    assert placed and not state().is_stale
+
+
 def test_presets_fit_the_surface(hair):
     operate(bpy.ops.vellus.apply_style_preset, preset="CURLY")
     (plain,) = (style for style in style_presets.read("CURLY").styles if isinstance(style, curl.Settings))

@@ -102,9 +102,12 @@ def _found(place: Remembered) -> Curves:
 
 
 def _placing_locks(hair, styles):
-    """Return the computation that places the locks of styles on a hair's surface, if the hair is bound."""
+    """Return the computation that places the locks of styles on a hair's surface, if the hair is bound and live.
+
+    Without Auto Update the next update places them.
+    """
     trees = [tree for tree, _level in program.tree_levels([setting_properties.as_stored(style) for style in styles])]
-    bound = bindings.of(hair) if trees else None
+    bound = bindings.of(hair) if trees and hair.vellus.is_live else None
 
     def compute(progress):
         if bound is not None:
