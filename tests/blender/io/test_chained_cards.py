@@ -126,7 +126,10 @@ def test_springs_in_files_stand_where_the_chains_stand(hair, tmp_path, is_rigged
         rig(sphere).location = (1.0, 0.0, 0.0)
     update()
     made = chained("cards", hair)
+    made.parent.rotation_euler = (0.3, 0.8, -0.2)  # an artist may turn them
     update()
+    to_surface = sphere.matrix_world.inverted() @ Matrix.Translation(sphere.matrix_world.translation)
+    to_surface @= made.parent.matrix_world.inverted()
     path = tmp_path / "hair.glb"
     mesh_export.write(path, [made])
     described = json.loads(path.read_bytes()[20:].split(b"BIN\0")[0][:-4].decode().rstrip("\0 "))
@@ -148,7 +151,7 @@ def test_springs_in_files_stand_where_the_chains_stand(hair, tmp_path, is_rigged
     reach = springs["springs"][0]["joints"][0]["hitRadius"]
     for node, its in spheres:
         center = (to_scene[node] @ [*its["offset"], 1.0])[:3]
-        local = sphere.matrix_world.inverted() @ Vector((center[0], -center[2], center[1]))
+        local = to_surface @ Vector((center[0], -center[2], center[1]))
         assert local.length < 1.0
         assert (np.linalg.norm(joints[:, 1:] - center, axis=2) >= its["radius"] + reach - 1e-4).all()
 

@@ -87,20 +87,17 @@ def _add_bones(armature_object, joints, root, names):
         with bpy.context.temp_override(**context):
             bpy.ops.object.mode_set(mode="EDIT")
             bones = armature_object.data.edit_bones
-            middle, length = (
-                Vector(joints[:, 0].mean(axis=0)),
-                np.linalg.norm(joints[:, 1] - joints[:, 0], axis=1).mean(),
-            )
-            top = _bone(bones, root, middle, middle + Vector((0.0, 0.0, float(length))))
+            middle = Vector(joints[:, 0].mean(axis=0))
+            length = float(np.linalg.norm(joints[:, 1] - joints[:, 0], axis=1).mean())
+            top = _bone(bones, root, middle, middle + Vector((0.0, 0.0, length)))
             for chain, of_chain in zip(joints, names, strict=True):
                 parent = top
                 for index, name in enumerate(of_chain):
                     bone = _bone(bones, name, Vector(chain[index]), Vector(chain[index + 1]))
                     bone.parent, bone.use_connect = parent, index > 0
                     parent = bone
-                end = _bone(
-                    bones, f"{of_chain[0][:-3]}_end", parent.tail, parent.tail + _END * (parent.tail - parent.head)
-                )
+                beyond = parent.tail + _END * (parent.tail - parent.head)
+                end = _bone(bones, f"{of_chain[0][:-3]}_end", parent.tail, beyond)
                 end.parent, end.use_connect, end.use_deform = parent, True, False
             bpy.ops.object.mode_set(mode="OBJECT")
     finally:
@@ -138,6 +135,7 @@ def springs_of(armature_object):
     chains = [[bone.name for bone in (first, *first.children_recursive)] for first in root.children]
     lengths = [bone.length for bone in bones if bone.use_deform and bone != root]
     spheres = np.array(armature_object.data[_SPHERES], np.float64).reshape(-1, 4)
-    centers = spheres[:, :3] + np.array(armature_object.matrix_world.translation)
+    to_world = np.array(armature_object.matrix_world)
+    centers = spheres[:, :3] @ to_world[:3, :3].T + to_world[:3, 3]
     upward = np.stack([centers[:, 0], centers[:, 2], -centers[:, 1]], axis=1)
     return Springs(root.name, chains, upward, spheres[:, 3], _HIT_RADIUS * float(np.mean(lengths)))
