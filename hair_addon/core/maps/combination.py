@@ -53,10 +53,16 @@ def ramped(masks: np.ndarray, ramp: np.ndarray, is_inverted: bool) -> np.ndarray
 
     is_inverted: whether masks are inverted first. Infinite masks count as 0; NaN, a strand without a map, stays.
     """
-    masks = np.where(np.isinf(masks), 0.0, np.asarray(masks, float))
-    places = np.clip(1.0 - masks if is_inverted else masks, 0.0, 1.0) * (len(ramp) - 1)
-    known = np.arange(len(ramp))
-    return np.stack([np.interp(places, known, channel) for channel in ramp.T], axis=1).astype(np.float32)
+    masks = np.asarray(masks, np.float32)
+    known = np.where(np.isfinite(masks), masks, np.float32(0.0))
+    places = np.clip(1.0 - known if is_inverted else known, 0.0, 1.0) * np.float32(len(ramp) - 1)
+    below = places.astype(np.int32)
+    share = (places - below)[:, None]
+    found, above = ramp[below], ramp[np.minimum(below + 1, len(ramp) - 1)]
+    # Exact at samples, and between equal samples.
+    found = found + share * (above - found)
+    found[np.isnan(masks)] = np.nan
+    return found
 
 
 def random_masks(identities: np.ndarray, seed: int) -> np.ndarray:
