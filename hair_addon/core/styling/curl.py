@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Curl: strands wind around their former path, as helices or flat waves.
 
-With the arc of a turn ℓ = sqrt((2πR)² + h²), κ = keep_length and y the strand's progress along its path:
+With h = pitch (1 + pitch_vary (2 h_pitch - 1)) of a lock, the arc of a turn ℓ = sqrt((2πR)² + h²), κ = keep_length and
+y the strand's progress along its path:
 
-    R_i = A_si · radius · smoothstep(2 s_i / ℓ),    h_i = pitch · (1 + stretch (1 - x_i))
+    R_i = A_si · radius · smoothstep(2 s_i / ℓ),    h_i = h · (1 + stretch (1 - x_i))
     φ_i = φ_(i-1) + 2π d_i ((1 - κ) / h_i + κ / sqrt((2πR)² (1 + (1 - flatness)²) / 2 + h_i²))
                   + (2π Σ (y_j - y_(j-1)) / h_j - φ_(i-1)) h_i² / ((2πR)² (1 + (1 - flatness)²) / 2 + h_i²)
     φ_0 = 2π (h_clump + (1 - coherence) (h_s - ½)),    ρ_i = R_i (cos φ_i, ± (1 - flatness) sin φ_i)
@@ -12,7 +13,7 @@ The second line corrects the phase to one turn per pitch of y. Below a Clump, y 
 strand's lock, and ρ is in the center's frames, so that strands with different roots wind together (beside.strand).
 Without a Clump, y is the strand's own.
 
-A straight strand of length L reaches L pitch / ℓ. It becomes the curve of curvature R / (R² + (h/2π)²) and torsion
+A straight strand of length L reaches L h / ℓ. It becomes the curve of curvature R / (R² + (h/2π)²) and torsion
 (h/2π) / (R² + (h/2π)²), the helix that natural curvature gives a fiber [Bertails06]. A twentieth of the locks, between
 left and right, is flat, so that the fraction of left-handed locks can be animated. In coils whose handedness changes
 along the strand (switchbacks, or perversions), φ reverses where a one-dimensional noise of the lock changes sign.
@@ -20,7 +21,7 @@ along the strand (switchbacks, or perversions), φ reverses where a one-dimensio
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..params import param, param_of
 from .base import Cutter, ProfiledSettings, Step, step_of
@@ -28,7 +29,16 @@ from .base import Cutter, ProfiledSettings, Step, step_of
 LABEL = "Curl"
 DESCRIPTION = "Wind strands into coils or waves"
 STEP = "CURL"
-NUMBERS = ("radius", "pitch", "roundness", "coherence", "stretch", "left_handed", "switchback")  # of curl.strand
+NUMBERS = (
+    "radius",
+    "pitch",
+    "pitch_vary",
+    "roundness",
+    "coherence",
+    "stretch",
+    "left_handed",
+    "switchback",
+)  # of curl.strand
 
 POINTS_A_TURN = 8  # with fewer, coils look angular
 
@@ -56,6 +66,14 @@ class Settings(ProfiledSettings):
         unit="LENGTH",
         subtype="DISTANCE",
         precision=4,
+    )
+    pitch_vary: float = param(
+        0.0,
+        "Largest difference of a lock's pitch, as a part of the pitch: neighboring locks do not stay in step",
+        label="Pitch variation",
+        low=0.0,
+        high=0.9,
+        subtype="FACTOR",
     )
     flatness: float = param(
         0.0, "Flatten coils into waves: 0 is a round coil, 1 a flat wave", low=0.0, high=1.0, subtype="FACTOR"
@@ -93,7 +111,7 @@ class Settings(ProfiledSettings):
     start: float = param_of(ProfiledSettings, "start", 0.02)
 
 
-WAVE = {"flatness": 1.0, "coherence": 0.9}  # as added from the menu under the name Wave
+WAVE = {"flatness": 1.0, "coherence": 0.9, "pitch_vary": 0.3}  # as added from the menu under the name Wave
 
 
 def turn_length(settings: Settings) -> float:
@@ -103,8 +121,9 @@ def turn_length(settings: Settings) -> float:
 
 
 def points_wanted(settings: Settings, length: float) -> int:
-    """Return the number of points that a strand of a length [m] needs for smooth coils."""
-    return math.ceil(POINTS_A_TURN * length / turn_length(settings)) + 1
+    """Return the number of points that a strand of a length [m] needs for smooth coils, also in the tightest locks."""
+    tightest = replace(settings, pitch=settings.pitch * (1.0 - settings.pitch_vary))
+    return math.ceil(POINTS_A_TURN * length / turn_length(tightest)) + 1
 
 
 def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:

@@ -10,7 +10,7 @@ import numpy as np
 # Purposes: numbers of a strand.
 VARY, STRAY, LENGTH, UNDERCOAT, CROSSOVER, PHASE, TURN = range(7)
 # Numbers of a clump.
-CLUMP_PHASE, CLUMP_HAND, CLUMP_SHIFT = 16, 17, 18
+CLUMP_PHASE, CLUMP_HAND, CLUMP_SHIFT, CLUMP_PITCH = 16, 17, 18, 19
 # Numbers of each wave of a noise, and of the cells along a strand.
 WAVE_PHASES, WAVE_VECTORS, CLUMP_CELLS = 32, 64, 128
 

@@ -55,6 +55,19 @@ def test_a_part_of_the_locks_winds_to_the_left():
     assert (turns < 0.0).mean() == pytest.approx(0.3, abs=0.07)
 
 
+def test_locks_vary_in_pitch_and_strands_of_a_lock_do_not():
+    """Locks vary in pitch by the given part, evenly around the pitch; the strands of a lock wind as often."""
+    members = np.repeat(np.arange(200), 2)
+    settings = helix(left_handed=0.0, radius=0.001, pitch_vary=0.3)
+    strands = straight_strands(400, 0.3, 101)
+    turns = winding(stepped(strands, settings, members=members)).reshape(200, 2)
+    np.testing.assert_allclose(turns[:, 0], turns[:, 1], rtol=1e-3)
+    same = winding(stepped(strands, replace(settings, pitch_vary=0.0), members=members)).mean()
+    ratios = same / turns[:, 0]  # of the pitch of each lock to the pitch
+    assert 0.68 < ratios.min() < 0.73 and 1.27 < ratios.max() < 1.32
+    assert ratios.mean() == pytest.approx(1.0, abs=0.03)
+
+
 def test_a_coil_reaches_as_far_as_its_pitch_says():
     """A coil reaches as far as its pitch says with ten points per turn, except in the first half turn."""
     settings = helix(radius=0.005, pitch=0.03)

@@ -34,7 +34,7 @@ STACKS = {
     "smooth": (bend.Settings(**bend.ROLL), smooth.Settings(length=0.08, amount=0.7)),
     "frizz": (frizz.Settings(amplitude=0.008, octaves=4, coherence=0.5, stray=0.2, keep_length=0.3),),
     "curl": (curl.Settings(radius=0.01, coherence=0.3, shape=0.8, vary=0.5),),
-    "switchbacks": (curl.Settings(switchback=0.05, stretch=0.7, left_handed=0.2, keep_length=0.2),),
+    "switchbacks": (curl.Settings(switchback=0.05, stretch=0.7, left_handed=0.2, keep_length=0.2, pitch_vary=0.4),),
     "clump": (clump.Settings(size=0.04, twist=1.0, stray=0.2, root=0.3),),
     "locks that curl": (clump.Settings(size=0.04), curl.Settings(seed=1), frizz.Settings(seed=2)),
     "two clumps": (clump.Settings(size=0.04), curl.Settings(), clump.Settings(size=0.03, levels=1, seed=4)),
