@@ -1,9 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Guides as antialiased lines of constant width in one color, or each in its own, as the report's locator.
+// Guides as antialiased lines of constant width in one color, or each in its own, as the report's locator. Frozen points
+// are faded.
 
 #include "visibility/unclipped.glsl"
 
 const float FRINGE_OPACITY = 0.35;  // of a dark pixel along both sides, for light hair
+const float FROZEN_OPACITY = 0.25;  // of frozen points
+
+// 1 at a frozen point of a guide, 0 at others; guides have `frozen_places` texels each.
+float frozen_at(int place)
+{
+  int texel = strand_index * frozen_places + place;
+  int width = textureSize(frozen, 0).x;
+  return texelFetch(frozen, ivec2(texel % width, texel / width), 0).r;
+}
+
+float frozen_part()
+{
+  if (frozen_places == 0) {
+    return 0.0;
+  }
+  float along = strand_place / float(max(view.drawn_points - 1, 1)) * float(frozen_places - 1);
+  int below = clamp(int(along), 0, frozen_places - 2);
+  return mix(frozen_at(below), frozen_at(below + 1), clamp(along - float(below), 0.0, 1.0));
+}
 
 vec3 hue(float turn)
 {
@@ -22,5 +42,7 @@ void main()
   float line = clamp(half_line - away, 0.0, 1.0);
   float fringe = FRINGE_OPACITY * clamp(half_line + 1.0 - away, 0.0, 1.0);
   float coverage = line + (1.0 - line) * fringe;
-  color = vec4((is_own_color != 0 ? own : line_color.rgb) * (line / max(coverage, 1e-6)), coverage * line_color.a);
+  float shown = line / max(coverage, 1e-6);  // the part that is not dark
+  coverage *= mix(1.0, FROZEN_OPACITY, frozen_part());
+  color = vec4((is_own_color != 0 ? own : line_color.rgb) * shown, coverage * line_color.a);
 }

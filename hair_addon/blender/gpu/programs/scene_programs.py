@@ -66,6 +66,8 @@ def guide_program(is_clipped=False):
     info.push_constant("VEC4", "line_color")
     info.push_constant("FLOAT", "strip_width")
     info.push_constant("INT", "is_own_color")
+    info.push_constant("INT", "frozen_places")
+    info.sampler(len(SHADOW_SAMPLERS) + len(STRAND_SAMPLERS), "FLOAT_2D", "frozen")
     return compile_drawing(info, "strands/strip.vert", "strands/guides.frag", COLOR, replaced)
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides in viewports: lines of constant width over the hair, thin and faded so that the hair is seen behind them."""
+"""Guides in viewports: lines of constant width over the hair, thin and faded so that the hair is seen behind them.
+
+Frozen points are fainter than others.
+"""
 
 import zlib
 
@@ -8,7 +11,8 @@ import numpy as np
 
 from ....core.errors import HairError
 from ...data import scene
-from ...gpu import drawing
+from ...data.strands import curves, frozen_points
+from ...gpu import drawing, strand_textures
 from ...gpu.programs import scene_programs, uniforms
 from ...host.notices import name_of
 from ...materials import looks
@@ -16,6 +20,7 @@ from .. import hair_cache
 
 _LINE_WIDTH = 1.25  # [pixels]
 _FRINGE = 3.0  # [pixels]: antialiasing and a dark edge on both sides, as in strands/guides.frag
+FROZEN_PLACES = 32  # of a guide at which the viewport knows whether it is frozen
 _PLAIN = (0.72, 0.86, 1.0)
 
 
@@ -45,10 +50,27 @@ def draw(guide_object, view, lights, clip_planes):
     program.uniform_float("line_color", (*_color_of(guide_object.data), state.guide_opacity))
     program.uniform_float("strip_width", strip_width())
     program.uniform_int("is_own_color", int(state.guide_colors == "GUIDE"))
+    frozen = _frozen_texture(guide_object.data)
+    program.uniform_int("frozen_places", 0 if frozen is None else FROZEN_PLACES)
+    samplers = {"frozen": guides.texture if frozen is None else frozen}
     record = drawing.strand_record(guides, view, np.array(guide_object.matrix_world, np.float64))
     record["thickness"] = 0.0  # lines of constant width
     with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA"):
-        drawing.draw_strip(guides, program, record, uniforms.uniform_buffer(lights), clip_planes=clip_planes)
+        drawing.draw_strip(guides, program, record, uniforms.uniform_buffer(lights), samplers, clip_planes)
+
+
+def _frozen_texture(guides):
+    """Return a texture with `FROZEN_PLACES` numbers for each guide, evenly from root to tip: 1 at frozen points.
+
+    None if no point is frozen.
+    """
+    are_frozen = frozen_points.read(guides)
+    if are_frozen is None:
+        return None
+    starts, counts = curves.curve_offsets(guides)[:-1], curves.point_counts(guides)
+    steps = np.rint(np.linspace(0.0, 1.0, FROZEN_PLACES) * np.maximum(counts - 1, 0)[:, None]).astype(np.int64)
+    values = are_frozen[np.minimum(starts[:, None] + steps, len(are_frozen) - 1)]
+    return strand_textures.numbers_texture(values.ravel(), min(strand_textures.TEXTURE_WIDTH, values.size))
 
 
 def _color_of(guides):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import scene
+from hair_addon.blender.data.strands import frozen_points
 from hair_addon.blender.gpu import drawing
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import guide_lines
@@ -77,6 +78,25 @@ def test_opacity_scales_all_of_it(upright):
     assert lost[0].max() > 0.5
     np.testing.assert_allclose(lost[1], 0.5 * lost[0], atol=1e-3)
     assert not lost[2].any()
+
+
+@pytest.mark.parametrize("part", [0.5, 1.0])
+def test_frozen_points_are_drawn_faded(upright, part):
+    """Frozen points of a guide are a quarter as opaque, the others as before."""
+    upright.data.vellus.guide_opacity = 1.0
+    before = LEVEL - read(upright)
+    count = len(upright.data.points) // len(upright.data.curves)
+    are_frozen = np.zeros(len(upright.data.points), bool)
+    are_frozen[: round(part * count)] = True
+    frozen_points.write(upright.data, are_frozen)
+    lost = LEVEL - read(upright)
+    rows = np.flatnonzero(before.sum(axis=(1, 2)) > 0.1)
+    ratios = lost[rows].sum(axis=(1, 2)) / before[rows].sum(axis=(1, 2))
+    upper, lower = ratios[-len(rows) // 5 :], ratios[: len(rows) // 5]
+    np.testing.assert_allclose(lower, 0.25, atol=0.03)
+    np.testing.assert_allclose(upper, 0.25 if part == 1.0 else 1.0, atol=0.03)
+    frozen_points.write(upright.data, np.zeros(len(are_frozen), bool))
+    np.testing.assert_allclose(LEVEL - read(upright), before, atol=1e-6)
 
 
 def hues(picture):
