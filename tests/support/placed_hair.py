@@ -31,7 +31,7 @@ def files_in(folder, add=lambda _body: None):
             bpy.context.view_layer.update()
             add(bpy.data.objects["Body"])
             files[place] = str(folder / f"{len(files)}.blend")
-            bpy.ops.wm.save_as_mainfile(filepath=files[place], copy=True, compress=False)  # loads sooner
+            bpy.ops.wm.save_as_mainfile(filepath=files[place], copy=True)
         return files[place]
 
     return file_of
@@ -44,7 +44,7 @@ def _grown(place):
     bpy.context.preferences.edit.use_global_undo = True
     grow(place)
     path = str(Path(tempfile.mkdtemp(dir=bpy.app.tempdir)) / "grown.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, compress=False)
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     return path
 
 

@@ -29,6 +29,7 @@ from tests.support.reading import vertex_positions
 def blender():
     """Register the add-on in Blender, with a GPU context: once per process."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.preferences.filepaths.use_file_compression = False  # files are saved and loaded sooner
     if not hasattr(bpy.types.Curves, "vellus"):
         hair_addon.register()
     gpu.init()
@@ -80,7 +81,7 @@ def scene_files(blender, tmp_path_factory):
         for group in bpy.data.node_groups:
             group.use_fake_user = True  # to be written
         files[stage] = folder / f"{stage}.blend"
-        bpy.ops.wm.save_as_mainfile(filepath=str(files[stage]), copy=True, compress=False)  # loads sooner
+        bpy.ops.wm.save_as_mainfile(filepath=str(files[stage]), copy=True)
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.vellus.multiple_scattering = "DUAL"

@@ -36,6 +36,7 @@ OTHERS = {
     "core/files/table_exr.py": "OpenEXR",
     # What Vellus has written for itself, or the system.
     "blender/gpu/programs/shaders.py": "the add-on's own shaders",
+    "blender/data/strands/follow_nodes.py": "the add-on's own .blend",
     "blender/host/memory.py": "the system's",
     "blender/host/paths.py": "the add-on's own manifest",
     "blender/live/first_setup.py": "compared, not parsed",
