@@ -246,7 +246,7 @@ class Fault:
 
 @functools.cache
 def owner_of(path):
-    """Return what a file of code belongs to: "test", "called back" by Blender, "changing" files, "other"."""
+    """Return the kind of a piece of code: "test", "called back" by Blender, "changing" files, or "other"."""
     if "tests" in path:
         return "test"
     if "/live/" in path or "/settings/" in path:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards and tubes with chains of bones: their place at rest, motion by bones and surfaces, springs in .glb files."""
+"""Cards and tubes with chains of bones stay in place at rest, move with bones and surfaces, and have springs in .glb
+files.
+"""
 
 import json
 
@@ -46,7 +48,7 @@ def chained(kind, hair):
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("kind", ["cards", "tubes"])
 def test_chains_leave_pieces_in_place_and_follow_the_surface(hair, kind, place):
-    """With bones, vertices lie where they lie without, on any surface, and move with it."""
+    """Vertices are at the same places with and without bones, on any surface, and move with it."""
     sphere = bpy.data.objects["Sphere"]
     sphere.matrix_world = PLACES[place]
     update()
@@ -63,7 +65,7 @@ def test_chains_leave_pieces_in_place_and_follow_the_surface(hair, kind, place):
 
 @pytest.mark.parametrize("kind", ["cards", "tubes"])
 def test_bones_move_tips_and_leave_roots(hair, kind):
-    """A turned first bone moves its chain's pieces as a rigid body at their ends, and no root of any piece."""
+    """Turning a first bone moves the ends of its chain's pieces rigidly, and moves no root."""
     made = chained(kind, hair)
     rest, across = places(made), 2 if kind == "cards" else 3
     bone = made.parent.pose.bones["Hair_001_01"]
@@ -119,7 +121,7 @@ def test_chains_hang_on_the_strongest_bone_and_the_rig_is_as_before(hair):
 
 @pytest.mark.parametrize("is_rigged", [False, True])
 def test_springs_in_files_stand_where_the_chains_stand(hair, tmp_path, is_rigged):
-    """Joints in a .glb lead from root to tip where Blender has them, and spheres are clear of all swinging joints."""
+    """Joints in a .glb are where Blender has them, from root to tip, and spheres are clear of all swinging joints."""
     sphere = bpy.data.objects["Sphere"]
     sphere.matrix_world = PLACES["uneven"]
     if is_rigged:

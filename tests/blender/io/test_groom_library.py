@@ -262,7 +262,7 @@ def test_names_that_are_no_file_names(groom, tmp_path):
 
 
 def test_maps_of_vertex_groups_come_along(groom, sphere, tmp_path):
-    """A saved groom has the maps of vertex groups, with the group, and their ramps; maps of images are left out."""
+    """A saved groom has its maps of vertex groups with these groups and the ramps; maps of images are left out."""
     hair = groom[1]
     sphere.vertex_groups.new(name="short").add(list(range(40)), 1.0, "REPLACE")
     wanted = [api.set_map(hair, "guides.length", "group:short"), api.set_map(hair, "look.melanin", "clump")]

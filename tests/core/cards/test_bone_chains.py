@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Chains of bones: middle lines of clumps, weights along them, and spheres that keep them outside the surface."""
+"""Chains of bones are the middle lines of clumps, with weights along them and spheres inside the surface."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests.support.meshes import subdivided_sphere
 
 
 def bent(rng, count=60, points=24):
-    """Strands that hang from places on a plane, bend sideways and differ in length."""
+    """Return strands that hang from places on a plane, bend sideways and differ in length."""
     along = np.linspace(0.0, 1.0, points)[None, :, None] * rng.uniform(0.5, 1.0, (count, 1, 1))
     roots = np.concatenate([rng.uniform(-1.0, 1.0, (count, 1, 2)), np.zeros((count, 1, 1))], axis=2)
     return roots + along * (0.0, 0.0, -1.0) + along**2 * (0.5, 0.0, 0.0)
@@ -34,7 +34,9 @@ def test_a_chain_follows_its_strands_with_equal_bones(rng):
 
 
 def test_weights_lead_from_the_root_to_the_last_bone(rng):
-    """Weights sum to one; roots follow the root bone alone, ends of bones these bones, and points beyond the last."""
+    """Weights sum to one; roots follow the root bone alone, the end of a bone that bone, and points beyond it the
+    last bone.
+    """
     points = bent(rng)
     joints = bone_chains.chains(points, 6, 4)
     lines = np.concatenate([joints, joints[:, -1:] + (0.0, 0.0, -3.0)], axis=1)

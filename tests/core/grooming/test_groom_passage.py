@@ -106,7 +106,7 @@ def test_settings_follow_the_size_of_the_surface_and_forget_the_scene():
 
 
 def test_maps_are_renamed_with_their_masks_and_leave_images_behind():
-    """Maps of masks follow their names; maps of images and of strands' attributes do not leave the scene."""
+    """Maps follow the renamed masks, and maps of images and of attributes of strands are left out."""
     kinds = {"look.color": ("IMAGE", "Coat"), "look.tint": ("CURVES", "top"), "strands.thickness": ("GROUP", "top")}
     kinds |= {"guides.length": ("ATTRIBUTE", "long"), "look.melanin": ("CLUMP", "")}
     maps = tuple(MapSettings(setting=name, kind=kind, source=source) for name, (kind, source) in kinds.items())

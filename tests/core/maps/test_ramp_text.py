@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ramps as text."""
+"""Ramps are written as text, and read from it."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ COLORS = ["0:0.1/0.05/0 1:1/0.8/0.5/0.5", "constant hsv cw 0:1/0/0 0.25:0/1/0 1:
 
 @pytest.mark.parametrize("text", CURVES + COLORS)
 def test_text_is_what_it_was_parsed_from(text):
-    """The text of a parsed ramp is the same text, and its points are in the order of their positions."""
+    """A parsed ramp has the same text again, with its points in the order of their positions."""
     ramp = ramp_text.parsed(text)
     assert ramp.text() == text
     assert isinstance(ramp, ramp_text.Colors if text in COLORS else ramp_text.Curve)
@@ -69,7 +69,9 @@ def test_a_ramp_has_the_kind_of_its_setting():
 
 
 def test_masks_without_a_value_keep_none():
-    """A ramp is evaluated between its samples; masks beyond 0 and 1 have the ends, infinite ones are 0, NaN stays."""
+    """A ramp is evaluated between samples: masks beyond 0 and 1 have the ends, infinite masks are 0, and NaN stays
+    NaN.
+    """
     ramp = np.float32([[0.0, 1.0], [0.5, 1.0], [0.5, 0.0]])
     masks = np.float32([0.0, 0.25, 1.0, -3.0, 7.0, np.inf, np.nan])
     found = combination.ramped(masks, ramp, is_inverted=False)

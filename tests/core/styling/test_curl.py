@@ -56,7 +56,9 @@ def test_a_part_of_the_locks_winds_to_the_left():
 
 
 def test_locks_vary_in_pitch_and_strands_of_a_lock_do_not():
-    """Locks vary in pitch by the given part, evenly around the pitch; the strands of a lock wind as often."""
+    """Locks vary evenly around the pitch by the given fraction, and the strands of a lock have the same number of
+    turns.
+    """
     members = np.repeat(np.arange(200), 2)
     settings = helix(left_handed=0.0, radius=0.001, pitch_vary=0.3)
     strands = straight_strands(400, 0.3, 101)

@@ -17,7 +17,7 @@ from .. import vertex_groups
 from . import armature_weights
 
 _SPHERES = "vellus_spheres"  # property of the armature: center and radius of each, in its coordinates
-_END = 0.1  # length of the last bone, relative to the one before
+_END = 0.1  # length of the last bone, relative to the previous bone
 _NAME_BYTES = 50  # of the hair's name in names of bones, which have at most 63
 _HIT_RADIUS = 0.05  # relative to the length of a bone
 

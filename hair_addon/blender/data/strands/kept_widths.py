@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Radii that kept hair came with, stored while a map or a curve changes them."""
+"""Original radii of kept hair, stored while a map or a curve changes them."""
 
 import numpy as np
 
@@ -7,12 +7,12 @@ from . import attributes, curves
 
 
 def are_kept(hair):
-    """Whether kept hair stores the radii that it came with."""
+    """Whether kept hair stores its original radii."""
     return attributes.has(hair, curves.OWN_RADIUS, "FLOAT", "POINT")
 
 
 def own(hair):
-    """Return (N,) float32 radii that hair came with; the present ones of points that were added since."""
+    """Return (N,) float32 original radii of the hair, and current radii of points that were added since."""
     present = curves.read_radii(hair)
     found = attributes.read(hair, curves.OWN_RADIUS, "FLOAT", "POINT")
     if found is None:
@@ -28,12 +28,12 @@ def change(hair, radii):
 
 
 def restore(hair):
-    """Give hair the radii that it came with."""
+    """Restore the original radii of hair."""
     attributes.write(hair, "radius", "FLOAT", "POINT", own(hair))
     forget(hair)
 
 
 def forget(hair):
-    """Remove the radii that hair came with; its present ones stay."""
+    """Remove the stored original radii; the current radii stay."""
     if are_kept(hair):
         hair.attributes.remove(hair.attributes[curves.OWN_RADIUS])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ramps of maps: curves of a map's numbers, and color ramps that turn them into colors."""
+"""Ramps of maps change numbers by curves, and turn numbers into colors by color ramps."""
 
 import bpy
 import numpy as np
@@ -31,7 +31,7 @@ def ramp_of(hair, setting):
 
 @pytest.fixture
 def coat(hair):
-    """Hair with a color."""
+    """Return hair with a color."""
     hair.data.vellus.appearance.parametrization = "COLOR"
     bpy.context.view_layer.update()
     return hair
@@ -46,7 +46,7 @@ def masks_of(hair, **source):
 
 
 def test_a_color_ramp_gives_each_strand_the_color_of_its_number(coat):
-    """Strands have the color of the stop that their random number reaches; Invert applies before the ramp."""
+    """Strands have the color of the ramp at their random number, and Invert applies before the ramp."""
     masks = masks_of(coat.data, kind="STRAND", seed=3)
     for is_inverted in (False, True):
         vary(coat.data, "look.color", kind="STRAND", seed=3, ramp=BANDS, is_inverted=is_inverted)
@@ -68,7 +68,7 @@ def test_alpha_is_the_share_of_the_ramps_color(coat):
 
 
 def test_a_curve_changes_the_numbers_of_a_map(hair):
-    """A line from 0 to 1 changes nothing; a step makes two sorts of strands, in thickness, length and pigment."""
+    """A line from 0 to 1 changes nothing, and a step makes two kinds of strands, in thickness, length and pigment."""
     for setting in ("strands.thickness", "strands.strand_length", "look.melanin"):
         vary(hair.data, setting, kind="STRAND", low=0.5)
     radii, long = curves.read_radii(hair.data).copy(), lengths(points(hair))
@@ -91,7 +91,7 @@ def test_a_curve_changes_the_numbers_of_a_map(hair):
 
 
 def test_an_edit_in_the_widget_updates_hair_and_copies_have_their_own(coat):
-    """A moved stop changes the strands of its hair; a copy keeps its looks; undo takes it back."""
+    """A moved stop changes the strands of its hair, but not those of a copy, and undo restores the strands."""
     bpy.context.view_layer.objects.active = coat
     vary(coat.data, "look.color", kind="STRAND", ramp=BANDS)
     copy = coat.copy()
@@ -149,7 +149,7 @@ def test_files_and_settings_keep_ramps(coat, tmp_path):
 
 
 def test_the_panels_buttons_add_and_remove_a_ramp(coat):
-    """A new ramp ends in the setting's color, or is a line; removed, no node group is left."""
+    """A new color ramp ends in the setting's color, a new curve is a line, and removing a ramp leaves no node group."""
     bpy.context.view_layer.objects.active = coat
     before = len(bpy.data.node_groups)
     coat.data.vellus.appearance.color = RED

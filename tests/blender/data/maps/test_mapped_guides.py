@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of guides by maps: each guide grows with the values that the maps give its root."""
+"""Each guide grows with the settings that maps give its root."""
 
 import bpy
 import numpy as np
@@ -16,7 +16,7 @@ from tests.support.reading import points, write_points
 
 @pytest.fixture
 def grown(hair):
-    """Guides and hair; the vertex group `top` has the upper half of the sphere."""
+    """Return guides and hair; the vertex group `top` has the upper half of the sphere."""
     settings = hair.data.vellus.guide_curves.vellus.guides
     settings.gravity, settings.tilt, settings.length_variation, settings.drape = 0.6, 0.3, 0.3, False
     bpy.context.view_layer.update()
@@ -24,12 +24,14 @@ def grown(hair):
 
 
 def shapes():
-    """Return (G, P, 3) of guides."""
+    """Return (G, P, 3) points of guides."""
     return points(bpy.data.objects["Guides"]).copy()
 
 
 def on_halves():
-    """Return ((G,) whether guides are rooted well on the upper half, the same of the lower half)."""
+    """Return two (G,) bool arrays: guides rooted well inside the upper half, and guides rooted well inside the lower
+    half.
+    """
     heights = shapes()[:, 0, 2]
     return heights > 0.3, heights < -0.3
 
@@ -49,7 +51,7 @@ def test_a_constant_map_is_the_constant(grown, setting):
 
 @pytest.mark.parametrize("setting", VALUES)
 def test_two_halves_are_the_two_grooms(grown, setting):
-    """Guides on each half of a painted mesh are, bit for bit, those of the groom with the value of this half."""
+    """Guides on each half of a painted mesh have, bit for bit, the shape of the groom with the value of this half."""
     settings = bpy.data.objects["Guides"].data.vellus.guides
     first = getattr(settings, setting)
     plain = shapes()
@@ -71,7 +73,9 @@ def test_two_halves_are_the_two_grooms(grown, setting):
 
 
 def test_no_guide_loses_its_length_and_hair_follows(grown):
-    """Black leaves a thousandth of the length; the hair between short guides is short; a curve is a ramp of it."""
+    """Guides keep a thousandth of the length where a map is black, hair between them is as short, and a ramp
+    applies.
+    """
     hair = lengths(points(grown)).max()
     api.set_map(grown, "guides.length", "group:top", ramp="0:0 1:0")
     bpy.context.view_layer.update()
@@ -107,7 +111,9 @@ def with_map(settings, setting):
 
 
 def test_files_panels_and_refusals(grown, tmp_path):
-    """Settings files and the panel's buttons have maps of guides; other sources are a status with a sentence."""
+    """Settings files and buttons of the panel set maps of guides, and an unsupported source is a status with a
+    sentence.
+    """
     wanted = api.set_map(grown, "guides.lift", "strand", low=0.5)
     api.save_settings(tmp_path / "lift.json", api.settings_of(grown))
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]

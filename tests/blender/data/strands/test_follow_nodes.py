@@ -317,7 +317,7 @@ def content(group):
 
 
 def test_the_file_holds_the_nodes_that_the_code_builds(scene):
-    """Otherwise `python tools/write_nodes.py` writes it again."""
+    """The stored nodes are those that the code builds; if not, run `python tools/write_nodes.py`."""
     read, built = content(follow_nodes._appended()), content(follow_nodes.build())
     for part, expected in zip(read, built, strict=True):
         assert part == expected

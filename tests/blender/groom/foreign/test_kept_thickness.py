@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps and the thickness curve of kept hair."""
+"""Maps and the thickness curve change the radii of kept hair."""
 
 import bpy
 import numpy as np
@@ -22,7 +22,7 @@ COUNT = 60
 
 @pytest.fixture
 def kept(sphere, rng):
-    """Polylines of 5 to 12 points each with radii and a number of their own, used as hair."""
+    """Return polylines of 5 to 12 points with radii and a number of their own, used as hair."""
     hair = curves_object(list(lines_on(sphere, rng, COUNT, least=5)))
     radii = hair.data.attributes.get("radius") or hair.data.attributes.new("radius", "FLOAT", "POINT")
     radii.data.foreach_set("value", rng.uniform(0.001, 0.003, len(hair.data.points)).astype(np.float32))
@@ -44,7 +44,9 @@ def of_points(hair, values):
 
 @pytest.mark.parametrize(("source", "kind", "name"), [("group:top", "GROUP", "top"), ("curves:tone", "CURVES", "tone")])
 def test_a_map_multiplies_the_radii_that_hair_came_with(kept, source, kind, name):
-    """Each strand has its own radii times the factor of its root or curve; without the map, its own bit for bit."""
+    """Each strand has its original radii times the factor at its root or by its attribute; removing the map restores
+    them.
+    """
     before, points = curves.read_radii(kept.data).copy(), stored(kept).copy()
     for high in (2.0, 3.0):
         api.set_map(kept, "strands.thickness", source, low=0.5, high=high)
@@ -61,7 +63,7 @@ def test_a_map_multiplies_the_radii_that_hair_came_with(kept, source, kind, name
 
 
 def test_the_curve_gives_parts_of_the_radius_at_the_root(kept):
-    """Radii follow the curve and its edits; without it, they are those that the hair came with."""
+    """Radii follow the curve and its edits, and removing the curve restores the original radii."""
     before, starts = curves.read_radii(kept.data).copy(), curves.curve_offsets(kept.data)
     at_roots = of_points(kept, before[starts[:-1]])
     api.set_thickness_curve(kept, "0:1 1:0.25")
@@ -83,7 +85,7 @@ def test_the_curve_gives_parts_of_the_radius_at_the_root(kept):
 
 
 def test_a_missing_source_is_a_status_and_a_look_needs_none(kept):
-    """Without its source a map leaves the radii of the hair and names the source; maps of the look work as ever."""
+    """A map without its source leaves the radii unchanged and names the source; maps of the look need no radii."""
     before = curves.read_radii(kept.data).copy()
     api.set_map(kept, "strands.thickness", "group:lost")
     update()
@@ -110,7 +112,7 @@ def test_other_sizes_and_other_strands_do_not_bring_old_radii_back(kept):
 
 
 def test_undo_takes_a_map_back(kept):
-    """Undo restores the radii and the map, and the next map starts from the radii that the hair came with."""
+    """Undo restores the radii and removes the map, and the next map starts from the original radii."""
     before = curves.read_radii(kept.data).copy()
     bpy.ops.ed.undo_push(message="kept")
     api.set_map(kept, "strands.thickness", "strand", low=0.5, high=0.5)

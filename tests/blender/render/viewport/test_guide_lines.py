@@ -82,7 +82,7 @@ def test_opacity_scales_all_of_it(upright):
 
 @pytest.mark.parametrize("part", [0.5, 1.0])
 def test_frozen_points_are_drawn_faded(upright, part):
-    """Frozen points of a guide are a quarter as opaque, the others as before."""
+    """Frozen points of a guide are drawn with a quarter of the opacity, and other points as before."""
     upright.data.vellus.guide_opacity = 1.0
     before = LEVEL - read(upright)
     count = len(upright.data.points) // len(upright.data.curves)
