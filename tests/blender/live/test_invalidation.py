@@ -98,11 +98,11 @@ def stage(lit, monkeypatch):
     restart = hair_picture.HairPicture.restart
 
     def restart_with_the_same_samples(picture, is_moved=False):
-        """Start passes with the same samples again, as other samples after a movement would change the picture by
-        their noise.
+        """Start passes with the same samples and spreads again, as others after a movement would change the picture
+        by their noise.
         """
         restart(picture, is_moved)
-        picture._first_turn = 0
+        picture._first_turn, picture._spreads = 0, hair_picture._SPREADS
 
     monkeypatch.setattr(hair_picture.HairPicture, "restart", restart_with_the_same_samples)
     image = bpy.data.images.new("Sky", 16, 8)
