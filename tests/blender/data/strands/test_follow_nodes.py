@@ -8,7 +8,7 @@ from mathutils import Matrix
 
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves, follow_nodes, stored_roots
-from hair_addon.blender.live import events
+from hair_addon.blender.live import events, handlers
 from hair_addon.core.grooming import following
 from tests.support.counting import counts_of
 from tests.support.dynamics.following import assert_follows, drawn_points, grow, surface_points, update
@@ -338,3 +338,17 @@ def test_nodes_are_built_where_their_file_cannot_be_read(scene, monkeypatch, tmp
     monkeypatch.setattr(follow_nodes, "_FILE", path)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     assert follow_nodes._carries(follow_nodes._group())
+
+
+def test_reading_the_nodes_is_no_import_of_hair(hair, monkeypatch, tmp_path):
+    """What changed before hair is made stays to be followed; hair that is appended is shown and has readable names."""
+    imports = []
+    monkeypatch.setattr(handlers, "_show_hidden", lambda: imports.append("hair"))
+    path = str(tmp_path / "hair.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    imports.clear()  # saving shows all hair, too
+    follow_nodes._appended()
+    assert imports == []
+    with bpy.data.libraries.load(path) as (_there, here):
+        here.objects = ["Hair"]
+    assert imports == ["hair"]
