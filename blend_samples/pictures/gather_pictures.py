@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/manual/gather.png: hair that Gather leads through ties, drawn by Vellus: ponytail, bun, braids and a rope."""
+"""docs/manual/gather.png: hair that Gather leads through ties, drawn by Vellus: ponytail, bun, braids, a
+rope and cornrows."""
 
 import os
 import sys
@@ -7,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -17,18 +19,28 @@ from hair_addon import api
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "manual" / "gather.png"
 WIDTH, HEIGHT = 180, 220  # pixels of a picture
-COLUMNS = 4
+COLUMNS = 5
 LENGTH = 0.36  # [m] of guides
 
 BACK = (0.0, 0.030, 0.795)  # [m] a place near the tie of ponytail and bun
 TAIL = (BACK, (0.0, 0.062, 0.805), (0.0, 0.085, 0.785), (0.0, 0.088, 0.74), (0.0, 0.075, 0.60))
 SIDE = ((0.062, 0.012, 0.715), (0.085, 0.022, 0.700), (0.092, 0.012, 0.660), (0.088, -0.01, 0.56))
 BRAIDS = (SIDE, tuple((-x, y, z) for x, y, z in SIDE))
+_ROW_ANGLES = np.linspace(-0.75, 1.75, 40)  # from the hairline over the top to the nape
+ROWS = tuple(
+    tuple((x, 0.005 + 0.098 * np.sin(angle), 0.745 + 0.105 * np.cos(angle)) for angle in _ROW_ANGLES)
+    for x in (-0.044, -0.022, 0.0, 0.022, 0.044)
+)
 LOOKS = (
     ("Ponytail", (TAIL,), {"shape": "PONYTAIL"}),
     ("Bun", ((BACK, (0.0, 0.06, 0.82)),), {"shape": "BUN", "bun_radius": 0.036, "tail_radius": 0.014}),
     ("Braids", BRAIDS, {"shape": "BRAID", "tail_radius": 0.015, "tie_radius": 0.009, "pitch": 0.06}),
     ("Rope, Tightness 0.4", (TAIL,), {"shape": "ROPE", "tail_radius": 0.016, "pitch": 0.09, "tightness": 0.4}),
+    (
+        "Cornrows",
+        ROWS,
+        {"shape": "CORNROWS", "tie_radius": 0.007, "pitch": 0.025, "clearance": 0.001, "tightness": 1.0},
+    ),
 )
 
 

@@ -140,6 +140,33 @@ def test_a_mask_and_several_ties(guides):
     assert (np.sign(after[is_aside, -1, 0]) == np.sign(before[is_aside, 0, 0])).all()
 
 
+@pytest.mark.parametrize(
+    "placed", [Matrix(), Matrix.Translation((3.0, 0.0, 0.0)) @ Matrix.Diagonal((-1.0, 1.0, 1.0, 1.0))]
+)
+def test_cornrows_lie_on_the_surface_beside_their_curves(guides, placed):
+    surface = guides.data.surface
+    surface.matrix_world = placed @ surface.matrix_world
+    guides.matrix_world = placed @ guides.matrix_world
+    api.change_guides(guides, "LENGTH", method="SET", length=1.0)
+    bpy.context.view_layer.update()
+    angles = np.linspace(-1.2, 1.2, 25)
+    rows = [[(x, 0.95 * np.sin(a), 0.95 * np.cos(a)) for a in angles] for x in (-0.3, 0.3)]
+    add_line(placed, rows)
+    before = points(guides)
+    gather(guides, shape="CORNROWS")
+    after = points(guides)
+    np.testing.assert_allclose(segments(after), segments(before), rtol=0.01)
+    assert np.linalg.norm(after[:, 1:], axis=2).min() > 0.993
+    root = before[:, 0]
+    is_near = (np.abs(np.abs(root[:, 0]) - 0.3) < 0.35) & (np.abs(root[:, 1]) < 0.6) & (root[:, 2] > 0.0)
+    is_near &= np.abs(root[:, 0]) > 0.1
+    tips = after[is_near, -1]
+    assert is_near.sum() > 3
+    assert (np.abs(np.abs(tips[:, 0]) - 0.3) < 3.0 * SIZES["tie_radius"]).all()
+    assert (np.sign(tips[:, 0]) == np.sign(root[is_near, 0])).all()
+    assert np.linalg.norm(tips, axis=1).max() < 1.0 + 5.0 * SIZES["tie_radius"]
+
+
 def test_what_cannot_be_gathered_is_refused(guides):
     before = points(guides)
     with pytest.raises(HairError, match="Pick a curve"):

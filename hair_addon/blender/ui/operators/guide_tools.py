@@ -232,6 +232,7 @@ _ROWS_OF_SHAPES = {
     "PONYTAIL": ("tie_radius", "tail_radius"),
     "BRAID": ("tie_radius", "tail_radius", "pitch"),
     "ROPE": ("tie_radius", "tail_radius", "pitch"),
+    "CORNROWS": ("tie_radius", "pitch"),
     "BUN": ("tie_radius", "tail_radius", "bun_radius", "turns"),
 }
 

@@ -26,6 +26,7 @@ class GatherSettings(ToolSettings):
             ("PONYTAIL", "Ponytail", "A tail along the curve"),
             ("BRAID", "Braid", "Three locks that cross in turn, along the curve"),
             ("ROPE", "Rope", "Two locks twisted around each other, along the curve"),
+            ("CORNROWS", "Cornrows", "Braids on the surface: each curve is a row, which hair joins from both sides"),
             ("BUN", "Bun", "Wound into a ball on the surface at the tie"),
         ),
     )

@@ -20,7 +20,7 @@ from ...geometry.mesh import TriMesh
 from ...kernels import parallel
 from ...kernels.parallel import Rows
 from ..guide_shapes import joined, split, unit
-from . import tie_tails
+from . import cornrows, tie_tails
 from .gather_settings import GatherSettings
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
@@ -46,7 +46,7 @@ def gathered(
     after = points.copy()
     query = SurfaceQuery(mesh)
     roots = query.nearest(points[:, 0])
-    fields = [_field(mesh, query, line) for line in lines]
+    fields = [_field(mesh, query, line, settings) for line in lines]
     distances = np.stack([surface_distance.at(field, mesh, roots) for field in fields])
     nearest = distances.argmin(axis=0)
     is_gathered = np.isfinite(distances.min(axis=0))
@@ -68,15 +68,26 @@ def _checked(line):
     return line[is_new]
 
 
-def _field(mesh, query, line):
-    """Return (V,) distances along the surface from the tie, the first point of a line."""
-    return surface_distance.spread(mesh, surface_distance.source_distances(mesh, query.nearest(line[:1])))
+def _field(mesh, query, line, settings):
+    """Return (V,) distances along the surface from the first point of a line, or from the whole line for cornrows."""
+    if settings.shape == "CORNROWS":
+        line = cornrows.on_surface(query, mesh, line)[0]
+    else:
+        line = line[:1]
+    return surface_distance.spread(mesh, surface_distance.source_distances(mesh, query.nearest(line)))
 
 
 def _at_line(mesh, query, points, line, field, settings):
     """Return the guides (S, P, 3) that one line gathers."""
     lengths = split(points)[1]
     reach = float(lengths.sum(axis=1).max())
+    if settings.shape == "CORNROWS":
+        ways, apart, normals = _traced(mesh, query, points[:, 0], field, settings)
+        ways += _heights(apart, settings)[..., None] * normals
+        braid = cornrows.braid_line(*cornrows.on_surface(query, mesh, line), reach, settings)
+        ways = np.concatenate([ways, cornrows.ways_along(ways, braid, reach, settings)], axis=1)
+        ways[:, 0] = points[:, 0]
+        return joined(points, split(_walked(ways, lengths))[0], lengths)
     tie = query.nearest(line[:1])
     tail = tie_tails.tail_line(line, mesh_math.normals(mesh, tie)[0], reach, settings)
     ways, apart, normals = _traced(mesh, query, points[:, 0], field, settings)

@@ -12,7 +12,7 @@ from ..guide_shapes import unit
 from .gather_settings import GatherSettings
 
 _SAMPLES = 800  # points of a line
-_LOCKS = {"BRAID": 3, "ROPE": 2}  # that a tail is divided into
+_LOCKS = {"BRAID": 3, "CORNROWS": 3, "ROPE": 2}  # that a tail is divided into
 _INNER = 0.75  # radius of every other layer of a bun, relative to the outer ones
 _WOUND = 2.0  # length of the way of a bun, relative to its hair, whose segments cut its curves
 _MOST_LAYERS = 24  # of a bun

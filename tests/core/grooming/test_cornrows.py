@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cornrows: guides keep roots and lengths, go to the nearest row, and lie along it on the surface."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hair_addon.core.grooming.ties.gather_settings import GatherSettings
+from hair_addon.core.grooming.ties.gathering import gathered
+from tests.support.meshes import subdivided_sphere
+
+RADIUS = 0.1  # [m]
+SETTINGS = GatherSettings(shape="CORNROWS", clearance=0.001, tie_radius=0.006, pitch=0.03, tightness=1.0)
+FRONT, BACK = -1.2, 1.2  # angles of the ends of rows from the top
+
+
+def row_at(x, count=60):
+    """Return (count, 3): a row over the top of the sphere, from its front to its back."""
+    angles = np.linspace(FRONT, BACK, count)
+    size = np.sqrt(RADIUS**2 - x**2)
+    return np.stack([np.full(count, x), size * np.sin(angles), size * np.cos(angles)], axis=1)
+
+
+ROWS = [row_at(-0.03), row_at(0.03)]
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return subdivided_sphere(4, RADIUS)
+
+
+@pytest.fixture(scope="module")
+def guides():
+    """Return (60, 25, 3): straight guides of 0.1 m on the front half, beside the rows, in mirrored pairs."""
+    rng = np.random.default_rng(2)
+    angles, x = rng.uniform(FRONT, 0.0, 30), rng.uniform(0.005, 0.06, 30)
+    size = np.sqrt(RADIUS**2 - x**2)
+    normals = np.stack([x, size * np.sin(angles), size * np.cos(angles)], axis=1) / RADIUS
+    normals = np.concatenate([normals, normals * [-1.0, 1.0, 1.0]])
+    return (normals[:, None] * (RADIUS + np.linspace(0.0, 0.1, 25))[:, None]).astype(np.float32)
+
+
+def from_rows(points):
+    """Return (S, 2): distances of points (S, 3) from both rows."""
+    return np.stack([np.linalg.norm(points[:, None] - row, axis=2).min(axis=1) for row in ROWS], axis=1)
+
+
+def test_guides_lie_along_the_nearest_row(ball, guides):
+    after, is_gathered = gathered(ball, guides, ROWS, SETTINGS)
+    assert is_gathered.all()
+    np.testing.assert_array_equal(after[:, 0], guides[:, 0])
+    lengths = [np.linalg.norm(np.diff(points.astype(np.float64), axis=1), axis=2) for points in (guides, after)]
+    np.testing.assert_allclose(lengths[1], lengths[0], rtol=0.01)
+    tips = from_rows(after[:, -1])
+    assert (tips.argmin(axis=1) == from_rows(guides[:, 0]).argmin(axis=1)).all()
+    assert tips.min(axis=1).max() < 3.0 * SETTINGS.tie_radius
+    assert np.all(after[:, -1, 1] > guides[:, 0, 1] + 0.02)  # toward the end of the row
+    heights = np.linalg.norm(after[:, 1:], axis=2) - RADIUS
+    assert heights.min() > -0.002 and heights.max() < 4.0 * SETTINGS.tie_radius
+
+
+def test_strands_of_a_row_cross_as_a_braid_does(ball, guides):
+    """The guides of a row go from one side of it to the other."""
+    after, _all = gathered(ball, guides, ROWS, SETTINGS)
+    beside = np.abs(after[:, 8:, 0]) - 0.03
+    assert (beside.max(axis=1) > 0.1 * SETTINGS.tie_radius).mean() > 0.7
+    assert (beside.min(axis=1) < -0.1 * SETTINGS.tie_radius).mean() > 0.7
+
+
+def test_guides_beyond_the_end_of_a_row_go_straight_on(ball, guides):
+    longer = guides[:, :1] + 4.0 * (guides - guides[:, :1])
+    after, _all = gathered(ball, longer, ROWS, SETTINGS)
+    end = ROWS[1][-1]
+    ahead = (ROWS[1][-1] - ROWS[1][-2]) / np.linalg.norm(ROWS[1][-1] - ROWS[1][-2])
+    beyond = after[guides[:, 0, 0] > 0.0, -1] - end
+    along = beyond @ ahead
+    assert along.min() > 0.05
+    assert np.linalg.norm(beyond - along[:, None] * ahead, axis=1).max() < 0.03
+
+
+def test_a_row_that_moves_by_a_millimeter_moves_guides_little(ball, guides):
+    after, _all = gathered(ball, guides, ROWS, SETTINGS)
+    moved, _all = gathered(ball, guides, [row + np.array([0.001, 0.0, 0.0]) for row in ROWS], SETTINGS)
+    apart = np.linalg.norm(moved - after, axis=2).max(axis=1)
+    assert np.median(apart) < 0.004 and apart.max() < 0.015
+
+
+@pytest.mark.parametrize("scale", [0.01, 100.0])
+def test_the_shape_does_not_depend_on_the_scale(guides, scale):
+    sizes = {name: getattr(SETTINGS, name) * scale for name in ("clearance", "tie_radius", "pitch", "tail_radius")}
+    expected, _all = gathered(subdivided_sphere(4, RADIUS), guides, ROWS, SETTINGS)
+    rows = [row * scale for row in ROWS]
+    found, _all = gathered(subdivided_sphere(4, RADIUS * scale), guides * scale, rows, replace(SETTINGS, **sizes))
+    assert np.quantile(np.linalg.norm(found / scale - expected, axis=2), 0.9) < 0.002
