@@ -20,9 +20,7 @@ def _blend(path):
 
 def _gltf(path):
     bpy.ops.export_scene.gltf(filepath=path, export_format="GLB", use_selection=True, export_tangents=True)
-    chosen = [one for one in bpy.context.selected_objects if one.type == "ARMATURE" and chain_armatures.is_made(one)]
-    if chosen:
-        gltf_springs.add(Path(path), [chain_armatures.springs_of(one) for one in chosen])
+    gltf_springs.add(Path(path), chain_armatures.all_springs())
 
 
 def _fbx(path):

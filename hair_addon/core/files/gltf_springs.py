@@ -9,17 +9,18 @@ from pathlib import Path
 import numpy as np
 
 _HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
-_NAME = "VRMC_springBone"
+NAME = "VRMC_springBone"
 
 
 @dataclass(frozen=True)
 class Springs:
-    """Chains that swing below a root node of a name, [[node name from root to tip]], and spheres that they avoid.
+    """Chains that swing below the root bone of an armature, [[bone name from root to tip]], and spheres to avoid.
 
     centers (K, 3) in glTF's axes of the scene, Y upward, and radii (K,) [m]; hit_radius: of each joint [m]; stiffness:
     force towards the rest shape; drag: 0 to 1, how much of the motion is lost in each step.
     """
 
+    armature: str
     root: str
     chains: list[list[str]]
     centers: np.ndarray
@@ -30,9 +31,13 @@ class Springs:
 
 
 def add(path: Path, springs: list[Springs]) -> None:
-    """Add springs to a binary glTF file that Blender's exporter has written."""
+    """Add springs to a .glb file that Blender's exporter has written; armatures that it lacks are left out."""
     described, chunks = _read(path)
-    _describe(described, springs)
+    found = extension(described["nodes"], springs)
+    if not found:
+        return
+    described["extensionsUsed"] = [*{**dict.fromkeys(described.get("extensionsUsed", [])), NAME: None}]
+    described.setdefault("extensions", {})[NAME] = found
     text = json.dumps(described, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     body = _CHUNK.pack(len(text), b"JSON") + text + chunks
@@ -40,23 +45,28 @@ def add(path: Path, springs: list[Springs]) -> None:
 
 
 def _read(path):
-    """Return (the JSON of a file as a dictionary, its other chunks as bytes)."""
+    """(the JSON of a file as a dictionary, its further chunks as bytes)."""
     content = path.read_bytes()
     length, _kind = _CHUNK.unpack_from(content, _HEADER.size)
     start = _HEADER.size + _CHUNK.size
     return json.loads(content[start : start + length]), content[start + length :]
 
 
-def _describe(described, springs):
-    nodes = described["nodes"]
-    used = described.setdefault("extensionsUsed", [])
-    if _NAME not in used:
-        used.append(_NAME)
+def extension(nodes: list[dict], springs: list[Springs]) -> dict:
+    """Return the extension for the nodes of a glTF file, empty if they have none of the armatures.
+
+    Missing values of nodes may be None.
+    """
     written = {"specVersion": "1.0", "colliders": [], "colliderGroups": [], "springs": []}
     to_scene = matrices(nodes)
     for its in springs:
-        root = next(index for index, node in enumerate(nodes) if node.get("name") == its.root)
-        below = {nodes[index]["name"]: index for index in _below(nodes, root)}
+        armature = next((index for index, node in enumerate(nodes) if node.get("name") == its.armature), None)
+        if armature is None:
+            continue
+        below = {nodes[index]["name"]: index for index in _below(nodes, armature)}
+        if not {its.root, *(name for chain in its.chains for name in chain)} <= below.keys():
+            continue
+        root = below[its.root]
         first = len(written["colliders"])
         to_root = np.linalg.inv(to_scene[root])
         for center, radius in zip(its.centers, its.radii, strict=True):
@@ -71,7 +81,7 @@ def _describe(described, springs):
         for chain in its.chains:
             joints = [{"node": below[name], **_joint(its)} for name in chain]
             written["springs"].append({"name": chain[0], "joints": joints, "colliderGroups": groups})
-    described.setdefault("extensions", {})[_NAME] = {key: value for key, value in written.items() if value}
+    return {key: value for key, value in written.items() if value} if written["springs"] else {}
 
 
 def _joint(springs):
@@ -87,15 +97,15 @@ def _joint(springs):
 
 def _below(nodes, root):
     """Return the indices of all nodes below a node."""
-    found = list(nodes[root].get("children", []))
+    found = list(nodes[root].get("children") or [])
     for index in found:
-        found += nodes[index].get("children", [])
+        found += nodes[index].get("children") or []
     return found
 
 
 def matrices(nodes: list[dict]) -> list[np.ndarray]:
     """Return a matrix (4, 4) of each node of a glTF file to the scene."""
-    parents = {child: index for index, node in enumerate(nodes) for child in node.get("children", [])}
+    parents = {child: index for index, node in enumerate(nodes) for child in (node.get("children") or [])}
 
     def matrix(index):
         own = _own_matrix(nodes[index])
@@ -105,9 +115,9 @@ def matrices(nodes: list[dict]) -> list[np.ndarray]:
 
 
 def _own_matrix(node):
-    if "matrix" in node:
+    if node.get("matrix"):
         return np.array(node["matrix"], np.float64).reshape(4, 4).T
-    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+    x, y, z, w = node.get("rotation") or (0.0, 0.0, 0.0, 1.0)
     turn = np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -116,6 +126,6 @@ def _own_matrix(node):
         ]
     )
     found = np.eye(4)
-    found[:3, :3] = turn * np.array(node.get("scale", (1.0, 1.0, 1.0)))
-    found[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+    found[:3, :3] = turn * np.array(node.get("scale") or (1.0, 1.0, 1.0))
+    found[:3, 3] = node.get("translation") or (0.0, 0.0, 0.0)
     return found

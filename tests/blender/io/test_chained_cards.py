@@ -4,6 +4,8 @@ files.
 """
 
 import json
+import sys
+import types
 
 import bpy
 import numpy as np
@@ -11,7 +13,7 @@ import pytest
 from mathutils import Euler, Matrix, Vector
 
 from hair_addon import api
-from hair_addon.blender.io import mesh_export
+from hair_addon.blender.io import gltf_hooks, mesh_export
 from hair_addon.core.files import gltf_springs
 from tests.support.dynamics.following import update
 
@@ -85,6 +87,14 @@ def test_bones_move_tips_and_leave_roots(hair, kind):
     np.testing.assert_allclose(moved.reshape(24, -1, across, 3)[tips, -1][is_long], expected[is_long], atol=0.05)
 
 
+def _described(path):
+    """The JSON of a glTF file."""
+    content = path.read_bytes()
+    return json.loads(
+        content if path.suffix == ".gltf" else content[20 : 20 + int.from_bytes(content[12:16], "little")]
+    )
+
+
 def rig(sphere):
     """Return an armature with a bone that moves the lower half and one that moves the rest."""
     armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
@@ -134,7 +144,7 @@ def test_springs_in_files_stand_where_the_chains_stand(hair, tmp_path, is_rigged
     to_surface @= made.parent.matrix_world.inverted()
     path = tmp_path / "hair.glb"
     mesh_export.write(path, [made])
-    described = json.loads(path.read_bytes()[20:].split(b"BIN\0")[0][:-4].decode().rstrip("\0 "))
+    described = _described(path)
     springs, nodes = described["extensions"]["VRMC_springBone"], described["nodes"]
     assert "VRMC_springBone" in described["extensionsUsed"] and len(springs["springs"]) == CHAINS
     to_scene = gltf_springs.matrices(nodes)
@@ -156,6 +166,27 @@ def test_springs_in_files_stand_where_the_chains_stand(hair, tmp_path, is_rigged
         local = to_surface @ Vector((center[0], -center[2], center[1]))
         assert local.length < 1.0
         assert (np.linalg.norm(joints[:, 1:] - center, axis=2) >= its["radius"] + reach - 1e-4).all()
+
+
+@pytest.mark.parametrize(("ending", "kind"), [("glb", "GLB"), ("gltf", "GLTF_SEPARATE")])
+def test_blenders_exporter_writes_the_springs_of_what_it_exports(hair, tmp_path, monkeypatch, ending, kind):
+    """With the installed extension, files of Blender's exporter have the springs of the exported armature alone."""
+    package = types.ModuleType("vellus_installed")  # as the root's __init__.py is in an installed extension
+    package.glTF2ExportUserExtension = gltf_hooks.GltfHooks
+    monkeypatch.setitem(sys.modules, "vellus_installed", package)
+    entry = bpy.context.preferences.addons.new()
+    entry.module = "vellus_installed"
+    try:
+        made, other = chained("tubes", hair), chained("tubes", hair)
+        for one in bpy.context.view_layer.objects:
+            one.select_set(one in (other, other.parent))
+        bpy.ops.export_scene.gltf(filepath=str(tmp_path / f"a.{ending}"), export_format=kind, use_selection=True)
+    finally:
+        bpy.context.preferences.addons.remove(entry)
+    described = _described(tmp_path / f"a.{ending}")
+    springs, nodes = described["extensions"]["VRMC_springBone"], described["nodes"]
+    assert len(springs["springs"]) == CHAINS and not [node for node in nodes if node["name"] == made.parent.name]
+    assert nodes[springs["springs"][0]["joints"][0]["node"]]["name"] == "Hair_001_01"
 
 
 def test_chains_of_long_names_are_made_while_guides_are_combed(hair, tmp_path):

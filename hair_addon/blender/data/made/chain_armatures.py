@@ -123,13 +123,13 @@ def _parent(armature_object, surface_object, places):
     bpy.context.view_layer.update()
 
 
-def is_made(armature_object):
-    """Whether an armature has bone chains."""
-    return _SPHERES in armature_object.data
+def all_springs():
+    """Return the `Springs` of all armatures with bone chains, for glTF."""
+    armatures = [one for one in bpy.data.objects if one.type == "ARMATURE" and _SPHERES in one.data]
+    return [_springs_of(one) for one in armatures]
 
 
-def springs_of(armature_object):
-    """Return the `Springs` of bone chains for glTF."""
+def _springs_of(armature_object):
     bones = armature_object.data.bones
     root = next(bone for bone in bones if bone.parent is None)
     chains = [[bone.name for bone in (first, *first.children_recursive)] for first in root.children]
@@ -138,4 +138,6 @@ def springs_of(armature_object):
     to_world = np.array(armature_object.matrix_world)
     centers = spheres[:, :3] @ to_world[:3, :3].T + to_world[:3, 3]
     upward = np.stack([centers[:, 0], centers[:, 2], -centers[:, 1]], axis=1)
-    return Springs(root.name, chains, upward, spheres[:, 3], _HIT_RADIUS * float(np.mean(lengths)))
+    return Springs(
+        armature_object.name, root.name, chains, upward, spheres[:, 3], _HIT_RADIUS * float(np.mean(lengths))
+    )
