@@ -92,6 +92,7 @@ def _changed_parts(guides, manifest):
     if manifest.guide_count != len(guides.curves):
         return ["guides"]
     try:
+        scene.present_depsgraph()  # masks are read from it, and a file that was just opened is not evaluated
         return guide_baking.changed_parts(guides, scene_time.present_scene(), manifest)
     except HairError as error:
         return [str(error)]

@@ -81,7 +81,10 @@ def memory_of(guides_list: Sequence[Curves]) -> int:
 
 
 def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
-    """Return {part: digest} of the inputs of the frames of guides, except all animation. Raises `HairError`."""
+    """Return {part: digest} of the inputs of the frames of guides, except all animation. Raises `HairError`.
+
+    Masks are read from the dependency graph as it is, as updates call this.
+    """
     settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
     parts = {
         "solver": SOLVER_VERSION,
@@ -91,7 +94,7 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
         "frame rate": scene_time.animation_rate(scene),
         "units": scene.unit_settings.scale_length,
     }
-    regions, wetness = _regions(guides), wet_guides.unkeyed(guides, scenes.present_depsgraph())
+    regions, wetness = _regions(guides), wet_guides.unkeyed(guides, scenes.last_depsgraph())
     found = {_PARTING: regions, "wet places": wetness}
     return frame_manifest.digests_of(parts | {name: part for name, part in found.items() if part is not None})
 
@@ -125,7 +128,7 @@ def _regions(guides):
     if not guide_regions.is_parted(guides):
         return None
     try:
-        return guide_regions.regions_of(guides, scenes.present_depsgraph())
+        return guide_regions.regions_of(guides, scenes.last_depsgraph())
     except HairError as error:
         return str(error)
 

@@ -7,6 +7,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking, guide_draping
+from hair_addon.blender.live import dynamics_state
 from hair_addon.core.grooming.guide_tool_settings import DrapeSettings
 from hair_addon.core.long_work import run_now
 from tests.support.dynamics.swung import simulate, swing
@@ -61,6 +62,32 @@ def test_guides_are_wet_where_the_mask_is(hair, swung):
     np.testing.assert_array_equal(baked(swung)[dry_side], wet[dry_side])
     swung.data.vellus.dynamics.wetness = 1.0  # of all
     np.testing.assert_array_equal(baked(swung), wet)
+
+
+def test_changed_guides_with_baked_frames_are_noted_without_another_update(hair, swung):
+    """Wet guides that grow again after a bake are updated once: updates within updates would not end."""
+    paint(1.0)
+    api.add_style(hair, api.Wet(lock=0.4, mask="rain"))
+    baked(swung, 2)
+    depth, most = [0], [0]
+
+    def begin(*_):
+        depth[0] += 1
+        most[0] = max(most[0], depth[0])
+
+    def end(*_):
+        depth[0] -= 1
+
+    handlers = bpy.app.handlers.depsgraph_update_post
+    handlers.insert(0, begin)
+    handlers.append(end)
+    try:
+        swung.data.vellus.guides.length = 0.3
+        bpy.context.view_layer.update()
+    finally:
+        handlers.remove(begin)
+        handlers.remove(end)
+    assert "bake again" in dynamics_state.state_of(swung.data)[0] and depth == [0] and most == [1]
 
 
 def test_guides_are_as_wet_as_their_strands_on_the_mean(hair, swung):
