@@ -68,7 +68,7 @@ def _add_scalp(head):
 
 
 def above_hairline(positions):
-    """Return (N, 3) places on the head [m] → (N,) heights above the hairline as it is seen from the side."""
+    """Return heights (N,) of places on the head (N, 3) [m] above the hairline as it is seen from the side."""
     return positions[:, 2] - np.interp(positions[:, 1], _HAIRLINE[:, 0], _HAIRLINE[:, 1])
 
 

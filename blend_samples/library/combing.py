@@ -35,7 +35,7 @@ class Solid:
         self._query = SurfaceQuery(self.mesh)
 
     def nearest(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return (N, 3) places [m] → the nearest points (N, 3) and the smooth normals there (N, 3)."""
+        """Return the points nearest to places (N, 3) [m], and the smooth normals there, (N, 3) each."""
         found = self._query.nearest(places)
         return positions(self.mesh, found), normals(self.mesh, found)
 

@@ -108,7 +108,7 @@ def render(out):
 
 
 def _halved(plane):
-    """Return (2 H, 2 W) → the means of its blocks."""
+    """Return the means of 2 × 2 blocks of a picture (2 H, 2 W)."""
     height, width = (length // 2 for length in plane.shape)
     return plane[: 2 * height, : 2 * width].reshape(height, 2, width, 2).mean(axis=(1, 3))
 

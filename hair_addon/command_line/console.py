@@ -99,7 +99,7 @@ def occupy_closed_streams():
 
 @contextlib.contextmanager
 def own_streams(is_verbose):
-    """Return (out, errors) for the command only. Other output of the process is discarded, or goes to errors.
+    """Yield (out, errors) for the command only. Other output of the process is discarded, or goes to errors.
 
     This lasts until the process exits, when libraries flush their buffers.
     """

@@ -63,7 +63,7 @@ def checked(given):
 
 
 def wanted(kind, given, file_axes):
-    """Return the `Wanted` of the options; file_axes: (3, 3), Blender's axes → the mesh file's."""
+    """Return the `Wanted` of the options; file_axes: (3, 3) from Blender's axes to those of the mesh file."""
     # --up belongs to the mesh file if that has no up axis, otherwise to the curve file.
     is_of_curves = given.up and not blender.io.mesh_files.lacks_up_axis(given.input)
     convention = Convention(parsed_unit(given.unit) if given.unit else None, given.up if is_of_curves else None)

@@ -53,11 +53,11 @@ class Surface:
         return np.linalg.inv(self.to_world_axes)
 
     def to_local(self, points):
-        """Return (S, P, 3) points of strands → float32 local coordinates."""
+        """Return points (S, P, 3) of strands as float32 local coordinates."""
         return geometry.transform.transformed(points, self.to_local_axes)
 
     def from_local(self, positions):
-        """Return (..., 3) local coordinates → float32 in this space."""
+        """Return local coordinates (..., 3) as float32 in this space."""
         return transformed(positions, self.to_world_axes)
 
     @property
@@ -285,7 +285,7 @@ class Surface:
         return geometry.faces.face_places.on_triangles(self.mesh, self.triangulated, polygons, vertices, barycentric)
 
     def to_local_normals(self, normals):
-        """Return (N, 3) unit normals → unit normals in local coordinates, by the inverse transpose of `to_local`."""
+        """Transform unit normals (N, 3) to local coordinates, by the inverse transpose of `to_local`."""
         if np.array_equal(self.to_world_axes, np.eye(3)):
             return normals
         local = normals @ self.to_world_axes.astype(np.float32)

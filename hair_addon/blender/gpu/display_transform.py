@@ -65,7 +65,7 @@ def linear_at(places):
 
 
 def apply(transform, colors):
-    """Return (N, 3) scene-linear float32 → (N, 3) display colors, by Blender's OpenColorIO configuration.
+    """Return display colors (N, 3) of scene-linear colors (N, 3) float32, by Blender's OpenColorIO configuration.
 
     If OpenColorIO is missing or lacks the transform: by the Standard view for sRGB, with a message on the console.
     """

@@ -62,7 +62,7 @@ class SceneLights:
         return all(pair == (ALL, ALL) for pair in (*self.links, *self.rest_links))
 
     def casters(self, hair, hair_owners, surfaces, surface_owners):
-        """Return the function of a light's index → (hair, surfaces) that cast its shadow; None if all do."""
+        """Return a function from a light's index to the (hair, surfaces) that cast its shadow; None if all do."""
         if all(blockers == ALL for _receivers, blockers in self.links):
             return None
 

@@ -111,7 +111,7 @@ class StrandsOnGPU:
 
 
 def upload_strands(points, radii, randoms=None, wetness=None, looks=None):
-    """Return (S, P, 3) points and (S, P) radii, float32, in one coordinate system → `StrandsOnGPU`.
+    """Return the `StrandsOnGPU` of points (S, P, 3) and radii (S, P), float32, in one coordinate system.
 
     randoms: (S,) numbers in [0, 1] for variation, None: all strands are average; wetness: (S,) in [0, 1], None if
     strands do not differ; looks: `StrandLooks` (S,), None without maps.

@@ -136,7 +136,7 @@ class SurfaceOnGPU:
 def upload_surface(
     vertices, triangles, normals=None, has_vertex_normals=True, uvs=None, colors=(), to_world=None, known=None
 ):
-    """Return (V, 3) float32 vertices and (3 F,) vertex indices of triangles → `SurfaceOnGPU`. Raises `HairError`.
+    """Return the `SurfaceOnGPU` of vertices (V, 3) float32 and vertex indices (3 F,) of triangles. Raises `HairError`.
 
     normals: unit, (V, 3) of vertices, or without has_vertex_normals (3 F, 3) of corners, in the coordinates of
     vertices; None if only depth is drawn; to_world: (4, 4), None: vertices are in world space; uvs: (3 F, 2) or None;
@@ -162,7 +162,7 @@ def upload_surface(
 
 
 def packed_colors(colors):
-    """Return (N, 3) linear RGB → (N,) float32: square roots in eight bits each, as integers that are exact in
+    """Return linear RGB (N, 3) as (N,) float32: square roots in eight bits each, as integers that are exact in
     floats.
     """
     roots = np.rint(255.0 * np.sqrt(np.clip(colors, 0.0, 1.0)))

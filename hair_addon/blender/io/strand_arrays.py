@@ -107,7 +107,7 @@ def _shown(datablock):
 
 
 def other_places(datablock):
-    """Return [(4, 4) float64]: `world_points` [m] → where other objects of the view layer show them.
+    """Return [(4, 4) float64] from `world_points` [m] to where other objects of the view layer show them.
 
     Raises `HairError`.
     """
@@ -150,7 +150,10 @@ def world_scale(datablock):
 
 
 def _to_world(datablock):
-    """Return (4, 4) float64, local → world, of the object that shows Curves; of the surface for guides without one."""
+    """Return the matrix (4, 4) float64 from local to world coordinates of the object that shows Curves.
+
+    Guides without an object have that of their surface.
+    """
     shown = selection.object_of(datablock, bpy.context.view_layer)
     if shown is None and datablock.vellus.kind == "GUIDES":
         shown = datablock.surface  # new guides lie on it with no transform of their own

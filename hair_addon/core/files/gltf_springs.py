@@ -31,10 +31,13 @@ class Springs:
 
 
 def add(path: Path, springs: list[Springs]) -> None:
-    """Add springs to a .glb file that Blender's exporter has written; armatures that it lacks are left out."""
+    """Add springs to a .glb file that Blender's exporter has written; armatures that it lacks are left out.
+
+    A file that has them already, by the exporter's hooks, is left as it is.
+    """
     described, chunks = _read(path)
     found = extension(described["nodes"], springs)
-    if not found:
+    if not found or NAME in described.get("extensions", {}):
         return
     described["extensionsUsed"] = [*{**dict.fromkeys(described.get("extensionsUsed", [])), NAME: None}]
     described.setdefault("extensions", {})[NAME] = found

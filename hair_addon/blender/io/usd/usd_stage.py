@@ -145,7 +145,7 @@ def times_of(prim, attributes, within: tuple[float, float] | None) -> list[float
 
 
 def matrix_of(prim, time) -> np.ndarray:
-    """Return (4, 4) float64, local → stage coordinates."""
+    """Return the matrix (4, 4) float64 from local to stage coordinates."""
     from pxr import UsdGeom
 
     return np.array(UsdGeom.Imageable(prim).ComputeLocalToWorldTransform(time)).T  # USD's have rows of vectors

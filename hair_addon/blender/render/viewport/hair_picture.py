@@ -182,7 +182,7 @@ class HairPicture:
 
 
 def table_texture(table):
-    """Return (N, N, N, 3) float32, whose third axis runs along x → a texture with linear interpolation."""
+    """Return a texture with linear interpolation of a table (N, N, N, 3) float32, whose third axis runs along x."""
     size = len(table)
     texels = np.ones((size, size, size, 4), np.float32)
     texels[..., :3] = table

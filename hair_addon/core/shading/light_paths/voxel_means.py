@@ -231,7 +231,7 @@ def _keep(
 
 
 def shares(sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int, int] = (0, 0, 0)) -> np.ndarray:
-    """Return (Z, Y, X, 12) sums of `gather` over some paths → (Z, Y, X, 4) float32 shares of light.
+    """Return shares of light (Z, Y, X, 4) float32 from sums (Z, Y, X, 12) of `gather` over some paths.
 
     The shares are RGB relative to the light in uniform light, and the fraction of the drawn light to keep; both
     together are the light of the paths. Drawn light distinguishes strands and places within a voxel. The fraction is
@@ -261,8 +261,8 @@ def explained_part(sums: wp.array4d[wp.float64]) -> float:
 def smooth_ratios(
     sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int, int] = (0, 0, 0)
 ) -> np.ndarray:
-    """Return (Z, Y, X, 6 N) sums of light RGB and of uniform light RGB over some paths, N times → (Z, Y, X, 3 N)
-    their ratios.
+    """Return ratios (Z, Y, X, 3 N) of sums of light RGB to those of uniform light RGB over some paths: sums
+    (Z, Y, X, 6 N) have both, N times.
 
     From large to small voxels, each ratio is blended with that of the enclosing larger voxel, which has the weight of
     `prior` average paths. origin: index of the first voxel along X, Y, Z: voxels with an even index share a larger
