@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that strands collide with: distances, planes of contact, and a substep of strands that touch."""
+"""Meshes that strands collide with: distances, contact planes, and substeps of strands with contacts."""
 
 from typing import TYPE_CHECKING
 

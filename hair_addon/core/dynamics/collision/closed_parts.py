@@ -7,13 +7,13 @@ from ...geometry.closest_point import SurfaceQuery
 from ...geometry.faces.connected_components import connected_components
 from ...geometry.mesh import TriMesh
 
-_MOST_SAMPLES = 16  # vertices of a part that are tested for being inside another part
+_MOST_SAMPLES = 16  # most vertices of a part that are tested for being inside another part
 
 
 def outward(mesh: TriMesh) -> np.ndarray:
-    """Return the triangles (F, 3) int32, in closed parts wound counter-clockwise seen from outside.
+    """Return the triangles (F, 3) int32; closed parts are wound counter-clockwise as seen from outside.
 
-    A closed part of negative volume is flipped, unless it is inside another one and thus bounds a cavity.
+    A closed part of negative volume is flipped, unless it is inside another closed part and thus bounds a cavity.
     """
     triangles = mesh.checked_triangles.copy()
     parts = connected_components(mesh)
@@ -29,7 +29,7 @@ def outward(mesh: TriMesh) -> np.ndarray:
 
 
 def open_parts(mesh: TriMesh) -> np.ndarray:
-    """Return the connected part (F,) int32 of each triangle, -1 for closed parts, whose outside is known."""
+    """Return the index (F,) int32 of each triangle's connected part; -1 for closed parts, whose outside is known."""
     parts = connected_components(mesh)
     return np.where(_is_closed(welded(mesh), parts)[parts], -1, parts).astype(np.int32)
 
@@ -70,7 +70,7 @@ def facing_strands(mesh: TriMesh, roots: np.ndarray, seconds: np.ndarray) -> np.
 
 
 def _unit(vectors):
-    """Normalize vectors (N, 3); zero stays zero."""
+    """Return normalized vectors (N, 3); zero vectors stay zero."""
     sizes = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.divide(vectors, sizes, out=np.zeros_like(vectors), where=sizes > 0.0)
 
@@ -78,7 +78,7 @@ def _unit(vectors):
 def rims(mesh: TriMesh) -> np.ndarray:
     """Return rim bits (F,) int32 of triangles.
 
-    Bit k: the edge opposite to corner k has no other triangle. Bit 3 + k: corner k is on such an edge.
+    Bit k: no other triangle shares the edge opposite corner k. Bit 3 + k: corner k is on such an edge.
     """
     triangles = welded(mesh)
     edges = np.sort(np.stack([np.roll(triangles, -1 - k, axis=1)[:, :2] for k in range(3)], axis=1), axis=2)
@@ -102,9 +102,9 @@ def welded(mesh: TriMesh) -> np.ndarray:
 
 
 def _edge_kinds(edges):
-    """Return (unique edge of each edge (N, 2), number of each unique edge).
+    """Return (index of the unique edge of each edge (N, 2), number of occurrences of each unique edge).
 
-    Edges are sorted as single numbers, in a fifth of the time of rows.
+    Sorting edges as single numbers takes a fifth of the time of sorting rows.
     """
     _, kinds, counts = np.unique(
         edges[:, 0].astype(np.int64) << 32 | edges[:, 1], return_inverse=True, return_counts=True
@@ -113,7 +113,7 @@ def _edge_kinds(edges):
 
 
 def _is_closed(triangles, parts):
-    """Return (parts,) bool: whether each edge of a part has two triangles with opposite directions."""
+    """Return (parts,) bool: whether two triangles with opposite directions share each edge of a part."""
     directed = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     ahead = directed[:, 0] < directed[:, 1]
     of_edge, counts = _edge_kinds(np.sort(directed, axis=1))

@@ -24,7 +24,7 @@ from .rigid_motion import STILL, RigidMotion, largest
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-FARTHEST = 1.0e6  # [m] from the origin
+FARTHEST = 1.0e6  # largest absolute coordinate of a vertex [m]
 
 _LEAST_ROWS = 32_768  # least number of vertices for a thread
 
@@ -33,8 +33,8 @@ _LEAST_ROWS = 32_768  # least number of vertices for a thread
 class Collider:
     """A mesh in its pose at the end of a frame; name: unique among colliders.
 
-    friction: Coulomb's coefficient; distance [m]: kept by the hair; is_double_sided: for sheets, on which each point
-    stays on its side; otherwise the back of the mesh is its inside.
+    friction: Coulomb's coefficient; distance: between hair and the mesh [m]; is_double_sided: True for sheets, on which
+    each point of hair stays on its side; False if the back of the mesh is its inside.
     """
 
     name: str
@@ -81,15 +81,15 @@ class Colliders:
         self.face_colliders: Any = None  # (F,) int
         self.rims: Any = None  # (F,) int, from `closed_parts.rims`
         self.settings: Any = None  # (C,) vec3: friction, distance [m], 1 if double-sided
-        self._rows: list[tuple[float, float, float]] = []  # of `settings`
+        self._rows: list[tuple[float, float, float]] = []  # rows of `settings`
         self.names: tuple[str, ...] = ()
         self.largest_distance = 0.0  # [m]
-        self.largest_motion = 0.0  # of a vertex in this frame [m]
-        # (rotation (3, 3), translation [m]) of all colliders in this substep, and since the beginning; `motion`: bound
-        # of the residual motion of a vertex in this substep [m].
+        self.largest_motion = 0.0  # largest motion of a vertex in this frame [m]
+        # Rigid motion (rotation (3, 3), translation [m]) of all colliders in this substep, and since the beginning;
+        # `motion`: bound of the residual motion of a vertex in this substep [m].
         self.rigid_motion = self.rigid_motion_so_far = STILL
         self.motion = 0.0
-        # (matrix (3, 3), translation [m]) of points that move with the colliders, and bound of the residual [m].
+        # Affine motion (matrix (3, 3), translation [m]) of points with the colliders, and bound of the residual [m].
         self.carry, self.deformation = STILL, 0.0
         # Bound of the residual motion of a vertex in this frame, and in all previous frames [m].
         self.drift = self.drift_before = 0.0
@@ -97,11 +97,11 @@ class Colliders:
         self._before: Any = None
         self._after: Any = None
         self._way: Any = None  # RigidMotion of the frame
-        self._end: Any = None  # (V, 3) vertices at its end
+        self._end: Any = None  # vertices (V, 3) at the end of the frame
         self._part = 0.0
         self._is_still = True
         self._posed: Any = None  # vertices of the mesh; None between two frames
-        self._moves: dict[tuple[float, float], _Move] = {}  # of this frame, by start and end
+        self._moves: dict[tuple[float, float], _Move] = {}  # moves in this frame, by start and end
 
     def read(self, colliders: Sequence[Collider], frame: int = 0) -> None:
         """Set the poses at the end of a frame, which starts at the end of the previous one.
@@ -133,19 +133,19 @@ class Colliders:
         return self.mesh is not None and self._is_still
 
     def pose(self, part: float) -> None:
-        """Move to the pose at a fraction in [0, 1] of the frame, greater than the last one, by linear interpolation."""
+        """Move to the linearly interpolated pose at a fraction in [0, 1] of the frame; fractions must increase."""
         self.go_to(part)
         self.place(part)
 
     def expect(self, count: int) -> None:
-        """Announce a number of equidistant poses in the frame, whose motions are computed together."""
+        """Compute the motions to a number of equidistant poses of the frame in advance."""
         if self.mesh is None or self._is_still or (0.0, 1.0 / count) in self._moves:
             return
         parts = [step / count for step in range(count + 1)]
         self._moves.update(zip(itertools.pairwise(parts), self._moves_of(parts[:-1], parts[1:]), strict=True))
 
     def go_to(self, part: float) -> None:
-        """Update the motion data on the host for a pose; part of `pose`."""
+        """Update the motion data on the host for a pose: the first half of `pose`."""
         if self.mesh is None or self._is_still:
             return
         key = self._part, part
@@ -166,7 +166,7 @@ class Colliders:
         return [_Move(*row) for row in zip(*whole, deformations.tolist(), drifts.tolist(), strict=True)]
 
     def place(self, part: float) -> None:
-        """Move the mesh on the device to a pose; part of `pose`."""
+        """Move the mesh on the device to a pose: the second half of `pose`."""
         if self.mesh is None or self._is_still:
             return
         parallel.launch(
@@ -251,9 +251,9 @@ class Colliders:
 
 
 def problem_of(collider: Collider, frame: int = 0, is_new: bool = True) -> HairError | None:
-    """Return why a collider cannot be used, with its name and the frame; None if it can.
+    """Return the reason why a collider is unusable, with its name and the frame; None if it is usable.
 
-    is_new: False skips the slow check for faces of positive area, for colliders that have passed it.
+    is_new: False skips the slow check for faces of positive area; known colliders have passed this check.
     """
     cause = _cause(collider, is_new)
     if cause is None:

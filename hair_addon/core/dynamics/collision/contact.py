@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact planes between strands and colliders, in front of which the solver keeps points.
+"""Contact planes between strands and colliders; the solver keeps points in front of these planes.
 
-Arrays are (groups, rows, lanes), as in the solver. A vector has three rows, a plane `PLANE` rows: n (3), the offset
-n·c + r, the displacement of the surface at c in this substep (3), and the coefficient of friction. A point in front has
-n·x ≥ offset; n = 0 without contact.
+Arrays are (groups, rows, lanes), as in the solver. A vector has three rows. A plane has `PLANE` rows: the normal n (3),
+the offset n·c + r with the surface point c and the distance r to keep, the displacement of the surface at c in this
+substep (3), and the coefficient of friction. A point x is in front of a plane if n·x ≥ offset; n = 0 without contact.
 """
 
 from typing import Any
@@ -21,15 +21,15 @@ from .distance_grid import distance_grid
 from .nearest_surface import Surface
 from .surface_motions import SurfaceMotions
 
-RISE = 0.02  # largest speed of points that move out because they are inside in the groom [m/s]
-LEAST_ROWS = 128  # least number of `WIDTH` strands for a thread
+RISE = 0.02  # largest outward speed of points that are inside a collider in the groom [m/s]
+LEAST_ROWS = 128  # least number of blocks of `WIDTH` strands for a thread
 
-_MOST_DRIFT = 0.5  # of a cell of the distance grid, beyond which the next frame builds a new grid
+_MOST_DRIFT = 0.5  # drift, in cells of the distance grid, beyond which the next frame builds a new grid
 _DEEPEST = 0.1  # search radius for the groom's distances [m]
 
 
 class Contacts:
-    """Contact planes of strands, with positions (groups, vertices × 3, lanes) [m], and `Colliders`.
+    """Contact planes between `Colliders` and strands with positions (groups, vertices × 3, lanes) [m].
 
     Each vertex but the root keeps the smaller of the collider's distance and its distance in the groom, so that no
     vertex is pushed in the first frame. Raises `HairError` for arrays that do not match.
@@ -58,7 +58,7 @@ class Contacts:
         self.measure(groom)
 
     def measure(self, groom: Any) -> None:
-        """Measure the distances of positions at rest, which points keep."""
+        """Measure the distances between positions at rest and the colliders; points keep these distances."""
         self._require_shape(groom)
         self.forget()
         for is_middle, samples in enumerate((self.vertices, self.middles)):
@@ -78,10 +78,11 @@ class Contacts:
     ) -> Any:
         """Return `planes` for the predicted positions of a substep, which began at `last_positions`.
 
-        To be called in every substep, then again with `is_final`, because near surfaces are tracked between calls.
-        duration: of the substep [s]; is_final: after the solve, for points that are still inside, `found_planes`,
-        without segments and without rise; moved: (groups, 1, lanes) numbers, non-zero for strands with points that have
-        moved since, which alone are queried again; is_skipping: False queries every point, with the same result.
+        Call this in every substep, then again with `is_final`, because near surfaces are tracked between calls.
+        duration: of the substep [s]; is_final: True after the solve returns `found_planes` for points that are still
+        inside, without segments and without rise; moved: (groups, 1, lanes) numbers, non-zero for strands with points
+        that have moved since, and only these strands are queried again; is_skipping: False queries every point, with
+        the same result.
         """
         self._require_shape(positions)
         self._require_shape(last_positions)
@@ -122,7 +123,7 @@ class Contacts:
         return self._planes
 
     def follow(self) -> None:
-        """Update the data of the colliders; to be called once per substep, after they are posed."""
+        """Update the data of the colliders; call this once per substep, after the colliders are posed."""
         colliders = self.colliders
         counts = colliders.build_count, colliders.jump_count
         if self._counts != counts:
@@ -148,7 +149,7 @@ class Contacts:
         return distance_grid(vertices, mesh.indices.numpy().reshape(-1, 3), sample_count, self.colliders.device)
 
     def _put_distances(self):
-        """Copy the grid's distances to the array for kernels, which is reallocated only if it is too small."""
+        """Copy the grid's distances to the kernels' array; an array that is too small is reallocated."""
         distances = self._grid.distances.flatten()
         if len(self._distances) < len(distances):
             count = len(distances) + len(distances) // 2
@@ -156,7 +157,7 @@ class Contacts:
         wp.copy(self._distances, distances, count=len(distances))
 
     def expect(self, count: int) -> None:
-        """Announce the maximum number of substeps of the frame."""
+        """Prepare for a frame with at most a number of substeps."""
         self.colliders.expect(count)
         self._motions.make_room(count)
 
@@ -169,12 +170,12 @@ class Contacts:
         self._motions.send(first, end)
 
     def memory(self) -> list[tuple[int, int]]:
-        """Return address and length of the arrays of `surface` that may be reallocated."""
+        """Return the address and length of each array of `surface` that may be reallocated."""
         arrays = self._motions.array, self._distances, self.colliders.settings
         return [(array.ptr, len(array)) for array in arrays]
 
     def planes_of(self, group_count: int) -> tuple[Any, Any, Any]:
-        """Allocate planes of a number of groups: of vertices before and after the solve, and of segments."""
+        """Return new planes for a number of groups: of vertices before and after the solve, and of segments."""
         counts = self._vertex_count, self._vertex_count, self._vertex_count - 1
         shapes = [(group_count, PLANE * count, self._shape[2]) for count in counts]
         first, second, third = (wp.zeros(shape, dtype=float, device=self.colliders.device) for shape in shapes)
@@ -234,7 +235,7 @@ class Contacts:
             raise HairError("Positions of strands must be one block of memory, on the colliders' device.")
 
     def _launch(self, kernel, inputs, outputs):
-        """Launch a kernel for all samples: on a CPU a thread for `WIDTH` strands each, on all cores."""
+        """Launch a kernel for all samples; a CPU divides blocks of `WIDTH` strands between all cores."""
         groups, _, lanes = self._shape
         device, count = self.colliders.device, self._vertex_count - 1
         at_once = (count, WIDTH) if device.is_cpu else (1, 1)
@@ -251,7 +252,7 @@ class Contacts:
 def query_options(
     duration: float, is_final: bool = False, is_again: bool = False, is_skipping: bool = True
 ) -> QueryOptions:
-    """Return the `QueryOptions` of a substep of a duration [s], zero for no rise; the others as in `Contacts.find`."""
+    """Return the `QueryOptions` of a substep; duration: [s], 0 for no rise; other arguments as in `Contacts.find`."""
     asking = QueryOptions()
     asking.is_final, asking.is_again, asking.is_skipping = int(is_final), int(is_again), int(is_skipping)
     asking.rise = RISE * duration

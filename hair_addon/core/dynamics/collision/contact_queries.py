@@ -11,7 +11,7 @@ from ...kernels import native_code
 from .nearest_surface import BACK, Hit, Surface, crossed, nearest
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
-BLOCK = 64  # threads of a GPU block: 256 would wait for the slowest query, with few blocks per multiprocessor
+BLOCK = 64  # threads of a GPU block: blocks of 256 are few per multiprocessor, and wait for their slowest query
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "block_dim": BLOCK})
 
 PLANE = wp.constant(8)  # rows of a plane
@@ -36,12 +36,12 @@ class Samples:
 
 @wp.struct
 class QueryOptions:
-    """Query options: see `Contacts.find`."""
+    """Options of a query, as in `Contacts.find`."""
 
     is_final: int
     is_again: int
     is_skipping: int
-    rise: float  # motion in this substep of samples that are inside in the groom [m]
+    rise: float  # outward motion in this substep of samples that are inside a collider in the groom [m]
 
 
 @wp.struct
@@ -55,7 +55,7 @@ class Query:
     middle_planes: wp.array3d[float]  # of segments, `PLANE` rows each
     is_middle: int  # 1: middles of segments; 0: vertices
     samples: Samples
-    planes: wp.array3d[float]  # of these samples, to be written
+    planes: wp.array3d[float]  # planes of these samples, which the query writes
 
 
 @wp.func

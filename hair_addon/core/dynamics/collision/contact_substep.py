@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Substeps of strands with collisions: the stages of the solver, with contact queries between them.
 
-On a CPU one kernel runs all stages for a group of strands, whose state stays in the cache: a pass over all strands for
-each stage took twice as long without contacts. On a GPU each stage is a launch; the launches of a frame are recorded
-once and replayed, because launching from Python would take longer than the kernels.
+On a CPU one kernel runs all stages for a group of strands, whose state stays in the cache. A separate pass over all
+strands for each stage took twice as long in a test without contacts. On a GPU each stage is a launch; the launches of a
+frame are recorded once and replayed, because launching from Python would take longer than the kernels.
 """
 
 from dataclasses import replace
@@ -43,12 +43,12 @@ _WIDTH = wp.constant(WIDTH)
 class CollidingStrands:
     """Strands with their contacts, and memory for the planes of the groups in progress."""
 
-    takes_groups = True  # on a CPU: all stages group by group; False: stage by stage, as on a GPU
+    takes_groups = True  # on a CPU: True runs all stages group by group, False runs stage by stage, as on a GPU
 
     def __init__(self, rods: Rods, contacts: Contacts) -> None:
         self._rods, self._contacts = rods, contacts
         self._replays = Replays(rods.device)
-        self._planes: list[tuple[Any, Any, Any]] = []  # of each share of the strands
+        self._planes: list[tuple[Any, Any, Any]] = []  # planes of each share of the strands
 
     def advance(self, step: FrameSubsteps, first: int, end: int, surroundings: Surroundings) -> None:
         """Advance by substeps first … end - 1, and pose the colliders. Raises `HairError` if counts do not match."""
@@ -76,7 +76,7 @@ class CollidingStrands:
         around = (surroundings.airs, surroundings.drags, surroundings.accelerations)
         memory = contacts.memory() + [None if array is None else array.ptr for array in around]
         key = colliders.build_count, colliders.is_still, colliders.largest_distance, *memory
-        # The first substep after a change of size differs from the others.
+        # The first substep after a change of the substeps' duration differs from the others.
         middle = end if step.carried == 1.0 else first + 1
         self._replay(key, step, first, middle, surroundings)
         if middle < end:
@@ -127,19 +127,19 @@ class CollidingStrands:
         rods.step_size = step.size
 
     def _planes_of(self, share_count):
-        """Return memory for one group of each share, which its groups use in turn."""
+        """Return the planes of one group for each share; the groups of a share use this memory in turn."""
         while len(self._planes) < share_count:
             self._planes.append(self._contacts.planes_of(1))
         return self._planes[:share_count]
 
 
 def _options_of_queries(step):
-    """Return the `QueryOptions` before the solve, after it, and after AGAIN."""
+    """Return the `QueryOptions` before the solve, after the solve, and after AGAIN."""
     return query_options(step.size), query_options(0.0, is_final=True), query_options(0.0, is_final=True, is_again=True)
 
 
 def _for_each(array, group_count):
-    """Return a view of one group's memory as an array of many groups, which use it in turn."""
+    """Return a view of one group's memory as an array of many groups; the groups use the memory in turn."""
     _, rows, lanes = array.shape
     shape, strides = (group_count, rows, lanes), (0, *array.strides[1:])
     return wp.array(ptr=array.ptr, dtype=float, shape=shape, strides=strides, device=array.device)

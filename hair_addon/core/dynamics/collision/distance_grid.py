@@ -2,8 +2,8 @@
 """Lower bounds of the distance from colliders, on a grid: points that are far away need no surface query.
 
 Each vertex of the grid stores its distance from the nearest cell that a triangle may touch. A lower bound at a point is
-the distance of the nearest vertex minus the distance between the two. Outside the grid, which contains all triangles,
-the bound at the closest place of the grid and the distance to this place are combined.
+the distance stored at the nearest vertex minus the distance between point and vertex. Outside the grid, which contains
+all triangles, the bound at the closest place of the grid and the distance to this place are combined.
 """
 
 import math
@@ -48,14 +48,17 @@ def least_distance(grid: DistanceGrid, point: wp.vec3) -> float: ...
 
 
 def cell_size(extent: np.ndarray, cell_count: int) -> float:
-    """Return the size [m] of cells for about `cell_count` cells in a box (3,) [m]."""
+    """Return the size [m] of the cells that divide a box of an extent (3,) [m] into about `cell_count` cells."""
     longest = float(extent.max())
     along = min(max(math.cbrt(cell_count), 4.0), _MOST_CELLS_ALONG)
     return max(longest / along, (math.prod(np.maximum(extent, longest / along)) / cell_count) ** (1.0 / 3.0), 1e-6)
 
 
 def distance_grid(vertices: np.ndarray, triangles: np.ndarray, cell_count: int, device: Any) -> DistanceGrid:
-    """Return the grid of triangles (F, 3) with vertices (V, 3) [m], with about `cell_count` cells, 64 along an axis."""
+    """Return the grid of triangles (F, 3) with vertices (V, 3) [m].
+
+    It has about `cell_count` cells, and at most 64 cells along an axis.
+    """
     low, high = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)
     size = cell_size(high - low, cell_count)
     low = low - 0.5 * size
@@ -74,9 +77,9 @@ def distance_grid(vertices: np.ndarray, triangles: np.ndarray, cell_count: int, 
 def distances_by_kernels(
     places: np.ndarray, triangles: np.ndarray, counts: np.ndarray, size: float, device: Any
 ) -> wp.array:
-    """Return distances (counts + 1) [m], equal to those of NumPy, in a fiftieth of the time on a GPU.
+    """Return distances (counts + 1) [m] equal to NumPy's; a GPU takes a fiftieth of NumPy's time.
 
-    places (V, 3): of vertices, in cells; size: of a cell [m].
+    places: (V, 3) of vertices, in cells; size: of a cell [m].
     """
     shape = tuple(int(count) + 1 for count in counts)
     squares = wp.full(shape, _FARTHEST**2, dtype=int, device=device)
@@ -155,7 +158,7 @@ def _touched(places, triangles, counts):
     """Return (I, J, K) bool: vertices of cells that a triangle's bounding box touches; places: in cells."""
     corners = [places[triangles[:, corner]] for corner in range(3)]
     first = np.floor(np.minimum(np.minimum(*corners[:2]), corners[2]) - _SLACK).astype(int)
-    last = np.floor(np.maximum(np.maximum(*corners[:2]), corners[2]) + _SLACK).astype(int) + 1  # a vertex
+    last = np.floor(np.maximum(np.maximum(*corners[:2]), corners[2]) + _SLACK).astype(int) + 1  # last touched vertex
     # Boxes are accumulated as differences, and counted by cumulative sums along the axes.
     shape = counts + 2
     changes = np.zeros(math.prod(shape), np.int32)

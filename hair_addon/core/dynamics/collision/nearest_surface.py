@@ -6,7 +6,7 @@ import warp as wp
 from .distance_grid import GridPlace
 
 BACK = wp.constant(1e-4)  # offset of a ray's start before the point's last position [m]
-_AT_EDGE = wp.constant(1e-5)  # barycentric coordinates below count as zero
+_AT_EDGE = wp.constant(1e-5)  # barycentric coordinates below this limit count as zero
 _TINY = wp.constant(1e-6)  # distance below which the face normal is used [m]
 
 
@@ -40,12 +40,12 @@ class Surface:
     largest_distance: float
     distances: wp.array[float]  # of the grid; empty without a grid
     motions: wp.array[Motion]  # of the substeps of a frame
-    substep: int  # the present one
+    substep: int  # present substep
 
 
 @wp.struct
 class Hit:
-    """The nearest surface: distance of a point along the normal, negative inside; collider: -1 for no surface."""
+    """The surface nearest to a point. distance: along the normal, negative inside; collider: -1 for no surface."""
 
     distance: float
     gap: float  # absolute distance

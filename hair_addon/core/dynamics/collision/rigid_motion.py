@@ -27,10 +27,10 @@ class RigidMotion:
     def between(self, first: ArrayLike, last: ArrayLike) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
         """Return the motion between two times in [0, 1]: (rotation (3, 3), translation [m]), bound of the residual [m].
 
-        For many pairs of times (…) at once: rotations (…, 3, 3), translations (…, 3), bounds (…).
+        Arrays (…) of times give rotations (…, 3, 3), translations (…, 3) and bounds (…).
 
         Points at time p are c + p d + (1 - p + p R) a + p e, with the center c, its displacement d, offsets a and a
-        residual e. Their common rotation is by φ(p), with tan φ = p sin θ / (1 - p + p cos θ).
+        residual e. Their common rotation has the angle φ(p), with tan φ = p sin θ / (1 - p + p cos θ).
         """
         first, last = np.asarray(first, np.float64), np.asarray(last, np.float64)
         turn = self._turn(self._turned(last) - self._turned(first))
@@ -39,7 +39,7 @@ class RigidMotion:
         return (turn, self._shift(turn, first, last)), rest + self._rest_of(turn, first, last)
 
     def carried(self, first: ArrayLike, last: ArrayLike) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-        """Return the motion as in `between`, but by a matrix that includes the contraction of linear interpolation."""
+        """Return the motion as in `between`, with a matrix that includes the contraction by linear interpolation."""
         first, last = np.asarray(first, np.float64), np.asarray(last, np.float64)
         carry = self._offsets(last) @ np.linalg.inv(self._offsets(first))
         return (carry, self._shift(carry, first, last)), self._rest_of(carry, first, last)
@@ -70,7 +70,7 @@ class RigidMotion:
 
 
 def _each(function, values):
-    """Apply a function of Python's `math` to each value (…); results of NumPy's functions depend on the machine."""
+    """Return the results of a function of Python's `math` for values (…): NumPy's results depend on the machine."""
     values = np.asarray(values)
     return np.array([function(value) for value in values.ravel().tolist()]).reshape(values.shape)
 
@@ -87,7 +87,7 @@ def _rotation(start, end):
 
 
 def _axis_and_angle(turn):
-    """Return unit axis and angle of a rotation; angle 0 for rotations near 180°."""
+    """Return the unit axis and the angle [rad] of a rotation; the angle is 0 for rotations near 180°."""
     twice = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     sine = 0.5 * np.linalg.norm(twice)
     angle = math.atan2(sine, 0.5 * (np.trace(turn) - 1.0))
@@ -97,5 +97,5 @@ def _axis_and_angle(turn):
 
 
 def largest(offsets: np.ndarray) -> float:
-    """Return the length of the longest of offsets (V, 3)."""
+    """Return the greatest length of offsets (V, 3)."""
     return math.sqrt(np.einsum("vi,vi->v", offsets, offsets).max())

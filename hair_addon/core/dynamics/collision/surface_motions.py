@@ -19,7 +19,7 @@ class SurfaceMotions:
         self.make_room(_SUBSTEPS)
 
     def make_room(self, count: int) -> None:
-        """Ensure a capacity of substeps; stored motions may be lost."""
+        """Ensure capacity for a number of substeps; stored motions may be lost."""
         if hasattr(self, "array") and len(self.array) >= count:
             return
         self.array = wp.zeros(2 * count, dtype=Motion, device=self._device)  # for kernels
@@ -28,7 +28,7 @@ class SurfaceMotions:
         self._target, self._source = _bytes(self.array), _bytes(written)
 
     def note(self, substep: int, colliders: Colliders, grid: Any) -> None:
-        """Store the motion of colliders to their present pose, and the place of their `DistanceGrid`, or None."""
+        """Store the motion of colliders to their present pose, and the place of their `DistanceGrid`, if any."""
         rows = self._rows
         (carry, carry_shift), (turned, moved) = colliders.carry, colliders.rigid_motion_so_far
         rows["motion"][substep], rows["deformation"][substep] = colliders.motion, colliders.deformation
