@@ -2,12 +2,12 @@
 """Conversion between combed points and simulated vertices, with the detail between the vertices.
 
 Vertices are evenly spaced along a guide. The coarse curve h(u) between them is cubic Hermite, with tangents from the
-frames of the segments. The offset o of each combed point is stored in frames R(u) that are interpolated between those
-of the segments:
+frames of the segments. The offset o of each combed point is stored in frames R(u) that are interpolated between the
+frames of the segments:
 
     p = h(u) + R(u) o
 
-Rigid motion is exact, a guide at rest equals the combed one, and bent curls keep their length.
+Rigid motion is exact, a guide at rest equals the combed guide, and bent curls keep their length.
 """
 
 from dataclasses import dataclass
@@ -85,7 +85,7 @@ def detail_of(points: np.ndarray, rods: Rods) -> Detail:
 
 
 def detailed_points(detail: Detail, rods: Rods) -> wp.array:
-    """Return points (S, P) vec3 [m] on the rods' device of guides at their simulated vertices and frames."""
+    """Return the points (S, P) vec3 [m] of simulated guides with their detail, on the rods' device."""
     require_count("guides", len(detail.places), rods.strand_count)
     points = wp.empty(detail.offsets.shape, dtype=wp.vec3, device=rods.device)
     _launch(_put_back, [Rows(detail.places), Rows(detail.offsets)], points, rods)

@@ -8,7 +8,7 @@ With the radius r of a fiber of length L, its section A = π r², stiffness k an
     b_0 = l_0 / 2,    b_j = (l_(j-1) + l_j) / 2                             length of strand that joint j bends
 
 A guide represents a wisp of n fibers; n scales weight and stiffness alike and cancels, and k describes how much fibers
-stick together. Wet hair weighs 1.3 times as much, and swollen fibers have half their stiffness [Robbins12].
+stick together. Wet hair weighs 1.3 times as much as dry hair, and has half its stiffness [Robbins12].
 
 Drag of a cylinder in air perpendicular to its axis, per length [N s/m²], with Re = 2 r |v| / ν [White06]:
 
@@ -50,8 +50,8 @@ class Material:
 def material_of(settings: DynamicsSettings, lengths: np.ndarray, wetness: np.ndarray | None = None) -> Material:
     """Return the `Material` of strands with lengths (S, M) [m] of segments in the groom, root to tip.
 
-    wetness: (S,) of each strand in [0, 1], None for that of the settings. Raises `HairError` for segments of zero
-    length.
+    wetness: (S,) of each strand in [0, 1], None for the wetness of the settings. Raises `HairError` for segments of
+    zero length.
     """
     lengths = np.asarray(lengths, np.float64)
     if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
@@ -85,7 +85,7 @@ def material_of(settings: DynamicsSettings, lengths: np.ndarray, wetness: np.nda
 
 
 def _point_lengths(lengths):
-    """Return (S, M+1) [m]: half of the lengths of the segments at each point."""
+    """Return (S, M+1) [m]: half the total length of the segments at each point."""
     halves = np.zeros((len(lengths), lengths.shape[1] + 1))
     halves[:, :-1] += lengths / 2.0
     halves[:, 1:] += lengths / 2.0

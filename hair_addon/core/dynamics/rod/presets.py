@@ -10,7 +10,7 @@ from typing import Any
 from ...params import declared
 from .settings import DynamicsSettings
 
-# In the order of a menu.
+# In the order of the menu.
 PRESETS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "NATURAL": ("Natural", "Dry hair that swings freely and keeps its shape", {}),
     "LOOSE": ("Loose", "Single fibers that bend easily", {"bend_stiffness": 1.0}),

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Direct solver of strands as Cosserat rods: substeps of many strands, each a chain of segments.
 
-Points and segment frames [Kugelstadt16] with compliant constraints [Macklin16]; the system of equations of a chain is
-block tridiagonal, and is solved directly [Deul18]. rod_solver.cpp and the files it includes are compiled for CPU and
-GPU: on a CPU `LANES` strands share the lanes of vectors, on a GPU each has a thread.
+A strand has points and segment frames [Kugelstadt16] with compliant constraints [Macklin16]. The system of equations of
+a chain is block tridiagonal, and is solved directly [Deul18]. rod_solver.cpp and the files that it includes are
+compiled for CPU and GPU: on a CPU, `LANES` strands share the lanes of vectors; on a GPU, each strand has a thread.
 
-Arrays are (groups, rows, lanes) float32: a group has `lane_count` strands, and each row has one number of every strand
-of the group, contiguously. `to_lanes` and `from_lanes` convert.
+Arrays are (groups, rows, lanes) float32: a group has `lane_count` strands, and each row has one number for every strand
+of the group, contiguously. `to_lanes` and `from_lanes` convert numbers of strands to these arrays and back.
 """
 
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ from ...kernels.checks import require_count
 LANES = 16  # strands of a CPU thread: 8 take a quarter longer, even with vectors of 8 numbers
 GPU_LANES = 32  # strands with contiguous numbers in GPU memory: a warp
 MOST_SEGMENTS = 64
-LEAST_GROUPS = 8  # fewer are not worth a thread
+LEAST_GROUPS = 8  # least number of groups for a thread
 BLOCK = 32  # threads of a GPU block: few, because there are few strands with much work each
 
 PREDICT, SOLVE, FINISH, AGAIN = 1, 2, 4, 8  # parts of a substep
 WHOLE = PREDICT | SOLVE | FINISH
 
 PLANE_ROWS = 8  # of a point: normal (3), offset n·c + r, displacement (3), friction
-ROOT_ROWS = 14  # position (3) and frame (4) at the frame's start, and at its end
+ROOT_ROWS = 14  # position (3) and rotation (4) at the start of an animation frame, then at its end
 _KEPT_ROWS, _CONTACT_ROWS = 64, 8
 
 wp.set_module_options({"enable_backward": False, "block_dim": BLOCK})
@@ -37,18 +37,18 @@ _CONSTANTS = {
     "WIDTH": LANES,
     "GROUP": GPU_LANES,
     "MOST": MOST_SEGMENTS,
-    "STEPS": 8,  # maximum of Newton's method
-    "PASSES": 4,  # maximum of contact
+    "STEPS": 8,  # most steps of Newton's method
+    "PASSES": 4,  # most passes of contact
     "TURN": 2e-3,  # |Δθ|² of a step that ends the solve: the remaining error is half of it
     "DRAG_ALONG": 0.5,  # drag along a slender body / drag across it
     "AWAY": 1e-3,  # remaining mobility along the contact normal: zero would make the matrix singular
-    "MOST_AWAY": 1e-2,  # the same for stiff points: with a third of it short hair breaks, more weakens friction
-    "STIFF": 1e4,  # κ = h² / (b m l²) above which a point is stiff; hair of 10 cm has some hundreds
+    "MOST_AWAY": 1e-2,  # the same for stiff points: a third of this value breaks short hair, more weakens friction
+    "STIFF": 1e4,  # κ = h² / (b m l²) above which a point is stiff; κ of hair of 10 cm is some hundreds
     "CREEP": 1e-4,  # speed of points held by friction [m/s]
     "ROD_SHARE": 1.0,
     "CHANGE": 0.05,  # relative change of friction that requires another pass
     "INSIDE": 5e-3,  # tolerance of penetration and length, relative to a segment, without another solve
-    "SWEEPS": 20,  # maximum of a repair
+    "SWEEPS": 20,  # most sweeps of a repair
     "PINCHED": 0.02,  # largest strain of segments in strands that cannot be outside otherwise
     "LEAST_ANGLE": 0.05,  # least squared sine between two planes with a usable line of intersection
     "LEAST_INERTIA": 3e-6,  # of a frame, in h² (1 + τ / h) / compliance of its joint; rounding is visible below 1e-7
@@ -116,7 +116,7 @@ _FIXED_ROWS = {"drag_rates": 3, "roots": ROOT_ROWS, "resets": 1, "solved_again":
 
 
 def row_count(name: str, segment_count: int) -> int:
-    """Return the number of rows of one of the `RodArrays`."""
+    """Return the number of rows of an array of `RodArrays`."""
     rows = ROWS[name]
     return _FIXED_ROWS[name] if rows is None else rows[0] * segment_count + rows[1] * (segment_count + 1)
 
@@ -170,7 +170,7 @@ class FrameSubsteps:
     twist_ratio: float = 1.0  # compliance of twisting / compliance of bending
     hold: float = 0.0  # [1/s²]
     hold_tip: float = 1.0
-    pinned: int = 0  # points from the root that follow the surface, beside the root itself
+    pinned: int = 0  # number of points after the root that follow the surface like the root
     most_stretch: float = 1.2  # length / rest length of a segment beyond which a strand breaks
     carried: float = 1.0  # (h / h of the last substep)²
 
@@ -230,7 +230,7 @@ def lane_count(device: wp.DeviceLike) -> int:
 
 
 def to_lanes(values: np.ndarray, lanes: int) -> np.ndarray:
-    """Convert numbers of strands (S, …) → (groups, rows, lanes) float32, padded with the last strand."""
+    """Return numbers of strands (S, …) as (groups, rows, lanes) float32, padded with the last strand."""
     rows = np.asarray(values, np.float32).reshape(len(values), -1)
     group_count = -(-len(rows) // lanes)
     padded = np.concatenate([rows, np.repeat(rows[-1:], group_count * lanes - len(rows), axis=0)])
@@ -238,12 +238,12 @@ def to_lanes(values: np.ndarray, lanes: int) -> np.ndarray:
 
 
 def from_lanes(rows: np.ndarray, strand_count: int) -> np.ndarray:
-    """Convert (groups, rows, lanes) → (S, rows) float32."""
+    """Return numbers (groups, rows, lanes) as (S, rows) float32."""
     return np.ascontiguousarray(rows.swapaxes(1, 2)).reshape(-1, rows.shape[1])[:strand_count]
 
 
 def scratch(segment_count: int, group_count: int, device: wp.DeviceLike) -> wp.array:
-    """Return working memory of `advance` for a GPU, where threads have too little local memory; empty on a CPU."""
+    """Return working memory for `advance` on a GPU, where threads have too little local memory; empty on a CPU."""
     is_cpu = wp.get_device(device).is_cpu
     row_count = _KEPT_ROWS * segment_count + _CONTACT_ROWS * (segment_count + 1)
     shape = (0, 0, 0) if is_cpu else (group_count, row_count, GPU_LANES)
@@ -260,12 +260,12 @@ def advance(
     surroundings: Surroundings = EMPTY,
     block_dim: int = BLOCK,
 ) -> None:
-    """Advance strands by substeps first … end - 1 of a frame's `step.count`; end: None for all remaining.
+    """Advance strands by substeps first … end - 1 of a frame's `step.count`; end: None for all remaining substeps.
 
     stages: PREDICT writes positions without the rod's forces, for which contact planes can then be found; SOLVE
-    computes the final positions; AGAIN solves again for strands with a point inside one of `found_planes`, which
-    replaces its plane; FINISH moves out points inside the last planes, and computes velocities. Without planes, one
-    launch does all stages. Raises `HairError` if counts do not match.
+    computes the final positions; AGAIN solves again for strands with a point inside one of `found_planes`, and this
+    plane replaces the point's plane; FINISH moves out points inside the last planes, and computes velocities. Without
+    planes, one launch runs all stages. Raises `HairError` if counts do not match.
     """
     numbers, around = kernel_inputs(arrays, step, scratch, first, end, surroundings)
     device, group_count = arrays.positions.device, len(arrays.positions)
@@ -279,14 +279,14 @@ def advance(
 
 
 def stages_of(arrays: RodArrays, step: FrameSubsteps, stages: int) -> int:
-    """Return the stages to run: without SOLVE and AGAIN if all segments are pinned."""
+    """Return the stages to run: if all segments are pinned, `stages` without SOLVE and AGAIN."""
     return stages & ~(SOLVE | AGAIN) if step.pinned == arrays.lengths.shape[1] else stages
 
 
 def kernel_inputs(
     arrays: RodArrays, step: FrameSubsteps, scratch: wp.array, first: int, end: int | None, surroundings: Surroundings
 ) -> tuple[Numbers, Around]:
-    """Return step and surroundings for kernels. Raises `HairError` if counts do not match."""
+    """Return a step and its surroundings for kernels. Raises `HairError` if counts do not match."""
     end = step.count if end is None else end
     _check(arrays, step, scratch, surroundings)
     if first < 0 or end > step.count:

@@ -2,7 +2,7 @@
 """`Rods`: the state of simulated strands on a device, from a groom and a material.
 
 The surface determines the position of each root and its rotation relative to the groom. The frame before segment 0 is
-that of segment 0 in the groom, rotated with the surface: a strand leaves the surface at its combed angle.
+the frame of segment 0 in the groom, rotated with the surface: a strand leaves the surface at its combed angle.
 """
 
 from collections.abc import Mapping
@@ -22,12 +22,12 @@ from .settings import DynamicsSettings
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-# Arrays that a substep reads and that are not determined by groom, material and roots.
+# Arrays that a substep reads and that do not follow from groom, material and roots.
 STATE = ("positions", "velocities", "frames", "spins", "multipliers", "slips", "roots", "resets")
 _ROOT_END = wp.constant(rod_solver.ROOT_ROWS // 2)  # first row of a root's pose at the end of the frame
 _NO_TURNS = np.zeros((0, 4))
 _FARTHEST = 1e30  # [m]
-MOST_STRETCH = 1.2  # of a segment, above which a strand is reset to its groom; larger for stretchable hair
+MOST_STRETCH = 1.2  # length / rest length of a segment above which a strand is reset; larger for stretchable hair
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def combed_shape(groom: np.ndarray) -> RestShape:
 
 
 def half_rotations(frames: np.ndarray) -> np.ndarray:
-    """Return half of the rotation (S, M, 4) from each previous frame to the next one; the identity for the first."""
+    """Return half the rotation (S, M, 4) from the previous frame to each frame; the identity for the first frame."""
     before = np.concatenate([frames[:, :1], frames[:, :-1]], axis=1)
     return rotations.half(rotations.product(rotations.inverse(before), frames))
 
@@ -61,7 +61,7 @@ def half_rotations(frames: np.ndarray) -> np.ndarray:
 def step_of(
     settings: DynamicsSettings, material: Material, seconds: float, count: int, gravity: tuple[float, float, float]
 ) -> FrameSubsteps:
-    """Return the `FrameSubsteps` of a frame of a duration [s] in a number of substeps; gravity: of the scene [m/s²]."""
+    """Return the `FrameSubsteps` of a frame; seconds: duration; count: of substeps; gravity: of the scene [m/s²]."""
     return FrameSubsteps(
         seconds / count,
         count,
@@ -120,8 +120,8 @@ class Rods:
             require_count(name, getattr(material, name).size, self.strand_count * self.segment_count)
         if not (np.isfinite(rest.lengths).all() and (rest.lengths > 0.0).all()):
             raise HairError("Simulated strands have segments without length.")
-        # A unit near the mean mass avoids overflow in single precision. Powers of four, and the solver's square roots
-        # of them, are exact: no strand depends on the masses of others.
+        # A unit near the mean mass avoids overflow in single precision. Powers of four, and their square roots in the
+        # solver, are exact: no strand depends on the masses of other strands.
         unit = float(4.0 ** np.round(0.5 * np.log2(material.masses.mean())))
         self.arrays.multipliers.assign(self.arrays.multipliers.numpy() * np.float32(self._mass_unit / unit))
         self._mass_unit = unit
@@ -162,7 +162,8 @@ class Rods:
     def move_roots(self, positions: np.ndarray, turns: np.ndarray | None = None) -> None:
         """Set the roots at the end of the next frame, which begins at the end of the last one.
 
-        positions: (S, 3) [m]; turns: (S, 4) rotations x, y, z, w of the surface relative to the groom, None for none.
+        positions: (S, 3) [m]; turns: (S, 4) rotations x, y, z, w of the surface relative to the groom, None for no
+        rotation.
         """
         require_count("coordinates of roots", np.size(positions), 3 * self.strand_count)
         positions, turns = np.reshape(positions, (-1, 3)), _NO_TURNS if turns is None else np.reshape(turns, (-1, 4))
@@ -176,7 +177,7 @@ class Rods:
         kernel_cache.launch(_move_roots, (len(roots), self.lanes), inputs=inputs, outputs=[roots], device=self.device)
 
     def set_start(self, turns: np.ndarray) -> None:
-        """Set the reference rotations (S, 4) of `move_roots` and `reset`: those of the surface in the groom."""
+        """Set the reference rotations (S, 4) of `move_roots` and `reset`: rotations of the surface in the groom."""
         require_count("numbers of rotations of roots", np.size(turns), 4 * self.strand_count)
         self._start_turns, self._start = turns, self._doubles(turns)
 
@@ -184,9 +185,9 @@ class Rods:
         return wp.array(np.asarray(rows, np.float64), dtype=wp.float64, device=self.device)
 
     def in_lanes(self, values: np.ndarray, is_padded: bool = True) -> wp.array:
-        """Convert numbers (S, rows) → (groups, rows, lanes) float32 on the device.
+        """Return numbers (S, rows) as (groups, rows, lanes) float32 on the device.
 
-        is_padded: unused lanes repeat the last strand, otherwise they are zero.
+        is_padded: True repeats the last strand in unused lanes, False fills unused lanes with zeros.
         """
         rows = rod_solver.to_lanes(np.asarray(values), self.lanes)
         if not is_padded:
@@ -204,8 +205,8 @@ class Rods:
     def carry(self, chosen: np.ndarray, turns: np.ndarray, pivots: np.ndarray, places: np.ndarray) -> None:
         """Move some strands rigidly, as after a jump of the surface: x becomes place + turn (x - pivot).
 
-        chosen: (S,) bool; turns: (S, 4) rotations x, y, z, w; pivots, places: (S, 3) [m]. Velocities and roots, the
-        start of the next frame, are transformed as well.
+        chosen: (S,) bool; turns: (S, 4) rotations x, y, z, w; pivots, places: (S, 3) [m]. Velocities, and the roots at
+        the start of the next frame, are transformed as well.
         """
         for count in (len(chosen), len(turns), len(pivots), len(places)):
             require_count("strands", count, self.strand_count)
@@ -251,7 +252,7 @@ class Rods:
             self.step_size = step.size
 
     def begun(self, step: FrameSubsteps) -> FrameSubsteps:
-        """Return a step that continues the last one."""
+        """Return a step with values that continue the last step; the first step also sets the multipliers."""
         if self.step_size == 0.0:  # the first step starts with the rest shape's multipliers of equilibrium
             self._put("multipliers", self._held * (step.size**2 / self._mass_unit))
             self.step_size = step.size
@@ -297,7 +298,7 @@ class Rods:
         self.step_size = float(size[0])
 
     def read(self, name: str) -> np.ndarray:
-        """Return (S, rows) float32 of one of `RodArrays`."""
+        """Return an array of `RodArrays` as (S, rows) float32."""
         return rod_solver.from_lanes(getattr(self.arrays, name).numpy(), self.strand_count)
 
     def _put(self, name, values):

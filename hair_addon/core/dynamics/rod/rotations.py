@@ -10,7 +10,7 @@ IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the product a b: the rotation b, then a."""
+    """Return the product a b: first the rotation b, then the rotation a."""
     # By components: NumPy's cross product alone takes three times as long.
     ax, ay, az, aw = _components(a)
     bx, by, bz, bw = _components(b)
@@ -26,7 +26,7 @@ def inverse(a: np.ndarray) -> np.ndarray:
 
 
 def rotated(a: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Rotate vectors (…, 3)."""
+    """Return vectors v (…, 3) after the rotation a."""
     ax, ay, az, aw = _components(a)
     x, y, z = _components(v)
     tx, ty, tz = 2.0 * (ay * z - az * y), 2.0 * (az * x - ax * z), 2.0 * (ax * y - ay * x)
@@ -35,13 +35,13 @@ def rotated(a: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def _components(a):
-    """Return contiguous arrays (…) of each component, which are faster to read."""
+    """Return one contiguous array (…) for each component: contiguous arrays are faster to read."""
     a = np.asarray(a)
     return a.transpose(a.ndim - 1, *range(a.ndim - 1)).copy()  # `moveaxis` takes longer than the copy
 
 
 def _together(*components):
-    """Join components along the last axis; `np.stack` takes twice as long for few strands."""
+    """Return components joined along the last axis; `np.stack` takes twice as long for few strands."""
     found = np.empty((*components[0].shape, len(components)), components[0].dtype)
     for place, component in enumerate(components):
         found[..., place] = component
@@ -49,7 +49,7 @@ def _together(*components):
 
 
 def unit(a: np.ndarray) -> np.ndarray:
-    """Normalize vectors or quaternions."""
+    """Return normalized vectors or quaternions."""
     return a / np.linalg.norm(a, axis=-1, keepdims=True)
 
 
@@ -59,7 +59,7 @@ def half(a: np.ndarray) -> np.ndarray:
 
 
 def least_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the least rotation from unit vectors a to b; about any perpendicular axis if they are opposite."""
+    """Return the least rotation from unit vectors a to b; about any perpendicular axis if a and b are opposite."""
     real = 1.0 + np.sum(a * b, axis=-1, keepdims=True)
     other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
     is_opposite = real < 1e-9
@@ -89,7 +89,7 @@ def frames_along(points: np.ndarray) -> np.ndarray:
 
 
 def from_matrices(matrices: np.ndarray) -> np.ndarray:
-    """Convert rotation matrices (…, 3, 3) → quaternions (…, 4) with non-negative real part."""
+    """Return the quaternions (…, 4), with non-negative real part, of rotation matrices (…, 3, 3)."""
     m = np.asarray(matrices, np.float64)
     x, y, z = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
     # Four times the outer product of the quaternion with itself; the longest row is the most accurate [Bar-Itzhack00].

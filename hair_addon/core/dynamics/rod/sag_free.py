@@ -8,7 +8,7 @@ With the forces F_j = Σ m g of all points beyond segment j, its rest length l_j
     2 Im e_j = -α_j λ_j                                              bend and twist
 
 The half rest rotation s_j is the solution of s e s = r, where r is the rotation from frame j - 1 to frame j:
-s = e^-½ (e^½ r e^½)^½ e^-½. G depends on s, so this is iterated.
+s = e^-½ (e^½ r e^½)^½ e^-½. G depends on s, so the solution is iterated.
 
 The equilibrium may be unstable: an upright strand falls like a column if Γ = ρA g L³ / EI exceeds 7.84 [Greenhill81].
 """
@@ -28,7 +28,10 @@ GREENHILL = 7.84
 
 @dataclass(frozen=True)
 class SagFree:
-    """A `RestShape` with strands at rest in their groom, except for clipped joints; clipped: (S,) number of these."""
+    """A `RestShape` with strands at rest in their groom, except for clipped joints.
+
+    clipped: (S,) number of clipped joints.
+    """
 
     rest: RestShape
     clipped: np.ndarray
@@ -62,7 +65,7 @@ def sag_free(groom: np.ndarray, material: Material, gravity: tuple[float, float,
 
 
 def least_stiffness(groom: np.ndarray, material: Material, gravity: tuple[float, float, float]) -> float:
-    """Return the factor of a material's bending stiffness at which all strands (S, M+1, 3) [m] are stable."""
+    """Return the least factor of a material's bending stiffness with which all strands (S, M+1, 3) [m] are stable."""
     return float(least_stiffnesses(groom, material, gravity).max(initial=0.0))
 
 
@@ -120,7 +123,7 @@ def _bent(halves, before, turns, moments, compliances):
 
 
 def _multipliers(bend, moments):
-    """Solve (e_w 1 + [e_v]×) λ = moments in closed form, for a unit quaternion e."""
+    """Return the closed-form solution λ of (e_w 1 + [e_v]×) λ = moments for a unit quaternion e."""
     axis, real = bend[..., :3], bend[..., 3:]
     real = np.maximum(real, 1e-6)
     along = np.sum(axis * moments, axis=-1, keepdims=True)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of the simulation of guides: material, forces, shape, collision, solver.
 
-Settings are in SI units: motion does not depend on the number of vertices, the frame rate or the number of substeps.
+Settings are in SI units, so motion does not depend on the number of vertices, the frame rate or the number of substeps.
 """
 
 from dataclasses import dataclass

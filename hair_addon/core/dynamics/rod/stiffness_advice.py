@@ -43,7 +43,7 @@ def tip_sink(ratio: float, tip_stiffness: float = 1.0) -> float:
     """
     count = _SEGMENT_COUNT
     joints = np.arange(count) / count
-    joints[0] = 0.25 / count  # the center of the half segment from the clamp
+    joints[0] = 0.25 / count  # the center of the half segment at the clamp
     stiffness = count * np.maximum(1.0 + (tip_stiffness - 1.0) * joints, LEAST_STIFFNESS)
     stiffness[0] *= 2.0
     load = ratio * (1.0 - (np.arange(count) + 0.5) / count) / count
