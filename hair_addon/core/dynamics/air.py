@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Force fields: velocity of the air, accelerations and drag at each point.
 
-Falloff, distances and shapes are those of Blender's force fields, as in its source, effect.cc. The quantities differ:
-*Wind* is the velocity of the air, to which *Turbulence* adds noise in space and time; *Force* and *Vortex* are
-accelerations; *Drag* multiplies the drag of air.
+Falloff, distances and shapes are the same as in Blender's force fields (effect.cc in its source). The quantities
+differ: *Wind* is a velocity of the air, *Turbulence* adds noise in space and time to this velocity, *Force* and
+*Vortex* are accelerations, and *Drag* multiplies the drag of air.
 """
 
 import math
@@ -26,7 +26,7 @@ SHAPES = ("POINT", "LINE", "PLANE")
 FALLOFFS = ("SPHERE", "TUBE", "CONE")
 DIRECTIONS = ("BOTH", "POSITIVE", "NEGATIVE")
 MOST_FIELDS = 1024
-LARGEST = 1e6  # of a strength
+LARGEST = 1e6  # largest strength of a field
 
 _WIND, _TURBULENCE, _FORCE, _VORTEX, _DRAG = (wp.constant(index) for index in range(len(KINDS)))
 _POINT, _LINE, _PLANE = (wp.constant(index) for index in range(len(SHAPES)))
@@ -39,11 +39,11 @@ _DEGREES = wp.constant(180.0 / math.pi)
 
 @dataclass(frozen=True)
 class ForceField:
-    """A force field; names and meanings of values as in `bpy.types.FieldSettings`.
+    """A force field; values have the names and meanings of `bpy.types.FieldSettings`.
 
-    origin (3,) [m]; axis (3,): direction of its Z axis; strength: of Wind and Turbulence [m/s], of Force [m/s²], of
-    Vortex [1/s], POINT: [1/s²], of Drag: added to the factor 1; flow [1/s]: damping of hair in Force and Vortex, unused
-    in Wind and Turbulence, where the drag of air replaces it; distances [m]: None if unused.
+    origin: (3,) [m]; axis: (3,) direction of the field's Z axis; strength: Wind and Turbulence [m/s], Force [m/s²],
+    Vortex [1/s] or, with the shape POINT, [1/s²], Drag: a number added to the factor 1; flow: damping of hair in Force
+    and Vortex [1/s], unused in Wind and Turbulence, where the drag of air replaces flow; distances [m]: None if unused.
     """
 
     kind: str
@@ -53,20 +53,20 @@ class ForceField:
     flow: float = 0.0
     shape: str = "POINT"
     falloff: str = "SPHERE"
-    direction: str = "BOTH"  # side of the origin along the axis on which the field acts
+    direction: str = "BOTH"  # side of the origin, along the axis, on which the field acts
     power: float = 0.0
     minimum: float | None = None
     maximum: float | None = None
-    radial_power: float = 0.0  # of TUBE and CONE
-    radial_minimum: float | None = None  # CONE: an angle [rad]
+    radial_power: float = 0.0  # radial values are for TUBE and CONE
+    radial_minimum: float | None = None  # an angle [rad] for CONE
     radial_maximum: float | None = None
-    is_gravitation: bool = False  # Force: multiplied by the inverse squared distance
-    size: float = 0.0  # of Turbulence [m], 0: 1 m
+    is_gravitation: bool = False  # Force: the strength is divided by the squared distance
+    size: float = 0.0  # of the noise of Turbulence [m]; 0 means 1 m
     is_global: bool = False  # Turbulence: noise in world space, not relative to the object
     seed: int = 1
 
     def problem(self) -> str | None:
-        """Return why this field cannot act; None if it can."""
+        """Return the reason why this field cannot act; None if it can act."""
         names = ((self.kind, KINDS), (self.shape, SHAPES), (self.falloff, FALLOFFS), (self.direction, DIRECTIONS))
         for name, known in names:
             if name not in known:
@@ -104,7 +104,7 @@ class _Field:
 class Air:
     """Effect of force fields on points: arrays (groups, rows, lanes) float32 on one device, in the solver's layout.
 
-    airs: 3 rows per point, velocity of the air [m/s]; accelerations: 3 rows [m/s²]; drags: 1 row, factor of air drag.
+    airs: velocity of the air [m/s], 3 rows per point; accelerations: [m/s²], 3 rows; drags: factor of air drag, 1 row.
     """
 
     def __init__(self, point_shape: tuple[int, int, int], device: wp.DeviceLike = "cpu") -> None:
@@ -120,8 +120,8 @@ class Air:
     def blow(self, fields: Sequence[ForceField], positions: Any, velocities: Any, time: float) -> list[HairError]:
         """Evaluate fields at positions [m] of points with velocities [m/s], 3 rows per point, at a time [s].
 
-        Returns the reasons why fields do not act; such fields are ignored. Raises `HairError` for arrays of other
-        shapes.
+        Returns one error with the reason for each field that cannot act and is ignored. Raises `HairError` for arrays
+        of other shapes.
         """
         groups, points, lanes = self._shape
         for array in (positions, velocities):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draping of guides after growth: new hair hangs, and lies on its surface instead of passing through it.
 
-Growth is simulated as on a human scalp for any size of surface, because all lengths of new hair are proportional to the
-surface (grooming/groom_defaults.py). Hair of a giant and of a mouse thus looks alike. The gravity is a setting of the
-guides, not the scene's.
+A surface of any size is simulated like a human scalp, because all lengths of new hair are proportional to the surface
+(grooming/groom_defaults.py). Hair of a giant and of a mouse thus looks alike. Gravity is a setting of the guides; the
+scene's gravity has no effect.
 """
 
 import math
@@ -28,15 +28,18 @@ from .rod import detail, rod_solver, rods
 from .rod.settings import DynamicsSettings
 
 SCALP = 0.055  # area of a human scalp [m²]
-# Loose hair, two millimeters from the skin: guides represent wisps, whose strands lie beside them.
+# Loose hair, two millimeters from the skin: guides represent wisps, whose strands lie beside the guides.
 _HAIR = DynamicsSettings(bend_stiffness=0.5, collision_distance=2e-3, substeps=2)
 _SECONDS = 1.0
 _EARTH = 9.81  # [m/s²]
-_GROWN = 0.6  # progress after growth
+_GROWN = 0.6  # fraction of the progress that growth takes; draping takes the rest
 
 
 def grow(mesh: TriMesh, settings: GuideSettings, *, progress: Progress = no_progress, **ground: Any) -> Strands:
-    """`groom.distribute_guides` with the same arguments, then draping if the settings enable it. Raises `HairError`."""
+    """Return the guides of `groom.distribute_guides`, draped if the settings enable it.
+
+    Arguments as in `groom.distribute_guides`. Raises `HairError`.
+    """
     if not settings.drape:
         return distribute_guides(mesh, settings, progress=progress, **ground)
     guides = distribute_guides(mesh, settings, progress=part_of(progress, 0.0, _GROWN), **ground)
@@ -56,7 +59,7 @@ def settled(
     mirror: Mirror = ACROSS_X,
     progress: Progress = no_progress,
 ) -> Strands:
-    """Return guides that have grown on a mesh in their rest position. settings: completed for the mesh.
+    """Return grown guides of a mesh after they have settled. settings: completed for the mesh.
 
     Other arguments as in `groom.distribute_guides`. Raises `HairError` if guides cannot be draped.
     """

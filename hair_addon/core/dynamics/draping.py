@@ -15,12 +15,12 @@ from .rod.settings import DynamicsSettings
 from .root_motion import RootPose
 from .simulation import MOST_SUBSTEPS, Obstacle, Simulation, World
 
-# Animation frames in a simulated frame: reading the surface for each frame is slow.
+# Animation frames in a simulated frame: reading the surface for each animation frame would be slow.
 _FRAMES = 4
 FRAME = _FRAMES / 24.0  # [s]
-REST = 5e-3  # [m/s] below which guides are at rest
+REST = 5e-3  # speed below which guides are at rest [m/s]
 _DAMPING = 0.05  # [s]
-_DRAG = 4.0  # multiple of air drag: same equilibria, reached sooner
+_DRAG = 4.0  # factor of air drag: guides reach the same equilibria sooner
 
 
 def draped(
@@ -36,8 +36,8 @@ def draped(
 ) -> np.ndarray:
     """Simulate guides (G, P, 3) [m] until they rest, for at most `seconds`; returns (G, P, 3) float64.
 
-    mesh: the surface that they grow and lie on; gravity: [m/s²]; tell: called with the completed fraction, may raise to
-    cancel; wetness: as in `Simulation`. Raises `HairError`, also if the surface is unusable as a collider.
+    mesh: the surface on which guides grow and lie; gravity: [m/s²]; tell: called with the completed fraction, may raise
+    to cancel; wetness: as in `Simulation`. Raises `HairError`, also if the surface is unusable as a collider.
     """
     pose = RootPose(np.asarray(points[:, 0], np.float64), np.tile(rotations.IDENTITY, (len(points), 1)))
     vertices, triangles = (

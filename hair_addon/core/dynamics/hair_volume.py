@@ -10,12 +10,12 @@ integers, and thus bit-identical for any order and number of cores.
     s_c = min(0.8 ρ⁰_c - ρ_c, 3 ρ_c)₊                             cohesion: lack of density, zero if torn apart
     v_i ← v_i - Δt (k_p / ρ̄) Σ_c (e_c - wetness_i s_c) ∇w_ic      |Δv| ≤ ½ cell / Δt
 
-ρ̄ is the mean of ρ⁰ over its non-empty cells. Without it in the pressure, hair could not fall into places without hair
-in the groom. ρ¹ is the largest density of a single straight strand in a cell: without it isolated strands would repel
+ρ̄ is the mean of ρ⁰ over its non-empty cells. Without ρ̄ in the pressure, hair could not fall into places without hair
+in the groom. ρ¹ is the largest density of a single straight strand in a cell: without ρ¹, isolated strands would repel
 themselves.
 
-Hair at rest stays at rest. Where an explicit step would overshoot because hair is too dense, e and s are reduced:
-(ω Δt)² = 2 k_p ρ_c / ρ̄ (Δt / cell)² stays below 1. ∇w is discontinuous between cells, so a point between opposite
+Hair at rest stays at rest. Where an explicit step would overshoot because hair is too dense, e and s are reduced so
+that (ω Δt)² = 2 k_p ρ_c / ρ̄ (Δt / cell)² stays below 1. ∇w is discontinuous between cells, so a point between opposite
 pushes moves to the border of the cells (hair_cells.py).
 """
 
@@ -35,10 +35,10 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 LEAST_CELL = 0.004  # [m]
 MOST_CELLS_ALONG = 96
-MOST_CELLS = 4 * MOST_CELLS_ALONG**3  # of all regions
+MOST_CELLS = 4 * MOST_CELLS_ALONG**3  # cells of all regions together
 
 _FEWEST_CELLS = 4096  # number of cells of a region that is always allowed
-_MOST_SHARES = 4  # each with its own grid for sums
+_MOST_SHARES = 4  # shares of the points, each with its own grid for sums
 _LEAST_ROWS = 20_000  # least number of points for a thread
 _UNIT = wp.constant(2.0**20)  # units of sums per mean mass
 _FASTEST = wp.constant(1.0e4)  # [m/s]: faster points are ignored
@@ -47,7 +47,7 @@ _DENSE, _THIN, _LOOSE = wp.constant(1.2), wp.constant(0.8), wp.constant(3.0)
 
 
 class HairVolume:
-    """The volume of strands with masses of points (groups, points, lanes), in units of their mean.
+    """The volume of strands whose points have masses (groups, points, lanes), in units of the mean mass.
 
     Points of zero mass, such as those of unused lanes, are ignored. Positions and velocities are (groups, points × 3,
     lanes), as in the solver.
@@ -82,7 +82,7 @@ class HairVolume:
         self._missing: Any = None  # s / ρ̄ of each cell; empty if all strands are dry
 
     def fit(self, positions: Any, groom: Any) -> None:
-        """Fit the grid to strands and to the groom as carried by the surface [m]; to be called once per frame."""
+        """Fit the grid to strands and to the groom, moved with the surface [m]; call this once per frame."""
         self._require_shape(positions)
         self._require_shape(groom)
         bounds = wp.array(np.repeat([[np.inf], [-np.inf]], 3, axis=1), dtype=float, device=self.device)
@@ -134,13 +134,16 @@ class HairVolume:
         parallel.launch_shares(_rub, groups * points * lanes, inputs, [[velocities]] * shares, self.device)
 
     def _missing_of(self, cell_count):
-        """Return the array of s for a number of cells."""
+        """Return the array of s / ρ̄ for a number of cells."""
         if self._missing is None or len(self._missing) != cell_count:
             self._missing = wp.empty(cell_count, dtype=float, device=self.device)
         return self._missing
 
     def _single_strand_mass(self, groom):
-        """Return ρ¹, the most mass of a straight mean strand in a cell: a point, or all points in a cell's length."""
+        """Return ρ¹, the largest mass of a straight mean strand in a cell.
+
+        This is the mass of a point, or of all points within the length of a cell.
+        """
         if self._weights is None:
             masses = self._masses.numpy().astype(np.float64)
             points = groom.numpy().astype(np.float64).reshape(len(masses), -1, 3, masses.shape[2])
@@ -179,7 +182,7 @@ class HairVolume:
         return sums[0]
 
     def _cleared(self, cell_count, width, shares):
-        """Return arrays of zeros; those for motion are reused, because allocation takes as long as a sum."""
+        """Return arrays of zeros; arrays for motion are reused, because allocation takes as long as a sum."""
         if width == 1:
             return [wp.zeros((cell_count, width), dtype=wp.int64, device=self.device) for _ in range(shares)]
         if len(self._kept_sums) != shares or len(self._kept_sums[0]) != cell_count:

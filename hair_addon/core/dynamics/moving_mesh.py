@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulation of guides on a mesh whose vertices move from frame to frame: plain arrays in, plain arrays out."""
+"""Simulation of guides on a mesh whose vertices move from frame to frame, with arrays as input and output."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -89,7 +89,7 @@ class _Surface:
         corners, weights = self._places
         roots = np.einsum("nc,ncx->nx", weights, mesh.vertices[corners])
         self._reach = max(float(np.ptp(mesh.vertices, axis=0).max()), 1e-20)
-        # Each root, and a point at a distance along each axis.
+        # Each root, and three points at a distance from the root along the axes.
         self._crosses = roots[:, None] + self._reach * np.concatenate([np.zeros((1, 3)), np.eye(3)])
 
     @cached_property

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands kept outside of meshes: hair between simulated guides, and guides that are combed.
+"""Motion of strands out of meshes: hair between simulated guides, and combed guides.
 
-Simulated guides are outside, but their weighted sums may pass through a collider between them; strokes may push guides
-into the surface. From root to tip, each point that is inside is moved to the closest place outside; the following
-points move along and return gradually, so that strands keep their shape and almost their length. Strands that are
-outside stay bit-identical.
+Simulated guides are outside, but the weighted sums of guides between them may pass through a collider; strokes may push
+guides into the surface. From root to tip, each point that is inside is moved to the closest place outside; the
+following points move along and return gradually, so that strands keep their shape and almost their length. Strands that
+are outside stay bit-identical.
 """
 
 from collections.abc import Sequence
@@ -24,9 +24,9 @@ from .simulation import Obstacle
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _RETURN = wp.constant(0.15)  # fraction of the way back to the original path, per segment
-_ROUNDS = wp.constant(3)  # of moving a point out, and back to its distance from the previous point
+_ROUNDS = wp.constant(3)  # a point moves out, and back to its distance from the previous point, in each round
 _TURNS = wp.constant(8)  # further turns of a segment outwards, where a mesh is concave
-_TURN = wp.constant(0.3)  # of a segment's length, by which each of them moves its end
+_TURN = wp.constant(0.3)  # fraction of a segment's length by which a turn moves the segment's end
 _PUSHES = wp.constant(4)  # further moves out, for notches of a mesh
 _AHEAD = wp.constant(1.0)  # additional search radius in segments, which saves later queries
 _FAR = wp.constant(1e6)  # [m]
@@ -39,10 +39,10 @@ _NON_FINITE = "Strands to keep outside need points with finite coordinates."
 def moved_outside(
     points: np.ndarray, obstacles: Sequence[Obstacle], device: wp.DeviceLike = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Move strands (S, P, 3) [m] out of obstacles → (points (S, P, 3) float64, (S,) bool: which were moved).
+    """Return (points (S, P, 3) float64 of strands moved out of obstacles, (S,) bool: whether each strand moved).
 
-    obstacles: with the distance that points keep. Roots do not move. Invalid colliders are ignored, as in `Colliders`.
-    Raises `HairError` for non-finite points.
+    points: (S, P, 3) [m]; obstacles: with the distance that points keep. Roots do not move. Invalid colliders are
+    ignored, as in `Colliders`. Raises `HairError` for non-finite points.
     """
     points = np.asarray(points, np.float64)
     origin = points[:, :1].reshape(-1, 3).mean(axis=0) if points.size else np.zeros(3)
@@ -65,7 +65,7 @@ class Barrier:
             self._surface, self._grid = _surface_of(self._colliders), _grid_of(self._colliders, point_count)
 
     def moved(self, points: np.ndarray, held: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Move strands (S, P, 3) [m] out of the obstacles; returns as `moved_outside`.
+        """Return strands (S, P, 3) [m] moved out of the obstacles, with the results of `moved_outside`.
 
         held: (S,) number of points from the root that do not move, at least 1; None for the root alone. Raises
         `HairError` for non-finite points.
@@ -77,7 +77,7 @@ class Barrier:
         if self._colliders.mesh is None or not points.size:
             return points, is_moved
         device = self._colliders.device
-        # Rows of whole strands: broadcasting over three numbers takes three times as long.
+        # Each row is a whole strand: broadcasting over three numbers takes three times as long.
         offsets = points.reshape(len(points), -1) - np.tile(self._origin, points.shape[1])
         original = wp.array(offsets.astype(np.float32).reshape(points.shape), dtype=wp.vec3, device=device)
         held = np.ones(len(points), np.int32) if held is None else np.asarray(held, np.int32)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Motion of the roots of simulated strands from frame to frame: jumps, and motion without effect on the hair.
 
-A strand whose root jumps, farther than the teleport distance or by a large angle, moves along rigidly. With inertia
-below 1, a fraction of the rigid motion of the whole surface moves all strands rigidly, without effect on their shape.
+A strand moves rigidly with its root if the root jumps: farther than the teleport distance, or by a large angle. With
+inertia below 1, a fraction of the rigid motion of the whole surface moves all strands rigidly, without effect on their
+shape.
 """
 
 import math
@@ -37,7 +38,7 @@ class RootPose:
             raise HairError("The surface has no size: its scale is zero or not a number.")
 
     def carried(self, points: np.ndarray) -> np.ndarray:
-        """Move points (S, N, 3) of the groom, relative to each root, with the surface; returns float64."""
+        """Return points (S, N, 3) float64 of the groom, relative to each root, after they move with the surface."""
         return self.positions[:, None] + rotations.rotated(self.turns[:, None], self.scale * points)
 
     def moved(self, motion: "RigidMotion") -> "RootPose":
@@ -47,7 +48,7 @@ class RootPose:
         )
 
     def with_rows(self, chosen: np.ndarray, other: "RootPose") -> "RootPose":
-        """Return the pose with some roots, (M,) indices, taken from another pose."""
+        """Return the pose with chosen roots from another pose; chosen: (M,) indices."""
         positions, turns = self.positions.copy(), self.turns.copy()
         positions[chosen], turns[chosen] = other.positions[chosen], other.turns[chosen]
         return replace(self, positions=positions, turns=turns)
@@ -55,7 +56,7 @@ class RootPose:
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """A rotation (…, 4) about center (…, 3), followed by a translation way (…, 3) [m]."""
+    """A rotation (…, 4) about a center (…, 3) [m], followed by a translation; way: (…, 3) [m]."""
 
     rotation: np.ndarray
     center: np.ndarray
@@ -93,7 +94,7 @@ def jumps(before: RootPose, after: RootPose, distance: float) -> np.ndarray:
 
 
 def jump_of(before: RootPose, after: RootPose, chosen: np.ndarray) -> RigidMotion:
-    """Return the motion of each of some roots, (M,) indices or a mask."""
+    """Return the motion of each chosen root; chosen: (M,) indices or a mask."""
     turned = rotations.product(after.turns, rotations.inverse(before.turns))[chosen]
     return RigidMotion(turned, before.positions[chosen], (after.positions - before.positions)[chosen])
 

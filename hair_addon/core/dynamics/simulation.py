@@ -3,7 +3,7 @@
 
 Guides are simulated as strands with fewer points, `Rods`; the remaining detail of their shape is added to the result.
 All coordinates are in meters, in axes that do not turn with the surface. The solver uses single precision, with an
-origin near the hair that follows it in steps that are exact in single precision.
+origin near the hair. The origin follows the hair in steps that are exact in single precision.
 """
 
 import math
@@ -30,17 +30,17 @@ from .rod.settings import DynamicsSettings
 from .root_motion import RigidMotion, RootPose
 
 MOST_SUBSTEPS = 64
-_LONGEST_WAY = 0.01  # largest motion of roots and colliders in a substep [m]; smaller for shorter segments,
-_SHORTEST_WAY = 0.003  # down to this limit, below which short fur moves the same
+_LONGEST_WAY = 0.01  # largest motion of roots and colliders in a substep [m]; shorter segments reduce this limit
+_SHORTEST_WAY = 0.003  # least value of the reduced limit [m]: smaller values do not change the motion of short fur
 _GRID = 0.125  # spacing of possible origins [m]
-_LEAST_RUBBING = 0.01 - 1e-9  # interval between evaluations of the hair volume [s]
+_LEAST_RUBBING = 0.01 - 1e-9  # least interval between evaluations of the hair volume [s]
 _ASKED = 256  # sampled guides for the mean distance
-_MOST_RESETS = 10  # consecutive frames with breakage after which a strand stays in its groom
+_MOST_RESETS = 10  # number of consecutive frames with breakage after which a strand stays in its groom
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A mesh that hair collides with: vertices (V, 3) float64 [m], triangles (F, 3) int32; other fields: `Collider`."""
+    """A mesh that hair collides with: vertices (V, 3) float64 [m], triangles (F, 3) int32, and values of `Collider`."""
 
     name: str
     vertices: np.ndarray
@@ -83,14 +83,14 @@ class Simulation:
         regions: np.ndarray | None = None,
         wetness: np.ndarray | None = None,
     ) -> None:
-        """groom: (G, P, 3) [m], combed guides on the surface at rest; pose: of their roots in the first frame.
+        """groom: (G, P, 3) [m], combed guides on the surface at rest; pose: of the guides' roots in the first frame.
 
         regions: (G,) integers from 0; guides of different regions do not interact; None for one region. wetness: (G,)
-        of each guide in [0, 1], None for that of the settings. Raises `HairError` for non-finite values or counts that
-        do not match.
+        of each guide in [0, 1], None for the wetness of the settings. Raises `HairError` for non-finite values or
+        counts that do not match.
         """
         self.settings, self.pose, self.world = settings, pose, world
-        self.substeps = self.required_substeps = 0  # of the last frame, and the number that its motion requires
+        self.substeps = self.required_substeps = 0  # number in the last frame, and number that its motion requires
         self._device = wp.get_device(device)
         self._start, self._origin = pose, np.round(pose.positions.mean(axis=0) / _GRID) * _GRID
         self._scale = pose.scale
@@ -103,7 +103,7 @@ class Simulation:
         self._rods = Rods(vertices, self._material, rest, self._device)
         self._rods.set_start(pose.turns)
         self._detail = detail.detail_of(combed, self._rods)
-        self._resets = np.zeros((2, len(groom)), int)  # total, and consecutive frames
+        self._resets = np.zeros((2, len(groom)), int)  # total number, and number of consecutive frames with resets
         self._colliders = Colliders(self._device)
         self._read_obstacles(world.obstacles)
         self._contacts = Contacts(self._rods.arrays.positions, self._colliders)
@@ -162,8 +162,8 @@ class Simulation:
     ) -> None:
         """Continue with other settings, wetness and groom, with the same number of vertices.
 
-        groom: None for no change; wetness: (G,), None for that of the settings. Raises `HairError` for another number
-        of vertices.
+        groom: None for no change; wetness: (G,), None for the wetness of the settings. Raises `HairError` for another
+        number of vertices.
         """
         wetness = self._checked_wetness(wetness)
         if settings.vertex_count != self.settings.vertex_count:
@@ -195,9 +195,9 @@ class Simulation:
         self._volume, self._waters = self._new_volume(), self._new_waters()
 
     def advance(self, pose: RootPose, world: World, seconds: float) -> None:
-        """Simulate a frame of a duration [s]; pose and world: at its end.
+        """Simulate a frame of a duration [s]; pose and world: at the end of the frame.
 
-        Raises `HairError` for invalid input, without a change.
+        Raises `HairError` for invalid input; the simulation is then unchanged.
         """
         require_count("roots", len(pose.positions), len(self._groom))
         if not math.isfinite(seconds) or seconds < 0.0:
@@ -273,7 +273,7 @@ class Simulation:
         return replace(field, origin=(x, y, z), strength=self.settings.force_fields * field.strength)
 
     def _carried_along(self, before, after):
-        """Apply the part of the surface's motion that moves strands rigidly; returns the start pose of the rest."""
+        """Apply the surface's motion that moves strands rigidly; returns the start pose of the remaining motion."""
         origin = np.round(after.positions.mean(axis=0) / _GRID) * _GRID
         shared = None
         if self.settings.inertia < 1.0:
@@ -294,7 +294,7 @@ class Simulation:
         return before
 
     def _carry(self, motion, chosen=None):
-        """Move strands rigidly: all, or (M,) indices of some, each with its own motion."""
+        """Move strands rigidly; chosen: (M,) indices of strands with one motion each, None for all strands."""
         count = len(self._groom)
         rows = np.arange(count) if chosen is None else chosen
         is_chosen = np.zeros(count, bool)
@@ -360,14 +360,14 @@ class Simulation:
         return self._rods.stretch()
 
     def save(self) -> dict[str, np.ndarray]:
-        """Return the state from which the simulation can continue, without the inputs of `__init__`: arrays by name."""
+        """Return the state from which the simulation can continue, {name: array}, without inputs of `__init__`."""
         rods = {f"rods_{name}": array for name, array in self._rods.save().items()}
         contacts = {f"contacts_{name}": array for name, array in self._contacts.state().items()}
         own = {"origin": self._origin, "resets": self._resets, "since_rubbed": np.array([self._since_rubbed])}
         return rods | contacts | own
 
     def load(self, state: Mapping[str, np.ndarray], pose: RootPose, world: World) -> None:
-        """Continue from a state of `save`; pose and world: of its frame. Raises `HairError`."""
+        """Continue from a state of `save`; pose and world: in the frame of this state. Raises `HairError`."""
         origin, resets, rubbed = (np.asarray(state.get(name, ())) for name in ("origin", "resets", "since_rubbed"))
         is_finite = all(np.isfinite(array).all() for array in (origin, rubbed))
         if not is_finite or (origin.shape, resets.shape, rubbed.shape) != ((3,), self._resets.shape, (1,)):
@@ -384,12 +384,12 @@ class Simulation:
 
 
 def _mean_distance(places):
-    """Return the mean distance of places (G, 3) from the nearest other one, by samples; 0 for a single place."""
+    """Return the mean distance between nearest neighbors of places (G, 3), from samples; 0 for a single place."""
     if len(places) < 2:
         return 0.0
     some = places[:: max(len(places) // _ASKED, 1)]
     distances = np.linalg.norm(some[:, None] - places, axis=2)
-    distances[distances == 0.0] = np.inf  # the same or a coincident place
+    distances[distances == 0.0] = np.inf  # the place itself, or a coincident place
     nearest = distances.min(axis=1)
     return float(nearest[np.isfinite(nearest)].mean()) if np.isfinite(nearest).any() else 0.0
 

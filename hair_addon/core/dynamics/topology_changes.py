@@ -13,10 +13,10 @@ from .simulation import Obstacle
 def stopped(
     obstacles: Sequence[Obstacle], last: Mapping[str, Obstacle], frame: int
 ) -> tuple[tuple[Obstacle, ...], list[HairError]]:
-    """Return (obstacles of a frame, a note for each obstacle whose topology has changed, which keeps its last pose).
+    """Return (obstacles of a frame, a note for each obstacle whose topology has changed).
 
-    last: {name: obstacle} that this function returned for the previous frame. Obstacles that were missing there, or had
-    non-finite vertices, are new.
+    An obstacle with changed topology keeps its last pose. last: {name: obstacle} that this function returned for the
+    previous frame. Obstacles that are missing in `last`, or were empty or non-finite, are new.
     """
     taken, notes = [], []
     for obstacle in obstacles:
@@ -33,8 +33,8 @@ def stopped(
 def divided(obstacles: Sequence[Obstacle], last: Mapping[str, Obstacle]) -> dict[str, Obstacle]:
     """Return the obstacles of the previous frame whose faces changed, with their present faces, by name.
 
-    Only obstacles with the same number of vertices are included. In changed local coordinates Blender may triangulate
-    quads differently, although the mesh is the same.
+    Only obstacles with the same number of vertices are included. Blender may triangulate the quads of a mesh
+    differently after a change of local coordinates, although the mesh is the same.
     """
     found = {}
     for obstacle in obstacles:
