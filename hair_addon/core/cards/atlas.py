@@ -11,15 +11,15 @@ from .outlines import Outlines
 
 _BORDER = 2.0  # empty texels around a picture
 _TRIALS = 40
-_STATIONS = 8  # along a card, at which outlines are compared
+_STATIONS = 8  # places along a card at which outlines are compared
 
 
 @dataclass(frozen=True)
 class Atlas:
-    """Pictures of K cards in a square texture. shown: (K,) the card of each picture; picture_of: (C,) of each card.
+    """Pictures of K cards in a square texture, for C cards.
 
-    corners (K, 2): of pictures, from 0 to 1; scale: of all pictures, in fractions of the texture's side per unit of
-    length.
+    shown: (K,) index of each picture's card; picture_of: (C,) index of each card's picture; corners: (K, 2) of
+    pictures, from 0 to 1; scale: of all pictures, in fractions of the texture's side per unit of length.
     """
 
     shown: np.ndarray
@@ -29,9 +29,9 @@ class Atlas:
     scale: float
 
     def placed(self, flat: np.ndarray, radii: np.ndarray, labels: np.ndarray, boxes: np.ndarray) -> tuple:
-        """Place the flattened strands of the shown cards in the texture.
+        """Return the flattened strands of the shown cards at their places in the texture.
 
-        Returns (indices of the strands, (M, P, 3) places from 0 to 1 with heights in the same unit, (M, P) radii).
+        Return value: (indices of strands, (M, P, 3) places from 0 to 1 with heights in the same unit, (M, P) radii).
         """
         picture = np.full(len(boxes), -1)
         picture[self.shown] = np.arange(len(self.shown))
@@ -45,7 +45,7 @@ class Atlas:
     def uvs(self, found: Outlines) -> np.ndarray:
         """Return UV coordinates (C, n, 2, 2) of the low and high edges of cards.
 
-        Shown cards cut their picture along their outline; other cards stretch the whole picture over their outline.
+        Shown cards cut their picture along their outline; other cards stretch a whole picture over their outline.
         """
         boxes = found.boxes
         edges = np.stack([found.low, found.high], axis=-1)
@@ -60,10 +60,10 @@ class Atlas:
 
 
 def atlas(found: Outlines, strand_counts: np.ndarray, picture_count: int, texture_size: int) -> Atlas:
-    """Arrange the pictures of cards in a texture; picture_count: limit of pictures, 0 for one for each card.
+    """Return the `Atlas` of cards' pictures; picture_count: most pictures, 0 for one picture per card.
 
-    strand_counts: (C,) strands of each card; cards that share a picture are similar in shape and in number of strands;
-    texture_size: texels along a side. Raises `HairError` if pictures do not fit.
+    strand_counts: (C,) number of strands of each card; texture_size: texels along a side. Cards that share a picture
+    are similar in shape and in number of strands. Raises `HairError` if pictures do not fit.
     """
     boxes = found.boxes
     if 0 < picture_count < len(boxes):
@@ -94,7 +94,7 @@ def _features(found, strand_counts):
 
 
 def _shelves(sizes, border):
-    """Pack rectangles on shelves, longest first, at the largest scale that fits: ((K, 2) corners, scale)."""
+    """Return ((K, 2) corners, scale) of rectangles on shelves, longest first, at the largest scale that fits."""
     order = np.argsort(-sizes[:, 1], kind="stable")
     low, high = 0.0, min(1.0 / np.sqrt(sizes.prod(axis=1).sum()), *((1.0 - 2.0 * border) / sizes.max(axis=0)))
     best = None

@@ -12,7 +12,7 @@ _TINY = 1e-12
 def chains(points: np.ndarray, chain_count: int, bone_count: int) -> np.ndarray:
     """Return joints (C, bone_count + 1, 3) float64 of chains from root to tip: the middle lines of clumps of strands.
 
-    points: strands (S, P, 3), of which there are at least C. Bones of a chain are equally long. Raises `HairError`.
+    points: (S, P, 3) of strands, with S at least C. Bones of a chain are equally long. Raises `HairError`.
     """
     if not np.isfinite(points).all():
         raise HairError("Some strands have non-finite coordinates: regenerate the hair.")
@@ -36,7 +36,7 @@ def arc_lengths(lines: np.ndarray) -> np.ndarray:
 
 
 def nearest_chains(lines: np.ndarray, joints: np.ndarray) -> np.ndarray:
-    """Return the index (N,) of the chain most like each line (N, n, 3), by roots, thirds and tips."""
+    """Return the index (N,) of the chain most similar to each line (N, n, 3) at root, thirds and tip."""
     own, of_chains = clusters.strand_features(lines), clusters.strand_features(joints)
     squares = np.stack([((own - features) ** 2).sum(axis=1) for features in of_chains])
     return squares.argmin(axis=0)
@@ -45,9 +45,9 @@ def nearest_chains(lines: np.ndarray, joints: np.ndarray) -> np.ndarray:
 def weights(lines: np.ndarray, joints: np.ndarray) -> np.ndarray:
     """Return weights (N, n, bone_count + 1) of points of lines (N, n, 3) on their chains (N, bone_count + 1, 3).
 
-    The first weight is the root bone's, which does not swing: points at the root follow it alone, points as far along
-    as the end of a bone follow that bone alone, and points between are mixed. Points beyond the chain follow the last
-    bone.
+    The first weight belongs to the root bone, which does not swing. Points at the root follow only the root bone,
+    points at the end of a bone follow only this bone, and points between follow a mixture. Points beyond the chain
+    follow the last bone.
     """
     bone_count = joints.shape[1] - 1
     lengths = np.maximum(arc_lengths(joints)[:, -1:], _TINY)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from ..errors import HairError
 from ..params import Settings, param, param_of
 
-MOST_TRIANGLES = 5_000_000  # of a mesh: beyond it, Blender's own tools stall
+MOST_TRIANGLES = 5_000_000  # of a mesh: with more triangles, Blender's own tools stall
 
 
 @dataclass(frozen=True)
 class Level:
-    """A level of detail: number of cards, segments of each, side of the textures [pixels]."""
+    """A level of detail: number of cards, segments of each card, side of the textures [pixels]."""
 
     card_count: int
     segment_count: int

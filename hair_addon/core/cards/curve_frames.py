@@ -7,7 +7,7 @@ _TINY = 1e-12
 
 
 def unit(vectors: np.ndarray, otherwise: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> np.ndarray:
-    """Normalize vectors (..., 3); `otherwise` replaces vectors of zero length."""
+    """Return normalized vectors (..., 3); `otherwise` replaces vectors of zero length."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.where(lengths > _TINY, vectors / np.maximum(lengths, _TINY), otherwise)
 
@@ -19,9 +19,9 @@ def perpendicular(vectors: np.ndarray) -> np.ndarray:
 
 
 def resample_by_curvature(curves: np.ndarray, point_count: int) -> np.ndarray:
-    """Resample curves (C, P, 3) → (C, point_count, 3) float64, with points closer together in bends.
+    """Return curves (C, P, 3) resampled to (C, point_count, 3) float64, with points closer together in bends.
 
-    A turn by 180° weighs as much as the whole length. The ends are kept.
+    A turn by 180° weighs as much as the whole length. The ends do not move.
     """
     curves = np.asarray(curves, np.float64)
     edges = np.diff(curves, axis=1)
@@ -46,7 +46,7 @@ def resample_by_curvature(curves: np.ndarray, point_count: int) -> np.ndarray:
 
 
 def tangents(curves: np.ndarray) -> np.ndarray:
-    """Return unit tangents (C, P, 3): at inner points the mean of the two edges' directions."""
+    """Return unit tangents (C, P, 3); at inner points, the mean direction of the two edges."""
     directions = unit(np.diff(curves, axis=1))
     inner = unit(directions[:, 1:] + directions[:, :-1])
     return np.concatenate([directions[:, :1], inner, directions[:, -1:]], axis=1)
@@ -71,6 +71,6 @@ def steady_normals(curves: np.ndarray, first: np.ndarray | None = None) -> np.nd
 
 
 def _reflected(vectors, axes):
-    """Reflect vectors (C, 3) in planes perpendicular to axes (C, 3); unchanged for axes of zero length."""
+    """Return vectors (C, 3) reflected in planes perpendicular to axes (C, 3); unchanged for axes of zero length."""
     squares = np.maximum(np.einsum("ci,ci->c", axes, axes), _TINY**2)
     return vectors - (2.0 * np.einsum("ci,ci->c", axes, vectors) / squares)[:, None] * axes

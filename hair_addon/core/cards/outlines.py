@@ -34,14 +34,14 @@ class Outlines:
 def outlines(flat: np.ndarray, radii: np.ndarray, labels: np.ndarray, axes: Axes) -> Outlines:
     """Return the edges of ribbons that enclose flattened strands (S, P, 3) with radii (S, P).
 
-    Places along a ribbon are the points of its axis; the first and last are moved to the ends of its strands.
+    Places along a ribbon are the points of its axis; the first and the last place move to the ends of its strands.
     """
     count = len(axes.centres)
     order = np.argsort(labels, kind="stable")
     starts = np.searchsorted(labels[order], np.arange(count))
     across, onward, reach = flat[order, :, 0], flat[order, :, 1], radii[order].max(axis=1)
     along = axes.distances
-    # The ends of the axis are moved outwards only.
+    # The ends of the axis only move outwards.
     along[:, 0] = np.minimum(along[:, 0], np.minimum.reduceat(onward.min(axis=1) - reach, starts))
     along[:, -1] = np.maximum(along[:, -1], np.maximum.reduceat(onward.max(axis=1) + reach, starts))
     of_strand, segment_count = labels[order], along.shape[1] - 1
@@ -69,10 +69,10 @@ _RIDGE = 1e-4  # regularization relative to all points' weight: places without p
 
 
 def heights(flat: np.ndarray, labels: np.ndarray, found: Outlines) -> np.ndarray:
-    """Return heights (C, n) of ribbons above the middle line that fit their flattened strands best: least squares.
+    """Return heights (C, n) of ribbons above the middle line, the least-squares fit to their flattened strands.
 
-    The middle line is the mean of all strands of a clump. Where only some of them are, for example at roots that lie
-    behind the others, and where strands bend between places, a ribbon on the middle line would cut into the surface.
+    The middle line is the mean of all strands of a clump. A ribbon on the middle line would cut into the surface where
+    only some strands are present, for example at roots behind other roots, and where strands bend between places.
     """
     count, last = found.along.shape[0], found.along.shape[1] - 1
     diagonal, beside, sums = np.zeros((3, last + 1, count))
@@ -106,7 +106,7 @@ def levelled(flat: np.ndarray, labels: np.ndarray, found: Outlines, lifted: np.n
 
 
 def _nearness(along, onward, place):
-    """Return hat functions (S, P) at points (S, P): 1 at a place, 0 at its neighbors; along (S, n): the places."""
+    """Return hat functions (S, P) at points (S, P): 1 at a place, 0 at its neighbors; along: (S, n) of all places."""
     here, near = along[:, place, None], np.ones(onward.shape)
     if place:
         before = along[:, place - 1, None]
@@ -118,9 +118,10 @@ def _nearness(along, onward, place):
 
 
 def ribbon_mesh(axes: Axes, found: Outlines, uvs: np.ndarray, lifted: np.ndarray) -> PolygonMesh:
-    """Return the mesh of all ribbons with two vertices, low and high, at each place; uvs: (C, n, 2, 2) of vertices.
+    """Return the mesh of all ribbons with two vertices, low and high, at each place.
 
-    Faces point along the normals of the axes; lifted: (C, n) offsets along the normals.
+    uvs: (C, n, 2, 2) of vertices; lifted: (C, n) offsets along the normals of the axes. Faces point along these
+    normals.
     """
     count, places, _ = axes.centres.shape
     centres = axes.centres.copy()

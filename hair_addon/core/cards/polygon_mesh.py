@@ -17,7 +17,7 @@ class PolygonMesh:
     uvs: np.ndarray
 
     def transformed(self, axes: np.ndarray) -> "PolygonMesh":
-        """Return the mesh transformed by axes (3, 3); faces are flipped if these mirror."""
+        """Return the mesh transformed by axes (3, 3); faces are flipped if the axes mirror."""
         vertices = (self.vertices @ axes.T).astype(np.float32)
         if np.linalg.det(axes) > 0.0:
             return replace(self, vertices=vertices)

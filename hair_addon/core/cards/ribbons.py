@@ -41,10 +41,10 @@ class Axes:
 
 
 def axes_of(points: np.ndarray, labels: np.ndarray, count: int, segment_count: int, surface: TriMesh) -> Axes:
-    """Return the middle lines of `count` clumps of strands (S, P, 3); labels (S,): the clump of each strand.
+    """Return the middle lines of `count` clumps of strands (S, P, 3); labels: (S,) clump of each strand.
 
-    Lines are the means of their strands, resampled by curvature. Normals point in the direction of least spread, away
-    from the surface.
+    A line is the mean of the strands of a clump, resampled by curvature. Normals point in the direction of least
+    spread, away from the surface.
     """
     means = clusters.cluster_means(points, labels, count)
     centres = curve_frames.resample_by_curvature(means, segment_count + 1)
@@ -59,7 +59,7 @@ def _away(places, surface):
 
 
 def _angles(points, labels, count, axes, away):
-    """Return rotation angles (C,) [rad] of normals: the least eigenvector of spread minus outward facing."""
+    """Return rotation angles (C,) [rad] that turn normals to the least eigenvector of spread minus outward facing."""
     flat = flattened(points, labels, axes)
     across = flat[..., [2, 0]].astype(np.float64)  # along the normal and the binormal
     moments = np.einsum("spi,spj->sij", across, across)
@@ -73,7 +73,7 @@ def _angles(points, labels, count, axes, away):
 
 
 def flattened(points: np.ndarray, labels: np.ndarray, axes: Axes) -> np.ndarray:
-    """Map strands (S, P, 3) to ribbon coordinates (S, P, 3) float32 of their clumps: across, along, and above.
+    """Return strands (S, P, 3) in ribbon coordinates (S, P, 3) float32 of their clumps: across, along, and above.
 
     Each point is projected to the closest point of the ribbon's middle line near the same fraction of the length.
     Beyond the ends, and on the outside of bends, the ribbon is extended straight.
@@ -106,7 +106,7 @@ def _edges(centres, segment):
 
 
 def _components(points, labels, axes, nearest, on_line):
-    """Return ribbon coordinates (S, P, 3); nearest: segment of the projection, on_line: distance from its start."""
+    """Return ribbon coordinates (S, P, 3); nearest: segment of the projection; on_line: distance along the segment."""
     centres, normals, distances = (array.astype(np.float32) for array in (axes.centres, axes.normals, axes.distances))
     edges = np.diff(centres, axis=1)
     lengths = np.maximum(np.linalg.norm(edges, axis=-1), np.float32(_TINY))

@@ -1,22 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spheres inside a surface that keep swinging bones outside it."""
+"""Spheres inside a surface that keep swinging bones outside the surface."""
 
 import numpy as np
 
 from .. import geometry
 from ..geometry.mesh import TriMesh, interpolate
 
-_MOST = 8  # spheres
+_MOST = 8  # most spheres
 _GRID = 14  # places along each axis of the bounding box
 _APART = 0.7  # least distance between centers, relative to the larger radius
-_LEAST = 0.25  # radius, relative to the largest sphere
+_LEAST = 0.25  # least radius, relative to the largest sphere
 
 
 def inner_spheres(surface: TriMesh, joints: np.ndarray, clearance: float) -> tuple[np.ndarray, np.ndarray]:
     """Return centers (K, 3) and radii (K,) of spheres inside a surface, the largest first; K may be zero.
 
-    joints: (N, 3), which stay outside all spheres by the clearance, so that nothing moves at rest. Open surfaces are
-    taken as solid where their nearest normals point outward.
+    joints: (N, 3) of bones; clearance: least distance between joints and spheres, so that bones at rest do not move. An
+    open surface counts as solid behind its normals.
     """
     low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
     steps = [np.linspace(low[axis], high[axis], _GRID + 2)[1:-1] for axis in range(3)]

@@ -13,7 +13,7 @@ NO_STRAND = -1
 class PlacedStrands:
     """Strands in a texture: places (M, P, 3) from 0 to 1 with heights, radii (M, P), linear colors (M, P, 3), ids (M,).
 
-    heights: (lowest, highest) in the same unit, of depth 0 and 1.
+    heights: the lowest and the highest height in the same unit, which have the depths 0 and 1.
     """
 
     places: np.ndarray
@@ -34,8 +34,8 @@ class TexelSums:
     def add(self, segments: np.ndarray, strands: PlacedStrands, per_side: int, shift: np.ndarray, rows: range) -> None:
         """Add a pass of per_side² samples per texel, for some rows of texels.
 
-        segments: (len(rows) · per_side, size · per_side) visible segment strand · (P - 1) + piece of each sample,
-        `NO_STRAND` for none, bottom row first; shift: (2,) [samples] offset of the picture.
+        segments: (len(rows) · per_side, size · per_side), bottom row first: the index strand · (P - 1) + piece of the
+        segment that each sample shows, or `NO_STRAND`; shift: (2,) [samples] offset of the picture.
         """
         if rows.start == 0:
             self._sample_count += per_side**2
@@ -68,7 +68,7 @@ class TexelSums:
 def _sampled(strands, segments, centres, texel):
     """Return (9, N) color, normal, depth, fraction from root to tip and ID of samples at centers (N, 2).
 
-    texel: its width. Thinner strands are shaded as flat, because both sides fall into one texel.
+    texel: width of a texel. Thinner strands are shaded as flat, because both sides fall into one texel.
     """
     pieces = strands.places.shape[1] - 1
     strand, piece = np.divmod(segments, pieces)
@@ -90,7 +90,7 @@ def _sampled(strands, segments, centres, texel):
 
 
 def _normals(edges, across):
-    """Return unit normals (N, 3) of fibers seen from above, at positions `across` their width in [-1, 1]."""
+    """Return unit normals (N, 3) of fibers seen from above; across: (N,) positions across their width in [-1, 1]."""
     tangents = edges / np.maximum(np.linalg.norm(edges, axis=1, keepdims=True), 1e-12)
     facing = np.array([0.0, 0.0, 1.0]) - tangents[:, 2:] * tangents
     length = np.linalg.norm(facing, axis=1, keepdims=True)
@@ -100,7 +100,7 @@ def _normals(edges, across):
 
 
 def _filled(sums, weights):
-    """Return means (n, n, k); texels without weight are filled from a pyramid's next coarser level (pull-push)."""
+    """Return means (n, n, k); the next coarser level of a pyramid fills texels without weight (pull-push)."""
     means = sums / np.maximum(weights, 1e-12)[..., None]
     if len(sums) == 1 or not (weights == 0.0).any():
         return means
@@ -115,6 +115,6 @@ def _filled(sums, weights):
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:
-    """Apply sRGB's transfer function (IEC 61966-2-1) to linear values, clipped to [0, 1]."""
+    """Return sRGB values of linear values, clipped to [0, 1], by the transfer function of IEC 61966-2-1."""
     linear = np.clip(linear, 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)

@@ -9,7 +9,7 @@ from . import curve_frames
 from .card_settings import TubeSettings
 from .polygon_mesh import PolygonMesh
 
-_LEAST_RADIUS = 0.01  # of the strand's own: keeps the tip's ring from collapsing
+_LEAST_RADIUS = 0.01  # relative to the radius without taper: the ring at the tip must not collapse
 
 
 def chosen_strands(strand_count: int, tube_count: int) -> np.ndarray:
@@ -18,7 +18,7 @@ def chosen_strands(strand_count: int, tube_count: int) -> np.ndarray:
 
 
 def tubes(points: np.ndarray, radii: np.ndarray, settings: TubeSettings) -> PolygonMesh:
-    """Return tubes around the chosen strands: points (S, P, 3), resampled by curvature, radii (S, P) in the same unit.
+    """Return tubes around the chosen strands: points (S, P, 3), resampled by curvature; radii (S, P) in the same unit.
 
     Both ends are closed. U runs around the tube, V from root 0 to tip 1; end caps have the coordinates of their rings.
     Raises `HairError`.
