@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings that vary over a head: values of maps at the roots of strands, and their combination with a setting."""
+"""Settings that vary over a head: values of maps at the roots of strands, combined with the value of a setting."""
 
 from typing import TYPE_CHECKING
 

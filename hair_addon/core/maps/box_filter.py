@@ -15,14 +15,14 @@ from . import uv_islands
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_TAPS = 4  # texels along each side of a strand's share, at the level at which the share has 3 or less
+_TAPS = 4  # texels along each side that a strand's share touches at the level where its side is at most 3 texels
 
 
 @dataclass(frozen=True, eq=False)
 class _Taps:
-    """Texels of some strands in one image and its halvings, one after the other.
+    """Texels of some strands in an image and its halved versions, one after the other.
 
-    strands: (N,) indices; texels: (N, K) int32; weights: (N, K) float32, rows of which sum to one.
+    strands: (N,) indices; texels: (N, K) int32; weights: (N, K) float32, in rows that sum to one.
     """
 
     strands: np.ndarray
@@ -33,16 +33,16 @@ class _Taps:
 
 @dataclass(frozen=True, eq=False)
 class RootTexels:
-    """Texels of images at roots; depends on roots, UV map and sizes of images, not on pixels.
+    """Texels of images at roots; the texels depend on roots, UV map and sizes of images, not on pixels.
 
-    tiles: {UDIM tile, or None for an image without tiles: the taps of its strands}.
+    tiles: {UDIM tile: `_Taps` of its strands}; the key is None for an image without tiles.
     """
 
     strand_count: int
     tiles: Mapping[int | None, _Taps]
 
     def sample(self, pixels: Mapping[int | None, np.ndarray]) -> np.ndarray:
-        """Return (S, C) float32 means; pixels: {tile: (H, W, C) float32, bottom row first}. NaN without a tile."""
+        """Return means (S, C) float32, NaN without a tile; pixels: {tile: (H, W, C) float32, bottom row first}."""
         channels = next(iter(pixels.values())).shape[2] if pixels else 1
         found = np.full((self.strand_count, channels), np.nan, np.float32)
         for tile, taps in self.tiles.items():
@@ -52,7 +52,7 @@ class RootTexels:
 
 
 def _levels(pixels, size):
-    """Return the texels (N, C) of an image and its halvings, one after the other."""
+    """Return the texels (N, C) of an image and its halved versions, one after the other."""
     if pixels.shape[1::-1] != tuple(size):
         raise ValueError(f"pixels of size {pixels.shape[1::-1]} at places for {size}")
     levels = [np.ascontiguousarray(pixels, np.float32)]
@@ -66,7 +66,7 @@ def halved(pixels: np.ndarray) -> np.ndarray:
     height, width = pixels.shape[:2]
     if height % 2 or width % 2:
         pixels = np.pad(pixels, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-    # A quarter of each, as sums of large floats overflow.
+    # Each texel is divided by four first, because sums of large floats overflow.
     quarter = np.float32(0.25)
     rows = quarter * pixels[::2] + quarter * pixels[1::2]
     return rows[:, ::2] + rows[:, 1::2]
@@ -114,9 +114,9 @@ def root_texels(
 ) -> RootTexels:
     """Return the `RootTexels` of roots (S,) on a mesh with a UV map (F, 3, 2).
 
-    sizes: {UDIM tile: (width, height)}, or {None: ...} of an image that repeats. The share of a strand is a square
-    around its root with the mesh's area divided by the number of strands. Texels that another UV island touches do not
-    take part.
+    sizes: {UDIM tile: (width, height)}, or {None: ...} for an image that repeats. The share of a strand is a square
+    around its root; its area is the mesh's area divided by the number of strands. Texels that another UV island touches
+    do not take part.
     """
     require_indices("triangles", roots.triangle, len(corner_uvs))
     uvs = np.einsum("nc,ncu->nu", roots.barycentric.astype(np.float64), corner_uvs[roots.triangle].astype(np.float64))
@@ -136,13 +136,13 @@ def root_texels(
 
 
 def _tiles_of(uvs):
-    """Return UDIM tiles (N,); 0 outside of all."""
+    """Return UDIM tiles (N,); 0 outside all tiles."""
     column, row = np.floor(uvs).astype(np.int64).T
     return np.where((column >= 0) & (column < 10) & (row >= 0), 1001 + column + 10 * row, 0)
 
 
 def _sides(mesh, corner_uvs, strand_count):
-    """Return (F,) the side of a strand's share in each triangle, in the unit of UVs."""
+    """Return the side (F,) of a strand's share in each triangle, in units of the UV map."""
     edges = corner_uvs[:, 1:].astype(np.float64) - corner_uvs[:, :1]
     uv_areas = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
     areas = mesh.areas
@@ -167,7 +167,7 @@ def _taps(uvs, sides, islands_of, covered, repeats):
             some = due[levels[due] == level]
             found = _on_level(uvs[some], sides[some], islands_of[some], covered, level, repeats)
             texels[some], weights[some] = firsts[level] + found[0], found[1]
-        # Where other islands touch the share at this level, a smaller share within the island is left.
+        # Where other islands touch all texels of the share at this level, a finer level is tried.
         due = due[weights[due].sum(axis=1) <= 0.0]
         at_last = due[levels[due] == 0]
         own = np.minimum((uvs[at_last] * size).astype(np.int64), size - 1)
@@ -196,7 +196,7 @@ def _on_level(uvs, sides, islands_of, covered, level, repeats):
 
 
 def _along(centre, half):
-    """Return (texels (N, K), their parts (N, K)) of the interval from center - half to center + half."""
+    """Return (texels (N, K), covered fractions (N, K)) of the interval from center - half to center + half."""
     texels = np.floor(centre - half).astype(np.int64)[:, None] + np.arange(_TAPS)
     ends = np.minimum((centre + half)[:, None], texels + 1), np.maximum((centre - half)[:, None], texels)
     return texels, np.maximum(ends[0] - ends[1], 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 from ..params import Param
 from ..styling.random_numbers import random_numbers
 
-_PURPOSE = 512  # unlike any purpose of styles
+_PURPOSE = 512  # different from all purposes of styles
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Combination:
 
 
 def varied_number(value: float, mask: np.ndarray, how: Combination, details: Param) -> np.ndarray:
-    """Return (S,) float64: value × lerp(low, high, mask) of masks (S,), within the range of the setting.
+    """Return value × lerp(low, high, mask) (S,) float64 for masks (S,), within the range of the setting.
 
     Infinite masks count as 0; NaN, a strand without a map, keeps the value.
     """
@@ -35,7 +35,7 @@ def varied_number(value: float, mask: np.ndarray, how: Combination, details: Par
 
 
 def varied_color(value: tuple, colors: np.ndarray, alpha: np.ndarray, how: Combination, details: Param) -> np.ndarray:
-    """Return (S, 3) float64: mix(value, color, amount × alpha) of colors (S, 3) and alpha (S,), within the range.
+    """Return mix(value, color, amount × alpha) (S, 3) float64 for colors (S, 3) and alpha (S,), within the range.
 
     Infinite colors count as 0; NaN, a strand without a map, keeps the value.
     """
@@ -49,9 +49,10 @@ def varied_color(value: tuple, colors: np.ndarray, alpha: np.ndarray, how: Combi
 
 
 def ramped(masks: np.ndarray, ramp: np.ndarray, is_inverted: bool) -> np.ndarray:
-    """Return (S, C) float32: a ramp, given by N even samples (N, C) from 0 to 1, at masks (S,) of strands.
+    """Return the values (S, C) float32 of a ramp at masks (S,) of strands.
 
-    is_inverted: whether masks are inverted first. Infinite masks count as 0; NaN, a strand without a map, stays.
+    ramp: (N, C) values at N evenly spaced positions from 0 to 1; is_inverted: whether masks are inverted first.
+    Infinite masks count as 0; NaN, a strand without a map, stays NaN.
     """
     masks = np.asarray(masks, np.float32)
     known = np.where(np.isfinite(masks), masks, np.float32(0.0))
@@ -59,12 +60,12 @@ def ramped(masks: np.ndarray, ramp: np.ndarray, is_inverted: bool) -> np.ndarray
     below = places.astype(np.int32)
     share = (places - below)[:, None]
     found, above = ramp[below], ramp[np.minimum(below + 1, len(ramp) - 1)]
-    # Exact at samples, and between equal samples.
+    # This form is exact at samples, and between equal samples.
     found = found + share * (above - found)
     found[np.isnan(masks)] = np.nan
     return found
 
 
 def random_masks(identities: np.ndarray, seed: int) -> np.ndarray:
-    """Return (S,) float32 in [0, 1) by the IDs (S,) int32 of strands or clumps; equal IDs have equal numbers."""
+    """Return random numbers (S,) float32 in [0, 1) for IDs (S,) int32 of strands or clumps; equal for equal IDs."""
     return random_numbers(np.asarray(identities).astype(np.int32), seed, _PURPOSE)

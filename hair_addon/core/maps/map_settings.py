@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of a map: what it varies, where its values come from, and how they are combined with the setting."""
+"""Settings of a map: the setting that the map varies, the source of its values, and their combination."""
 
 from dataclasses import dataclass
 
@@ -41,5 +41,5 @@ class MapSettings(Settings):
 
     @property
     def combination(self) -> Combination:
-        """How the map changes its setting."""
+        """The `Combination` of the map with its setting."""
         return Combination(self.low, self.high, self.is_inverted, self.amount)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pixels of images → masks and colors in scene-linear floats."""
+"""Conversion of the pixels of images to masks and colors in scene-linear floats."""
 
 from functools import cache
 
 import numpy as np
 
-MOST_SIDE = 2048  # texels along a side: larger images are averaged, which bounds memory
+MOST_SIDE = 2048  # texels along a side: larger images are averaged to limit memory
 
 _ROWS_AT_ONCE = 256
 
@@ -22,14 +22,15 @@ def colors(
 ) -> np.ndarray:
     """Return (H, W, 4) float32 of (H, W, C) pixels: linear colors multiplied by alpha, and alpha.
 
-    is_srgb: pixels are encoded for display; has_alpha: the fourth of four channels is alpha, otherwise it is ignored;
-    is_premultiplied: colors are multiplied by it already. Images larger than `MOST_SIDE` are averaged.
+    is_srgb: pixels are encoded for display; has_alpha: the last of two or four channels is alpha, otherwise this
+    channel is ignored; is_premultiplied: colors are already multiplied by alpha. Images larger than `MOST_SIDE` are
+    averaged.
     """
     return _reduced(pixels, lambda rows: _premultiplied(rows, is_srgb, has_alpha, is_premultiplied))
 
 
 def changed_rows(before: np.ndarray, now: np.ndarray) -> slice | None:
-    """Return the rows between the first and the last in which images (H, W, C) float32 differ; None if none do."""
+    """Return the slice from the first to the last row in which images (H, W, C) float32 differ; None if all agree."""
     bits = [
         np.ascontiguousarray(pixels, np.float32).view(np.int32).reshape(len(pixels), -1) for pixels in (before, now)
     ]
@@ -38,11 +39,11 @@ def changed_rows(before: np.ndarray, now: np.ndarray) -> slice | None:
 
 
 def unpremultiplied(means: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return colors (S, 3) and alpha (S,) in [0, 1] of means (S, 4) of `colors`; colors without alpha are black."""
+    """Return colors (S, 3) and alpha (S,) in [0, 1] for means (S, 4) of `colors`; colors without alpha are black."""
     alpha = means[:, 3]
     with np.errstate(divide="ignore", invalid="ignore"):
         found = means[:, :3] / alpha[:, None]
-    # A color that covers all stays as it is, bit for bit.
+    # A color with full alpha stays bit-identical.
     found = np.where(alpha[:, None] == 1.0, means[:, :3], np.where(alpha[:, None] > 0.0, found, 0.0))
     return np.where(np.isnan(alpha)[:, None], np.nan, found), np.clip(alpha, 0.0, 1.0)
 
@@ -54,7 +55,7 @@ def _mask(colored):
 
 
 def _premultiplied(rows, is_srgb, has_alpha, is_premultiplied):
-    """Return (H, W, 4) of rows (H, W, C); non-finite and negative components are 0."""
+    """Return premultiplied colors (H, W, 4) of rows (H, W, C); non-finite and negative components become 0."""
     rows = np.where(np.isfinite(rows), rows, np.float32(0.0))
     channels = rows.shape[2]
     found = np.ones((*rows.shape[:2], 4), np.float32)
@@ -68,7 +69,7 @@ def _premultiplied(rows, is_srgb, has_alpha, is_premultiplied):
 
 
 def linear(encoded: np.ndarray) -> np.ndarray:
-    """Return linear float32 values of sRGB values of 8 bits, as floats from 0 to 1 (IEC 61966-2-1)."""
+    """Return linear float32 values for 8-bit sRGB values, given as floats from 0 to 1 (IEC 61966-2-1)."""
     return _linear_bytes()[np.rint(np.clip(encoded, 0.0, 1.0) * 255.0).astype(np.uint8)]
 
 
@@ -79,7 +80,7 @@ def _linear_bytes():
 
 
 def _reduced(pixels, convert):
-    """Convert pixels in blocks of rows, averaged by a power of two if they are more than `MOST_SIDE`."""
+    """Return pixels converted in blocks of rows, and averaged by a power of two if a side exceeds `MOST_SIDE`."""
     height, width = pixels.shape[:2]
     step = 1
     while max(height, width) > step * MOST_SIDE:

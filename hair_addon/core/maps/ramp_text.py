@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from ..errors import HairError
 
-HANDLES = ("vector", "auto", "auto_clamped")  # of the points of curves; the first is the default
+HANDLES = ("vector", "auto", "auto_clamped")  # handles of points of curves; the first is the default
 EXTENDS = ("horizontal", "extrapolated")  # of curves beyond their first and last points
 # Of color ramps: interpolation of colors, color space, and direction of hues.
 INTERPOLATIONS = ("linear", "ease", "b_spline", "cardinal", "constant")
@@ -57,7 +57,7 @@ class Colors:
 
 
 def parsed(text: str) -> Curve | Colors | None:
-    """Parse the text of a ramp; None for an empty text. Raises `HairError`."""
+    """Return the ramp of a text; None for an empty text. Raises `HairError`."""
     words = text.split()
     if not words:
         return None
@@ -74,7 +74,7 @@ def _written(number):
 
 
 def require_curve(text: str) -> None:
-    """Raise `HairError` unless a text is empty or the curve of a number."""
+    """Raise `HairError` unless a text is empty or describes a curve."""
     if isinstance(parsed(text), Colors):
         raise HairError('"{ramp}" is a color ramp: write a curve, such as 0:1 0.5:0.3 1:0.2.', ramp=text[:80])
 
@@ -108,7 +108,7 @@ def _colors(options, points, text):
 
 
 def _chosen(options, known):
-    """Remove the word that is one of the known ones from options, and return it; the default without one."""
+    """Remove the known word from options and return this word; without a known word, return the default."""
     found = next((word for word in options if word in known), None)
     if found is not None:
         options.remove(found)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Islands of a UV map, and the texels that each covers."""
+"""Islands of a UV map, and the texels that each island covers."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from ..kernels import kernel_cache
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _NONE = 2**30  # lowest island of a texel that no island covers
-_STACKED = 0.25  # islands that share this fraction of the smaller one's texels were stacked on purpose
+_STACKED = 0.25  # islands that share this fraction of the smaller island's texels were stacked on purpose
 
 
 def islands(corner_uvs: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -32,10 +32,10 @@ def islands(corner_uvs: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """The islands that touch the texels of an image, at full size and halved again and again.
+    """The islands that touch the texels of an image, at full size and at each halved size.
 
-    lows, highs: the lowest and highest island in each texel (H, W) int32; islands: (F,) int32 of triangles, in which
-    stacked islands have one number.
+    lows, highs: the lowest and highest island in each texel (H, W) int32, for each size; islands: (F,) int32 of
+    triangles; stacked islands share a number.
     """
 
     islands: np.ndarray
@@ -43,7 +43,7 @@ class Coverage:
     highs: list[np.ndarray]
 
     def is_of(self, level: int, texels: np.ndarray, island: np.ndarray) -> np.ndarray:
-        """Return whether no other island touches texels of a level: flat indices (...), islands (...)."""
+        """Return (...) bool: whether only its island (...) touches each texel (...), a flat index of a level."""
         return (self.lows[level].ravel()[texels] == island) & (self.highs[level].ravel()[texels] == island)
 
 
@@ -130,7 +130,7 @@ def _touch(
 
 
 def _merged(low, high, count):
-    """Return the new numbers (count,) of islands after stacked ones are joined; None if none are."""
+    """Return the numbers (count,) of islands after stacked islands are joined; None if no texel has two islands."""
     is_shared = (high >= 0) & (low != high)
     if not is_shared.any():
         return None

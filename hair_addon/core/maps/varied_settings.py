@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings that a map may vary, as declared where each setting is."""
+"""Settings that a map may vary, as declared with each setting."""
 
 from functools import cache
 from typing import Any
@@ -10,10 +10,10 @@ from ..params import Param, Settings, declared
 from ..shading.appearance import COLOR_FIELDS, Appearance
 from . import map_settings, ramp_text
 
-# First part of a setting's name → class of settings.
+# {first part of a setting's name: class of settings}
 SECTIONS = {"look": Appearance, "strands": HairSettings, "guides": GuideSettings}
 
-# Setting → the color parametrization that uses it.
+# {setting: color parametrization that uses the setting}
 _PARAMETRIZATION = {f"look.{name}": way for way, names in COLOR_FIELDS.items() for name in names}
 
 
@@ -21,7 +21,7 @@ _PARAMETRIZATION = {f"look.{name}": way for way, names in COLOR_FIELDS.items() f
 def all_varied() -> dict[str, tuple[Any, Param]]:
     """Return {"section.setting": (default, its `Param`)} of all settings that may vary.
 
-    A radius has the name of its diameter, as panels show it: "strands.thickness".
+    A radius has the name of the diameter that panels show: "strands.thickness".
     """
     return {
         f"{section}.{details.diameter[0] if details.diameter else name}": (default, details)
@@ -47,7 +47,7 @@ def require_varied(setting: str) -> None:
 
 
 def require_map(settings: map_settings.MapSettings) -> None:
-    """Raise `HairError` unless a map may vary its setting, with a ramp of this setting's kind."""
+    """Raise `HairError` unless a map may vary its setting and has a ramp of the setting's kind."""
     require_varied(settings.setting)
     ramp = ramp_text.parsed(settings.ramp)
     if isinstance(ramp, ramp_text.Curve) and is_color(settings.setting):
