@@ -21,10 +21,11 @@ def _turned(quaternion):
 # Faces and corners of a cube: the quadrature with these weights is exact for polynomials of degree 5 [Lebedev76].
 _FACES = np.concatenate([np.eye(3), -np.eye(3)])
 _CORNERS = np.array(list(product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
-# Rotated: otherwise four directions would lie in the plane of a level surface, which would occlude 0.37 of the weight.
+# Directions are rotated: otherwise four directions would lie in the plane of a level surface, and the surface would
+# occlude 0.37 of the weight.
 _QUATERNION = np.array([3.0, 1.0, 0.5, 0.8])
 DIRECTIONS = np.concatenate([_FACES, _CORNERS]) @ _turned(_QUATERNION)  # (14, 3) unit vectors
-WEIGHTS = np.repeat([1 / 15, 3 / 40], [6, 8])  # (14,), of sum one
+WEIGHTS = np.repeat([1 / 15, 3 / 40], [6, 8])  # (14,), with the sum one
 
 
 def side_shares(directions: np.ndarray) -> np.ndarray:

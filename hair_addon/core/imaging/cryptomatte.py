@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cryptomatte [Friedman15]: names hashed to numbers, and the coverage of each pixel by things with numbers.
+"""Cryptomatte [Friedman15]: hashes of names as numbers, and the coverage of each pixel by objects with these numbers.
 
-Mattes are labels (…, M) int32, 0 for none, with coverages (…, M) float32, largest first.
+Mattes are labels (…, M) int32, 0 for no object, with coverages (…, M) float32, largest first.
 """
 
 import json
@@ -13,7 +13,7 @@ _WORD = 0xFFFFFFFF
 
 
 def name_hash(name: str) -> int:
-    """Return the hash of a name, 32 bits: MurmurHash3_x86_32 [Appleby08] of its UTF-8 text, with seed 0."""
+    """Return the 32-bit hash of a name: MurmurHash3_x86_32 [Appleby08] of its UTF-8 text, with seed 0."""
     data, value = name.encode("utf-8"), 0
     whole = len(data) // 4 * 4
     for place in range(0, whole, 4):
@@ -36,14 +36,14 @@ def _turned(word, count):
 
 
 def hash_numbers(hashes: Sequence[int]) -> np.ndarray:
-    """Return hashes as float32 with the same bits, but for one bit where these are no normal number."""
+    """Return hashes as float32 with the same bits; one bit is flipped if the result is not a normal number."""
     bits = np.array(hashes, np.uint32)
     exponents = bits >> np.uint32(23) & np.uint32(255)
     return np.where((exponents == 0) | (exponents == 255), bits ^ np.uint32(1 << 23), bits).view(np.float32)
 
 
 def metadata(layer: str, names: Sequence[str]) -> dict[str, str]:
-    """Return the metadata of a file for a layer such as "ViewLayer.CryptoObject", with the manifest of names."""
+    """Return the metadata of a file, with the manifest of names, for a layer such as "ViewLayer.CryptoObject"."""
     start = f"cryptomatte/{name_hash(layer):08x}"[: len("cryptomatte/") + 7]
     manifest = {name: f"{bits:08x}" for name in names for bits in [int(hash_numbers([name_hash(name)]).view("u4")[0])]}
     values = {
@@ -56,9 +56,9 @@ def metadata(layer: str, names: Sequence[str]) -> dict[str, str]:
 
 
 def combined(labels: np.ndarray, coverages: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return mattes (N, count) in which each label occurs once with the sum of its coverages; the smallest are dropped.
+    """Return mattes (N, count) in which each label occurs once, with the sum of its coverages.
 
-    labels, coverages: (N, M), in any order.
+    labels, coverages: (N, M), in any order. Labels with the smallest coverages are dropped.
     """
     row_count, width = labels.shape
     order = np.argsort(labels, axis=1, kind="stable")
@@ -95,9 +95,10 @@ def added(mattes: tuple[np.ndarray, np.ndarray], others: tuple[np.ndarray, np.nd
 def passes(
     labels: np.ndarray, coverages: np.ndarray, names: Mapping[int, str], depth: int, kind: str
 ) -> dict[str, np.ndarray]:
-    """Return {pass: (H, W, 4) float32} with two numbers and coverages each, of the mattes (H, W, M) of all labels.
+    """Return {pass: (H, W, 4) float32} for mattes (H, W, M); each pass has two numbers with their coverages.
 
-    names: label → name, several labels may share one; depth: number of ranks; kind: such as "CryptoObject".
+    names: {label: name}, in which several labels may share a name; depth: number of ranks; kind: such as
+    "CryptoObject".
     """
     unique = sorted(set(names.values()))
     places = {name: place for place, name in enumerate(unique, 1)}

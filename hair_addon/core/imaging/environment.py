@@ -12,18 +12,18 @@ import numpy as np
 from . import ambient_cube
 
 _LOBE_LIMIT = 4
-_LEAST_PART = 0.08  # of all light: dimmer lobes remain in the ambient cube
+_LEAST_PART = 0.08  # least fraction of all light in a lobe: dimmer lobes remain in the ambient cube
 _WINDOW, _RING = np.cos(np.radians([30.0, 45.0]))  # maximum radius of a lobe, and outer radius of its background ring
-_SHARPNESS = 20.0  # of the kernel for finding the brightest point
+_SHARPNESS = 20.0  # sharpness of the kernel that finds the brightest point
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True)
 class Lobe:
-    """A bright part of the environment: unit direction towards it, irradiance (3,) of a small ball [W/m²].
+    """A bright part of the environment. direction: unit vector toward the lobe.
 
-    variance: of its light about the direction, along each of two axes [rad²]; a plane that faces it receives the
-    fraction 1 - variance.
+    irradiance: (3,) of a small ball [W/m²]; variance: of the light about the direction, along each of two axes [rad²].
+    A plane that faces the lobe receives the fraction 1 - variance.
     """
 
     direction: np.ndarray
@@ -32,13 +32,13 @@ class Lobe:
 
 
 def split(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
-    """Split an environment image into ([`Lobe`, ...], (6, 3) mean radiance of the cube's sides without the lobes)."""
+    """Return ([`Lobe`, ...], (6, 3) mean radiance of the cube's sides without the lobes) of an environment image."""
     lobes, left = decompose(radiance)
     return lobes, _side_means(left, np.eye(3))
 
 
 def turned(lobes: list[Lobe], left: np.ndarray, to_image: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
-    """Return the result of `split` for an image that is turned; lobes, left: from `decompose`.
+    """Return the result of `split` for a turned image; lobes, left: from `decompose`.
 
     to_image: (3, 3), from world directions to directions of the image.
     """
@@ -51,7 +51,7 @@ def _side_means(radiance, to_image):
 
 
 def decompose(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
-    """Decompose an environment image into ([`Lobe`, ...], (H, W, 3) its radiance without the lobes)."""
+    """Return ([`Lobe`, ...], (H, W, 3) radiance without the lobes) of an environment image."""
     directions, solid_angles = _texels(*radiance.shape[:2])
     left = np.maximum(radiance.reshape(-1, 3), 0.0).astype(float)
     least = _LEAST_PART * float((left @ _LUMINANCE) @ solid_angles)

@@ -10,7 +10,7 @@ from . import ambient_cube
 
 SUN, POINT, SPOT, AREA = range(4)  # kinds
 
-_FADE = 0.25  # relative excess over the importance of the first omitted lamp at which a lamp has full weight
+_FADE = 0.25  # a lamp has full weight if its importance exceeds that of the first omitted lamp by this fraction
 
 
 def directions_to(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -22,7 +22,7 @@ def directions_to(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def irradiance(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the irradiance (N, P, 3) [W/m²] of a small ball at places (P, 3) from lamps (N,), as light/lights.glsl."""
+    """Return irradiance (N, P, 3) [W/m²] of a small ball at places (P, 3) by lamps (N,), as in light/lights.glsl."""
     kind = lamps["kind"][:, None]
     offsets = places - lamps["position"][:, None, :3].astype(float)
     squared = np.maximum(np.sum(np.square(offsets), axis=-1), 1e-8)
@@ -39,7 +39,7 @@ def irradiance(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _disk_irradiance(height, beside, radius):
-    """Return the irradiance of a small ball by a Lambertian disk with 1 W/sr along its axis: see light/lights.glsl."""
+    """Return the irradiance of a small ball by a Lambertian disk of 1 W/sr along its axis, as in light/lights.glsl."""
     outside = height**2 + beside**2 - radius**2
     root = np.maximum(np.sqrt(outside**2 + 4.0 * height**2 * radius**2), 1e-12)
     far = 2.0 * height**2 / (root * np.maximum(root + outside, 1e-12))

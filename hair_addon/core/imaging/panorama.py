@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panoramic pictures: the direction of each pixel, and its place on the faces of a cube around the camera.
 
-Directions are in the camera's axes, with the view along -Z and Y up. Projections are Cycles'
+Directions are in the camera's axes, with the view along -Z and Y up. Projections are the same as in Cycles
 (kernel/camera/projection.h).
 """
 
@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 MARGIN = 2  # texels around the visible part of a face, for interpolation
-_FINER = 1.25  # resolution of a face at its center relative to the pixels
+_FINER = 1.25  # resolution of a face at its center, relative to the picture's pixels
 _PER_SIDE = 2  # samples of a pixel along each side
-_SOME = 64  # pixels sampled along each side of a picture to estimate their size
+_SOME = 64  # pixels along each side of a picture that are sampled to estimate the size of a pixel
 _AT_ONCE = 1 << 18  # pixels in a batch
 
-# (6, 3, 3) rotations from the camera to the faces, which look along their own -Z: ahead, right, left, back, up, down.
+# (6, 3, 3) rotations from the camera to the faces ahead, right, left, back, up and down. A face looks along its -Z.
 FACES = np.array(
     [
         [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -32,7 +32,7 @@ FACES = np.array(
 
 @dataclass(frozen=True)
 class Panorama:
-    """A panoramic camera by Blender's settings; angles [rad], lengths of lens and sensor [mm]."""
+    """A panoramic camera with Blender's settings; angles [rad], lengths of lens and sensor [mm]."""
 
     kind: str  # Blender's panorama_type
     shift: tuple = (0.0, 0.0)  # in fractions of the picture
@@ -45,7 +45,7 @@ class Panorama:
     cylinder: tuple = (-math.pi, math.pi, -1.0, 1.0)  # least and greatest angle, then height / radius
 
     def directions(self, places: np.ndarray) -> np.ndarray:
-        """Return unit directions (..., 3) of places (..., 2) in the picture in [0, 1]; zero outside the projection."""
+        """Return unit directions (..., 3) for places (..., 2) in [0, 1] in the picture; zero outside the projection."""
         u, v = np.moveaxis(places + np.array(self.shift), -1, 0)
         found = _PROJECTIONS[self.kind](self, u, v)
         return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-12)
@@ -97,7 +97,7 @@ def _cylindrical(panorama, u, v):
 
 
 def _around(x, y, theta, is_seen):
-    """Return directions at an angle theta from the axis, towards (x, y)."""
+    """Return directions at an angle theta from the axis, toward (x, y)."""
     radius = np.maximum(np.hypot(x, y), 1e-12)
     across = np.sin(theta) / radius
     found = np.stack([across * x, across * y, -np.cos(theta)], axis=-1)
@@ -125,10 +125,10 @@ class FaceLookup:
         self._panorama, self._size, self._window = panorama, size, window
         self.side = self._face_side()  # texels along a side of a face
         self.half_width = self.side / (self.side - 2.0 * MARGIN)  # tangent of half the field of view of a face
-        self.windows = self._face_windows()  # {face: (left, bottom, width, height) of its visible part [texels]}
+        self.windows = self._face_windows()  # {face: (left, bottom, width, height) of the face's visible part [texels]}
 
     def _face_side(self):
-        """Return the texels along a side, by the median over pixels of the geometric mean of width and height."""
+        """Return the texels along a side of a face, from the median size of pixels: √(width × height)."""
         left, bottom, width, height = self._window
         x = left + np.arange(0, width, -(-width // _SOME))
         y = bottom + np.arange(0, height, -(-height // _SOME))
@@ -150,7 +150,7 @@ class FaceLookup:
                 highest[face] = np.maximum(highest.get(face, -np.inf), here.max(axis=0))
         found = {}
         for face in sorted(lowest):
-            # Places are centers of pixels, which extend beyond them.
+            # Places are centers of pixels; pixels extend beyond these places.
             start = np.maximum(np.floor(lowest[face]).astype(int) - 2 * MARGIN, 0)
             end = np.minimum(np.floor(highest[face]).astype(int) + 2 + 2 * MARGIN, self.side)
             found[int(face)] = (*start.tolist(), *(end - start).tolist())
@@ -164,7 +164,7 @@ class FaceLookup:
     def _places(self, first, last, per_side=_PER_SIDE):
         """Return (faces, places, distance / depth, visibility) of samples (rows, width, N) of pixels.
 
-        Places (..., 2) on faces are in texels from the center of the first one.
+        Places (..., 2) on faces are in texels from the center of the first texel.
         """
         left, bottom, width, _height = self._window
         along = (np.arange(per_side) + 0.5) / per_side
@@ -180,7 +180,7 @@ class FaceLookup:
         return faces, places, 1.0 / depth, np.abs(ahead) > 0.0
 
     def means(self, pictures: dict[int, np.ndarray], unseen: tuple[float, ...]) -> np.ndarray:
-        """Return pixel means (height, width, C) float32 of the window from pictures {face: array of its window}.
+        """Return pixel means (height, width, C) float32 of the window from pictures {face: array of the face's window}.
 
         unseen: (C,) values outside the projection.
         """
@@ -210,7 +210,7 @@ class FaceLookup:
         return found
 
     def _middles(self, pictures):
-        """Yield (rows, pixels of these on a face, values at their centers, distance / depth) of each face."""
+        """Yield (rows, pixels of these rows on a face, values at pixel centers, distance / depth) for each face."""
         for first, last in self._rows():
             faces, places, stretch, is_seen = (values[:, :, 0] for values in self._places(first, last, 1))
             for face, picture in pictures.items():
@@ -221,7 +221,7 @@ class FaceLookup:
 
 
 def _between_texels(picture, places):
-    """Interpolate an array (H, W, C) bilinearly at places (N, 2) in texels → (N, C)."""
+    """Return bilinearly interpolated values (N, C) of an array (H, W, C) at places (N, 2) [texels]."""
     lowest = np.floor(places).astype(int)
     part = (places - lowest).astype(np.float32)
     x, y = (np.clip(lowest[:, axis], 0, picture.shape[1 - axis] - 2) for axis in (0, 1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Completeness checks of image files by their structure, without decoding pixels: thousands in a second.
+"""Completeness checks of image files by their structure, without decoding pixels: thousands of files per second.
 
 A truncated PNG lacks its end chunk, a truncated OpenEXR its table of chunk offsets or its last chunks.
 """
@@ -32,7 +32,7 @@ def require_whole(path: str | Path, name: str) -> None:
 
 
 def is_whole(path: str | Path) -> bool:
-    """Return whether a path is a complete .png or .exr file, according to its suffix."""
+    """Return whether a path is a complete picture of the format of its suffix, .png or .exr."""
     size, head, tail = _ends(path)
     if not head.startswith(_SIGNATURES[Path(path).suffix.lower()]):
         return False
@@ -53,7 +53,7 @@ def is_broken(path: str | Path) -> bool:
 
 
 def _ends(path):
-    """Return (size, first bytes, last bytes) of a plain file; (None, b"", b"") if it cannot be read."""
+    """Return (size, first bytes, last bytes) of a plain file; (None, b"", b"") if the file is unreadable."""
     try:
         # O_NONBLOCK: opening a pipe without a writer would block.
         flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -83,7 +83,7 @@ def _is_whole_exr(path, size, head):
         with open(path, "rb") as file:
             head = file.read(max(4 * len(head), end))
     if version & (_IS_TILED | _IS_DEEP):
-        return True  # not written by Blender
+        return True  # Blender does not write such files
     offsets = np.frombuffer(head, "<u8", sum(counts), place)
     if not len(offsets) or offsets.min() < end or offsets.max() >= size:
         return False
@@ -95,7 +95,7 @@ def _is_whole_exr(path, size, head):
 
 
 def _chunk_counts(head):
-    """Return ([chunks of each part], start of the offset table, version field); raises if the head is too short."""
+    """Return ([number of chunks of each part], start of the offset table, version field); raises for short heads."""
     version, place, counts = struct.unpack_from("<I", head, 4)[0], 8, []
     while True:
         attributes, place = _attributes(head, place)
@@ -107,7 +107,7 @@ def _chunk_counts(head):
 
 
 def _attributes(head, place):
-    """Return ({name: bytes} of a part's header, its end)."""
+    """Return ({name: bytes} of a part's header, end of the header)."""
     found = {}
     while head[place]:
         name_end = head.index(b"\0", place)

@@ -11,7 +11,7 @@ from ..params import Settings, param
 FIRST_FRAME, LAST_FRAME = -1_048_574, 1_048_574  # Blender's MINAFRAME and MAXFRAME
 
 _MOST_PER_SIDE = 4
-LENS_PASSES = 32  # least number of passes with depth of field: each uses one point of the lens
+LENS_PASSES = 32  # least number of passes with depth of field: each pass uses one point of the lens
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class RenderSettings(Settings):
 
 @dataclass(frozen=True)
 class PictureSettings(Settings):
-    """Settings of a picture: drawn at once in the memory of the graphics card, or a frame rendered into a file."""
+    """Settings of a picture: a picture drawn at once in the memory of the GPU, or a frame rendered to a file."""
 
     width: int = param(1280, "Width of the image in pixels", low=1, high=65536)
     height: int = param(720, "Height of the image in pixels", low=1, high=65536)
@@ -118,16 +118,16 @@ class PassSettings(Settings):
 
 
 def samples_per_side(sample_count: int, least_passes: int = 1) -> int:
-    """Return the samples along each side of a pixel in a pass, such that whole passes give the sample count.
+    """Return the number of samples along each side of a pixel in a pass; whole passes give the sample count.
 
-    least_passes: minimum number of passes, if there are that many samples.
+    least_passes: minimum number of passes, if there are enough samples.
     """
     sides = range(_MOST_PER_SIDE, 1, -1)
     return next((n for n in sides if sample_count % n**2 == 0 and sample_count >= least_passes * n**2), 1)
 
 
 def filter_margin(side: int, width: float) -> int:
-    """Return the number of samples around a pixel of side × side samples that `filter_weights` includes."""
+    """Return the number of samples beyond each edge of a pixel, of side × side samples, in `filter_weights`."""
     return 0 if width <= 1.0 else math.ceil((0.5 * width - 0.5) * side + 0.5)
 
 
@@ -149,8 +149,8 @@ def filter_weights(side: int, width: float, shift: float) -> np.ndarray:
 def moments(shutter: float, position: str, count: int, openings: np.ndarray | None = None) -> np.ndarray:
     """Return motion sample times (count,) [frames] relative to a frame, at the centers of intervals of equal exposure.
 
-    shutter: time that it is open [frames]; position: START, CENTER or END, the place of the frame in the exposure;
-    openings: (N,) shutter opening at the centers of N equal intervals; None or all zero for a constant one.
+    shutter: duration of the exposure [frames]; position: START, CENTER or END, the place of the frame in the exposure;
+    openings: (N,) shutter opening at the centers of N equal intervals; None or all zero for a constant opening.
     """
     before = {"START": 0.0, "CENTER": 0.5, "END": 1.0}[position]
     parts = (np.arange(count) + 0.5) / count
@@ -161,7 +161,7 @@ def moments(shutter: float, position: str, count: int, openings: np.ndarray | No
 
 
 def tiles(window: tuple[int, int, int, int], side: int) -> list[tuple[int, int, int, int]]:
-    """Divide a window (left, bottom, width, height) [pixels] into tiles of at most `side` pixels along each side."""
+    """Return tiles, with at most `side` pixels along each side, of a window (left, bottom, width, height) [pixels]."""
     left, bottom, width, height = window
     return [
         (left + x, bottom + y, min(side, width - x), min(side, height - y))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sizes of data textures that are not powers of two.
 
-Software drivers compile a program separately for textures whose sides are powers of two and for others.
+Software drivers compile a program separately for textures with sides that are powers of two, and for other textures.
 """
 
 from collections.abc import Sequence

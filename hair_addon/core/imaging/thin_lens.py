@@ -33,7 +33,7 @@ class Lens:
         return self.radius * unit / np.array([self.ratio, 1.0])
 
     def world_to_view(self, world_to_view: np.ndarray, turn: int) -> np.ndarray:
-        """Return the view matrix (4, 4) of a pass: the central one, sheared so that the plane of focus is fixed."""
+        """Return the view matrix (4, 4) of a pass: the central matrix, sheared so that the plane of focus is fixed."""
         x, y = self.point(turn)
         shear = np.eye(4)
         # Rays through (x, y, 0) and through the center intersect in the plane of focus.
@@ -43,7 +43,7 @@ class Lens:
 
 
 def _radical_inverse(index: int, base: int) -> float:
-    """Return the radical inverse: the index's digits mirrored at the radix point."""
+    """Return the radical inverse of an index: its digits mirrored at the radix point."""
     value, place = 0.0, 1.0 / base
     while index:
         index, digit = divmod(index, base)
@@ -53,7 +53,7 @@ def _radical_inverse(index: int, base: int) -> float:
 
 
 def _disk_point(square):
-    """Map a point (2,) of the unit square to the unit disk, preserving area ratios [Shirley97]."""
+    """Return the point (2,) of the unit disk for a point of the unit square, preserving area ratios [Shirley97]."""
     a, b = 2.0 * square - 1.0
     if a == 0.0 and b == 0.0:
         return np.zeros(2)
@@ -65,7 +65,10 @@ def _disk_point(square):
 
 
 def _polygon_point(disk, corner_count, rotation):
-    """Map a point (2,) of the unit disk to the inscribed regular polygon, rotated [rad], preserving area ratios."""
+    """Return the point (2,) of a rotated [rad] regular polygon for a point of the unit disk, preserving area ratios.
+
+    The polygon is inscribed in the disk.
+    """
     sector = (math.atan2(disk[1], disk[0]) / (2.0 * math.pi) % 1.0) * corner_count
     first = math.floor(sector)
     angles = rotation + (np.array([first, first + 1]) - 0.5) * 2.0 * math.pi / corner_count
