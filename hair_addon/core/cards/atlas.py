@@ -29,9 +29,9 @@ class Atlas:
     scale: float
 
     def placed(self, flat: np.ndarray, radii: np.ndarray, labels: np.ndarray, boxes: np.ndarray) -> tuple:
-        """Return the flattened strands of the shown cards at their places in the texture.
+        """Return (indices, places, radii) of the flattened strands of the shown cards in the texture.
 
-        Return value: (indices of strands, (M, P, 3) places from 0 to 1 with heights in the same unit, (M, P) radii).
+        indices: (M,) of strands; places: (M, P, 3) from 0 to 1, with heights in the same unit; radii: (M, P).
         """
         picture = np.full(len(boxes), -1)
         picture[self.shown] = np.arange(len(self.shown))

@@ -70,7 +70,7 @@ def _smooth(values):
 def shares(importance: np.ndarray, count: int) -> np.ndarray:
     """Return the fractions (N,) in [0, 1] of lamps' light that are drawn individually, positive for at most `count`.
 
-    Fractions are continuous in the importance (N,): a lamp has faded out before another one replaces it.
+    Fractions are continuous in the importance (N,): a lamp has faded out before another lamp replaces it.
     """
     if len(importance) <= count:
         return np.ones(len(importance))

@@ -9,7 +9,7 @@ from ..rod.settings import DynamicsSettings
 
 @dataclass(frozen=True)
 class ColliderSettings(Settings):
-    """Collision settings of a mesh object that override those of the hair."""
+    """Collision settings of a mesh object, which override the settings of the hair."""
 
     overrides_friction: bool = param(
         False, "Use the friction of this object instead of that of the hair", label="Own friction"

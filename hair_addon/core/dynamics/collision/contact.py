@@ -79,10 +79,10 @@ class Contacts:
         """Return `planes` for the predicted positions of a substep, which began at `last_positions`.
 
         Call this in every substep, then again with `is_final`, because near surfaces are tracked between calls.
-        duration: of the substep [s]; is_final: True after the solve returns `found_planes` for points that are still
-        inside, without segments and without rise; moved: (groups, 1, lanes) numbers, non-zero for strands with points
-        that have moved since, and only these strands are queried again; is_skipping: False queries every point, with
-        the same result.
+        duration: of the substep [s]; is_final: whether to return `found_planes`, for points that are still inside after
+        the solve, without segments and without rise; moved: (groups, 1, lanes) numbers, non-zero for strands with
+        points that have moved since, None to query all strands; is_skipping: False queries every point, with the same
+        result.
         """
         self._require_shape(positions)
         self._require_shape(last_positions)

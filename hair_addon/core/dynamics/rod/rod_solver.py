@@ -18,7 +18,7 @@ from ...errors import HairError
 from ...kernels import kernel_cache, native_code, parallel
 from ...kernels.checks import require_count
 
-LANES = 16  # strands of a CPU thread: 8 take a quarter longer, even with vectors of 8 numbers
+LANES = 16  # strands of a CPU thread: groups of 8 take a quarter longer, even with vectors of 8 numbers
 GPU_LANES = 32  # strands with contiguous numbers in GPU memory: a warp
 MOST_SEGMENTS = 64
 LEAST_GROUPS = 8  # least number of groups for a thread
@@ -39,7 +39,7 @@ _CONSTANTS = {
     "MOST": MOST_SEGMENTS,
     "STEPS": 8,  # most steps of Newton's method
     "PASSES": 4,  # most passes of contact
-    "TURN": 2e-3,  # |Δθ|² of a step that ends the solve: the remaining error is half of it
+    "TURN": 2e-3,  # |Δθ|² of a step that ends the solve: the remaining error is half of this step
     "DRAG_ALONG": 0.5,  # drag along a slender body / drag across it
     "AWAY": 1e-3,  # remaining mobility along the contact normal: zero would make the matrix singular
     "MOST_AWAY": 1e-2,  # the same for stiff points: a third of this value breaks short hair, more weakens friction

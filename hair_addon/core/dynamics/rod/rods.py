@@ -284,7 +284,7 @@ class Rods:
         return state | {"step_size": np.array([self.step_size])}
 
     def load(self, state: Mapping[str, np.ndarray]) -> None:
-        """Continue from a state of `save`. Raises `HairError` if it does not match the strands."""
+        """Continue from a state of `save`. Raises `HairError` if the state does not match the strands."""
         for name in STATE:
             rows = np.asarray(state.get(name, ()))
             expected = self.strand_count, rod_solver.row_count(name, self.segment_count)
