@@ -25,7 +25,7 @@ _CORNERS = np.array(list(product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
 # occlude 0.37 of the weight.
 _QUATERNION = np.array([3.0, 1.0, 0.5, 0.8])
 DIRECTIONS = np.concatenate([_FACES, _CORNERS]) @ _turned(_QUATERNION)  # (14, 3) unit vectors
-WEIGHTS = np.repeat([1 / 15, 3 / 40], [6, 8])  # (14,), with the sum one
+WEIGHTS = np.repeat([1 / 15, 3 / 40], [6, 8])  # (14,), with a sum of one
 
 
 def side_shares(directions: np.ndarray) -> np.ndarray:

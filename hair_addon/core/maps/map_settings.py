@@ -15,7 +15,7 @@ KINDS = (
     ("STRAND", "Per Strand", "A random number for each strand"),
     ("CLUMP", "Per Clump", "A random number for each clump of the hair's styles"),
 )
-NAMED = ("GROUP", "ATTRIBUTE", "CURVES")  # kinds with the name of a source; images have their own
+NAMED = ("GROUP", "ATTRIBUTE", "CURVES")  # kinds with a named source, besides images
 
 
 @dataclass(frozen=True)

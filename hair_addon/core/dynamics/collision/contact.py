@@ -157,7 +157,7 @@ class Contacts:
         wp.copy(self._distances, distances, count=len(distances))
 
     def expect(self, count: int) -> None:
-        """Prepare for a frame with at most a number of substeps."""
+        """Prepare the colliders' motions for a frame with at most `count` substeps."""
         self.colliders.expect(count)
         self._motions.make_room(count)
 

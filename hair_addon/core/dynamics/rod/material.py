@@ -8,7 +8,7 @@ With the radius r of a fiber of length L, its section A = π r², stiffness k an
     b_0 = l_0 / 2,    b_j = (l_(j-1) + l_j) / 2                             length of strand that joint j bends
 
 A guide represents a wisp of n fibers; n scales weight and stiffness alike and cancels, and k describes how much fibers
-stick together. Wet hair weighs 1.3 times as much as dry hair, and has half its stiffness [Robbins12].
+stick together. Wet hair weighs 1.3 times as much, and swollen fibers have half the stiffness of dry fibers [Robbins12].
 
 Drag of a cylinder in air perpendicular to its axis, per length [N s/m²], with Re = 2 r |v| / ν [White06]:
 

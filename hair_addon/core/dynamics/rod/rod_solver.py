@@ -39,7 +39,7 @@ _CONSTANTS = {
     "MOST": MOST_SEGMENTS,
     "STEPS": 8,  # most steps of Newton's method
     "PASSES": 4,  # most passes of contact
-    "TURN": 2e-3,  # |Δθ|² of a step that ends the solve: the remaining error is half of this step
+    "TURN": 2e-3,  # |Δθ|² of a step that ends the solve: the remaining error is half of it
     "DRAG_ALONG": 0.5,  # drag along a slender body / drag across it
     "AWAY": 1e-3,  # remaining mobility along the contact normal: zero would make the matrix singular
     "MOST_AWAY": 1e-2,  # the same for stiff points: a third of this value breaks short hair, more weakens friction

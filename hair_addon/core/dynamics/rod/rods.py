@@ -252,7 +252,7 @@ class Rods:
             self.step_size = step.size
 
     def begun(self, step: FrameSubsteps) -> FrameSubsteps:
-        """Return a step with values that continue the last step; the first step also sets the multipliers."""
+        """Return a step that continues from the last step's duration; the first step also sets the multipliers."""
         if self.step_size == 0.0:  # the first step starts with the rest shape's multipliers of equilibrium
             self._put("multipliers", self._held * (step.size**2 / self._mass_unit))
             self.step_size = step.size
