@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays in an uncompressed .npz file, which is read only if it is byte for byte what `write` would produce.
+"""Arrays in an uncompressed .npz file. A file is read only if `write` would produce exactly its bytes.
 
 No parser runs on untrusted files: names, types and shapes are known before a file is opened, and they determine every
 byte except the arrays' contents and checksums.
@@ -20,7 +20,7 @@ from . import untrusted_file
 Layout = Mapping[str, tuple[str, tuple[int, ...]]]
 
 TYPES = ("<f4", "<f8", "<i4", "<i8", "|u1")
-MOST_BYTES = 2**32 - 2**16  # of a file: larger ones would need ZIP64
+MOST_BYTES = 2**32 - 2**16  # limit of a file's size: larger files would need ZIP64
 
 _DATE = 0x0021  # 1 January 1980: equal arrays give equal files
 _VERSION = 20
@@ -60,7 +60,7 @@ def decoded(data: bytes, layout: Layout) -> dict[str, np.ndarray] | None:
 
 
 def write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write arrays (`TYPES`, any shapes) to a file. Raises OSError, and `HairError` as `encoded`."""
+    """Write arrays (`TYPES`, any shapes) to a file. Raises OSError, and `HairError` like `encoded`."""
     parts = encoded(arrays)
     with open(path, "wb", buffering=0) as file:
         for part in parts:
@@ -122,7 +122,7 @@ def _header(kind, shape):
 
 
 def _file_of(layout, contents):
-    """Return the parts of a file: for each member its local header, the array's header and bytes; the directory."""
+    """Return the parts of a file: the local header, array header and bytes of each member, then the directory."""
     parts, directory, place = [], b"", 0
     for name, (kind, shape) in layout.items():
         member, header, content = _member(name), _header(kind, shape), contents[name]

@@ -3,14 +3,15 @@
 
     roots (S, 3), strand_points (S, P, 3), guide_points (G, P, 3)   [m], in the axes of the mesh's file
     strand_widths (S, P), guide_widths (G, P)                       diameters [m]
-    strand_counts (S,), guide_counts (G,)                           points of each curve if these differ, see below
+    strand_counts (S,), guide_counts (G,)                           number of points of each curve, see below
     up                                                              the up axis: X, Y or Z
 
-    For export, also strand_ and guide_: ids (S,), root_uvs (S, 2), groups (S,), which index group_names (K,);
-    strand_guide_ids and strand_guide_weights (S, 3); strand_colors (S, P, 3), linear RGB, and strand_roughness (S, P)
+    Exported files also have, with the prefix strand_ or guide_: ids (S,); root_uvs (S, 2); groups (S,), indices into
+    group_names (K,); and of strands only: strand_guide_ids and strand_guide_weights (S, 3); strand_colors (S, P, 3),
+    linear RGB; strand_roughness (S, P)
 
 Only one of strand_points and guide_points is required. If curves have different numbers of points, the points of all
-curves are concatenated, (N, 3), with widths (N,) and the number of points of each curve in counts.
+curves are concatenated, (N, 3), with widths (N,), and the counts have the number of points of each curve.
 """
 
 from pathlib import Path
@@ -27,7 +28,7 @@ _NAMES = {"guide_points": "Guides", "strand_points": "Hair"}
 
 
 def read(path: Path, axis: str = "Z") -> CurveFile:
-    """Read the curves of a file of arrays; axis: the up axis of a file without one. Raises `HairError`."""
+    """Read the curves of a file of arrays; axis: the up axis if the file has none. Raises `HairError`."""
     with untrusted_arrays.opened(path) as archive:
         return _read(path, archive, axis)
 
@@ -76,7 +77,7 @@ def _read(path, archive, axis):
     return CurveFile(sets, Convention(1.0, axis))
 
 
-# Attributes of curves: name of an array → (argument of `curve_sets`, numbers of a curve, type).
+# Attributes of curves: name of an array → (argument of `curve_sets`, shape of a curve's value, type).
 _ATTRIBUTES = {
     "ids": ("ids", (), np.int32),
     "groups": ("group_ids", (), np.int32),
@@ -112,7 +113,7 @@ def _counts_of(name):
 
 
 def _counts(path, archive, there, name):
-    """Return (G,) int64 points of each curve; None if the file has no counts, and all curves have equally many."""
+    """Return the number of points (G,) int64 of each curve; None if the file has no counts: all are equal."""
     if _counts_of(name) not in there:
         return None
     counts = untrusted_arrays.array(archive, _counts_of(name))

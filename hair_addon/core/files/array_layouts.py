@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands in .npz files [Kern07] of other programs, by the shapes of their arrays.
+"""Strands in .npz files [Kern07] of other programs, recognized by the shapes of their arrays.
 
-    positions   (S, P, 3), or (N, 3) with the number of points of each strand or their offsets
-    counts      (S,) integers with sum N; offsets (S + 1,), ascending from 0 to N, or (S,) without the N
-    widths      width, thickness or diameter, which are diameters, or radius: (S, P), (N,), (S,) or one number
+    positions   (S, P, 3), or (N, 3) with the counts or the offsets of the strands
+    counts      (S,) integers with sum N; offsets (S + 1,), ascending from 0 to N, or (S,) without the last entry
+    widths      diameters (width, thickness, diameter) or radii (radius): (S, P), (N,), (S,) or one number
 
-An array counts as positions if its shape fits; if several do, the one with a name of `_POINTS`. Names are compared
-without case. Numbers may have 16, 32 or 64 bits.
+The array with a fitting shape holds the positions. If several arrays fit, the array with a name in `_POINTS` does.
+Names are compared without case. Numbers may have 16, 32 or 64 bits.
 """
 
 import zipfile
@@ -65,7 +65,7 @@ def _is_flat(shape):
 
 
 def _wide(values):
-    """Return numbers of 16 bits in 32."""
+    """Return numbers of 16 bits as float32, others unchanged."""
     return values.astype(np.float32) if values.dtype.itemsize < 4 else values
 
 
@@ -83,7 +83,7 @@ def _chosen(path, names):
 
 
 def _ragged(archive, headers, point_count):
-    """Return (S,) int64 points of each strand from an array of counts or offsets that fits; None without one."""
+    """Return the number of points (S,) int64 of each strand from counts or offsets that fit; None without these."""
     for name, (shape, kind) in headers.items():
         if kind.kind not in "iu" or len(shape) != 1 or not 1 <= shape[0] <= point_count + 1:
             continue
@@ -99,7 +99,7 @@ def _ragged(archive, headers, point_count):
 
 
 def _radii(archive, found, counts):
-    """Return (N,) float32 radii; None without an array that fits."""
+    """Return the radii (N,) float32 of all points; None if no array fits."""
     for names, factor in ((_RADII, 1.0), (_DIAMETERS, 0.5)):
         for name in names:
             if name not in found:

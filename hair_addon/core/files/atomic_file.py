@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Atomic writing of files: into a temporary file beside the target, which is replaced at the end."""
+"""Atomic writing of files: a temporary file is written beside the target, and replaces the target at the end."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ _PARTIAL = re.compile(r"\.vellus_[0-9a-f]{16}_(.+)", re.ASCII | re.DOTALL)
 
 @contextlib.contextmanager
 def atomic_file(path: str | Path, partial: Path | None = None, is_forced: bool = True) -> Generator[Path]:
-    """`atomic_files` for one file; partial: the temporary path, None for a new one."""
+    """Yield a temporary path, as `atomic_files` for one file; partial: this path, None for a new one."""
     with atomic_files([path], None if partial is None else [partial], is_forced) as (there,):
         yield there
 
@@ -25,10 +25,10 @@ def atomic_file(path: str | Path, partial: Path | None = None, is_forced: bool =
 def atomic_files(
     paths: Iterable[str | Path], partials: list[Path] | None = None, is_forced: bool = True
 ) -> Generator[list[Path]]:
-    """Yield temporary paths to write to; on success they replace `paths`, after an error none does.
+    """Yield temporary paths to write to; on success their files replace `paths`, after an error none does.
 
     partials: the temporary paths, None for new ones. Raises `HairError` if a folder cannot be written or the disk is
-    full. Some exporters do not report a full disk: `is_forced` flushes files to disk before they are moved.
+    full. is_forced: whether files are flushed to disk before they are moved; some exporters do not report a full disk.
     """
     places = [Path(path) for path in paths]
     for path in places:
@@ -60,7 +60,7 @@ def new_partial_of(path: Path) -> Path:
 
 
 def partial_of(path: Path) -> Path:
-    """Return an unpredictable temporary path for a claimed file; `leftovers` finds it after a killed process."""
+    """Return an unpredictable temporary path for a claimed file; `leftovers` finds it if the process is killed."""
     return path.with_name(f".vellus_{secrets.token_hex(8)}_{path.name}")
 
 
@@ -76,7 +76,7 @@ def leftovers(folder: Path) -> dict[str, list[Path]]:
 
 
 def require_room(path: Path, byte_count: int) -> None:
-    """Raise OSError unless a file can grow by `byte_count`; its content is unchanged, a missing file is created."""
+    """Raise OSError unless a file can grow by `byte_count`; creates a missing file, changes no content."""
     with open(path, "ab") as file:
         size = file.seek(0, os.SEEK_END)
         try:
@@ -102,7 +102,7 @@ def require_writable_path(path: str | Path) -> None:
 
 
 def _require_file(path):
-    """Raise `HairError` if a path exists and is not a file; a device would be replaced by the file."""
+    """Raise `HairError` if a path exists and is not a file: writing would replace a device."""
     try:
         is_taken = path.stat() and not path.is_file()
     except FileNotFoundError:

@@ -22,7 +22,7 @@ SPLINES_MOVE = "{path} is animated: its Catmull-Rom splines become polylines."
 # Meters in a unit, by its name in the interface.
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048, "km": 1000.0}
 
-# Up axis → matrix (3, 3) from such coordinates to Blender's, with Z up.
+# Up axis → matrix (3, 3) from coordinates with this axis to Blender's, with Z up.
 TO_Z_UP = {
     "X": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
     "Y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
@@ -51,7 +51,7 @@ def parsed_unit(text: str) -> float:
 class Convention:
     """Unit and up axis of coordinates; None where unspecified.
 
-    meters: in a unit; up: X, Y or Z.
+    meters: length of a unit; up: X, Y or Z.
     """
 
     meters: float | None = None
@@ -64,7 +64,7 @@ class Convention:
 
 @dataclass(frozen=True)
 class Motion:
-    """Points at several times: times (T,) [s], ascending; points_at: function of a time's index → all points (N, 3)."""
+    """Points at several times: times (T,) [s], ascending; points_at: index of a time → all points (N, 3)."""
 
     times: np.ndarray
     points_at: Callable[[int], np.ndarray]
@@ -72,13 +72,13 @@ class Motion:
 
 @dataclass(frozen=True)
 class CurveSet:
-    """The C curves of one object of a file with N points, in the file's world coordinates.
+    """The C curves of one object of a file, with N points in all, in the file's world coordinates.
 
-    name: of the object, shown to the user; points: (N, 3), concatenated over the curves; counts: (C,) points of each;
+    name: of the object, for the user; points: (N, 3), concatenated over the curves; counts: (C,) numbers of points;
     is_smooth: (C,) bool, Catmull-Rom splines whose end points count twice, as Blender draws them; radii: (N,), None if
     the file has no widths; is_guide: None if the file does not specify it. Attributes of Vellus and Unreal, None if
     missing: ids (C,) int32; root_uvs (C, 2); guide_ids (C, 3) int32, IDs of guides of the same file, and guide_weights
-    (C, 3); colors (N, 3), linear RGB. motion: of animated points.
+    (C, 3); colors (N, 3), linear RGB. motion: `Motion` of animated points.
     """
 
     name: str
@@ -100,7 +100,7 @@ class CurveSet:
         return len(self.counts)
 
     def placed(self, meters: float, up: str) -> "CurveSet":
-        """Return the curves in meters with Z up, float32; meters: in a unit of the file; up: axis of the file."""
+        """Return the curves in meters with Z up, float32; meters: length of the file's unit; up: its up axis."""
         turn, motion = TO_Z_UP[up] * meters, self.motion
 
         def turned(points):
@@ -142,7 +142,7 @@ class CurveSet:
 
 
 def as_polylines(curves: CurveSet) -> CurveSet:
-    """Return the curves with Catmull-Rom splines evaluated to polylines, with the same counts at all times."""
+    """Return the curves, splines evaluated to polylines that have the same counts at all times."""
     counts, is_smooth, motion = curves.counts, curves.is_smooth, curves.motion
     columns = [values for values in (curves.points, curves.colors, curves.radii) if values is not None]
     values, new_counts, lines = bezier_segments.smooth_lines(np.column_stack(columns), counts, is_smooth)
@@ -166,7 +166,7 @@ def as_polylines(curves: CurveSet) -> CurveSet:
 class CurveFile:
     """The objects of a file that have curves.
 
-    stated: the file's own unit and axis; usual: the default for such files; notes: warnings for the user.
+    stated: unit and up axis in the file; usual: the default for files of this kind; notes: warnings for the user.
     """
 
     sets: list[CurveSet]
@@ -176,7 +176,7 @@ class CurveFile:
 
 
 def join(sets: Sequence[CurveSet]) -> CurveSet:
-    """Join sets of curves in the same coordinates; drops attributes that are missing in any of them.
+    """Return one set of the curves of sets in the same coordinates, without attributes that any of these sets lacks.
 
     Radii are an exception: curves without radii get 0, which means none. Motion is kept if all moving sets have the
     same times.

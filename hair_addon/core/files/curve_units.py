@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Unit and up axis of a file's curves: given by the user, stated in the file, or such that roots lie on the surface."""
+"""Unit and up axis of a file's curves: given by the user, stated in the file, or chosen by the surface."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,7 @@ from ..geometry.strands import curve_offsets
 from .curve_file import TO_Z_UP, UNITS, Convention, CurveFile, CurveSet
 
 _TRIED = 256  # number of curves that are sampled
-_ON = 0.05  # largest distance of roots that count as on the surface, as a fraction of its size or the curves' extent
+_ON = 0.05  # largest distance of roots on the surface, as a fraction of its size or of the curves' extent
 
 _WORDS = {
     "m": "meters",
@@ -36,10 +36,10 @@ class Reading:
 
 
 def choose(file: CurveFile, sets: Sequence[CurveSet], given: Convention, mesh: TriMesh, name: str) -> Reading:
-    """Return the `Reading` of some sets of a file: the user's convention, else the file's, else by the surface.
+    """Return the `Reading` of sets of a file: the user's convention, the file's, or one with roots on the surface.
 
-    mesh: the surface in world space [m]; name: of the file. Raises `HairError` if the distance of the roots to the
-    surface exceeds the surface's size.
+    given: the user's convention; mesh: the surface in world space [m]; name: of the file. Raises `HairError` if the
+    distance of the roots to the surface exceeds the surface's size.
     """
     known = given.over(file.stated)
     ends = _Ends(sets, mesh)
@@ -57,7 +57,7 @@ def choose(file: CurveFile, sets: Sequence[CurveSet], given: Convention, mesh: T
 
 
 def _conventions(known, usual) -> Iterator[Convention]:
-    """Yield the possible conventions, the most usual first."""
+    """Yield the possible conventions, the most common first."""
     units = [usual.meters, *UNITS.values()] if known.meters is None else [known.meters]
     axes = [usual.up, "Z", "Y", "X"] if known.up is None else [known.up]
     for meters, up in itertools.product(dict.fromkeys(units), dict.fromkeys(axes)):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ..params import Settings, param
 
-OF_STRANDS = (".hair", ".data", ".ply", ".npz")  # one frame, without the look
+OF_STRANDS = (".hair", ".data", ".ply", ".npz")  # formats with one frame, without the look
 ENDINGS = (".abc", ".usd", ".usdc", ".usda", *OF_STRANDS)
 
 
@@ -27,5 +27,5 @@ class ExportSettings(Settings):
     )
 
     def moves(self, is_guide: bool) -> bool:
-        """Return whether guides, or strands, are animated in the file."""
+        """Return whether the file animates the guides, or the strands if not `is_guide`."""
         return self.animation == "ALL" or (self.animation == "GUIDES" and is_guide)

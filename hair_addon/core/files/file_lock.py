@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """File locks that assign a file to one of several processes, on one machine or on several.
 
-A claim is a lock on a file beside the one to be written. The operating system releases it when the process ends, even
-if killed.
+A claim is a lock on a file beside the file to be written. The operating system releases the lock when the process ends,
+even if it is killed.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ else:
     import fcntl
 
 _HELD = {errno.EACCES, errno.EAGAIN, errno.EDEADLK, errno.EWOULDBLOCK}
-# Links are not followed and opening a pipe does not block: the folder is untrusted.
+# Links are not followed, and opening a pipe does not block: the folder is untrusted.
 _NEVER_ELSEWHERE = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.EINVAL}
 
@@ -28,7 +28,7 @@ _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.
 def claim(path: str | Path) -> Generator[bool]:
     """Claim a file for the duration of the context; yields False if another process has claimed it.
 
-    On file systems without locks every claim succeeds: work is then duplicated, and each file is still complete. Raises
+    On file systems without locks every claim succeeds: work is then duplicated, but each file is still complete. Raises
     OSError if the folder is not writable.
     """
     beside = claim_of(path)
@@ -55,7 +55,7 @@ def claim_of(path: str | Path) -> Path:
 def _locked(path):
     """Return a descriptor that holds the lock of a file, or None if another process holds it."""
     while True:
-        if os.path.islink(path):  # where the system has no O_NOFOLLOW
+        if os.path.islink(path):  # for systems without O_NOFOLLOW
             raise OSError(errno.ELOOP, "it is a link", str(path))
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | _NEVER_ELSEWHERE, 0o666)
         try:

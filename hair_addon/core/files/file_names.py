@@ -5,7 +5,7 @@ import itertools
 import re
 from collections.abc import Callable
 
-# Windows forbids more than other systems do.
+# Windows forbids more characters than other systems do.
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f\x7f]')
 
 
@@ -17,7 +17,7 @@ def stem_of(name: str) -> str:
 def free_stem(name: str, is_taken: Callable[[str], bool]) -> str:
     """Return `stem_of` a name, with a number in Blender's format if it is taken.
 
-    is_taken: returns whether a stem belongs to another item. File systems may ignore case.
+    is_taken: returns whether a stem belongs to another item; it must ignore case, as some file systems do.
     """
     stem = stem_of(name)
     numbered = (f"{stem}.{number:03}" for number in itertools.count(1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All curves of a file in flat arrays → `CurveSet`s, one for the guides and one for the strands of each group."""
+"""`CurveSet`s from flat arrays of all curves: one set for the guides and one for the strands of each group."""
 
 from collections.abc import Mapping
 
@@ -24,7 +24,7 @@ def curve_sets(
 ) -> list[CurveSet]:
     """Return the `CurveSet`s of polylines; curves without points are left out.
 
-    name: of curves without a group; points: (N, 3); counts: (C,) points of each curve, with sum N; radii: (N,);
+    name: of curves without a group; points: (N, 3); counts: (C,) numbers of points, with sum N; radii: (N,);
     is_guide: (C,) bool, group_ids: (C,) int, None if the file does not state them; group_names: ID → name. ids, (C,),
     root_uvs, (C, 2), guide_ids and guide_weights, (C, 3): as in `CurveSet`.
     """

@@ -2,9 +2,9 @@
 """Frames of simulated guides in a folder, and the states from which a simulation continues.
 
 A folder has a marker of ownership, a manifest (frame_manifest.py), `+00000123.npz` for each frame and
-`state_+00000120.npz` for some. Files are written atomically; a file that does not match the manifest's layout counts as
-a missing frame. Nothing is written to a foreign folder, nor through a link. Only files with these names in an own
-folder are ever removed.
+`state_+00000120.npz` for some frames. Files are written atomically; a file that does not match the manifest's layout
+counts as a missing frame. Nothing is written to a foreign folder or through a link. Only files with these names, in a
+folder of ours, are ever removed.
 """
 
 import contextlib
@@ -37,7 +37,7 @@ class Frame:
     """One frame: points (G, P, 3) float32 [m] of the guides, on the surface at rest.
 
     key: of the simulation; digest: of the animation (`frame_manifest.digest`); is_carried: whether points were
-    transformed because the guides' coordinates have changed since.
+    transformed because the guides' coordinates have changed since they were simulated.
     """
 
     points: np.ndarray
@@ -59,7 +59,7 @@ def folder_of(base: Path, identity: str) -> Path:
 
 
 class FrameCache:
-    """Reader of frames in a folder. Unreadable files are missing frames; `take_errors` returns the reasons once."""
+    """Reader of frames in a folder. Unreadable files count as missing; `take_errors` returns the reasons once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -131,7 +131,7 @@ class FrameCache:
         return arrays
 
     def points_at(self, time: float) -> np.ndarray | None:
-        """Return points (G, P, 3) float32 [m] at a time in frames, whole or not; None if a frame is missing.
+        """Return points (G, P, 3) float32 [m] at a time in frames, maybe a fraction; None if a frame is missing.
 
         Interpolation is cubic through four frames, linear if one of the outer two is missing.
         """
@@ -170,7 +170,7 @@ class FrameCache:
             return None
 
     def _frame_arrays(self, number):
-        """Return the arrays of a frame's file or None; stores its fault for `fault_of`."""
+        """Return the arrays of a frame's file or None; stores the file's fault for `fault_of`."""
         path = self.folder / _name(number, False)
         stamp, fault = _stamp_of(path), None
         if stamp is None or self.manifest is None:
@@ -207,7 +207,7 @@ class Writer:
         self._write(_name(number, True), {**self._marked(number), **arrays}, self.manifest.state_file_layout, True)
 
     def remove_states(self, after: int) -> None:
-        """Remove the states after a frame, which may differ when simulated again. Raises `HairError`."""
+        """Remove the states after a frame: another simulation may give other states. Raises `HairError`."""
         try:
             _remove(self.folder, lambda name: (found := _NAME.fullmatch(name)) and found[1] and int(found[2]) > after)
         except OSError as error:
@@ -224,7 +224,7 @@ class Writer:
         self._is_complete = True
 
     def end(self) -> None:
-        """Write whether baking is complete. Called by `baking`."""
+        """Write to the manifest whether baking is complete. Called by `baking`."""
         with contextlib.suppress(HairError):  # the folder is gone or the disk is full: equivalent to a killed process
             if self.folder.is_dir():
                 self.change(state="complete" if self._is_complete else "part")
@@ -244,10 +244,10 @@ class Writer:
 
 @contextlib.contextmanager
 def baking(folder: Path, manifest: Manifest) -> Generator[Writer]:
-    """Claim a folder, created if missing, and write frames to it. Existing frames of any simulation are kept.
+    """Claim a folder, created if missing, and yield the `Writer` of its frames. Existing frames are kept.
 
-    Raises `HairError` if another process bakes it, if it cannot be written, or if it has frames of other guides. The
-    manifest is updated on exit: whether the frames are complete.
+    Raises `HairError` if another process bakes to the folder, if it cannot be written, or if it has frames of other
+    guides. On exit the manifest is updated to state whether the frames are complete.
     """
     with contextlib.ExitStack() as stack:
         try:
@@ -269,7 +269,7 @@ def baking(folder: Path, manifest: Manifest) -> Generator[Writer]:
 
 
 def remove(folder: Path, numbers: Iterable[int] | None = None) -> int:
-    """Remove frames and their states: given numbers, or all and the manifest. Returns the number of files removed.
+    """Remove frames and states of the given numbers, or all with the manifest. Returns the number of files removed.
 
     Nothing is removed from a folder without a valid manifest, through a link, or while another process bakes. Raises
     `HairError`.
@@ -313,7 +313,7 @@ def _require_own(folder):
     if all(name in own or _LEFT_OVER.fullmatch(name) for name in os.listdir(folder)):
         return
     try:
-        frame_manifest.read(folder)  # of an older version, which left no marker
+        frame_manifest.read(folder)  # folders of older versions have no marker
     except HairError as error:
         sentence = "{path} has files of another program: move them, or choose another cache folder."
         raise HairError(sentence, path=folder) from error
@@ -332,9 +332,10 @@ def _mark(folder):
 def between(
     before: np.ndarray | None, start: np.ndarray, end: np.ndarray, after: np.ndarray | None, part: float
 ) -> np.ndarray:
-    """Interpolate points, float32, at a fraction `part` in [0, 1] of the time between consecutive frames start and end.
+    """Return points, float32, interpolated at a fraction `part` in [0, 1] of the time from frame start to frame end.
 
-    Cubic through all four frames, exact for cubic motion; linear if `before` or `after` is None.
+    The frames are consecutive. Interpolation is cubic through all four frames, exact for cubic motion; linear if
+    `before` or `after` is None.
     """
     t = float(part)
     if before is None or after is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The manifest.json of a folder of simulated frames: the simulations that they belong to, and the layout of files."""
+"""The manifest.json of a folder of simulated frames: the simulations of the frames, and the layout of the files."""
 
 import dataclasses
 import hashlib
@@ -40,11 +40,11 @@ _STATE_BYTES_A_GUIDE = 32_768  # 65 vertices take 14,000
 class Manifest:
     """Description of the frames and files in a folder.
 
-    keys: for each simulation with frames in the folder {part: its digest} (`digests_of`); the last one is baked now.
+    keys: {part: digest} (`digests_of`) for each simulation with frames in the folder; the last one is baked now.
     guide_count, point_count: of each frame; state_layout: the arrays of a state; notes: (name, reason) of skipped
-    objects; parted_by: digest of the partings between guides; spaces: for each key the matrix from the guides' original
-    coordinates to those of its frames, 16 numbers; empty if all are the identity. Raises `HairError` for invalid
-    values.
+    objects; parted_by: digest of the partings between guides; spaces: for each key the matrix (16 numbers) from the
+    guides' original coordinates to the coordinates of its frames, empty if all are the identity. Raises `HairError` for
+    invalid values.
     """
 
     keys: tuple[Mapping[str, str], ...]
@@ -112,7 +112,7 @@ class Manifest:
         return None
 
     def continued(self, before: "Manifest") -> "Manifest":
-        """Return this manifest for a folder with frames of an earlier one; frames of other keys are kept as outdated.
+        """Return this manifest for a folder with frames of an earlier manifest; frames of other keys become outdated.
 
         Raises `HairError` if the numbers of guides or points differ.
         """
@@ -174,7 +174,7 @@ def parsed(data: bytes, path: Path) -> Manifest:
         found = json.loads(data.decode("utf-8"))
         if type(found) is not dict or (found.pop("format"), found.pop("version")) != (FORMAT, VERSION):
             raise ValueError("another program or version wrote it")
-        found.setdefault("spaces", [])  # of older versions
+        found.setdefault("spaces", [])  # files of older versions have none
         if set(found) != {field.name for field in dataclasses.fields(Manifest)}:
             raise ValueError("entries are missing")
         return _from_json(found)

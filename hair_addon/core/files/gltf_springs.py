@@ -14,10 +14,11 @@ NAME = "VRMC_springBone"
 
 @dataclass(frozen=True)
 class Springs:
-    """Chains that swing below the root bone of an armature, [[bone name from root to tip]], and spheres to avoid.
+    """Chains of bones that swing below the root bone of an armature, and spheres that the chains avoid.
 
-    centers (K, 3) in glTF's axes of the scene, Y upward, and radii (K,) [m]; hit_radius: of each joint [m]; stiffness:
-    force towards the rest shape; drag: 0 to 1, how much of the motion is lost in each step.
+    chains: [[bone name from root to tip]]; centers (K, 3), in the scene's axes in glTF, Y up, and radii (K,) of spheres
+    [m]; hit_radius: of each joint [m]; stiffness: force towards the rest shape; drag: fraction of the motion that is
+    lost in each step.
     """
 
     armature: str
@@ -31,9 +32,10 @@ class Springs:
 
 
 def add(path: Path, springs: list[Springs]) -> None:
-    """Add springs to a .glb file that Blender's exporter has written; armatures that it lacks are left out.
+    """Add springs to a .glb file that Blender's exporter has written.
 
-    A file that has them already, by the exporter's hooks, is left as it is.
+    Springs of armatures that the file lacks are left out. A file to which the exporter's hooks have already added
+    springs is unchanged.
     """
     described, chunks = _read(path)
     found = extension(described["nodes"], springs)
@@ -48,7 +50,7 @@ def add(path: Path, springs: list[Springs]) -> None:
 
 
 def _read(path):
-    """(the JSON of a file as a dictionary, its further chunks as bytes)."""
+    """Return (the JSON of a file as a dictionary, its further chunks as bytes)."""
     content = path.read_bytes()
     length, _kind = _CHUNK.unpack_from(content, _HEADER.size)
     start = _HEADER.size + _CHUNK.size
@@ -56,7 +58,7 @@ def _read(path):
 
 
 def extension(nodes: list[dict], springs: list[Springs]) -> dict:
-    """Return the extension for the nodes of a glTF file, empty if they have none of the armatures.
+    """Return the extension for the nodes of a glTF file, {} if none of the armatures is among the nodes.
 
     Missing values of nodes may be None.
     """
@@ -88,7 +90,7 @@ def extension(nodes: list[dict], springs: list[Springs]) -> dict:
 
 
 def _joint(springs):
-    # Without gravity: the rest shape of hair hangs already.
+    # Without gravity: the rest shape of hair already hangs.
     return {
         "hitRadius": springs.hit_radius,
         "stiffness": springs.stiffness,
@@ -107,7 +109,7 @@ def _below(nodes, root):
 
 
 def matrices(nodes: list[dict]) -> list[np.ndarray]:
-    """Return a matrix (4, 4) of each node of a glTF file to the scene."""
+    """Return the matrix (4, 4) from each node of a glTF file to the scene."""
     parents = {child: index for index, node in enumerate(nodes) for child in (node.get("children") or [])}
 
     def matrix(index):

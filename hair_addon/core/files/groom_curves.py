@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides and strands for export to other programs: their attributes, in parts, and the limits of importers."""
+"""Guides and strands for export to other programs: attributes, points in parts, and limits of importers."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ Rows = Callable[[slice], np.ndarray]
 class GroomCurves:
     """Attributes of guides or strands, without their points.
 
-    counts: (S,) int32 points of each curve; first_id: ID of the first curve, IDs are consecutive; widths: diameters
+    counts: (S,) int32 numbers of points; first_id: ID of the first curve, IDs are consecutive; widths: diameters
     (N,), in the unit of points; root_uvs: (S, 2), None without a UV map; guide_ids and guide_weights: (S, 3) from
     `closest_guides`, None for guides; colors: linear RGB (N, 3), and roughness (N,), None if not exported; look: of
     strands.
@@ -68,7 +68,7 @@ def slices(count: int) -> Iterator[slice]:
 
 
 def closest_guides(indices: np.ndarray, weights: np.ndarray, first_id: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return IDs (S, 3) int32 and weights (S, 3) float32 with sum 1 of each strand's guides with the largest weights.
+    """Return each strand's three guides of largest weight: IDs (S, 3) int32, and weights (S, 3) float32 with sum 1.
 
     indices and weights: (S, k) of guides, -1 for none; first_id: ID of guide 0. A strand with fewer than three guides
     repeats its first one with weight 0; a strand without guides has zero weights.
@@ -81,7 +81,7 @@ def closest_guides(indices: np.ndarray, weights: np.ndarray, first_id: int) -> t
 
 
 def _closest(indices, weights):
-    """`closest_guides` of some strands, as indices of guides."""
+    """Return `closest_guides` of some strands, with indices of guides instead of IDs."""
     kept_weights = np.where(indices >= 0, np.maximum(weights, 0.0), 0.0).astype(np.float64)
     order = np.argsort(-kept_weights, axis=1, kind="stable")[:, :GUIDE_SLOTS]
     ids, shares = np.zeros((len(indices), GUIDE_SLOTS), np.int32), np.zeros((len(indices), GUIDE_SLOTS))
@@ -136,7 +136,7 @@ class Check:
 
 
 def limit_notes(name: str, counts: np.ndarray) -> Iterator[HairError]:
-    """Yield warnings about Unreal's limits for a group's guides or strands; counts: (S,) points of each."""
+    """Yield warnings about Unreal's limits for a group's guides or strands; counts: (S,) numbers of points."""
     curve_count, point_count = len(counts), int(counts.sum(dtype=np.int64))
     most = int(counts.max(initial=0))
     if most > MOST_POINTS_OF_CURVE:
@@ -165,7 +165,7 @@ def limit_notes(name: str, counts: np.ndarray) -> Iterator[HairError]:
 def group_names(names: Sequence[str], reserved: Collection[str] = ()) -> list[str]:
     """Return unique names of groups of ASCII letters, digits and underscores, which all programs accept.
 
-    They also differ from all `guides_name`s. reserved: names that no group may have.
+    They also differ from the `guides_name` of every group. reserved: names that no group may have.
     """
     result, taken = [], set(reserved)
     for name in names:

@@ -10,7 +10,7 @@ from .settings_file import GroomSettings
 
 S = TypeVar("S", bound=Settings)
 
-# Settings that name an object or an image of the scene, by section, and those of styles.
+# Settings that name an object or an image of the scene: of each section, and of styles.
 _NAMES_OF_OTHERS = {"guides": ("density_image", "flow_lines"), "hair": ("density_image", "part_lines")}
 _NAMES_OF_OTHERS_IN_STYLES = ("mask_image", "cutter", "target")
 _OTHER_MAPS = ("IMAGE", "CURVES")  # kinds of maps with the name of an image, or of an attribute of strands
@@ -62,7 +62,7 @@ def masks_of(settings: GroomSettings) -> list[str]:
 
 
 def renamed(settings: GroomSettings, names: Mapping[str, str]) -> GroomSettings:
-    """Return `GroomSettings` with renamed masks; names: {old: new}, "" removes a mask, and the maps that it is of."""
+    """Return `GroomSettings` with renamed masks; names: {old: new}, "" removes a mask and its maps."""
     maps = (
         replace(one, source=names.get(one.source, one.source)) if one.kind in _MASK_MAPS else one
         for one in settings.maps

@@ -43,7 +43,7 @@ class GroomSettings:
     style_names: tuple[str, ...] = ()  # one for each style, "" for unnamed; empty if no style has a name
     dynamics: DynamicsSettings = field(default_factory=DynamicsSettings)
     maps: tuple[MapSettings, ...] = ()  # at most one for each setting; a list is converted to a tuple
-    thickness_curve: str = ""  # from root to tip, as `ramp_text`; empty: a line to the thickness of the tip
+    thickness_curve: str = ""  # from root to tip, in the format of `ramp_text`; empty: linear to the tip's thickness
 
     def __post_init__(self) -> None:
         for name, settings_class in SECTIONS.items():

@@ -79,7 +79,7 @@ def _write_set(folder, arrays, settings, version):
 
 
 def _settings_of_folder(folder, name):
-    """Return the settings in the header of a table; name: of one with the same channels in both modes."""
+    """Return the settings in the header of a table; name: of a table with the same channels in both modes."""
     image = _Image(Path(folder) / f"{name}.exr", table_axes.channels(name, "classic"))
     return _settings_from_header(image, name)
 
@@ -122,7 +122,7 @@ def _table_header(name, half, settings, version):
 
 
 def _digest(half, settings_text):
-    """Return a digest that detects damaged or edited texels and settings; OpenEXR may not report them."""
+    """Return a digest that detects damaged or edited texels and settings; OpenEXR may not report damage."""
     return hashlib.sha256(settings_text.encode() + np.ascontiguousarray(half, "<f2").tobytes()).hexdigest()
 
 
@@ -155,8 +155,8 @@ def _settings_from_header(image, name):
 
 
 def _encode(half, channels, header):
-    # If Blender links OpenEXR as a shared library, as Debian's does, its functions override those of the wheel, which
-    # has another version: compression would then print errors for every block, although the file is valid.
+    # If Blender links OpenEXR as a shared library, as Debian's does, this library's functions override the functions of
+    # the wheel, whose version differs: compression would print errors for every block, although the file is valid.
     attributes = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.NO_COMPRESSION, **header}
     planes = {name: np.ascontiguousarray(half[..., index]) for index, name in enumerate(channels)}
     stream = io.BytesIO()
@@ -185,7 +185,7 @@ class _Image:
         self.demand_size(None)
 
     def demand_size(self, size):
-        """Raise `HairError` unless (height, width) is `size`, or, if None, at most `MAX_SIZE`."""
+        """Raise `HairError` unless (height, width) is `size`, or at most `MAX_SIZE` if `size` is None."""
         (left, top), (right, bottom) = self.header["dataWindow"]
         height, width = int(bottom) - int(top) + 1, int(right) - int(left) + 1
         if max(height, width) > MAX_SIZE:

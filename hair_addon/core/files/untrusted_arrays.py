@@ -49,7 +49,7 @@ def header(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dty
 
 
 def array(archive: zipfile.ZipFile, name: str) -> np.ndarray:
-    """Return an array of an archive. Its declared size may not exceed its member's, which bounds the memory used."""
+    """Return an array of an archive. Raises ValueError if the declared size exceeds the size of the member."""
     shape, kind = header(archive, name)
     member = archive.getinfo(f"{name}.npy")
     if min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize > member.file_size:
@@ -59,7 +59,7 @@ def array(archive: zipfile.ZipFile, name: str) -> np.ndarray:
 
 
 def _cause(error):
-    """Return the error's text if it is meant for people, else a general one."""
+    """Return the error's text if it is meant for people, else a general text."""
     if isinstance(error, zipfile.BadZipFile | RuntimeError | NotImplementedError) or type(error) is ValueError:
         return " ".join(str(error).split())[:200].rstrip(".") or "it is damaged"
     return "it is damaged"

@@ -18,14 +18,14 @@ _PAUSES = (0.05, 0.2)  # [s] between attempts
 
 
 def read(path: Path, most: int) -> bytes:
-    """Return the bytes of a plain file, at most `most`. Raises `HairError` for anything else, and for links.
+    """Return the bytes of a plain file of at most `most` bytes. Raises `HairError` for other files and for links.
 
     Opening does not block on a pipe; a larger file is not read.
     """
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
 
     def opened():
-        if stat.S_ISLNK(os.lstat(path).st_mode):  # where the system has no O_NOFOLLOW
+        if stat.S_ISLNK(os.lstat(path).st_mode):  # for systems without O_NOFOLLOW
             raise OSError(errno.ELOOP, "it is a link")
         return open(path, "rb", buffering=0, opener=lambda path, _flags: os.open(path, flags))
 
@@ -45,7 +45,7 @@ def read(path: Path, most: int) -> bytes:
 
 
 def tried(action: Callable[[], T]) -> T:
-    """Run an action on a file and return its result; repeated up to twice while another program holds the file."""
+    """Return the result of an action on a file, repeated up to twice while another program holds the file."""
     for pause in _PAUSES:
         try:
             return action()
