@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from . import ogawa
 from .writer import TYPES, AlembicWriter, Object, Property, serialized
 
-# Number of values of a parameter: one, one for each curve, one for each point.
+# Number of values of a parameter: one in all, one for each curve, or one for each point.
 SCOPES = {"constant": "con", "uniform": "uni", "vertex": "vtx"}
 
 _CURVES = {"schema": "AbcGeom_Curve_v2", "schemaBaseType": "AbcGeom_GeomBase_v1"}
@@ -55,7 +55,7 @@ class CurvesWriter:
         self._archive, self._sampling = archive, sampling
 
     def add(self, name: str, counts: np.ndarray, widths: Parameter | None, parameters: Iterable[Parameter]) -> Curves:
-        """Write everything but the points of polylines; counts: (S,) points of each."""
+        """Write everything but the points of polylines; counts: (S,) numbers of points."""
         archive = self._archive
         properties = [
             archive.array("nVertices", "int32", counts),
@@ -111,7 +111,7 @@ class CurvesWriter:
 
 
 def _measured(parts, bounds) -> Iterator[ogawa.Data]:
-    """Yield points in parts as float32; bounds: (2, 3) float64, which are grown to include them."""
+    """Yield points in parts as float32; extends bounds, (2, 3) float64, to include the points."""
     for part in parts:
         points = np.ascontiguousarray(part, np.float32)
         if len(points):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Curves of [Alembic26] files as a `CurveFile`, with their transforms and the groom attributes of [UnrealGroom26].
 
-Alembic files have no unit and no up axis. Files of Vellus are in centimeters with Z up; for other programs their
-default convention is assumed.
+Alembic files have no unit and no up axis. Files of Vellus are in centimeters with Z up; files of another program
+are read with the default convention of the program.
 """
 
 from collections import Counter
@@ -104,7 +104,7 @@ def _nodes(top) -> list[_Node]:
 
 
 def _names(nodes):
-    """Return unique names: the transform's if the curves are its only child, else the curves'; paths for duplicates."""
+    """Return unique names: of the transform if the curves are its only child, else of the curves; paths if equal."""
     siblings = Counter(node.path[:-1] for node in nodes)
     own = [node.path[-2] if len(node.path) > 1 and siblings[node.path[:-1]] == 1 else node.path[-1] for node in nodes]
     counts = Counter(own)
@@ -156,7 +156,7 @@ def _sets_of(archive, node, name, application, notes) -> Iterator[CurveSet]:
 
 
 def _colors(parameters, drawn):
-    """Return linear RGB (N, 3) of the points of `Drawn`, from one for each, for each curve or for all; or None."""
+    """Return linear RGB (N, 3) at the points of `Drawn`, from colors of points, of curves or of all; None without."""
     colors, count = parameters.values("groom_color", "f", 3), len(drawn.kept)
     if colors is None:
         return None
@@ -198,7 +198,7 @@ class _Parameters:
 def _split_by_group(curves, parameters, kept) -> Iterator[CurveSet]:
     """Yield the curves with their parameters: one set for each group, separately for guides and strands.
 
-    kept: (C,) mask of these curves among those of the file, for which parameters have values.
+    kept: (C,) mask of the given curves among all curves of the object; parameters have values for all curves.
     """
     file_count = len(kept)
 

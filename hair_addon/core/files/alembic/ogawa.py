@@ -5,7 +5,7 @@ Children are written before their group, and large data in parts: memory is boun
 
     header   "Ogawa", 0xff when the file is complete, version 1 (16 bits, big-endian), position of the root group
     data     number of bytes, the bytes
-    group    number of children, the address of each: its position; the highest bit is set for data
+    group    number of children, their addresses: positions in the file, with the highest bit set for data
 
 All other numbers are little-endian and have 64 bits.
 """

@@ -72,7 +72,7 @@ class Property:
     """A property: the children of a compound, or samples, whose values `Archive.values` reads.
 
     kind: NumPy's type, None for strings; extent: numbers in an element; addresses: (n,) of the contents of samples that
-    differ from the previous one; times: of these [s].
+    differ from the previous one; times: of the samples [s].
     """
 
     name: str
@@ -193,7 +193,7 @@ class Archive:
                 self._size_of(address)
 
     def _property(self, headers, address, depth):
-        """Read a property and its children; headers: positioned at its header, which is consumed."""
+        """Return a property with its children; headers: at the header of the property, which is consumed."""
         bits = headers.number("I")
         width = "BHI"[min(bits >> 2 & 3, 2)]
         form, kind, extent = bits & 3, bits >> 4 & 0xF, bits >> 12 & 0xFF
@@ -252,7 +252,7 @@ class Archive:
             yield _metadata(rest.take(rest.number("B")))
 
     def _visit(self, address):
-        """Return a group that belongs to only one object or compound."""
+        """Return the addresses in a group. Raises `Damaged` if the group belongs to two objects or compounds."""
         if address and address in self._visited:
             raise Damaged
         self._visited.add(address)
@@ -275,7 +275,7 @@ class Archive:
         return self._bytes((address & ~_DATA) + 8, size) if size else b""
 
     def _size_of(self, address):
-        """Return the number of bytes of a content, which lies within the file."""
+        """Return the number of bytes of a content. Raises `Damaged` unless the content lies within the file."""
         if not address & _DATA:
             raise Damaged
         place = address & ~_DATA

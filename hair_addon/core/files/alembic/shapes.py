@@ -28,7 +28,7 @@ _POWERS = '"{name}" in {path} has {count} curves in the power basis, which is no
 class Drawn:
     """Points (M, 3) float64 of curves, counts (K,) of each, and diameters (M,) or None.
 
-    kept: (S,) mask of these curves among those of the file; lines: number of lines of each segment, None for curves
+    kept: (S,) mask of these curves among the object's curves; lines: number of lines of each segment, None for curves
     that keep their points; notes: [(sentence, count)], warnings for the user.
     """
 
@@ -44,8 +44,8 @@ class Drawn:
 class Shape:
     """Curves with the properties of AbcGeom's schema. Raises `Damaged`.
 
-    is_of_blender: whether Blender wrote them. Its Catmull-Rom splines pass through all of their points, and its Bézier
-    curves have no handles.
+    is_of_blender: whether Blender wrote the curves. Blender's Catmull-Rom splines pass through all of their points, and
+    Blender's Bézier curves have no handles.
     """
 
     def __init__(self, archive: Archive, properties: Mapping[str, Property], is_of_blender: bool) -> None:
@@ -91,7 +91,7 @@ class Shape:
         return Drawn(values[:, :3], new_counts, widths, kept, self._is_smooth, lines, notes)
 
     def points_at(self, archive: Archive, time: float, drawn: Drawn) -> np.ndarray:
-        """Return the points (M, 3) at a time; archive: the open one; drawn: of the first sample."""
+        """Return the points (M, 3) at a time [s]; archive: the open archive; drawn: the result of `drawn`."""
         points = _points(values_at(archive, self.points, time))
         if len(points) != len(self._first):
             raise Damaged
@@ -120,7 +120,7 @@ class Shape:
         return orders, knots, weights
 
     def _optional(self, name, kind, count):
-        """Return a property's values if it has this kind and count, else None."""
+        """Return a property's values if they have this kind and count, else None."""
         if name not in self._properties:
             return None
         values = parameter(self._archive, self._properties[name])
@@ -128,7 +128,7 @@ class Shape:
         return values if is_fitting else None
 
     def _are_valid(self):
-        """Return (S,) bool: which curves have enough points."""
+        """Return (S,) bool: whether each curve has enough points."""
         counts = self._counts
         if self._knots is not None:
             return counts >= self._orders
@@ -149,7 +149,7 @@ class Shape:
         return "periodic" if self._is_closed else "nonperiodic"
 
     def _set_trim(self):
-        """Drop the duplicated end points of Catmull-Rom splines, which Blender then draws through all points."""
+        """Drop the duplicated end points of Catmull-Rom splines: Blender itself counts end points twice."""
         self._trim = 0
         if self._kind != _CUBIC or self._basis != 3 or self._is_closed or self._knots is not None:
             return
@@ -190,7 +190,7 @@ class Shape:
         return made, made_counts, places, lines
 
     def _widths(self, notes):
-        """Return diameters: one for each point, each curve, all, or each end of a segment; None if there are none."""
+        """Return diameters: for each point, each curve, all curves or each end of a segment; None without widths."""
         counts, found = self._counts, None
         for place, name in (("", "width"), (".arbGeomParams", "groom_width")):
             properties = self._properties[place].children if place in self._properties else self._properties
@@ -210,7 +210,7 @@ class Shape:
 
 
 def parameter(archive: Archive, target: Property) -> Any:
-    """Return (n,) or (n, extent) values of a geometry parameter, indexed or not, or a list of str; first sample."""
+    """Return the first sample of a geometry parameter, indexed or not: (n,) or (n, extent) values, or a list of str."""
     if ".vals" not in target.children:
         return archive.values(target) if target.addresses else np.zeros(0)
     values = archive.values(target.children[".vals"])

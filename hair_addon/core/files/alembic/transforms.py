@@ -7,7 +7,7 @@ import numpy as np
 
 from .reader import Archive, Damaged, Property
 
-# Operation → number of its channels.
+# Operations, and the number of channels of each.
 _SCALE, _TRANSLATE, _ROTATE, _MATRIX, _ROTATE_X, _ROTATE_Y, _ROTATE_Z = range(7)
 _CHANNELS = {_SCALE: 3, _TRANSLATE: 3, _ROTATE: 4, _MATRIX: 16, _ROTATE_X: 1, _ROTATE_Y: 1, _ROTATE_Z: 1}
 _AXES = {_ROTATE_X: (1.0, 0.0, 0.0), _ROTATE_Y: (0.0, 1.0, 0.0), _ROTATE_Z: (0.0, 0.0, 1.0)}
@@ -49,7 +49,7 @@ def matrix_at(archive: Archive, stack: Sequence[Mapping[str, Property]], time: f
 
 
 def _product(codes, values):
-    """Return the matrix of operations: the last one is applied to points first."""
+    """Return the matrix of operations, of which the last one is applied to points first."""
     matrix, place = np.eye(4), 0
     for code in codes:
         size = _CHANNELS.get(code, 0)

@@ -35,7 +35,7 @@ class UnrealGroomWriter:
         self._added: list[tuple[Curves, CurvesWriter, Check]] = []
 
     def add(self, curves: GroomCurves, moves: bool = False) -> int:
-        """Write the attributes of curves; returns their number. moves: whether points are written for each time."""
+        """Write the attributes of curves; returns their number for `write_points`. moves: whether they are animated."""
         writer = self._moving if moves else self._still
         width = Parameter("width", "float32", "vertex", _of_points(curves, curves.widths))
         self._added.append((writer.add(curves.name, curves.counts, width, _parameters(curves)), writer, Check(curves)))

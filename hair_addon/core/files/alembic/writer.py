@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Writer of [Alembic26] archives in Ogawa: objects with properties, some of which have a sample for each time.
 
-An archive is written bottom-up: samples, then their properties, the compounds of these, the objects, and finally the
-archive.
+An archive is written bottom-up: samples, then their properties, the compounds of properties, the objects, and finally
+the archive.
 
     archive   version of this layout, version of the library, root object, metadata, time samplings, table of metadata
     object    its properties (a compound), its child objects, their headers and two digests
@@ -196,9 +196,9 @@ class AlembicWriter:
 def _property_header(header, index):
     """Return the bytes of a property's header.
 
-    Bits 0 and 1: 0 compound, 1 scalar, 2 array, 3 array with one element in each sample; 2 and 3: bytes of the numbers
-    below, 1, 2 or 4; 4 to 7: type; 8: has its own time sampling; 10: same number of elements in every sample; 11: one
-    sample only; 12 to 19: extent; 20 to 27: index of the metadata in the table.
+    Bits 0 and 1: 0 compound, 1 scalar, 2 array, 3 array with one element in each sample; 2 and 3: size of the numbers
+    that follow, 0 for 1 byte, 1 for 2, 2 for 4; 4 to 7: type; 8: own time sampling; 10: equal numbers of elements in
+    all samples; 11: one sample only; 12 to 19: extent; 20 to 27: index of the metadata in the table.
     """
     name, metadata, count = header.name.encode(), header.metadata.encode(), len(header.sizes)
     largest = max(len(name), len(metadata), count, header.sampling)
