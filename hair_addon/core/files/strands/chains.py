@@ -9,8 +9,8 @@ from .contents import Damaged
 def polylines(edges: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return (indices (N,), counts (C,)) of the polylines that edges (E, 2) form.
 
-    Edges in the order of their polylines keep it. Otherwise a polyline begins at its end with the smaller index, and
-    a loop repeats its first point. Raises `Damaged` for indices that are no vertices, and where edges branch.
+    Edges that are sorted along their polylines keep their order. Otherwise a polyline begins at its end with the
+    smaller index, and a loop repeats its first point. Raises `Damaged` for invalid indices and for branching edges.
     """
     edges = edges.astype(np.int64)
     if len(edges) and (edges.min() < 0 or edges.max() >= vertex_count):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bytes of untrusted files of strands, and the one sentence for damaged ones.
+"""Bytes of untrusted files of strands, and the error for damaged files.
 
 Readers compare each count with the bytes that are left before they allocate memory for it.
 """
@@ -19,7 +19,7 @@ class Damaged(Exception):
 
 @contextmanager
 def bytes_of(path: Path) -> Iterator[bytes]:
-    """Give the bytes of a file. `Damaged` within the context, and errors of the disk, raise `HairError`."""
+    """Yield the bytes of a file. `Damaged` within the context, and errors of the disk, raise `HairError`."""
     try:
         with open(path, "rb") as file:
             data = file.read()

@@ -6,7 +6,7 @@
         .bin    float32 x, y, z, direction (3), label (1)
 
 Little-endian, from root to tip, without widths. No source states the units and axes: HairSalon's head is in meters with
-Y up, CT2Hair's scans are in millimeters with Z up. A .bin of x, y, z alone, as some programs write, is read too.
+Y up, CT2Hair's scans are in millimeters with Z up. A .bin file of x, y, z alone, as some programs write, is read too.
 """
 
 from pathlib import Path
@@ -40,7 +40,7 @@ def read_bin(path: Path) -> CurveFile:
 
 
 def _whole(data, width):
-    """Return points and counts as `_parsed`; None unless the strands end with the file."""
+    """Return points and counts like `_parsed`; None unless the strands end with the file."""
     try:
         values, counts, end = _parsed(data, width)
     except Damaged:

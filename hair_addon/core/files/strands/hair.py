@@ -5,14 +5,14 @@
     4    uint32    strands S
     8    uint32    points N
     12   uint32    arrays of the file, in this order: 1 segments, 2 points, 4 thickness, 8 transparency, 16 colors
-    16   uint32    segments of each strand, without that array
-    20   float32   thickness, without that array
+    16   uint32    segments of each strand, if segments are missing
+    20   float32   thickness, if thickness is missing
     24   float32   transparency; 28: color, 3 float32; 40: text, 88 bytes
 
     segments (S,) uint16; points (N, 3) float32, from root to tip; thickness (N,); transparency (N,); colors (N, 3)
 
 The specification does not define thickness further: it is read and written as a diameter. A default thickness of 1 is
-that of the format's library for files without thickness, and ignored. It states no unit and no axis.
+ignored: the format's library writes it to files without thickness. The specification states no unit and no axis.
 """
 
 import struct

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lines of Wavefront OBJ files [Wavefront95] as strands: v x y z, and l with the numbers of a line's points.
 
-A number may have a texture vertex, 7/3, and be negative, counted from the last point. Lines of two points that share
-ends, as Blender writes edges, are joined. o and g begin objects. Faces and free-form curves are left out. The format
-states no unit and no axis; programs write Y up by default.
+A number may be followed by a texture vertex, as in 7/3; negative numbers are counted back from the last point. Lines of
+two points that share ends, as Blender writes edges, are joined. o and g begin objects. Faces and free-form curves are
+left out. The format states no unit and no axis; programs write Y up by default.
 """
 
 from pathlib import Path

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands in PLY files: vertices, with an element that divides them into strands. No standard defines strands.
 
-    element vertex    x, y, z; radius, or thickness, width or diameter, which are diameters
+    element vertex    x, y, z; radius; or thickness, width or diameter, all of which are diameters
     element strand    nsegs: segments of the strand with the next vertices, as hairutil [Takayama23] writes; or count:
                       its points; or a list of vertices. Vellus adds id, group, guide (1 for guides), u and v of the
                       root, guide_id_0 to 2 and guide_weight_0 to 2
     element polyline, line, curve, hair, strip: with a list of vertices
     element edge      vertex1, vertex2: edges that form lines
 
-A file of points without any of these has no strands. The format states no unit and no axis.
+A file of vertices without any of the other elements has no strands. The format states no unit and no axis.
 """
 
 from pathlib import Path
@@ -22,7 +22,7 @@ from . import chains, contents, ply_table
 from .contents import Damaged
 
 OURS = "Vellus: meters, Z up, thickness is the diameter"
-GROUP = "Vellus group"  # begins a comment with the number and the name of a group
+GROUP = "Vellus group"  # start of a comment, before the number and the name of a group
 
 _USUAL = Convention(1.0, "Z")
 _RADII = ("radius", "radii")
@@ -88,7 +88,7 @@ def _strands(elements, vertex_count):
 
 
 def _whole(values):
-    """Return numbers as int64; -1 for those that are not."""
+    """Return integral numbers as int64, others as -1."""
     values = np.asarray(values, np.float64)
     return np.where((values >= 0.0) & (values < 2.0**31), values, -1.0).astype(np.int64)
 

@@ -9,7 +9,7 @@
     32   128 bytes reserved
 
 The fourth number of a position is 0 where a point is fixed. Thickness is a factor of the renderer's fiber radius, which
-the file does not have, so no widths are read. No source states unit and axis: Maya's exporter writes its own,
+the file does not state, so no widths are read. No source states unit and axis: the exporter from Maya writes Maya's,
 centimeters with Y up.
 """
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Grooms → files of strands: HAIR, HairSalon's .data, PLY and .npz, of one frame, in meters.
 
-All are in the axes of Blender, Z up, except .data, which has Y up as HairSalon's own. HAIR and .data have no guides,
-groups or attributes: they get the strands, or the guides of a file of guides alone.
+All are in the axes of Blender, Z up, except .data, which has Y up like HairSalon's files. HAIR and .data have no
+guides, groups or attributes: the strands are written, or the guides if there are no strands.
 """
 
 from collections.abc import Callable, Iterator
@@ -32,12 +32,12 @@ class StrandsWriter:
         self._points: dict[int, np.ndarray] = {}
 
     def add(self, curves: GroomCurves, _moves: bool = False) -> int:
-        """Add curves; returns their number."""
+        """Add curves; returns their number for `write_points`."""
         self._added.append((curves, Check(curves)))
         return len(self._added) - 1
 
     def write_points(self, number: int, points: Rows) -> None:
-        """Keep the points (N, 3) [m] of curves. Raises `HairError` for non-finite coordinates."""
+        """Store the points (N, 3) [m] of curves. Raises `HairError` for non-finite coordinates."""
         self._points[number] = np.concatenate([*self._added[number][1].parts(points)])
 
     def notes(self) -> list[HairError]:
@@ -57,7 +57,7 @@ class StrandsWriter:
 def writing(path: Path, ending: str) -> Iterator[StrandsWriter]:
     """Write a groom to a path; the file is complete after the context. Raises OSError, and `HairError`.
 
-    ending: of `export_settings.OF_STRANDS`.
+    ending: from `export_settings.OF_STRANDS`.
     """
     write, has_kinds = _WRITERS[ending]
     writer = StrandsWriter(has_kinds)
@@ -80,7 +80,7 @@ def _joined(written):
 
 
 def _colors(written):
-    """Return (N, 3) linear RGB of all points; None unless all curves have colors."""
+    """Return linear RGB (N, 3) of all points; None unless all curves have colors."""
     if any(curves.colors is None for curves, _points in written):
         return None
     return np.concatenate([_all(curves.colors, curves) for curves, _points in written]).astype(np.float32)
@@ -235,7 +235,7 @@ def _arrays(some):
     return arrays
 
 
-# Extension → (function of a path and curves with points, whether guides are told from strands).
+# Extension → (function of a path and curves with points, whether the format separates guides from strands).
 _WRITERS = {
     ".hair": (_write_hair, False),
     ".data": (_write_data, False),
