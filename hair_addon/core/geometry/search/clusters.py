@@ -17,7 +17,7 @@ def strand_features(points: np.ndarray) -> np.ndarray:
 
 
 def clusters(features: np.ndarray, count: int, progress: Progress = no_progress) -> np.ndarray:
-    """Return labels (N,) int32 in [0, count) of features (N, D), all in use. Deterministic. Raises `HairError`."""
+    """Return labels (N,) int32 in [0, count) of features (N, D), each used. Deterministic. Raises `HairError`."""
     if not 1 <= count <= len(features):
         raise HairError("{rows} strands cannot form {count} clumps.", rows=len(features), count=count)
     # Far from the origin, squared coordinates would cancel the distances between rows.
@@ -83,7 +83,7 @@ def _nearest(features, centres, progress):
 
 
 def _without_empty(labels, squares, count):
-    """Fill empty clusters with the rows farthest from their centers, taken from clusters of several rows."""
+    """Return labels without empty clusters, which get the rows farthest from centers, from clusters of several rows."""
     sizes = np.bincount(labels, minlength=count)
     missing = list(np.flatnonzero(sizes == 0))
     for row in np.argsort(-squares, kind="stable"):

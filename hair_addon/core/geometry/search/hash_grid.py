@@ -21,13 +21,13 @@ GRID_SIZE = 32  # cells along each axis; distant cells wrap around and share a b
 CELLS_PER_RADIUS = 2.0  # cell width / first search radius: visiting fewer cells is faster than comparing fewer points
 CELL_WIDTH = 0.8  # width of the cells that sort the queries / first search radius
 CELLS_ALONG = 1024  # maximum number of these cells along each axis
-CANDIDATE_LIMIT = 128  # candidate points of the queries of one cell
+CANDIDATE_LIMIT = 128  # maximum number of candidate points for the queries of one cell
 candidate_indices = wp.types.vector(length=CANDIDATE_LIMIT, dtype=int)
 candidate_values = wp.types.vector(length=CANDIDATE_LIMIT, dtype=float)
 LIMIT = 64  # maximum number of neighbors of a query
 key_list = wp.types.vector(length=LIMIT, dtype=wp.uint64)
 NO_KEY = wp.constant(wp.uint64(2**64 - 1))
-QUERIES_AT_ONCE = 8  # of a cell, in vector registers
+QUERIES_AT_ONCE = 8  # queries of a cell in one pass, in vector registers
 SLOTS_AT_ONCE = 9
 SHORT = -2  # replaces the nearest point's index if too few points were found: the query needs a wider search
 WIDENINGS = 3  # doublings of the search radius before a brute-force search
@@ -241,11 +241,11 @@ def _by_queries(
 def neighbours(
     points: wp.array[wp.vec3], queries: wp.array[wp.vec3], distance: float, limit: int
 ) -> tuple[wp.array2d[int], wp.array2d[float]]:
-    """Find the nearest points within a distance of each query: at most `limit`, at least one.
+    """Return the nearest points within a distance of each query: at most `limit`, at least one.
 
-    points (N,) and queries (Q,) are vec3 arrays [m] on one device, N > 0; distance [m]. Returns indices (Q, limit)
-    int32 and distances (Q, limit) float32 [m] on the device; rows are sorted by distance and then by index, unused
-    slots are -1 and infinity. A query without a point in range gets the nearest one. Raises `HairError`.
+    points (N,) and queries (Q,) are vec3 arrays [m] on one device, N > 0; distance [m]. The result is indices (Q,
+    limit) int32 and distances (Q, limit) float32 [m] on the device; rows are sorted by distance and then by index, and
+    unused slots are -1 and infinity. A query without a point in range gets the nearest one. Raises `HairError`.
     """
     if not (math.isfinite(distance) and distance > 0.0):  # also refuses NaN, which wp.HashGrid does not
         raise HairError(f"The search distance must be positive and finite, not {distance:g} m.")
@@ -258,7 +258,7 @@ def neighbours(
     distances = wp.empty((len(queries), limit), dtype=float, device=device)
     if len(queries) == 0:
         return indices, distances
-    # Non-finite coordinates would be written outside the grid's memory.
+    # The grid would write non-finite coordinates outside of its memory.
     if not (np.isfinite(points.numpy()).all() and (device.is_cuda or np.isfinite(queries.numpy()).all())):
         raise HairError("Some guides or strands have roots with non-finite coordinates: repair the surface.")
     first_radius = _first_radius(points.numpy(), distance, limit)
@@ -342,7 +342,7 @@ def _sorted_by_cell(points, queries, width):
 
 
 def _first_radius(points, distance, limit):
-    """Return the first search radius [m]: the distance, unless it typically contains far too many points, or none."""
+    """Return the first search radius [m]: the distance, unless it typically contains far too many or no points."""
     extent = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
     # Mean spacing of points on a surface; a single point gets wide cells, which are few.
     spacing = extent / math.sqrt(len(points)) if extent else distance

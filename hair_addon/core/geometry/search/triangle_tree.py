@@ -10,10 +10,9 @@ LEAF_TRIANGLES = 4
 
 
 def build(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (boxes (2 L, 2, 3) float32, triangles (L, LEAF_TRIANGLES) int32 of each leaf) of triangles (F, 3, 3), F
-    > 0.
+    """Return (boxes (2 L, 2, 3) float32, triangles (L, LEAF_TRIANGLES) int32 of each leaf) of triangles (F, 3, 3).
 
-    L is a power of two; the last leaves are filled up with a triangle that is in one already. boxes[n]: least and
+    F > 0; L is a power of two; the list of triangles is filled up with repetitions of the last one. boxes[n]: least and
     greatest coordinates of node n.
     """
     corners = np.asarray(corners, np.float32)
@@ -21,7 +20,7 @@ def build(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     order = np.minimum(np.arange(leaf_count * LEAF_TRIANGLES), len(corners) - 1)
     middles = corners.mean(axis=1)
     node_count = 1
-    while node_count < leaf_count:  # half of each node's triangles are in each of its halves, by the longest side
+    while node_count < leaf_count:  # each node is halved at its median triangle, along its longest side
         places = middles[order].reshape(node_count, -1, 3)
         along = np.ptp(places, axis=1).argmax(axis=1)
         places = np.take_along_axis(places, along[:, None, None], axis=2)[..., 0]
