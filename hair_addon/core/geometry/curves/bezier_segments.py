@@ -11,8 +11,8 @@ import numpy as np
 
 from .. import strands
 
-# Accuracy of polylines: for a strand of 20 cm 40 µm, half a hair's thickness. The relative error of the length is at
-# most the angle squared / 24, 0.1 %.
+# Accuracy of polylines: 40 µm for a strand of 20 cm, half a hair's thickness. The relative error of the length is at
+# most the angle squared / 24, or 0.1 %.
 SAGITTA = 2e-4  # largest distance from the curve, as a fraction of its length
 TURN = 0.15  # largest angle between neighboring lines [rad]
 
@@ -34,7 +34,7 @@ class Segments:
 
     controls: (K, p + 1, D) float64; weights: (K, p + 1), positive, None for polynomials; counts: (S,) segments of each
     curve; places: (K, 2) indices, with fractions, of a segment's start and end among attribute values that are linear
-    between the ends of segments; a curve of n segments has n + 1 of these.
+    between the ends of segments; a curve of n segments has n + 1 of these values.
     """
 
     controls: np.ndarray
@@ -79,7 +79,7 @@ def segment_counts(counts: np.ndarray, basis: str, wrap: str) -> np.ndarray:
 
 
 def is_cubic(counts: np.ndarray, basis: str, wrap: str) -> np.ndarray:
-    """Return (S,) bool: which counts of points are valid for cubic curves, with segments and no unused points."""
+    """Return (S,) bool: whether counts (S,) of points are valid for cubic curves, with segments and no unused points."""
     counts = np.asarray(counts)
     if wrap == "periodic":
         return (counts >= 3) & (counts % STEPS[basis] == 0)
@@ -203,7 +203,7 @@ def _places(segments, own, along):
 
 
 def polylines(segments: Segments, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Evaluate segments to polylines: (values (M, D), counts (S,), places (M,)); places: see `Segments`.
+    """Return segments as polylines: (values (M, D), counts (S,), places (M,)); places: see `Segments`.
 
     All points are on the curves, including their end points. lines: (K,) number of lines of each segment, as from
     `line_counts`.
@@ -238,9 +238,9 @@ def polylines(segments: Segments, lines: np.ndarray) -> tuple[np.ndarray, np.nda
 def smooth_lines(
     values: np.ndarray, counts: np.ndarray, is_smooth: np.ndarray, lines: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Evaluate the Catmull-Rom splines among curves to polylines: (values (M, D), counts (S,), lines (K,)).
+    """Return curves with their Catmull-Rom splines as polylines: (values (M, D), counts (S,), lines (K,)).
 
-    values: (N, D), counts: (S,) rows of each curve; is_smooth: (S,) bool, the splines, whose end points count twice as
+    values: (N, D), counts: (S,) rows of each curve; is_smooth: (S,) bool, for splines, whose end points count twice as
     in Blender; lines: number of lines of each segment of the splines, None for `line_counts`.
     """
     values, counts = np.asarray(values), np.asarray(counts, np.int64)

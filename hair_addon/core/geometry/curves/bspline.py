@@ -31,7 +31,7 @@ def greville_abscissae(control_count: int, degree: int = 3) -> np.ndarray:
 
 
 def basis(parameters: np.ndarray, control_count: int, degree: int = 3) -> np.ndarray:
-    """N_{i,p}(t): (T,) parameters in [0, 1] → (T, control_count) float64, by the recursion of Cox and de Boor."""
+    """Return N_{i,p}(t), (T, control_count) float64, at t (T,) in [0, 1], by the recursion of Cox and de Boor."""
     knots = clamped_knots(control_count, degree)
     t = np.asarray(parameters, dtype=np.float64)[:, None]
     values = ((knots[:-1] <= t) & (t < knots[1:])).astype(np.float64)  # Eq. 2
@@ -47,7 +47,7 @@ def basis(parameters: np.ndarray, control_count: int, degree: int = 3) -> np.nda
 def evaluate_recursive(
     controls: np.ndarray, parameters: np.ndarray, degree: int = 3, weights: np.ndarray | None = None
 ) -> np.ndarray:
-    """Evaluate controls (C, n, 3) [m] at parameters (T,) in [0, 1] → (C, T, 3) float64 [m].  Eq. 1 as corrected.
+    """Return points (C, T, 3) float64 [m] of controls (C, n, 3) [m] at parameters (T,) in [0, 1].  Eq. 1 as corrected.
 
     weights: (n,) or (C, n), positive, for rational curves (NURBS); None for polynomial ones.
     """
@@ -60,10 +60,10 @@ def evaluate_recursive(
 
 
 def subdivide(controls: np.ndarray, levels: int) -> np.ndarray:
-    """Subdivide controls (C, n, 3) [m] → (C, (n - 1) 2^levels + 1, 3) float64 [m]; each level adds midpoints.
+    """Return controls (C, n, 3) [m] subdivided to (C, (n - 1) 2^levels + 1, 3) float64 [m]; levels add midpoints.
 
     The limit curve is the *uniform* cubic B-spline with a mirrored phantom control at each end, which differs from the
-    clamped curve of `evaluate_recursive`. The points reach it only in the limit.
+    clamped curve of `evaluate_recursive`. The points converge to the limit curve.
     """
     points = np.asarray(controls, dtype=np.float64)
     for _ in range(levels):
@@ -86,7 +86,7 @@ def basis_matrix(control_count: int, point_count: int, degree: int = 3) -> np.nd
 def evaluate(
     controls: np.ndarray, point_count: int, device: wp.DeviceLike = "cpu", degree: int = 3
 ) -> wp.array2d[wp.vec3]:
-    """Evaluate controls (C, n, 3) float32 [m] → points (C, point_count) vec3 [m] on the device, by the constant matrix.
+    """Return points (C, point_count) vec3 [m] of controls (C, n, 3) float32 [m], on the device, by the constant matrix.
 
     BLAS is not used, because its rounding depends on the processor.
     """

@@ -79,11 +79,11 @@ def _resample(
 def resample(
     points: np.ndarray, starts: np.ndarray, point_count: int, is_smooth: np.ndarray | None = None
 ) -> np.ndarray:
-    """Resample ragged curves → (S, point_count, 3) float32, equally spaced along each, with the same ends.
+    """Return (S, point_count, 3) float32: ragged curves, resampled at equal spacing, with the same ends.
 
-    points: (N, 3), concatenated; starts: (S+1,) of each curve, the last entry is N; is_smooth: (S,) bool, which are
-    Catmull-Rom splines, None if all are polylines. A curve of one point repeats it. Raises `HairError` for curves
-    without points or with non-finite points.
+    points: (N, 3), concatenated; starts: (S+1,) of each curve, the last entry is N; is_smooth: (S,) bool, for
+    Catmull-Rom splines, None if all curves are polylines. A curve of one point repeats the point. Raises `HairError`
+    for curves without points or with non-finite points.
     """
     starts = np.asarray(starts, np.int64)
     counts = np.diff(starts)
