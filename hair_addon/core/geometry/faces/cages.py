@@ -11,9 +11,9 @@ from ..mesh import Faces
 
 
 def cage_vertices(faces: Faces, corner_count: int) -> np.ndarray:
-    """Return the vertices (N,) int32 at a cage's corners, concatenated over faces; those of `faces` if not subdivided.
+    """Return the vertices (N,) int32 at the corners of a cage, concatenated over faces.
 
-    corner_count: of the cage, 0 without subdivision.
+    corner_count: of the cage, 0 without subdivision. Without subdivision the corner vertices of `faces` are returned.
     """
     vertices = faces.corner_vertices
     if corner_count:
@@ -44,7 +44,7 @@ def cage_starts(faces: Faces, corner_count: int) -> np.ndarray | None:
 
 
 def cage_faces(faces: Faces, corner_count: int, own: Faces | None = None) -> tuple[Faces, np.ndarray] | None:
-    """Return (`Faces` of a cage, (F,) int: one subdivided face of each of them); None if unknown.
+    """Return (`Faces` of a cage, (F,) int: a subdivided face in each face of the cage); None if unknown.
 
     corner_count: see `cage_vertices`; own: the cage's `Faces`, if their corners match.
     """

@@ -14,7 +14,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 def connected_components(mesh: TriMesh) -> np.ndarray:
     """Return the component (F,) int32 of each triangle; vertices at the same position count as one."""
     found = joined(mesh.checked_triangles, len(mesh.vertices))
-    if found.any():  # several: seams with unmerged vertices do not separate a surface
+    if found.any():  # several components: vertices are merged, because seams do not separate a surface
         _, welded = np.unique(mesh.vertices, axis=0, return_inverse=True)
         found = joined(welded.reshape(-1)[mesh.triangles], len(mesh.vertices))
     _, numbers = np.unique(found, return_inverse=True)

@@ -80,17 +80,17 @@ def polygons_with(faces: Faces, vertex_count: int, vertices: np.ndarray) -> np.n
 
 
 def matching_vertices(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Match vertices (V, 3) before an edit to vertices (W, 3) after it: (V,) int32 indices, -1 for none.
+    """Return indices (V,) int32 of vertices (W, 3) after an edit that match vertices (V, 3) before it, -1 for none.
 
     Vertices are matched by position. Moved vertices are matched by index, because edits keep the order: between two
-    matched vertices there must be as many as before.
+    matched vertices there must be as many vertices as before.
     """
     found = _same_places(before, after)
     known = np.append(-1, np.flatnonzero(found >= 0))  # with a sentinel before the first vertex
     there = np.append(-1, found[known[1:]])
     is_taken = np.zeros(len(after) + 1, np.int64)
     is_taken[there[1:] + 1] = 1
-    taken = np.cumsum(is_taken)  # up to each vertex
+    taken = np.cumsum(is_taken)  # number of matched vertices up to each vertex
     gaps = np.diff(known) - 1
     is_kept = (gaps > 0) & (np.diff(known) == np.diff(there))
     is_kept[is_kept] = taken[there[1:][is_kept]] == taken[there[:-1][is_kept] + 1]
@@ -101,7 +101,7 @@ def matching_vertices(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 
 def _same_places(before, after):
-    """Match vertices with bit-identical positions: (V,) int32; several at one position are matched in order."""
+    """Return `matching_vertices` by bit-identical positions; several vertices at one position are matched in order."""
     rows = np.ascontiguousarray(np.concatenate([before, after]), np.float32) + np.float32(0.0)  # no -0.0
     _places, which = np.unique(rows.view("V12").ravel(), return_inverse=True)
     which, count = which.ravel(), len(before)
@@ -118,7 +118,7 @@ def _same_places(before, after):
 
 
 def corners_of(faces: Faces, polygons: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Return the corner (N, K) int32 of its polygon (N,) at which each vertex (N, K) is, -1 for none."""
+    """Return the corner (N, K) int32 of each vertex (N, K) in its polygon (N,), -1 if the vertex is at no corner."""
     sizes, starts = np.diff(faces.starts)[polygons], faces.starts[polygons]
     found = np.full(vertices.shape, -1, np.int32)
     for corner in range(int(sizes.max(initial=0)) - 1, -1, -1):
@@ -129,7 +129,7 @@ def corners_of(faces: Faces, polygons: np.ndarray, vertices: np.ndarray) -> np.n
 
 
 def _flat_quads(vertices, faces, polygons):
-    """Return corners (N, 4, 3) float64 of the quads among polygons (N,), projected to a plane along both diagonals.
+    """Return corners (N, 4, 3) float64 of the quads among polygons (N,), projected to a plane along the diagonals.
 
     Quads that are not convex in the plane keep their positions.
     """

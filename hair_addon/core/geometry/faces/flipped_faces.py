@@ -19,8 +19,8 @@ _SIDES = np.array([(0, 1), (1, 2), (2, 3), (3, 0)])
 class FlippedFaces:
     """The permutation of corners and vertices by a flip, which is its own inverse.
 
-    corners: (C,) int, the present corner of each original one; vertices: (V,) int32, the present number of each
-    original vertex; None if all are unchanged.
+    corners: (C,) int, the present corner of each original corner; vertices: (V,) int32, the present number of each
+    original vertex, None if all numbers are unchanged.
     """
 
     corners: np.ndarray
@@ -67,7 +67,7 @@ def turned_cage(faces: Faces, corner_count: int) -> FlippedFaces | None:
 
 
 def _image(quads, cage_size):
-    """Map a face's quads (Q, 4) to its mirror image: ((4 Q,) int corners of the image, (4 Q,) bool: inside the face).
+    """Return the mirror image of a face's quads (Q, 4): ((4 Q,) int corners of the image, (4 Q,) bool: in the face).
 
     The image has the same first corner and the opposite winding; None if there is no such image.
     """
@@ -100,7 +100,7 @@ def _image(quads, cage_size):
 
 
 def _steps_from(origins, links, count):
-    """Return distances (V, N) int in links (L, 2) from N origins to each of V vertices; count if unreachable."""
+    """Return distances (V, N) int, in links (L, 2), from N origins to each of V vertices; `count` if unreachable."""
     steps = np.full((count, len(origins)), count)
     steps[origins, np.arange(len(origins))] = 0
     while True:

@@ -21,7 +21,7 @@ class Texture:
         return Texture(self.values, np.ascontiguousarray(self.corner_uvs[:, [0, 2, 1]]))
 
     def at(self, points: SurfacePoints) -> np.ndarray:
-        """Sample the image at `SurfacePoints` → (N,) float64, bilinear between pixel centers, with repetition."""
+        """Return image values (N,) float64 at `SurfacePoints`, bilinear between pixel centers, with repetition."""
         uvs = np.einsum("nc,ncu->nu", points.barycentric, self.corner_uvs[points.triangle].astype(np.float64))
         height, width = self.values.shape
         x, y = uvs[:, 0] * width - 0.5, uvs[:, 1] * height - 0.5
