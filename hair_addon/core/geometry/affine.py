@@ -92,14 +92,14 @@ class Affine:
         return abs(self.scale - 1.0) <= _ROUNDING
 
     def points(self, points: np.ndarray) -> np.ndarray:
-        """Transform points (..., 3), float32; bit-identical for the identity."""
+        """Return transformed points (..., 3) float32; bit-identical for the identity."""
         if self.is_identity:
             return np.asarray(points, np.float32)
         with np.errstate(invalid="ignore", over="ignore"):
             return (np.asarray(points, np.float64) @ self.axes.T + self.matrix[:3, 3]).astype(np.float32)
 
     def widths(self, widths: np.ndarray) -> np.ndarray:
-        """Scale widths, radii or lengths, float32; bit-identical if `preserves_widths`."""
+        """Return scaled widths, radii or lengths, float32; bit-identical if `preserves_widths`."""
         if self.preserves_widths:
             return np.asarray(widths, np.float32)
         with np.errstate(invalid="ignore", over="ignore"):

@@ -14,7 +14,7 @@ from .mesh import SurfacePoints, TriMesh
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
-FARTHEST = 1.0e15  # [m]: the square does not overflow
+FARTHEST = 1.0e15  # [m]: the square of this distance does not overflow
 
 
 class SurfaceQuery:

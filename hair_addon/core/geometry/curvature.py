@@ -39,7 +39,7 @@ def mean_curvature(mesh: TriMesh) -> np.ndarray:
         integrals += np.bincount(vertices, weights=bends, minlength=vertex_count)
     for vertices in corners.T:
         areas += np.bincount(vertices, weights=mesh.areas[triangles] / 3.0, minlength=vertex_count)
-    # Summed over neighbors too: the value at a single vertex depends on the shapes of its triangles.
+    # Sums include the neighbors, because the value at a single vertex depends on the shapes of its triangles.
     integrals, areas = (_over_neighbours(sums, corners) for sums in (integrals, areas))
     return np.abs(integrals) / np.where(areas > 0.0, areas, 1.0)
 

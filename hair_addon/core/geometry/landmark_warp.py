@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import HairError
 
-# Least extent of landmarks along a direction for it to enter the affine map, or the rotation; relative to the largest.
+# Least extent of landmarks, relative to the largest, in a direction that enters the affine map, or the rotation.
 _DEEP, _WIDE = 0.1, 1e-3
 
 
@@ -43,7 +43,7 @@ class Warp:
 
 
 def through_landmarks(sources: ArrayLike, targets: ArrayLike) -> Warp:
-    """Return the `Warp` that maps landmarks (L, 3) [m] to others. Raises `HairError`.
+    """Return the `Warp` that maps landmarks `sources` (L, 3) [m] to `targets` (L, 3) [m]. Raises `HairError`.
 
     At least three landmarks that are not collinear are required. The spline reproduces any affine map if there are more
     than three and they are not nearly coplanar, else only similarities.
@@ -72,7 +72,7 @@ def through_landmarks(sources: ArrayLike, targets: ArrayLike) -> Warp:
 
 
 def similarity(sources: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the best similarity from points (L, 3) to others [Umeyama91]: scaled rotation (3, 3), offset (3,) [m]."""
+    """Return the best similarity of sources (L, 3) to targets [Umeyama91]: scaled rotation (3, 3), offset (3,) [m]."""
     middle, other_middle = sources.mean(axis=0), targets.mean(axis=0)
     left, values, right = np.linalg.svd((targets - other_middle).T @ (sources - middle))
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])
@@ -82,7 +82,7 @@ def similarity(sources: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np
 
 
 def between_boxes(sources: np.ndarray, targets: np.ndarray) -> Warp:
-    """Return the axis-aligned affine `Warp` between the bounding boxes of vertices (V, 3) [m] and of others."""
+    """Return the axis-aligned affine `Warp` from the bounding box of vertices (V, 3) [m] to the box of `targets`."""
     low, high = sources.min(axis=0).astype(np.float64), sources.max(axis=0).astype(np.float64)
     other_low, other_high = targets.min(axis=0).astype(np.float64), targets.max(axis=0).astype(np.float64)
     sides, other_sides = high - low, other_high - other_low

@@ -11,7 +11,7 @@ from ..errors import HairError
 from ..kernels.checks import require_count, require_indices
 from ..params import array_of
 
-# Halvings of the bounding box along each axis into the cells that sort triangles.
+# Number of times that the bounding box is halved along each axis, to the cells by which triangles are sorted.
 _HALVINGS = 10
 
 
@@ -221,7 +221,7 @@ def check_points(mesh: TriMesh, points: SurfacePoints) -> None:
 
 
 def interpolate(values: np.ndarray, mesh: TriMesh, points: SurfacePoints) -> np.ndarray:
-    """Interpolate values (V,) or (V, K) of vertices linearly to points: (N,) or (N, K) float32."""
+    """Return values (V,) or (V, K) of vertices, interpolated linearly to points: (N,) or (N, K) float32."""
     values = np.asarray(values, dtype=np.float32)
     total = np.zeros((), np.float32)
     # `take` is three times as fast as indexing with brackets.
@@ -249,6 +249,6 @@ def normals(mesh: TriMesh, points: SurfacePoints) -> np.ndarray:
 
 
 def _unit(vectors):
-    """Normalize vectors (N, 3); zero stays zero."""
+    """Return normalized vectors (N, 3); zero stays zero."""
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.where(lengths > 0.0, lengths, 1.0)

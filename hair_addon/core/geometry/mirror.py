@@ -18,7 +18,7 @@ class Mirror:
     across: np.ndarray | None = None
 
     def image(self, vectors: np.ndarray) -> np.ndarray:
-        """Reflect positions or directions (N, 3)."""
+        """Return reflected positions or directions (N, 3)."""
         return vectors - 2.0 * (vectors @ self.normal)[:, None] * self._across
 
     @property

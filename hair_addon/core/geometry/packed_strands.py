@@ -4,7 +4,7 @@
 A strand of P points is P + 1 texels of two floats: (root x, root y), (root z, range), then its points without the root.
 An offset has 20 bits along each axis: its error is at most 2^-20 of the range, besides the rounding of positions. A
 strand that fills a picture of 4,000 pixels is accurate to 0.004 pixels. The 60 bits are stored in two floats that are
-always normal numbers, because textures preserve only the bits of these. shaders/strands/packed_strand.glsl is the twin.
+always normal numbers, because textures preserve no other bits. shaders/strands/packed_strand.glsl does the same.
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Positions and normals of roots on a device, as mesh.py's `positions` and `normals`, and IDs of strands."""
+"""Positions and normals of roots on a device, like `positions` and `normals` of mesh.py, and IDs of strands."""
 
 import numpy as np
 import warp as wp

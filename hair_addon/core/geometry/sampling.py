@@ -100,6 +100,6 @@ def _there(array, dtype):
 
 
 def _runs(ends, order):
-    """Return the indices of all items with runs reordered; ends: of the consecutive runs; order: of the runs."""
+    """Return the indices of all items, with their runs in a new order; ends: of consecutive runs; order: of runs."""
     counts = np.diff(ends, prepend=0)[order]
     return np.repeat((ends[order] - np.cumsum(counts)).astype(np.int32), counts) + np.arange(ends[-1], dtype=np.int32)

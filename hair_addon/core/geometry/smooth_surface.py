@@ -2,10 +2,10 @@
 """Approximation of the smooth surface of a subdivided mesh from vertices on the flat faces of its cage.
 
 Away from extraordinary vertices, a Catmull-Clark surface [Catmull78] is the bicubic B-spline of the cage, and the faces
-of the cage are the bilinear one. B-splines are convolutions of boxes, so the bicubic is the bilinear surface convolved
-with a hat as wide as two faces, whose variance is 1/6 of a face squared along each axis. Repeated means of neighboring
-vertices with the same variance approximate the hat. Normals are within a degree of the surface's, and within ten
-degrees at the corners of a cube. follow_nodes.py of blender/data/strands uses the same blur.
+of the cage are its bilinear B-spline. B-splines are convolutions of boxes, so the bicubic surface is the bilinear
+surface convolved with a hat as wide as two faces, whose variance is 1/6 of a face squared along each axis. Repeated
+means of neighboring vertices with the same variance approximate the hat. Normals are within a degree of the surface's,
+and within ten degrees at the corners of a cube. follow_nodes.py of blender/data/strands uses the same blur.
 """
 
 import math
@@ -30,7 +30,7 @@ def rounds(face_count: int, cage_corners: int) -> tuple[int, float]:
     """Return the number of smoothing rounds and the weight of a neighbor, in single precision.
 
     face_count: of the subdivided mesh; cage_corners: corners of all faces of the cage, 0 for a mesh without smoothing.
-    (0, 0) without smoothing or subdivision.
+    Returns (0, 0) without smoothing or subdivision.
     """
     if cage_corners <= 0:
         return 0, 0.0

@@ -131,7 +131,7 @@ def places_along(points: np.ndarray, starts: np.ndarray) -> np.ndarray:
 
 
 def resample_values(values: np.ndarray, points: np.ndarray, starts: np.ndarray, point_count: int) -> np.ndarray:
-    """Resample values (N,) at the points of ragged polylines → (S, point_count) float32, equally spaced along each.
+    """Return values (N,) at the points of ragged polylines, resampled at equal spacing: (S, point_count) float32.
 
     points (N, 3) and starts (S+1,): see `resample`; no polyline may be empty.
     """
@@ -145,7 +145,7 @@ def resample_values(values: np.ndarray, points: np.ndarray, starts: np.ndarray, 
 
 
 def resample(points: np.ndarray, starts: np.ndarray, point_count: int) -> np.ndarray:
-    """Resample ragged polylines → (S, point_count, 3) float32 [m], equally spaced along each, with the same ends.
+    """Return (S, point_count, 3) float32 [m]: ragged polylines, resampled at equal spacing, with the same ends.
 
     points: (N, 3), concatenated; starts: (S+1,) of each polyline, the last entry is N (Blender's `curve_offset_data`).
     A polyline of one point, or of zero length, repeats the point.

@@ -7,8 +7,9 @@ columns are interpolated and orthonormalized. Thus rigid motion is reproduced ex
 than necessary, and neighboring roots do not separate, as they do with frames of single triangles or of a UV map.
 blender/data/strands/follow_nodes.py implements the same in geometry nodes.
 
-A deformed subdivided surface is smooth, but at rest its vertices lie on the flat faces of its cage, from which
-neighboring roots would turn apart. Its rotation is measured from the smooth surface of the cage (smooth_surface.py).
+A deformed subdivided surface is smooth, but at rest its vertices lie on the flat faces of its cage. Rotations from flat
+faces would separate neighboring roots. Therefore rotations are measured from the smooth surface of the cage
+(smooth_surface.py).
 """
 
 from dataclasses import dataclass
@@ -57,7 +58,7 @@ def motion(
 
 
 def turned(before: np.ndarray, after: np.ndarray, turning: VertexRotations) -> SurfaceMotion:
-    """Return the `SurfaceMotion` by a `VertexRotations`, reused for many poses; only its vertices get rotations."""
+    """Return the `SurfaceMotion` by `VertexRotations`, which serve many poses; only their vertices get rotations."""
     require_finite(after)
     require_count("vertices", len(after), len(before))
     found = turning.axes(after)
@@ -76,7 +77,7 @@ def carry(
     barycentric: np.ndarray,
     is_back: bool = False,
 ) -> np.ndarray:
-    """Move points (N, P, 3) float32 of strands rigidly with the surface at their roots; returns float32.
+    """Return points (N, P, 3) float32 of strands, moved rigidly with the surface at the roots of the strands.
 
     root_vertices: (N, 3) int32 corners of the roots' triangles; barycentric: (N, 3) float32 in the same order; is_back:
     apply the inverse motion, from `after` to `before`. Raises `HairError` if counts or indices do not match.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Distances along a mesh from some of its points, and the directions in which they grow.
+"""Distances along a mesh from some of its points, and the directions in which distances grow.
 
-Distances spread over triangles as from a virtual source in the plane of each triangle, as in [Kimmel98], until none
-changes: exact on planes, within a few percent on curved surfaces.
+Distances spread over triangles as from a virtual source in the plane of each triangle, as in [Kimmel98], until no
+distance changes: exact on planes, within a few percent on curved surfaces.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ def source_distances(mesh: TriMesh, points: SurfacePoints) -> np.ndarray:
 def spread(mesh: TriMesh, sources: np.ndarray) -> np.ndarray:
     """Return (V,) float64 [m]: distances along the mesh; infinite on parts without a source.
 
-    sources: (V,) distances at the sources, infinite elsewhere, which may become smaller.
+    sources: (V,) distances at the sources, which may become smaller; infinite elsewhere.
     """
     found = np.array(sources, np.float64)
     # Each triangle three times: its last vertex is reached from the first two.
@@ -78,7 +78,7 @@ def directions(mesh: TriMesh, distances: np.ndarray) -> np.ndarray:
 
 
 def at(values: np.ndarray, mesh: TriMesh, points: SurfacePoints) -> np.ndarray:
-    """Return values of vertices, finite or not, (V,) at surface points (N,); infinite beside infinite ones."""
+    """Return values (V,) of vertices at surface points (N,); infinite in triangles with an infinite value."""
     is_known = np.isfinite(values)
     found = interpolate(np.where(is_known, values, 0.0).astype(np.float32), mesh, points).astype(np.float64)
     found[~is_known[mesh.triangles[points.triangle]].all(axis=1)] = np.inf

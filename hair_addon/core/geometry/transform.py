@@ -25,7 +25,7 @@ def _transform(
 
 
 def transformed(points: np.ndarray, matrix: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
-    """Multiply points (S, P, 3) float32 by a matrix (3, 3); returns the points themselves for the identity.
+    """Return points (S, P, 3) float32 times a matrix (3, 3); for the identity, the given points themselves.
 
     out: array for the result, which may be `points`; None for a new one.
     """

@@ -20,7 +20,7 @@ from .mesh import Faces
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-# A gradient takes a tenth of a microsecond: fewer are not worth a thread.
+# A gradient takes a tenth of a microsecond: a thread for fewer faces is slower.
 _LEAST_FACES = 32_768
 
 UNTURNED = np.eye(3, dtype=np.float32)[:2]  # x and y axis of a vertex without rotation
@@ -39,7 +39,7 @@ class VertexRotations:
 
     @cached_property
     def needed(self) -> np.ndarray:
-        """Vertices (N,) int32, ascending, on whose positions the rotations depend, and those with a rotation."""
+        """Vertices (N,) int32, ascending: all with a rotation, and all whose positions affect a rotation."""
         is_needed = np.zeros(len(self.rest), bool)
         is_needed[self.corners] = True
         is_needed[self.vertices] = True
@@ -48,7 +48,7 @@ class VertexRotations:
     def axes(self, after: np.ndarray) -> np.ndarray:
         """Return (M, 2, 3) float32: images of the x and the y axis at each vertex; unrotated where no face moves.
 
-        after: (V, 3) float32, finite, all vertices in the present pose. Raises `HairError` for another count.
+        after: (V, 3) float32, finite, all vertices in the present pose. Raises `HairError` if their number differs.
         """
         require_count("vertices", len(after), len(self.rest))
         face_count, vertex_count = len(self.corners), len(self.vertices)
