@@ -72,7 +72,7 @@ def through_landmarks(sources: ArrayLike, targets: ArrayLike) -> Warp:
 
 
 def similarity(sources: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the best similarity of sources (L, 3) to targets [Umeyama91]: scaled rotation (3, 3), offset (3,) [m]."""
+    """Return the scaled rotation (3, 3) and offset (3,) [m] that best map sources (L, 3) to targets [Umeyama91]."""
     middle, other_middle = sources.mean(axis=0), targets.mean(axis=0)
     left, values, right = np.linalg.svd((targets - other_middle).T @ (sources - middle))
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])

@@ -79,7 +79,7 @@ def segment_counts(counts: np.ndarray, basis: str, wrap: str) -> np.ndarray:
 
 
 def is_cubic(counts: np.ndarray, basis: str, wrap: str) -> np.ndarray:
-    """Return (S,) bool: whether counts (S,) of points are valid for cubic curves, with segments and no unused points."""
+    """Return (S,) bool: whether counts (S,) are valid for cubic curves: with segments and without unused points."""
     counts = np.asarray(counts)
     if wrap == "periodic":
         return (counts >= 3) & (counts % STEPS[basis] == 0)
