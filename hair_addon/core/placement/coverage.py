@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The area covered by guides: outside it no hair grows, for example on the face beside a scalp's guides."""
+"""The area covered by guides. Outside this area no hair grows, for example on the face beside a scalp's guides."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from ..geometry.mesh import TriMesh
 
 _NEIGHBOURS = 4  # neighbors of a guide that define the guide spacing
 _END = 1.3  # limit of hair, in guide spacings
-LEVELS = 8  # of positive weights: Blender assigns each weight of a vertex group by a separate call
+LEVELS = 8  # number of positive weights: Blender assigns each weight of a vertex group by a separate call
 _WHOLE = 0.95  # mean weight above which the whole mesh counts as covered
 
 

@@ -32,17 +32,17 @@ from .sampled_cells import SampledCells
 from .voronoi import EVERYWHERE, sites_on
 
 STEPS_KEPT = 7
-LONGEST_STEP = 0.5  # of the distance to the next site
+LONGEST_STEP = 0.5  # fraction of the distance to the next site
 FEWEST_SITES = 260  # minimum count for multilevel placement
-LEAST_CELL = 0.75  # of the mean amount of a cell: sites with smaller cells are crowded
+LEAST_CELL = 0.75  # fraction of the mean amount of a cell: sites with smaller cells are crowded
 LEAST_LATE_CELL = 0.6  # the same at the finest level
 # Fractions of the final rounds after which crowded sites move to gaps.
 SPREAD_AT_ONCE, SPREAD_AFTER_LEVELS = (0.25, 0.5), (0.5,)
-GAP_SAMPLES = 8  # for each site, to find the widest gaps
+GAP_SAMPLES = 8  # samples for each site, to find the widest gaps
 RING = 7  # a site and its neighbors in a honeycomb
-LEAST_PAIR = 0.4  # of the surface shared by two neighbors in a honeycomb: smaller pairs are not refined
+LEAST_PAIR = 0.4  # fraction of the area shared by two neighbors in a honeycomb: smaller pairs are not refined
 GAP_ROUNDS = 4  # adjacent gaps are filled in succession
-START_SAMPLES = 16  # for each initial site
+START_SAMPLES = 16  # samples for each initial site
 SAMPLES_PER_SITE = 64  # at coarse levels
 LEAST_SAMPLES = 2000
 FIRST_ITERATIONS, COARSE_ITERATIONS = 6, 3
@@ -62,11 +62,11 @@ def place(
     device: str = "cpu",
     progress: Callable[[float], None] = lambda part: None,
 ) -> SurfacePoints:
-    """Place `count` sites evenly; returns `SurfacePoints`, which depend only on the arguments.
+    """Return `count` sites, placed evenly, as `SurfacePoints` that depend only on the arguments.
 
     mesh: a checked `TriMesh`; iterations: maximum at the finest level, 0 for random sites; density (V,) ≥ 0 of vertices
     and texture (`Texture`) are multiplied; mirror: `Mirror` for symmetric sites: the second half are images of the
-    first, in the same order, with an odd one in between; progress(part): receives the completed fraction, may raise to
+    first, in the same order, with an odd site in between; progress(part): receives the completed fraction, may raise to
     cancel. Raises `HairError`.
     """
     domain = Domain(mesh, count, density, texture, mirror, device)
@@ -172,7 +172,7 @@ def _descend(
 
 
 def _spread(domain, state, device):
-    """Move crowded sites to the widest gaps, which no descent does; returns sites, None if no site is crowded.
+    """Return sites with crowded ones moved to the widest gaps, which no descent does; None if no site is crowded.
 
     With a few distant initial sites, tips of thin parts have too many sites.
     """
@@ -212,7 +212,7 @@ class _State:
         return Springs(self.on, self.sums.masses, self._device).moves(gradient)
 
     def lloyd_moves(self, gradient):
-        """Return the same moves (n, 3) without coupling between cells."""
+        """Return moves (n, 3) as `moves`, without coupling between cells."""
         return self.inverse * gradient
 
     @property
@@ -250,7 +250,7 @@ def _pair_count(domain, cells, sites, device):
 
 
 def _thinned(domain, cells, sites, device):
-    """Remove crowded sites, the most crowded first, but no two neighbors.
+    """Return sites without crowded sites, of which the most crowded are removed first, but no two neighbors.
 
     Thin parts and corners have too many sites of a coarse level, which no descent moves elsewhere.
     """
@@ -277,7 +277,7 @@ def _crowded(amounts, least, on):
 
 
 def _refined(domain, cells, points, sites, count, device):
-    """Refine to `count` sites: one between each pair of neighbors, and the rest in the widest gaps.
+    """Return `count` sites: `sites`, a new site between each pair of neighbors, and the rest in the widest gaps.
 
     Pairs that share little of the surface are not refined, which thins out sites that are too close, for example where
     the surface bends within the width of a cell. New sites are chosen among `points`, the samples of the cells, so
@@ -300,7 +300,7 @@ def _refined(domain, cells, points, sites, count, device):
     for _ in range(GAP_ROUNDS):
         if len(sites) < count:
             sites = sites.joined(points[_widest_gaps(domain, cells, points, sites, count, device)])
-    lacking = count - len(sites)  # where islands are smaller than a cell
+    lacking = count - len(sites)  # sites are lacking where islands are smaller than a cell
     return sites.joined(points[np.linspace(0, len(points) - 1, lacking).astype(int)]) if lacking else sites
 
 

@@ -16,23 +16,24 @@ from ..geometry.mirror import Mirror
 from ..geometry.sampling import check_density, corner_masses
 
 GRID_SIZE = 32  # cells along each axis of the grid of sites; distant cells wrap around
-LONGEST_EDGE = 2.5  # of a piece, in spacings of sites: few cells share a piece
+LONGEST_EDGE = 2.5  # longest edge of a piece, in spacings of sites: few cells share a piece
 LONGEST_GRADED_EDGE = 1.5  # the same for varying density, which is constant in a piece
 SLIVER_LENGTH, SLIVER_WIDTH = (
     8.0,
     0.5,
 )  # of the longest and the shortest edge, relative to a piece's longest allowed edge
-MOST_SLICES = 64  # of a sliver in one step: the density may vary along it
-LEAST_COSINE = -1.0 / 3.0  # between normals of one side of a surface
+MOST_SLICES = 64  # maximum slices of a sliver in one step: the density may vary along it
+LEAST_COSINE = -1.0 / 3.0  # least cosine between normals of one side of a surface
 LEAST_PIECES = 2000  # least site count assumed for the cutting: the density is constant in a piece
 PLASTIC = 0.7548776662466927, 0.5698402909980532  # steps of the R2 low-discrepancy sequence [Roberts18]
 
 
 @dataclass(frozen=True)
 class Parts:
-    """Triangles that are parts of a mesh's triangles (Q,).
+    """Q triangles that are parts of a mesh's triangles.
 
-    barycentric (Q, 3, 3) and positions (Q, 3, 3) at unit size of their corners; areas (Q,).
+    triangle: (Q,), the mesh's triangles; barycentric: (Q, 3, 3) of the parts' corners; corners: (Q, 3, 3), positions at
+    unit size; areas: (Q,).
     """
 
     triangle: np.ndarray
@@ -100,7 +101,7 @@ class Domain:
         whole = Parts(grown, corners, self.mesh.corners[grown], self.mesh.areas[grown])
         if mirror is not None:
             whole = self._heavier_side(whole)
-        if texture is not None:  # may be finer than triangles
+        if texture is not None:  # a texture may be finer than triangles
             spacing = _spacing(whole.areas.sum(), LEAST_PIECES)
             whole = cut(whole, LONGEST_GRADED_EDGE * spacing, lambda parts: 1.0)
         # Pieces are smaller where the density is higher.
@@ -127,7 +128,7 @@ class Domain:
         return np.maximum(self.density_at(parts.centres()), 1e-3)
 
     def moved(self, points: SurfacePoints, places: np.ndarray) -> SurfacePoints:
-        """Move `SurfacePoints` to the points of the domain closest to places (N, 3).
+        """Return `SurfacePoints` moved to the points of the domain closest to places (N, 3).
 
         Points that would change sides or islands, have zero density, or cross the mirror, do not move.
         """
@@ -248,7 +249,7 @@ def _spacing(amount, count):
 
 
 def cut(parts: Parts, longest: float, density_of: Callable[[Parts], np.ndarray | float]) -> Parts:
-    """Cut parts until no edge is longer than `longest` / sqrt(density).
+    """Return parts cut until no edge is longer than `longest` / sqrt(density).
 
     Parts are halved across their longest edge; slivers are sliced across both long edges.
     """
@@ -269,7 +270,7 @@ def cut(parts: Parts, longest: float, density_of: Callable[[Parts], np.ndarray |
 
 
 def _sliced(parts, lengths):
-    """Cut slivers into slices of two triangles, one at the tip; lengths (Q, 3): of edges relative to the limit."""
+    """Return slivers cut into slices of two triangles, one at the tip; lengths (Q, 3): of edges, in limits."""
     rows, base = np.arange(len(lengths)), lengths.argmin(axis=1)
     length, width = lengths.max(axis=1), lengths[rows, base]
     counts = np.minimum(np.ceil(length / (1.0 - width)), MOST_SLICES).astype(int)  # no diagonal becomes too long
@@ -292,7 +293,7 @@ def _sliced(parts, lengths):
 
 
 def _halved(parts, edge):
-    """Cut each part into two at the midpoint of the edge that begins at corner `edge` (Q,)."""
+    """Return parts, each cut into two at the midpoint of the edge that begins at corner `edge` (Q,)."""
     rows = np.arange(len(edge))
     first, second = [], []
     for corners in (parts.barycentric, parts.corners):

@@ -26,8 +26,8 @@ from .voronoi import (
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-MOST_CORNERS = 16  # of the part of a triangle in one cell
-MOST_CELLS = 32  # that share one triangle: pieces are no larger than cells
+MOST_CORNERS = 16  # maximum corners of the part of a triangle in one cell
+MOST_CELLS = 32  # maximum cells that share one triangle: pieces are no larger than cells
 
 ring = wp.types.vector(length=MOST_CORNERS, dtype=float)
 labels = wp.types.vector(length=MOST_CORNERS, dtype=int)

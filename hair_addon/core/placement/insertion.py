@@ -51,7 +51,7 @@ def insert(
         return points[:0]
     wanted = _shares(domain, fixed, nearest, may_hold, points, count)
     new = candidates[farthest(domain, candidates, squares[may_hold], wanted)]
-    if not may_hold.all():  # cells end at the border, which keeps new sites inside
+    if not may_hold.all():  # cells end at the border of `may_hold`, which keeps new sites inside
         cells = SampledCells(domain, candidates, part[may_hold], total, device)
     for _ in range(ROUNDS if len(new) else 0):
         on = sites_on(domain, fixed.joined(new), device)

@@ -21,9 +21,9 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 NEAR, FAR = 1.2, 1.6  # springs fade out between these spacings; the second ring of a honeycomb is at 1.73
 FEWEST_SPRINGS = 4.5  # cells with fewer springs are at a border
-LEAST_HOLD = 0.02  # of a cell's mass: prevents drift of a network without a border
+LEAST_HOLD = 0.02  # fraction of a cell's mass: prevents drift of a network without a border
 YIELD = np.float32(1.3)  # measured optimum: unlike springs, cells yield sideways
-ROUNDS = 3  # of conjugate gradients: a preconditioner need not be exact
+ROUNDS = 3  # rounds of conjugate gradients: a preconditioner need not be exact
 
 
 class Springs:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Restricted Voronoi cells: the parts of a surface that are nearest to each site [Yan09].
 
-The two sides of a thin part, and separate islands, are not neighbours: between them an offset is added to the squared
+The two sides of a thin part, and separate islands, are not neighbors: between them an offset is added to the squared
 distance, so that the borders of cells remain planes (a power diagram).
 
 Sums are integers, in units far below single precision, and thus independent of the order and number of threads: results
@@ -27,10 +27,10 @@ SITES_AROUND = 16  # neighbors of a site, itself included, found in one search
 MOST_AROUND = 48  # neighbors before a search of all sites: a thin part has neighbors on its other side too
 ENOUGH_AROUND = 12  # neighbors on the site's own side
 FIRST_RING = 6  # neighbors in a honeycomb
-MOST_FAR = 256  # of the sites in the disk or ball around a site that are searched before all sites are
+MOST_FAR = 256  # maximum number of sites in the disk or ball around a site, searched before all sites
 FAR = 1.7  # radius of the search for them, in distances of the last neighbor
-FAR_MARGIN = 1.01  # of this radius, against rounding
-FARTHEST = 4.0  # largest radius, in radii of the search for neighbours: a larger one visits too many cells of the grid
+FAR_MARGIN = 1.01  # factor of this radius, against rounding
+FARTHEST = 4.0  # largest radius, in radii of the search for neighbors: larger ones visit too many cells of the grid
 EVERYWHERE = 4.0  # a distance larger than a surface of unit size
 SEARCH_RADIUS = 2.6  # relative to the square root of a cell's area: contains more than SITES_AROUND of a honeycomb
 DETOUR = 2.0  # added distance of a site on the other side of a thin part, in spacings of sites
