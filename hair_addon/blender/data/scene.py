@@ -28,6 +28,12 @@ _OF_CORNERS = {".corner_vert": "vertex_index", ".corner_edge": "edge_index"}  # 
 surface_cache = Cache(capacity=16)
 
 
+def require_scale(surface_object):
+    """Raise `HairError` for an object whose scale is zero along an axis."""
+    if surface_space.is_flattened(surface_object):
+        raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(surface_object))
+
+
 def read_surface(surface_object, depsgraph):
     """Return the evaluated mesh of an object as a `Surface`. Raises `HairError`, also for None, a deleted surface."""
     if surface_object is None:
@@ -36,10 +42,8 @@ def read_surface(surface_object, depsgraph):
         raise HairError(
             '"{name}" is not a mesh that hair can grow on: attach the hair to a mesh.', name=name_of(surface_object)
         )
+    require_scale(surface_object)
     to_world_axes = np.array(surface_object.matrix_world.to_3x3(), np.float64)
-    determinant = np.linalg.det(to_world_axes)
-    if not np.isfinite(to_world_axes).all() or abs(determinant) < 1e-30:
-        raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(surface_object))
     evaluated, known = surface_object.evaluated_get(depsgraph), surface_cache.get(surface_object.session_uid)
     mesh = evaluated.to_mesh()
     try:

@@ -21,6 +21,7 @@ from . import (
     copied_faces,
     events,
     file_changes,
+    flattened_surfaces,
     hidden_previews,
     invalidation,
     live_hair,
@@ -71,8 +72,10 @@ def after_depsgraph_update(scene, depsgraph):
     deformed = updates.deformed(reports)
     moving_surfaces.shape_changed(deformed & _surfaces())
     changed = updates.originals([u for u in reports if not _is_only_carried(u, deformed)], is_geometry=True)
+    transformed = updates.originals(reports, is_transform=True)
+    restored = flattened_surfaces.restored(_surfaces() & (deformed | {*transformed}))
     separated = []
-    for surface_object in deformed:
+    for surface_object in deformed | {*restored}:
         events.surface_moved(surface_object)
         # Hair waits until the surface leaves edit and paint modes, and until copies of its faces are separated.
         if surface_object.mode != "OBJECT":
@@ -81,9 +84,11 @@ def after_depsgraph_update(scene, depsgraph):
             separated.append(surface_object)
         else:
             is_edited = surface_object.data in changed and not moving_surfaces.is_to_be_checked_later(surface_object)
+            is_edited = is_edited or restored.get(surface_object, False)
+            if flattened_surfaces.note(surface_object, is_edited):
+                continue
             stale_marks.follow_surface(surface_object, depsgraph, is_edited)
     moved = updates.originals(reports, is_geometry=True, is_transform=True)
-    transformed = updates.originals(reports, is_transform=True)
     stale_marks.follow_partings(moved, transformed, depsgraph)
     stale_marks.follow_flow(moved, transformed, depsgraph)
     stale_marks.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
@@ -237,6 +242,8 @@ def _evaluate_guides(guides, depsgraph, combed):
     if guides.vellus.is_shading_stale:
         looks.evaluate_guides(guides)
     if guides.vellus.is_stale and guides.vellus.is_live and _is_ready(guides, depsgraph):
+        if flattened_surfaces.is_waiting(guides):
+            return
         with _once(guides):
             pipeline.evaluate(guides, depsgraph)
         events.strands_computed(guides)
@@ -252,6 +259,8 @@ def _evaluate_hair(hair, depsgraph, combed):
     if not (state.is_live and _is_ready(hair, depsgraph)):
         # Guides that are reported for the first time may be the guides that the hair was made with.
         state.is_stale = state.is_stale or (follows and staleness.is_left_by_undo(hair))
+    elif (state.is_stale or follows) and flattened_surfaces.is_waiting(hair):
+        state.is_stale = True
     elif state.is_stale and not live_hair.is_ahead(hair):
         with _once(hair):
             live_hair.regenerate(hair, depsgraph)

@@ -22,7 +22,16 @@ from ..render import hair_cache, modified_hair, solid_hair
 from ..render.frames import composite
 from ..render.viewport import live_light, region_pictures, viewport
 from ..settings import animated
-from . import dynamics_state, hidden_previews, moving_surfaces, refused_hair, reported, simulated_hair, unlocked_renders
+from . import (
+    dynamics_state,
+    flattened_surfaces,
+    hidden_previews,
+    moving_surfaces,
+    refused_hair,
+    reported,
+    simulated_hair,
+    unlocked_renders,
+)
 
 # Copies of Blender's data, and values computed from them. Undo and redo replace the data.
 COPIES = (
@@ -48,6 +57,7 @@ COPIES = (
     hidden_hair.hidden_cache,
     hidden_previews.changed_cache,
     copied_hair.known_cache,
+    flattened_surfaces.edited_cache,
     moving_surfaces.moved_cache,
     moving_surfaces.unchecked_cache,
     guide_map_readers.reading_cache,

@@ -7,6 +7,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from hair_addon.blender.data.strands import attributes
 from hair_addon.blender.groom import bindings, pipeline
@@ -325,3 +326,42 @@ def test_an_operator_computes_once(sphere, monkeypatch):
     sphere.location.x = 2.0  # hair is parented: it moves along
     update()
     assert calls == {"distribute_guides": 1, "bind_hair": 1}
+
+
+def flatten(surface, is_flat):
+    surface.scale = (0.0, 1.0, 1.0) if is_flat else (1.0, 1.0, 1.0)
+    update()
+
+
+@pytest.mark.parametrize("is_combed", [False, True])
+def test_hair_waits_while_the_surface_has_a_scale_of_zero(hair, is_combed):
+    """What is changed while the scale is zero is followed once it is not: settings, combing and the mesh itself."""
+    surface, guides = hair.data.surface, bpy.data.objects["Guides"]
+    if is_combed:
+        write_points(guides, points(guides) + np.float32(0.01))
+        update()
+    flatten(surface, True)
+    for vertex in surface.data.vertices:
+        vertex.co *= 2.0
+    surface.data.update()
+    update()
+    flatten(surface, False)
+    roots = points(guides)[:, 0]
+    assert _distance_to(surface, roots) < 1e-4 + 0.02 * is_combed
+    flatten(surface, True)
+    if is_combed:
+        write_points(guides, 1.5 * points(guides))
+    else:
+        guides.data.vellus.guides.length = 0.8
+    update()
+    assert "scale of zero" in (hair if is_combed else guides).data.vellus.status
+    flatten(surface, False)
+    assert [one.data.vellus.status for one in (hair, guides)] == ["", ""]
+    waited = points(hair)
+    pipeline.evaluate(hair.data, bpy.context.evaluated_depsgraph_get())
+    np.testing.assert_array_equal(points(hair), waited)
+
+
+def _distance_to(surface, roots):
+    """Return the largest distance of (N, 3) points to a mesh, in its coordinates."""
+    return max((surface.closest_point_on_mesh(root)[1] - Vector(root)).length for root in roots)
