@@ -11,7 +11,7 @@ from ..errors import HairError
 
 
 def require_count(name: str, count: int, wanted: int) -> None:
-    """Raise `HairError` unless a count of items has the expected value; name: of the items."""
+    """Raise `HairError` unless a count of items has the expected value; name: the items' name."""
     if count != wanted:
         sentence = "Hair data does not match: {count} {name} instead of {wanted}. Regenerate the strands."
         raise HairError(sentence, name=name, count=count, wanted=wanted)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import warp as wp
 
-VARIABLE = "VELLUS_KERNELS"  # environment variable with another folder, for example of a checkout's build
+VARIABLE = "VELLUS_KERNELS"  # environment variable with another folder, such as a checkout's build folder
 FOLDER = Path(os.environ.get(VARIABLE) or Path(__file__).resolve().parents[3] / "kernels")
 INDEX = "index.json"
 
@@ -24,7 +24,7 @@ _PACKAGE = __name__.removesuffix("core.kernels.compiled_kernels")  # prefix of W
 
 
 def load(module: "wp.Module", device: "wp.Device") -> bool:
-    """Load a Warp module's precompiled kernels on the CPU; returns whether there were matching ones."""
+    """Load a Warp module's precompiled kernels on the CPU, and return whether matching kernels were found."""
     if not device.is_cpu:
         return False
     processor, modules = _fitting(FOLDER)
@@ -79,7 +79,7 @@ def _warp_context():
     import warp as wp
     from warp._src import context
 
-    wp.init()  # versions and features are unknown before
+    wp.init()  # before this call, versions and features are unknown
     return context
 
 

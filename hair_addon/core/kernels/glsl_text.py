@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Warp kernels → GLSL: a compute program has the same source as the kernel on CPU and CUDA.
+"""Translation of Warp kernels to GLSL: compute programs share the source of the kernels on CPU and CUDA.
 
 A kernel and all functions that it calls are translated from their syntax trees; types follow from their annotations.
 A kernel's structs and arrays are global in GLSL, so a function with such parameters is written once for each
@@ -28,7 +28,7 @@ _KINDS |= {
 _KINDS |= {wp.vec2: "vec2", wp.vec3: "vec3", wp.vec4: "vec4", wp.vec3i: "ivec3"}
 _ELEMENTS = {"vec2": "float", "vec3": "float", "vec4": "float", "ivec3": "int"}
 _ZERO = {"float": "0.0", "int": "0", "uint": "0u", "bool": "false"}
-_RAY = "MeshQueryRay"  # what `wp.mesh_query_ray` returns
+_RAY = "MeshQueryRay"  # the type that `wp.mesh_query_ray` returns
 _RAY_FIELDS = {"result": "bool", "t": "float", "u": "float", "v": "float", "face": "int", "normal": "vec3"}
 
 _SIGNS = (
@@ -58,7 +58,7 @@ _CALLS = {
 
 @dataclass(frozen=True)
 class Given:
-    """A kernel parameter, or a member of one; path: the name of the parameter, then names of members."""
+    """A kernel parameter, or a member of a parameter; path: the parameter's name, then names of members."""
 
     path: tuple[str, ...]
     kind: Any  # a type of GLSL, `wp.struct` or `wp.array`
@@ -71,11 +71,12 @@ class Given:
 
 @dataclass(frozen=True)
 class KernelText:
-    """GLSL of a kernel: `source` defines `run_kernel()`, which reads `given`.
+    """The GLSL of a kernel: `source` defines `run_kernel()`, which reads `given`.
 
-    members: numbers in the block `given`; arrays: arrays that the kernel reads: for each, `given` has the index of its
-    first element in the texture of its type, and its size along each further axis; written: {name: type} of arrays that
-    the kernel writes by `write_NAME(index, value)`; has_mesh: whether it traces rays through the triangles of a mesh.
+    members: numbers in the block `given`; arrays: arrays that the kernel reads; for each array, `given` has the index
+    of its first element in the texture of its type, and its size along each further axis; written: {name: type} of
+    arrays that the kernel writes by `write_NAME(index, value)`; has_mesh: whether the kernel traces rays through the
+    triangles of a mesh.
     """
 
     source: str
@@ -142,7 +143,7 @@ def _type_name(kind):
 
 @dataclass
 class _Program:
-    """Structs and functions, each after those that it uses, and the kernel parameters that are used."""
+    """Structs and functions, each after the ones that it uses, and the kernel parameters in use."""
 
     structs: dict[str, str] = field(default_factory=dict)
     texts: list[str] = field(default_factory=list)
@@ -305,7 +306,7 @@ class _Function:
         if isinstance(target, ast.Name):
             is_new = depth == 1 and target.id not in self.kinds
             self._know(target, value.kind)
-            if is_new:  # others are declared at the top, as Python has no block scope
+            if is_new:  # other variables are declared at the top: Python has no block scope
                 self.declared.add(target.id)
             kind = f"{_type_name(value.kind)} " if is_new else ""
             return ["  " * depth + f"{kind}{self.local(target.id)} = {value.text};"]
@@ -345,7 +346,7 @@ class _Function:
         return [f"{indent}while ({condition}) {{", *self.block(statement.body, depth + 1), indent + "}"]
 
     def _has_constants(self, node):
-        """Whether a loop reads constant vectors: it is then unrolled, as by Warp."""
+        """Return whether a loop reads constant vectors; such a loop is unrolled, as by Warp."""
         subscripts = [part for part in ast.walk(node) if isinstance(part, ast.Subscript)]
         return any(hasattr(self.object_of(part.value), "_length_") for part in subscripts)
 

@@ -38,7 +38,7 @@ def launch(
     device: wp.DeviceLike = None,
     block_dim: int = 256,
 ) -> None:
-    """`load` a kernel's module and call `wp.launch`. Raises `HairError` like `load`."""
+    """Load a kernel's module with `load`, and call `wp.launch`. Raises `HairError` like `load`."""
     load(device, kernel.module)
     wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device=device, block_dim=block_dim)
 
@@ -46,13 +46,13 @@ def launch(
 def prepared(
     kernel: wp.Kernel, dim: int | Sequence[int], inputs: Sequence[Any], device: wp.DeviceLike = None
 ) -> wp.Launch:
-    """Prepare a launch; the returned object's `launch` method takes a few microseconds of Python."""
+    """Return a prepared launch, whose `launch` method takes a few microseconds of Python."""
     load(device, kernel.module)
     return wp.launch(kernel, dim, inputs=inputs, device=device, record_cmd=True)
 
 
 def load(device: wp.DeviceLike, *modules: wp.Module) -> None:
-    """Load Warp modules on a device: takes seconds if they must be compiled, microseconds if they are loaded.
+    """Load Warp modules on a device: takes seconds if they must be compiled, microseconds if they are already loaded.
 
     Raises `HairError` if they can be neither loaded nor compiled.
     """
@@ -66,7 +66,7 @@ def load(device: wp.DeviceLike, *modules: wp.Module) -> None:
 def default_device(name: str) -> wp.Device:
     """Make a device the default of all threads and return it.
 
-    Threads that change the default for a while, and then restore it, otherwise restore each other's.
+    Otherwise, threads that change the default temporarily restore each other's defaults.
     """
     wp.set_device(name)
     return wp.get_device(name)
@@ -139,7 +139,7 @@ def _use_temporary_folder():
 
 
 def temporary_folder() -> Path:
-    """Return a folder that only this user can write, the same for all processes; a new one if it is not our own."""
+    """Return a folder that only this user can write: one for all processes, or a new one if that is not private."""
     folder = Path(tempfile.gettempdir()) / f"vellus_kernels_{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
     with contextlib.suppress(FileExistsError):
         folder.mkdir(mode=0o700)

@@ -25,7 +25,7 @@ def is_whole(device: wp.Device, module: wp.Module) -> bool:
 
 
 def load(device: wp.Device, module: wp.Module) -> bool:
-    """Load a module's kernels from the cache; returns whether there were intact ones that Warp accepts."""
+    """Load a module's kernels from the cache, and return whether they were intact and Warp accepted them."""
     files = _files(device, module, _place(device, module))
     if not _is_whole(*files):
         return False

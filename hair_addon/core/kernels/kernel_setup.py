@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Loading of several Warp modules, compiled on several threads if needed, each module once.
 
-Warp's compiler releases the GIL. Concurrent callers share the work: each compiles free modules first, and waits for the
-modules of other threads last.
+Warp's compiler releases the GIL. Concurrent callers share the work: each caller compiles free modules first, and waits
+for the modules of other threads last.
 """
 
 import atexit
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 LOADING = "Loading kernels"
 COMPILING = "First-time setup (once)"
 
-# Each compiling thread first reads Warp's headers, which takes as long as the kernels of eight modules.
+# Each compiling thread first reads Warp's headers, which takes as long as compiling eight modules.
 MOST_THREADS = 4
 
 _PATIENCE = 0.05  # [s] between progress updates
@@ -35,7 +35,7 @@ def load(
     progress: Progress = no_progress,
     most_threads: int = MOST_THREADS,
 ) -> None:
-    """Load Warp modules on a device: takes seconds if they must be compiled, microseconds if they are loaded.
+    """Load Warp modules on a device: takes seconds if they must be compiled, microseconds if they are already loaded.
 
     progress(step, part): receives the fraction of loaded modules; may raise to cancel, which ends the threads after
     their present modules. Raises `HairError` like `kernel_cache.load`, and `Stopped` if Python exits meanwhile.
@@ -113,7 +113,7 @@ class _Loading:
             self._threads.append(thread)
 
     def is_running(self, seconds):
-        """Wait for a thread with a timeout [s]; returns whether any was still running."""
+        """Wait for a thread with a timeout [s], and return whether any thread was still running."""
         running = next((thread for thread in self._threads if thread.is_alive()), None)
         if running is not None:
             running.join(seconds)
@@ -139,7 +139,7 @@ class _Loading:
             self._is_stopped.set()
 
     def _free_ones_first(self):
-        """Yield modules with their locks: first free ones, then modules that other threads are loading."""
+        """Yield modules with their locks: first free modules, then modules that other threads are loading."""
 
         busy = []
         while self._pending and not self._is_stopped.is_set():

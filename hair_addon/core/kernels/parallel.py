@@ -23,10 +23,10 @@ from .checks import require_count
 PARTS_PER_CORE = 2  # for load balancing, because a core may have other work
 UNEVEN_PARTS_PER_CORE = 4  # if parts may take unequal times
 LEAST_ROWS = 4096  # fewer are not worth a thread
-MOST_SHARES = 8  # of sums, each in its own memory
+MOST_SHARES = 8  # shares of a sum, each in its own memory
 
-_SLICE = 0.004  # [s] of a launch on one core, after which it pauses
-_FIRST_SLICE = 64  # rows
+_SLICE = 0.004  # [s] of a launch on one core between pauses
+_FIRST_SLICE = 64  # rows in the first slice
 
 _limits = threading.local()  # of the threads that `on_one_core` limits
 
@@ -56,7 +56,7 @@ def launch(
 
     least_rows: fewer are not worth a CPU thread; under_way: called when all threads are about to begin; from then on
     they do not need the GIL until the end; threads_per_row: consecutive threads of the kernel for each row. Raises
-    `HairError` if an array has another number of rows.
+    `HairError` if an array has a different number of rows.
     """
     device = wp.get_device(device)
     values = [*inputs, *map(Rows, outputs)]
@@ -122,7 +122,7 @@ def on_one_core(pause: Callable[[], None] | None = None) -> Iterator[None]:
 
 
 def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=None, threads_per_row=1):
-    """Launch a kernel on parts of the rows, with a thread for each core; arguments(part, first, end): of a part."""
+    """Launch a kernel on parts of the rows, with a thread for each core; arguments(part, first, end): its arguments."""
     if part_count == 1:
         pause = getattr(_limits, "pause", None)
         if device.is_cpu and pause is not None:
@@ -189,7 +189,7 @@ def _on_threads(run, part_count, thread_count):
 
 
 def empty_vectors(shape: tuple[int, ...], device: wp.DeviceLike) -> wp.array:
-    """`wp.empty` of vec3; on the CPU in NumPy's memory with large pages, which is filled in a third of the time."""
+    """Return `wp.empty` of vec3; on the CPU, in NumPy's memory with large pages, which fills three times as fast."""
     device = wp.get_device(device)
     if not device.is_cpu:
         return wp.empty(shape, dtype=wp.vec3, device=device)
@@ -197,7 +197,7 @@ def empty_vectors(shape: tuple[int, ...], device: wp.DeviceLike) -> wp.array:
 
 
 def empty(count: int, kind: type, device: wp.DeviceLike) -> wp.array:
-    """`wp.empty` of numbers, in the memory of `empty_vectors`."""
+    """Return `wp.empty` of numbers, in memory like that of `empty_vectors`."""
     device = wp.get_device(device)
     if not device.is_cpu:
         return wp.empty(count, dtype=kind, device=device)

@@ -12,7 +12,7 @@ _MOST = 64  # sequences, beyond which the cache is cleared
 
 
 class Replays:
-    """Recorded sequences of launches on one device, by keys that include all that a sequence depends on."""
+    """Recorded sequences of launches on one device, by keys that include everything that a sequence depends on."""
 
     def __init__(self, device: wp.DeviceLike) -> None:
         self._device = wp.get_device(device)
@@ -42,7 +42,7 @@ class Replays:
         return self._device.is_cuda and not self._is_refused
 
     def _recorded(self, launch):
-        """Record launches as a graph without running them; returns None if the driver does not support it."""
+        """Return launches as a graph, recorded without running them; None if the driver does not support this."""
         try:
             wp.capture_begin(self._device, force_module_load=False)
         except RuntimeError:
