@@ -37,7 +37,7 @@ def carried(
 
     points (N, 3) float32 [m] and starts (S+1,) of the strands; places (N,) float32, the position of each point along
     its course, 0 to 1; before and now (S, P, 3) float32 [m], P > 1: their courses; normals (S, 3) float32, unit, of the
-    surface at their roots; is_back: the inverse, for points beside the present courses.
+    surface at their roots; is_back: apply the inverse, to points beside the present courses.
     """
     counts = np.diff(starts)
     require_count("courses", len(before), len(counts))

@@ -29,7 +29,7 @@ def _nearest(
 
 
 def clump_centers(guide_index: wp.array[int], roots: np.ndarray, guide_roots: np.ndarray) -> np.ndarray:
-    """Return (S,) int32: for each strand the index of the strand rooted nearest to its guide, among the guide's own.
+    """Return (S,) int32: for each strand, the index of the strand of the same guide whose root is nearest to it.
 
     guide_index: (S,) nearest guide of each strand; roots (S, 3) and guide_roots (G, 3) [m].
     """

@@ -5,8 +5,8 @@ With the weights w of a binding and guides' arms a_j (points minus root) in the 
 without preserved lengths gives strand s the arms sum_j w_sj Z_sj a_j in its own frame, Z_sj being the rotation about
 the normal (interpolation.py). For complex numbers x + iy that rotation is a factor e^(i phi), so x + iy and z are
 sparse linear least squares with one matrix each for all points, solved by the normal equations. Each guide is damped
-towards its present shape with its own weight: so the steps can be repeated although interpolation is not linear, and
-guides with few strands are stable.
+toward its present shape with its own weight, so that the steps can be repeated although interpolation is not linear,
+and guides with few strands are stable.
 """
 
 import numpy as np
@@ -34,7 +34,7 @@ def fitted(
 ) -> np.ndarray:
     """Return (G, P, 3) float32 [m]: arms of guides whose interpolation best fits strands.
 
-    binding: on the processor, of S strands to G guides; guide_weights: of the same, from `guide_weights.limited`; arms
+    binding: of S strands to G guides, on the CPU; guide_weights: of these strands, from `guide_weights.limited`; arms
     (S, P, 3) float32 [m]: points minus root of the strands; guide_arms (G, P, 3) float32 [m]: present arms of the
     guides; chosen: (M,) indices of the strands to fit; stretches (S,): factors by which preserved lengths lengthen
     strands, None for no factors.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Regions of guides, by regions of the surface and part lines: integers, equal for guides whose hair may touch.
 
-A guide is on the side of a part line to which its path is shorter. As paths do not cross lines, a closed line, or one
+A guide is on the side of a part line to which its path is shorter. Paths do not cross lines, so a closed line, or one
 from border to border, divides guides as it divides the surface. Beyond an open end, the sides continue straight ahead,
 each with the guides that are nearer to it.
 """
@@ -33,7 +33,7 @@ def guide_regions(
 ) -> np.ndarray:
     """Return (G,) int32, equal for guides in the same regions and on the same side of each line.
 
-    Numbers are those of `combined`. mesh: checked, with the guides' roots on it; lines: laid on it, or None.
+    The numbers are from `combined`. mesh: checked, with the guides' roots on it; lines: laid on it, or None.
     """
     labels = [np.zeros(len(roots), np.int32)]
     apart = region_labels(regions, roots, roots)
@@ -45,7 +45,7 @@ def guide_regions(
 
 
 def combined(labels: Sequence[np.ndarray]) -> np.ndarray:
-    """Return (G,) int32, equal where all labels (G,) are equal, numbered in the order of guides; needs a label."""
+    """Return (G,) int32, equal where all labels (G,) are equal, numbered in the order of guides; at least one label."""
     rows = np.stack([label.astype(np.int64) for label in labels], axis=1)
     _, first, numbers = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[numbers.reshape(-1)].astype(np.int32)
@@ -76,14 +76,14 @@ def _sides(mesh, roots, lines, device):
 def _is_left(frames, on_line, edges, lines):
     """Return (G,) bool for roots with frames (positions, normals); on_line: frames of at least two points of a line.
 
-    edges: (M, 3) of the line there [m]. For roots without a path to the line, as it is behind others, it is false.
+    edges: (M, 3) of the line there [m]. False for roots without a path to the line, because other lines are in between.
     """
     roots, normals = frames
     positions, places, ups = roots.numpy(), on_line[0].numpy(), on_line[1].numpy()
     device, count = roots.device, len(places)
     left = np.cross(ups, edges)
     left *= _APART * np.median(np.linalg.norm(edges, axis=1)) / np.maximum(np.linalg.norm(left, axis=1), 1e-30)[:, None]
-    beside = np.concatenate([places + left, places - left]).astype(np.float32)  # the left ones first
+    beside = np.concatenate([places + left, places - left]).astype(np.float32)  # points on the left first
     candidates = np.concatenate(
         [_nearest(positions, beside[:count]), count + _nearest(positions, beside[count:])], axis=1
     )
@@ -94,7 +94,7 @@ def _is_left(frames, on_line, edges, lines):
     there = wp.array(beside, dtype=wp.vec3, device=device)
     facing = wp.array(np.concatenate([ups, ups]), dtype=wp.vec3, device=device)
     part_lines.go_around(lines, roots, normals, there, facing, candidates, ways)
-    # If all are infinite, the first one is unchanged.
+    # If all paths are infinite, the first one is unchanged.
     return (candidates.numpy()[:, 0] < count) & np.isfinite(ways.numpy()[:, 1])
 
 

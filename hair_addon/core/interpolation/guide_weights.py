@@ -2,7 +2,7 @@
 """Neighboring guides of each strand and their weights  ([Report12] section 2.4, Eq. 8-9).
 
 A strand with its root at q blends the k guides nearest to it. With r_j the distance from q to guide j's root and r'
-that to the nearest excluded guide, the weight is the Gaussian of Eq. 9, reduced to zero by a second factor:
+the distance to the nearest excluded guide, the weight is the Gaussian of Eq. 9, reduced to zero by a second factor:
 
     w_j = exp(-r_j² / 2σ²) (1 - r_j² / ρ²)²    where r_j < ρ,    ρ = min(d, r'),    σ = d / 2
 
@@ -11,7 +11,7 @@ whether it passes the influence distance d or swaps ranks with another guide. Au
 around each root. If no guide is within d / STRETCH, d is STRETCH times the distance to the nearest one.
 
 `limited` then reduces the weights of guides whose shape differs from the nearest one's. It depends on the guides'
-shape and not on roots, so it needs no search and is repeated while combing.
+shapes and not on roots, so it needs no search, and combing repeats it.
 """
 
 import math
@@ -77,7 +77,7 @@ class Limits:
 
     @property
     def fading(self) -> tuple[float, float, float, float]:
-        """(cosine at which a guide has no weight, 1 / the range over which it fades, the same for logs of lengths)."""
+        """(cosine without weight, 1 / range of cosines over which guides fade, and both for logarithms of lengths)."""
         none, all_of_it = -3.0, -2.0
         if self.angle < math.pi:
             none, all_of_it = math.cos(self.angle), math.cos(max(self.angle - FADE, 0.0))
@@ -87,17 +87,17 @@ class Limits:
 
 @dataclass(frozen=True)
 class Reach:
-    """The strands that follow each guide, as compressed rows: those of guide g are strands[starts[g]:starts[g + 1]]."""
+    """The strands that follow each guide, as compressed rows: strands[starts[g]:starts[g + 1]] follow guide g."""
 
     starts: np.ndarray  # (G+1,) int64
     strands: np.ndarray  # int32
 
     def of(self, guides: np.ndarray) -> np.ndarray:
-        """Return the rising indices of the strands that follow any of some guides."""
+        """Return the ascending indices of the strands that follow any of some guides."""
         if len(guides) == len(self.starts) - 1:
             reached = self.strands
         else:
-            # For few guides the time depends on their strands, not on all.
+            # For few guides the time depends on their strands, not on all strands.
             rows = [self.strands[self.starts[guide] : self.starts[guide + 1]] for guide in guides]
             reached = np.concatenate([self.strands[:0], *rows])
         is_reached = np.zeros(int(reached.max(initial=-1)) + 1, bool)
@@ -112,7 +112,7 @@ def reach(guide_weights: GuideWeights, guide_count: int) -> Reach:
 
 def reach_by(indices: np.ndarray, guide_count: int) -> Reach:
     """Return the `Reach` of guides or other owners; indices (S, k) int32: owners of each strand, -1 for none."""
-    # Sorted as one number each, guide and then strand: four times as fast as by an order of indices.
+    # Each pair of guide and strand is sorted as one number, which is four times as fast as sorting indices.
     pairs = (indices.astype(np.int64) << 32) | np.arange(len(indices))[:, None]
     pairs = np.sort(pairs[indices >= 0])
     starts = np.searchsorted(pairs, np.arange(guide_count + 1) << 32)
@@ -125,7 +125,7 @@ def rows(array: wp.array, chosen: wp.array[int]) -> wp.array:
 
 
 def rows_here(array: wp.array, chosen: np.ndarray) -> np.ndarray:
-    """Return a copy of some rows of a Warp array in the processor's memory; chosen: (M,) indices."""
+    """Return a copy of some rows of a Warp array in CPU memory; chosen: (M,) indices."""
     if array.device.is_cpu:
         return array.numpy()[chosen]
     return rows(array, wp.array(chosen, dtype=int, device=array.device)).numpy()
@@ -161,7 +161,7 @@ def weigh(
     influence_distance: float | None,
     neighbour_limit: int,
 ) -> GuideWeights:
-    """Return the `GuideWeights` (S, k) of at least k + 1 `Candidates`; normals (S,), guide_normals (G,).
+    """Return the `GuideWeights` (S, k) for at least k + 1 `Candidates`; normals (S,), guide_normals (G,).
 
     influence_distance: d [m], None for automatic; neighbour_limit: k.
     """
@@ -199,7 +199,7 @@ def _nearest_guides(guide_roots, roots, count, regions):
     require_count("regions of guides", len(guide_regions), len(guide_roots))
     device = roots.device
     strays = np.flatnonzero(~np.isin(strand_regions, guide_regions))
-    if len(strays):  # in a region without guides: use that of the nearest guide
+    if len(strays):  # in a region without guides, use the region of the nearest guide
         found, _distances = hash_grid.neighbours(guide_roots, _some(roots, strays), EVERYWHERE, 1)
         strand_regions = strand_regions.copy()
         strand_regions[strays] = guide_regions[found.numpy()[:, 0]]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class HairBinding:
     """Binding of hair to a surface and its guides, which combing does not change.
 
-    It is all that the weighted sum and the following stages (grooming/following.py) need of strands.
+    The weighted sum and the later stages (grooming/following.py) need nothing else of strands.
     """
 
     roots: SurfacePoints
@@ -90,6 +90,6 @@ def relimited(binding: HairBinding, settings: Any) -> HairBinding:
 
 
 def reweighed(binding: HairBinding, settings: Any) -> HairBinding:
-    """Return a `HairBinding` with other weights, limits or lengths, without a search, for at most as many guides."""
+    """Return a `HairBinding` with other weights, limits or lengths, without a search; k must not grow."""
     at_roots, at_guides = (binding.positions, binding.normals), (binding.guide_positions, binding.guide_normals)
     return weighed(binding.roots, at_roots, at_guides, binding.candidates, settings, binding.is_mirrored)

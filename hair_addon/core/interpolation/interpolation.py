@@ -2,11 +2,11 @@
 """Strands between guides: weighted means of guides' offsets  ([Report12] section 2.4, Eq. 10).
 
 With weights w_j that sum to one, o_j,i the offsets of guide j (Eq. 7) and R_j the rotation from the surface at its root
-to the surface at the strand's, the strand is p'_0 = q and
+to the surface at the strand's root, the strand is p'_0 = q and
 
     p'_i = p'_(i-1) + λ_i m_i,    m_i = sum_j w_j R_j o_j,i,    l_i = sum_j w_j |o_j,i|,    λ_i = l_i / |m_i|
 
-Eq. 10 is λ_i = 1, which makes a strand shorter than its guides if these diverge, down to zero if they are opposite.
+Eq. 10 is λ_i = 1, which makes a strand shorter than its guides if they diverge, down to zero if they are opposite.
 With λ_i as above each segment has the average length of its guides' segments. Weights do not depend on the point
 (guide_weights.py): combing repeats only `interpolate`.
 
@@ -49,7 +49,7 @@ def interpolate(
     """Return (S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,), for guides (G, P) [m], normals (G,).
 
     keep_length: blend from Eq. 10 (0) to segments with the average length of the guides' segments (1); out: array to
-    fill and return, None for a new one; under_way: on the processor, as of `parallel.launch`. Raises `HairError` if
+    fill and return, None for a new one; under_way: on the CPU, as in `parallel.launch`. Raises `HairError` if
     counts do not match.
     """
     require_count("normals", len(normals), len(roots))

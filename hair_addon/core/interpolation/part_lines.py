@@ -7,7 +7,7 @@ shorter than the triangle of root, guide and any point v of that part, so with t
     length = min over {odd pieces, even pieces} of max over their points v of |q - v| + |v - g|
 
 which is exact for straight lines, and continuous unless the root passes through the line: where the straight path
-touches an end or a bend v, the last piece is only the point v on the path. So the separation decreases towards the end
+touches an end or a bend v, the last piece is only the point v on the path. So the separation decreases toward the end
 of a line. No path leads around an end at the surface's border or at another line.
 """
 
@@ -100,7 +100,7 @@ def _on_mesh(mesh, segments, drawn_on, device):
 
 
 def in_order(edges: ArrayLike) -> np.ndarray:
-    """Order edges (L, 2), indices of points, so that each starts at the end of the previous one if possible.
+    """Return edges (L, 2), indices of points, in an order in which each starts at the previous end if possible.
 
     Lines end where only one edge ends, or more than two meet; rings start at their first edge.
     """
@@ -137,7 +137,7 @@ def chained(segments: np.ndarray) -> list[np.ndarray]:
 
 
 def divided(line: np.ndarray, step: float) -> np.ndarray:
-    """Resample a polyline (N, 3) → (M, 3): points at most a step apart, and at least a quarter of a step."""
+    """Return a polyline (N, 3) resampled to (M, 3): points at most one step and at least a quarter step apart."""
     along = np.cumsum(np.concatenate([[0.0], np.linalg.norm(np.diff(line, axis=0), axis=1)]))
     is_kept = np.diff(np.floor(along / (0.25 * step)), prepend=-1.0) > 0.0
     is_kept[-1] = True
@@ -152,7 +152,7 @@ def _pairs(line):
 
 
 def _border_segments(mesh):
-    """Return (B, 2, 3) float64: border edges, of only one triangle; coincident vertices count as one."""
+    """Return (B, 2, 3) float64: edges of only one triangle; coincident vertices count as one vertex."""
     _places, same = np.unique(mesh.vertices, axis=0, return_inverse=True)
     triangles = same.reshape(-1)[mesh.triangles]
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -192,9 +192,9 @@ def go_around(
     candidates: wp.array2d[int],
     ways: wp.array2d[float],
 ) -> None:
-    """Lengthen paths (S, K) [m] from roots to candidate guides (S, K) around lines between them; sorts both again.
+    """Lengthen paths (S, K) [m] from roots to candidate guides (S, K) around lines between them, and sort both.
 
-    A guide behind a line without open ends is infinitely far away; if all are, the nearest one is unchanged.
+    A guide behind a line without open ends is infinitely far away; if all guides are, the nearest is unchanged.
     """
     require_count("normals", len(normals), len(roots))
     require_count("guide normals", len(guide_normals), len(guide_roots))

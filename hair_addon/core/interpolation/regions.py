@@ -24,7 +24,7 @@ class Regions:
 def regions_at(corners: np.ndarray, points: SurfacePoints) -> np.ndarray:
     """Return (N,) int32: the region with the largest barycentric weight at each of the `SurfacePoints`.
 
-    So the border between two regions of vertices is a straight line through each triangle, halfway along its edges.
+    The border between two regions of vertices is thus a straight line through each triangle, halfway along edges.
     """
     labels = corners[points.triangle]
     shares = np.einsum("nc,ncd->nd", points.barycentric, labels[:, :, None] == labels[:, None, :])

@@ -53,7 +53,7 @@ class RootBinder:
     def nearest(self, strands: HairBinding, centres: HairBinding) -> np.ndarray:
         """Return (S, 2) int32: the two centers nearest to each strand, in its region and on its side of part lines.
 
-        -1 if there are fewer.
+        -1 if there are fewer than two.
         """
         regions = self._with_guide_regions(strands, centres)
         found = interpolation.guide_weights.find_candidates(
