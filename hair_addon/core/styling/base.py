@@ -7,8 +7,8 @@ The amount of a style at point i of strand s, with x_i the fraction of the stran
     profile(x) = root + (tip - root) · g(clamp((x - start) / (1 - start), 0, 1))
 
 h_s is a random number of the strand (random_numbers.py) and g the curve of Blender's hair nodes with their Shape σ:
-x^e up to σ = ½, 1 - (1 - x)^e above, with e = -log2(1 - min(σ, 1 - σ)). Within half a segment after its start x^e is
-replaced by a straight line: it starts vertically, so points would jump when the start passes them.
+x^e up to σ = ½, 1 - (1 - x)^e above, with e = -log2(1 - min(σ, 1 - σ)). Within half a segment after the start, a
+straight line replaces x^e: x^e starts vertically, so points would jump when the start passes them.
 """
 
 import math
@@ -77,7 +77,7 @@ EVERYWHERE = Profile()
 
 @dataclass(frozen=True)
 class TreeSettings:
-    """Inputs of the clump sites of a style.
+    """Inputs for the clump sites of a style.
 
     sizes: distance between the sites of each level [m], the largest first; crossover: fraction of the strands that
     belong to the second nearest site.
@@ -103,8 +103,8 @@ class Cutter:
 class Step:
     """A row of a program: one run of a .strand file.
 
-    kind: of `kinds.STEPS`; numbers: values of the file's own parameters, by the names in `NUMBERS` of its module;
-    level: of the clump centers that it needs, counted from the style's first; None for those of a style above it.
+    kind: a key of `kinds.STEPS`; numbers: values of the file's own parameters, by the names in `NUMBERS` of its module;
+    level: level of the clump centers that the step needs, counted from its style's first; None for a style above.
     """
 
     kind: str
@@ -146,7 +146,7 @@ def step_of(settings: StyleSettings, kind: str, numbers: Mapping[str, Any], **ch
 
 
 def has_effect(settings: StyleSettings) -> bool:
-    """Whether a style can change any strand: it is enabled, and its amount and profile are not zero everywhere."""
+    """Return whether a style can change strands: it is enabled, with amount and profile not zero everywhere."""
     is_profile_zero = isinstance(settings, ProfiledSettings) and settings.root == settings.tip == 0.0
     return settings.is_on and settings.amount > 0.0 and not is_profile_zero
 
@@ -155,7 +155,7 @@ S = TypeVar("S", bound=StyleSettings)
 
 
 def scaled(settings: S, factor: float) -> S:
-    """Style settings with all lengths multiplied by a factor, within their ranges."""
+    """Return style settings with all lengths multiplied by a factor, within their ranges."""
     changes = {}
     for field in fields(settings):
         details = field.metadata["param"]

@@ -9,7 +9,7 @@ in the lock. The distance a of a point along the center depends only on its arc 
     da/ds = 1 / sqrt(1 + |dρ/da|²)
 
 so no point slides along its tress when the hair swings; where strands gather, they stretch by half at most. Center
-lines of three tresses are at least 0.90 R apart for a pitch of 6 R, so a tress can have half of that as its radius.
+lines of three tresses are at least 0.90 R apart for a pitch of 6 R, so the radius of a tress can be half of this.
 """
 
 from collections.abc import Mapping

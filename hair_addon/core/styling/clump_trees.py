@@ -22,7 +22,7 @@ from ..long_work import Progress, no_progress, part_of
 from .base import TreeSettings
 from .random_numbers import CROSSOVER, random_numbers
 
-MOST_SITES = 20_000  # of the finest level: placing them takes a second, and 50,000 on two levels seven
+MOST_SITES = 20_000  # of the finest level: placing them takes one second; 50,000 on two levels take seven
 MOST_SPARE = 2  # unused trees to keep: for a slider that goes back, or a style switched off and on
 _HEXAGON = 0.866  # area of a site's cell divided by the square of the distance between sites
 
@@ -58,7 +58,7 @@ class ClumpTrees:
     def levels(self, tree: TreeSettings, progress: Progress = no_progress) -> list[HairBinding]:
         """Return the centers of each level, the coarsest first, bound to guides.
 
-        progress(step, part): called while they are placed; if it raises, nothing of the tree is stored.
+        progress(step, part): called during placement; if it raises, no part of the tree is stored.
         """
         if tree not in self._levels:
             counts = self.site_counts(tree)
@@ -83,7 +83,7 @@ class ClumpTrees:
             self.levels(tree, part_of(progress, place / len(missing), (place + 1) / len(missing)))
 
     def lacks(self, trees: Collection[TreeSettings]) -> list[TreeSettings]:
-        """Return the trees that were not computed yet, each once."""
+        """Return the trees that are not computed yet, each once."""
         return [tree for tree in dict.fromkeys(trees) if tree not in self._levels]
 
     def keep_only(self, used: Collection[TreeSettings]) -> None:
@@ -129,7 +129,7 @@ class ClumpTrees:
         return self._members[key]
 
     def parents(self, tree: TreeSettings, level: int) -> list[np.ndarray]:
-        """Return (K,) int32 per level, the coarsest first: the centers above those of a level, themselves last."""
+        """Return (K,) int32 per level, the coarsest first: centers above those of a level, last the own indices."""
         own = np.arange(len(self.levels(tree)[level].roots), dtype=np.int32)
         return self._upward(tree, own, level)
 

@@ -121,7 +121,7 @@ def turn_length(settings: Settings) -> float:
 
 
 def points_wanted(settings: Settings, length: float) -> int:
-    """Return the number of points that a strand of a length [m] needs for smooth coils, also in the tightest locks."""
+    """Return the number of points that a strand of a length [m] needs for smooth coils, even in the tightest locks."""
     tightest = replace(settings, pitch=settings.pitch * (1.0 - settings.pitch_vary))
     return math.ceil(POINTS_A_TURN * length / turn_length(tightest)) + 1
 

@@ -39,5 +39,5 @@ def fitted_value(value: Any, details: Param, factor: float) -> Any:
 
 
 def _rounded(value):
-    """Round to three digits, as an artist would type it."""
+    """Return a value rounded to three digits, as an artist would type it."""
     return float(f"{value:.3g}")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaning of guides with a clearance from the surface: the styles Lean and Wet (lean.py, wet.py) on guides.
 
-t'_i = unit((1 - A) t_i + A D), or t_i if that sum is shorter than 1e-3. A segment that would end nearer to the surface
-than the clearance is rotated towards the surface's normal until it ends at the clearance; lengths are kept.
+t'_i = unit((1 - A) t_i + A D), or t_i if the sum is shorter than 1e-3. A segment that would end nearer to the surface
+than the clearance is rotated toward the surface's normal until it ends at the clearance; lengths are preserved.
 """
 
 import numpy as np
@@ -96,7 +96,7 @@ def leaned(
     vertex_normals: np.ndarray,
     clearance: float,
 ) -> np.ndarray:
-    """Return (G, P, 3) float32 [m]: guides whose segments are rotated towards directions.
+    """Return (G, P, 3) float32 [m]: guides whose segments are rotated toward directions.
 
     points: (G, P, 3) [m]; amounts: (G, P) in [0, 1]; directions: (G, 3) unit; surface: for the clearance;
     vertex_normals: (V, 3) of its mesh; clearance [m]. A guide whose amounts are all zero keeps its bits.

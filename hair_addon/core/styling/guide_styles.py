@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guides that strands follow: with the styles that act on guides, and with the strands' number of points.
+"""The guides that strands follow: combed guides after styles on guides, with the strands' number of points.
 
 Combed guides themselves do not change. Only guides that changed are computed again, so the time of a stroke depends on
 the guides that it moves.
@@ -38,7 +38,7 @@ class Lean:
     clearance: float
 
     def is_same(self, other: "Lean") -> bool:
-        """Whether both lean guides equally."""
+        """Return whether both styles lean guides equally."""
         arrays = (self.amounts, other.amounts), (self.directions, other.directions)
         return self.settings == other.settings and all(np.array_equal(*pair) for pair in arrays)
 
@@ -96,12 +96,12 @@ class FollowedGuides:
     """The guides that strands follow: leaned, and with the strands' number of points."""
 
     def __init__(self, mesh: TriMesh, leans: Sequence[Lean], point_count: int) -> None:
-        """mesh: for the clearance of guides."""
+        """mesh: the surface that leaned guides keep clear of."""
         self._mesh, self._leans, self._point_count = mesh, leans, point_count
         self._before, self._after = np.empty((0, 0, 3), np.float32), np.empty((0, 0, 3), np.float32)
 
     def continue_from(self, other: "FollowedGuides") -> None:
-        """Reuse the guides of another instance if it computes the same."""
+        """Reuse the guides of another instance if its inputs are the same."""
         is_same = (
             self._mesh is other._mesh
             and self._point_count == other._point_count

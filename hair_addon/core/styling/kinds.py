@@ -52,7 +52,7 @@ class Offer:
 
     @property
     def settings(self) -> StyleSettings:
-        """Return the settings of an added style, except its seed."""
+        """The settings of an added style, except its seed."""
         return KINDS[self.kind](**self.changes)
 
 
@@ -88,12 +88,12 @@ def module_of(settings: StyleSettings) -> Any:
 
 
 def needs_centre(step: str) -> bool:
-    """Whether a kind of step acts only on strands with a clump center."""
+    """Return whether a kind of step acts only on strands with a clump center."""
     return hasattr(STEPS[step], "NEEDS_CENTRE")
 
 
 def steps_of(settings: StyleSettings, cutters: Mapping[str, Cutter]) -> list[Step]:
-    """Return the steps of one style on strands, none for one that acts on guides; levels count from its own first.
+    """Return the steps of a style on strands, none for a style on guides; levels count from the style's first.
 
     cutters: planes by their names in Trim styles.
     """

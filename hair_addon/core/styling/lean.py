@@ -3,7 +3,7 @@
 
     t'_i = unit((1 - A) t_i + A D)
 
-It acts on guides, which are few, because each point is compared with the surface; strands follow.
+The style acts on guides, which are few, because it compares each point with the surface; strands follow guides.
 """
 
 from dataclasses import dataclass

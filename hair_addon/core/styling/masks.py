@@ -62,7 +62,7 @@ class CutMask:
     """The part of its length that each strand loses.
 
     length: the fraction of its length that a strand keeps; read: a function of a `HairBinding` and the clumps (S,)
-    int32 of its strands, None if unknown, that returns the fraction (S,) of each strand; None for `length`.
+    int32 of its strands, None if unknown, that returns the fraction (S,) that each keeps; None for `length`.
     """
 
     length: float

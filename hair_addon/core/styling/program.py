@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A stack of styles → the program that the kernel of steps.py runs, and the clump trees that it needs."""
+"""Compilation of a stack of styles to a program for the kernel of steps.py, and the clump trees that it needs."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ from .base import Cutter, Step, StyleSettings, TreeSettings, has_effect
 # The whole numbers of a step: its kind, of `kinds.STEP_KINDS`; its seed; its row of masks or -1; its row of members or
 # -1; the first of the centers that members count from.
 CHOICES = ("kind", "seed", "mask", "level", "first_centre")
-# The numbers that all steps have, before their own, and the total count.
+# The numbers that all steps have, which precede their own numbers, and the total count.
 SHARED = ("amount", "vary", "at_root", "at_tip", "exponent", "is_flipped", "from", "keep_length")
 NUMBERS = 24
 

@@ -30,7 +30,7 @@ from .style_inputs import Inputs
 if TYPE_CHECKING:
     from ..interpolation.guide_weights import Reach
 
-# Nothing differentiates these kernels.
+# No gradients are needed.
 wp.set_module_options({"enable_backward": False})
 
 _AGAINST = -0.5  # mean cosine between guides and normals below which hair grows on the surface's other side
@@ -42,7 +42,7 @@ Centres = tuple["wp.array2d[wp.vec3]", np.ndarray | None]
 
 @dataclass
 class _Level:
-    """Centre strands of one level of a clump tree."""
+    """Center strands of one level of a clump tree."""
 
     binding: HairBinding
     first: int  # index of its first center among all
@@ -57,7 +57,7 @@ class _Level:
 
 @dataclass
 class Styling:
-    """Styles bound to the strands of one hair. `stack.bind` makes it."""
+    """Styles bound to the strands of one hair, from `stack.bind`."""
 
     styles: tuple[StyleSettings, ...]
     inputs: Inputs
@@ -118,7 +118,7 @@ class Styling:
         kernel_cache.launch(_with_arcs, len(centres), inputs=[centres, rows], outputs=[into], device=centres.device)
 
     def reached(self, combed: np.ndarray, moved: np.ndarray) -> np.ndarray:
-        """Return the rising indices (M,) of the strands that move when guides are combed.
+        """Return the ascending indices (M,) of the strands that move when guides are combed.
 
         combed: (C,) indices of guides; moved: indices of the strands that follow them. Strands whose clump centers
         follow them move too.
@@ -141,7 +141,7 @@ class Styling:
 
     @cached_property
     def _members_of(self):
-        """Return for each level the strands that belong to each center."""
+        """The strands that belong to each center, for each level."""
         rows = self.data.members.numpy()[: len(self.levels)]
         return [
             interpolation.guide_weights.reach_by(members[:, None], len(level.binding.roots))
@@ -151,7 +151,8 @@ class Styling:
     def clumps(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Return (S,) int32 and (S,) float32 in [0, 1): the finest clump of each strand and the clump's random number.
 
-        Of the first style that gathers strands; None without one. -1 and 0 for strands without a clump.
+        The clumps are those of the first style that gathers strands; None without such a style. -1 and 0 stand for
+        strands without a clump.
         """
         if not self.tree_levels:
             return None
@@ -213,7 +214,7 @@ def bind(
 ) -> Styling:
     """Bind styles to strands; sites that `trees` does not contain yet are placed and bound.
 
-    binding: of the strands; guides: that they follow; inputs: `Inputs` of the styles; axes: (4, 4), from the
+    binding: of the strands; guides: that the strands follow; inputs: `Inputs` of the styles; axes: (4, 4), from the
     coordinates of strands to the surface's own, without scale; point_count: of a strand.
     """
     device = binding.positions.device
@@ -278,9 +279,9 @@ def bind(
 
 
 def _finest_clumps(levels, owner, rows, known):
-    """Return (S,) int32: the clumps of strands as in `Styling.clumps`; None for strands with no or several of them.
+    """Return (S,) int32: the clumps of strands as in `Styling.clumps`; None if the strands have no clumps or several.
 
-    owner: as of `ClumpTrees.members`; rows: members of the first `known` levels.
+    owner: as in `ClumpTrees.members`; rows: members of the first `known` levels.
     """
     if not levels:
         return None

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The kernel that applies a program of styles to strands: one launch for all steps.
 
-steps.cpp and the files it includes are compiled for both kinds of device. A program is two arrays of rows, one a step:
+steps.cpp and the files it includes are compiled for both kinds of device. A program is two arrays with a row per step:
 whole numbers (`CHOICES`) and numbers (`NUMBERS`), as program.py writes them.
 """
 
@@ -17,16 +17,16 @@ from ..kernels.checks import require_count, require_indices
 from . import kinds, style_text
 from .program import CHOICES, NUMBERS, Program
 
-# Nothing differentiates these kernels. A GPU's approximate divisions and roots move hair by less than 2e-6 of its size;
+# No gradients are needed. A GPU's approximate divisions and roots move hair by less than 2e-6 of its size;
 # steps.cpp uses exact ones where errors would be larger.
 _OPTIONS = {"enable_backward": False, "fast_math": True}
 wp.set_module_options(_OPTIONS)
 
 LEAST_BLOCKS = 64  # fewer are not worth a thread
-WIDTH = 16  # strands that a thread of the processor styles at once; with 8 it takes a fifth longer
-MOST_POINTS = 257  # of a strand
-SHORT_POINTS = 64  # of a strand in the variant with less GPU memory
-POINTS_AT_ONCE = 5  # of a strand in the shared memory of a GPU: more take cache from directions and lengths
+WIDTH = 16  # strands that a CPU thread styles at once; 8 at once take a fifth longer
+MOST_POINTS = 257  # points of a strand
+SHORT_POINTS = 64  # points of a strand in the variant with less GPU memory
+POINTS_AT_ONCE = 5  # points of a strand in a GPU's shared memory: more take cache from directions and lengths
 
 
 _TEXTS = style_text.texts(kinds.STEPS)
@@ -61,7 +61,7 @@ class StrandData:
 
 @dataclass(frozen=True)
 class Variant:
-    """The kernel for a number of strands that a thread of the processor styles at once, and a maximum of points."""
+    """The kernel for a number of strands that a CPU thread styles at once, and a maximum number of points."""
 
     kernel: wp.Kernel
     width: int

@@ -11,7 +11,7 @@ from .program import mask_key
 
 
 def is_uneven(styles: Sequence[StyleSettings]) -> bool:
-    """Whether a mask or a variation makes the wetness differ between strands."""
+    """Return whether a mask or a variation makes the wetness differ between strands."""
     soaking = _soaking(styles)
     everywhere = max((style.amount for style in soaking if not _has_places(style)), default=0.0)
     return any(style.amount > everywhere for style in soaking if _has_places(style))

@@ -12,7 +12,7 @@ from .masks import CutMask, Mask
 
 @dataclass(frozen=True)
 class Inputs:
-    """Masks by `program.mask_key`, planes of cutters and directions by objects."""
+    """Masks by `program.mask_key`; planes of cutters and directions of targets by the names of objects."""
 
     masks: Mapping[tuple[str, str, bool], Mask | CutMask] = field(default_factory=dict)
     cutters: Mapping[str, Cutter] = field(default_factory=dict)

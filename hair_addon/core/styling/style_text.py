@@ -42,7 +42,7 @@ def texts(steps: Iterable[str]) -> dict[str, str]:
 
 
 def ordered(step: Step) -> list[float]:
-    """Return the own numbers of a step in the order of the kernels."""
+    """Return a step's own numbers in the order in which kernels read them."""
     values = dict(step.numbers)
     found: list[float] = []
     for name in kinds.STEPS[step.kind].NUMBERS:
