@@ -11,8 +11,8 @@ from .groom import POINT_COUNT, GuideSettings, HairSettings
 # representative of its guide, ID, random number (4 each); root: triangle (4), corners, barycentric (12 each).
 _POINT_BYTES, _CURVE_BYTES = 16, 65
 _SLOT_BYTES = 8  # index and weight of a guide
-# Bytes on the GPU. Per point; per strand beside its points: root, range, random number; and visibility of the world at
-# every fourth point, in four textures of four bytes each.
+# Bytes on the GPU. Per point; per strand, besides its points: root, range, random number; and visibility of the world
+# at every fourth point, in four textures of four bytes each.
 _TEXEL_BYTES, _HEAD_BYTES = 8, 12
 _SEEN_STEP, _SEEN_BYTES = 4, 16
 
@@ -24,7 +24,7 @@ _FACE_WORK_BYTES, _GUIDE_WORK_BYTES, _STRAND_WORK_BYTES = 760, 3300, 680
 _MADE_POINT_BYTES, _STYLED_POINT_BYTES, _DRAWN_POINT_BYTES = 36, 12, 12
 _MADE_STRAND_BYTES = 380
 
-# Placing: per triangle of the surface and per guide, once, and in each round.
+# Placing guides: per triangle of the surface and per guide, once and in each round.
 _FACE_SECONDS, _FACE_ROUND_SECONDS = 5e-6, 2e-7
 _GUIDE_SECONDS, _GUIDE_ROUND_SECONDS = 4e-5, 9e-6
 _SPREAD_SECONDS = 2e-4  # per guide for all coarser levels
@@ -95,15 +95,15 @@ def hair_seconds(settings: HairSettings, face_count: int) -> float:
 
 
 def simulation_bytes(vertex_count: int, guide_count: int) -> int:
-    """Return the working memory for simulating guides [bytes]; vertex_count: of a guide."""
+    """Return the working memory for simulating guides [bytes]; vertex_count: per guide."""
     return guide_count * (_SIMULATED_GUIDE_BYTES + vertex_count * _SIMULATED_VERTEX_BYTES)
 
 
 def table_seconds(size: int) -> float:
-    """Return the time for baking the Marschner tables [s]; size: of each, in texels along a side."""
+    """Return the time for baking the Marschner tables [s]; size: texels along a side of each table."""
     return size**2 * _TEXEL_SECONDS
 
 
 def simulation_seconds(vertex_count: int, guide_count: int, substeps: int, frame_count: int) -> float:
-    """Return the time for simulating guides [s]; vertex_count: of a guide; substeps: of a frame."""
+    """Return the time for simulating guides [s]; vertex_count: per guide; substeps: per frame."""
     return frame_count * (_FRAME_SECONDS + guide_count * vertex_count * substeps * _VERTEX_SECONDS)

@@ -38,9 +38,10 @@ class DerivationSettings(Settings):
 class DerivedGuides:
     """Guides of existing hair, and the errors of its reproduction.
 
-    guides: `Strands` (G, P) on the CPU; sources: (G,) strands at whose roots they are, empty for given guides; binding:
-    of all strands to the guides; guide_map: (S, k) int32 guides, -1 for none, and float32 weights of each strand;
-    errors: (S,) root mean square distance between the points of a strand and its reproduction, relative to its length.
+    guides: `Strands` (G, P) on the CPU; sources: (G,) strands whose roots the guides share, empty for given guides;
+    binding: of all strands to the guides; guide_map: (S, k) int32 guides, -1 for none, and float32 weights of each
+    strand; errors: (S,) root mean square distance between the points of a strand and its reproduction, relative to its
+    length.
     """
 
     guides: Strands

@@ -2,7 +2,7 @@
 """Flow lines: polylines on a surface that determine the initial direction of guides.
 
 The direction at a root is a mean of the lines' directions with the weights of Eq. 9 [Report12], with the distance to
-the nearest line as sigma. On a line, guides follow the line; between lines, the direction is continuous. Where lines
+the nearest line as sigma. On a line, guides follow the line. Between lines, the direction is continuous. Where lines
 oppose each other, and far from all lines, guides follow the surface normal. The reach of a line depends on the spacing
 of lines.
 """
@@ -40,7 +40,7 @@ class FlowLines:
 def lay(
     mesh: TriMesh, segments: ArrayLike, device: wp.DeviceLike = "cpu", drawn_on: np.ndarray | None = None
 ) -> FlowLines:
-    """Project segments (L, 2, 3) [m] onto a checked mesh → `FlowLines`; consecutive segments that touch form a line.
+    """Return the `FlowLines` of segments (L, 2, 3) [m] projected onto a checked mesh; segments that touch form a line.
 
     drawn_on: (V, 3) vertices of the posed surface on which the segments were drawn, None for the mesh's own. Raises
     `HairError`.

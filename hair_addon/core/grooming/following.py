@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Evaluation of strands from their guides: all strands, in other threads, or some. Combing repeats only this.
+"""Evaluation of all strands from their guides, in other threads, or of some strands. Combing repeats only this.
 
 Warp is imported late, because the import is slow.
 """
@@ -76,7 +76,7 @@ def combed(guides: Strands, before: Strands) -> np.ndarray | None:
     is_other = guides.numpy() != before.numpy()
     if np.count_nonzero(is_other) > len(is_other):
         return np.flatnonzero(is_other.any(axis=(1, 2)))
-    return np.unique(np.flatnonzero(is_other) // is_other[0].size)  # half the time for few changes
+    return np.unique(np.flatnonzero(is_other) // is_other[0].size)  # takes half as long if few guides changed
 
 
 def follow_guides(binding: HairBinding, guides: Strands, styling: "Styling | None" = None) -> Strands:
@@ -124,7 +124,7 @@ def growing_points(
     executor = ThreadPoolExecutor(1, "vellus")
     growing = executor.submit(grow)
     executor.shutdown(wait=False)  # the thread ends with its work
-    growing.add_done_callback(lambda _done: is_under_way.set())  # also after an error
+    growing.add_done_callback(lambda _done: is_under_way.set())  # after an error too
     is_under_way.wait(PREPARATION)
     time.sleep(HEAD_START)
     return growing

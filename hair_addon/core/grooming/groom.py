@@ -261,8 +261,8 @@ def distribute_guides(
     mirror: for symmetric guides; shape: `TriMesh` of which `mesh` is a rotated and uniformly scaled copy, mirrored
     across the X axis: guides are placed on it, and thus in the same places for any rotation and scale, None for `mesh`;
     roots: existing `SurfacePoints` of guides, None to place them; flow: (L, 2, 3) segments [m] of flow lines, and
-    drawn_on (V, 3): as lines and drawn_on of `bind_hair`; varied: returns {setting: (G,)} in place of settings in
-    `VARIED` for guides with roots (G), or None; progress(step, part): callback, may raise to cancel. Raises
+    drawn_on (V, 3): as lines and drawn_on of `bind_hair`; varied: returns {setting: (G,)} for guides at roots (G),
+    in place of settings in `VARIED`, or None; progress(step, part): callback, may raise to cancel. Raises
     `HairError`.
     """
     check_mesh(mesh)
@@ -369,7 +369,7 @@ def laid_lines(
 def load_kernels(device: str, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS) -> None:
     """Load the kernels of guides and of hair without styles, which are compiled on first use.
 
-    device, progress: as in `distribute_guides`; most_threads: of compilation. Takes microseconds if they are loaded.
+    device, progress: as in `distribute_guides`; most_threads: of compilation. Takes microseconds if kernels are loaded.
     """
     progress(kernel_setup.LOADING, 0.0)
     on_device = [

@@ -136,5 +136,5 @@ def _between(low, high, part):
 
 
 def _rounded(value):
-    """Round to three digits, which survive Blender's storage in single precision."""
+    """Return a value rounded to three digits, which survive Blender's storage in single precision."""
     return float(f"{min(max(value, _SMALLEST), _LARGEST):.2e}")

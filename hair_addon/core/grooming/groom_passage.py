@@ -65,7 +65,7 @@ def _copied(source, target, roots):
         *geometry.landmark_warp.similarity(*(m.vertices.astype(np.float64) for m in (source.mesh, target.mesh)))
     )
     apart = np.abs(warp.places(source.mesh.vertices) - target.mesh.vertices).max()
-    if not apart <= _SAME * np.ptp(target.mesh.vertices, axis=0).max():  # also refuses NaN
+    if not apart <= _SAME * np.ptp(target.mesh.vertices, axis=0).max():  # rejects NaN too
         return None
     return Passage("COPY", groom_transfer.places_by_warp(source.mesh, target.mesh, roots, warp, _REACH), warp)
 
@@ -91,10 +91,10 @@ def _by_agreeing_uv(source, target, roots):
 def carried_weights(
     source: TransferSurface, target: TransferSurface, weights: np.ndarray, warp: Warp | None, reach: float = _REACH
 ) -> np.ndarray:
-    """Transfer masks (V, K) of the source's vertices to the target's W vertices: (W, K) float32 in [0, 1].
+    """Return masks (W, K) float32 in [0, 1] of the target's W vertices, from masks (V, K) of the source's vertices.
 
     warp: from the source's to the target's space, None for UV; reach: largest distance of a vertex from the warped
-    source, relative to the target's size; masks are 0 beyond it.
+    source, relative to the target's size; masks are 0 beyond this distance.
     """
     if warp is None:
         wanted, mesh = _uv_places(target), _layout(source)

@@ -32,7 +32,8 @@ class Places:
     """New roots of M of G guides.
 
     kept: (M,) ascending indices; roots: M `SurfacePoints`; turns: (M, 3, 3) orthogonal; scale: factor of lengths;
-    far_count: guides dropped because no surface is near; other_side_count: because the surface faces the other way.
+    far_count: guides dropped because no surface is near; other_side_count: guides dropped because the surface there
+    faces the other way.
     """
 
     kept: np.ndarray
@@ -80,7 +81,7 @@ def places_by_warp(
     at_roots = positions(source, roots)
     wanted = warp.places(at_roots)
     farthest = 0.1 * geometry.closest_point.FARTHEST
-    if not np.abs(wanted).max() < farthest:  # also refuses NaN
+    if not np.abs(wanted).max() < farthest:  # rejects NaN too
         raise HairError("The meshes cannot be aligned: check their scale and their landmarks.")
     found = geometry.closest_point.SurfaceQuery(target).nearest(wanted)
     apart = np.linalg.norm(positions(target, found) - wanted, axis=1)

@@ -15,7 +15,7 @@ from .guide_tool_settings import AttractSettings
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-STEPS = 6  # of the search for a segment's rise; each queries the surface below its end
+STEPS = 6  # of the search for a segment's rise; each step queries the surface below the segment's end
 CLOSE = 1e-4  # tolerance of the height, relative to a segment's length
 RAMP = 0.5  # rise per length at the root, until a guide reaches the clearance
 DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))

@@ -133,7 +133,7 @@ def copied(
 def upright_rotations(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Return rotations (N, 3, 3) that map unit normals (N, 3) to others, and upward tangents to upward tangents.
 
-    The least rotations where either surface is nearly level.
+    They are the least rotations where either surface is nearly level.
     """
     least = rotations(start, end)
     up = np.array([0.0, 0.0, 1.0])
@@ -141,7 +141,7 @@ def upright_rotations(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     is_steep = (np.linalg.norm(before, axis=1) > _UPRIGHT) & (np.linalg.norm(after, axis=1) > _UPRIGHT)
     carried = unit(np.einsum("nij,nj->ni", least, before))
     after = unit(after)
-    # A rotation about the end's normal, to which both are perpendicular.
+    # A rotation about the end's normal, to which both tangents are perpendicular.
     cosine = np.sum(carried * after, axis=1)
     sine = np.sum(np.cross(carried, after) * end, axis=1)
     angle = np.where(is_steep, np.arctan2(sine, cosine), 0.0)

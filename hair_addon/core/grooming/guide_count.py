@@ -91,7 +91,7 @@ def most_crowded(
     """Return the indices (count,) of guides to remove, in order, for an even rest: sample elimination [Yuksel15].
 
     roots (G, 3) [m]; normals (G, 3): unit; may_go: (G,) bool, guides that may be removed; spread: (G,) positive,
-    wanted density of guides at each root, None for uniform. Fewer are returned if not enough may be removed.
+    wanted density of guides at each root, None for uniform. Returns fewer indices if not enough guides may be removed.
     """
     roots = np.asarray(roots, np.float64)
     count = min(count, int(np.count_nonzero(may_go)))

@@ -100,7 +100,7 @@ def downhill(root_normals: np.ndarray, lift: float | np.ndarray, gravity: float 
 
 
 def mirrored(controls: np.ndarray, places: np.ndarray, mirror: Mirror) -> np.ndarray:
-    """Return controls (G, n, 3) whose second half are images of the first, for mirrored roots among places (G, 3)."""
+    """Return controls (G, n, 3) whose second half mirrors the first half, where roots at places (G, 3) are mirrored."""
     count = len(places) // 2
     images = mirror.image(places[:count])
     reach = 5e-3 * np.ptp(places, axis=0).max()
@@ -112,7 +112,7 @@ def mirrored(controls: np.ndarray, places: np.ndarray, mirror: Mirror) -> np.nda
 
 
 def _tilted(directions, largest, random_angle, random_turn):
-    """Tilt unit vectors (G, 3) by up to an angle [rad], uniformly over the spherical cap."""
+    """Return unit vectors (G, 3) tilted by up to an angle [rad], uniformly over the spherical cap."""
     cosine = 1.0 - random_angle * (1.0 - np.cos(largest))
     sine, turn = np.sqrt(1.0 - cosine**2), 2.0 * np.pi * random_turn
     # Any two perpendicular directions suffice: start with the axis farthest from each direction.
@@ -124,7 +124,7 @@ def _tilted(directions, largest, random_angle, random_turn):
 
 
 def _along(path, fractions):
-    """Interpolate paths (G, steps + 1, 3) of equal steps at fractions (n,) of their lengths → (G, n, 3)."""
+    """Return points (G, n, 3) on paths (G, steps + 1, 3) of equal steps, at fractions (n,) of their lengths."""
     places = fractions * (path.shape[1] - 1)
     before = np.minimum(places.astype(int), path.shape[1] - 2)
     share = (places - before)[:, None].astype(np.float32)

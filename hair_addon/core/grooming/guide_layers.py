@@ -6,7 +6,7 @@ base. A layer has a turn C_i and a stretch s_i per segment, so that layers 1 to 
 
     t'_i = F_i C_1,i^w1 ... C_n,i^wn e_z,    l'_i = l_i exp(w1 s_1,i + ... + wn s_n,i).
 
-Turns of a layer therefore follow the layers below, each segment for itself, and a part of a turn keeps all lengths.
+The turns of a layer therefore follow the layers below, segment by segment, and a fraction of a turn keeps all lengths.
 """
 
 from collections.abc import Callable
@@ -115,11 +115,11 @@ def composed_again(layers: GuideLayers, shape: np.ndarray, is_chosen: np.ndarray
 def recorded(
     layers: GuideLayers, active: int, points: np.ndarray, shape: np.ndarray | None = None, in_place: bool = False
 ) -> tuple[GuideLayers, np.ndarray]:
-    """Let the layer of index `active` make guides as they were edited; returns the layers and (G,) bool: which changed.
+    """Return (layers whose layer `active` reproduces edited guides, (G,) bool: guides that changed).
 
     points: (N, 3) of the edited guides; shape: (N, 3) float32, the composed points if they are known; in_place: whether
-    the arrays of `layers` may change. Other layers stay. A guide whose root has moved takes its base along. Guides
-    where the active layer weighs less than `LEAST_WEIGHT` stay as they are composed.
+    the arrays of `layers` may change. Other layers do not change. The base of a guide moves with its root. Guides for
+    which the active layer has a weight below `LEAST_WEIGHT` do not change.
     """
     points = np.asarray(points, np.float32)
     require_count("edited points", len(points), len(layers.base))
@@ -146,15 +146,15 @@ def is_other(layers: GuideLayers, points: np.ndarray, others: np.ndarray) -> np.
     apart, size = np.zeros(len(layers.counts), np.float32), np.zeros(len(layers.counts), np.float32)
     apart[has_points] = np.maximum.reduceat(np.abs(points - others).ravel(), firsts)
     size[has_points] = np.maximum.reduceat(np.abs(others).ravel(), firsts)
-    return ~(apart <= _TOLERANCE * size)  # also of NaN
+    return ~(apart <= _TOLERANCE * size)  # true for NaN too
 
 
 def moved(layers: GuideLayers, move: Callable[[np.ndarray], np.ndarray]) -> GuideLayers:
-    """Let layers follow a map of space that moves the guides; weights stay.
+    """Return the layers of guides that a map of space has moved; weights do not change.
 
     move: a function of points (N, 3), in the order of the guides' points. Turns stay the same under rotations and
-    scales, and are reflected by reflections. Under other maps each layer keeps the shape that it makes of the layers
-    below.
+    scales, and are reflected by reflections. Under other maps, each layer with the layers below reproduces
+    the mapped shape.
     """
     if not len(layers.base):
         return layers
@@ -201,7 +201,7 @@ def moved(layers: GuideLayers, move: Callable[[np.ndarray], np.ndarray]) -> Guid
 
 
 def merged(layers: GuideLayers, lower: int) -> GuideLayers:
-    """Merge a layer and the one above it, with their weights, into one layer of weight 1; guides keep their shape."""
+    """Return the layers with one layer and the next merged, by their weights, into one of weight 1; guides do not change."""
     shape = composed(layers)
     above = [index for index in range(len(layers.turns)) if index != lower + 1]
     turns, stretches = layers.turns.copy(), layers.stretches.copy()
@@ -222,7 +222,7 @@ def merged(layers: GuideLayers, lower: int) -> GuideLayers:
 
 
 def _rooted(layers, points, starts):
-    """Return (layers whose base begins where edited guides do, (G,) bool: guides whose base or frame has changed).
+    """Return (layers whose base begins at the roots of edited guides, (G,) bool: guides whose base or frame changed).
 
     New guides without a base take the edited points.
     """

@@ -41,7 +41,7 @@ def _scaled(points, factors):
 
 
 def cut(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Cut guides at given lengths: (S, P, 3) float32 [m], with the same number of points, all on the original guide.
+    """Return guides (S, P, 3) float32 [m] cut at given lengths, with as many points as before, all on the original.
 
     points (S, P, 3) [m]; ends (S,) [m]: arc length of each cut, at most the guide's length. Points keep their fractions
     of the length: a guide that is cut at its tip is unchanged.
@@ -63,10 +63,10 @@ def cut(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 
 def cut_to_length(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Cut guides so that the results have the wanted lengths (S,) [m]: (S, P, 3) float32 [m].
+    """Return guides (S, P, 3) float32 [m] cut so that the results have the wanted lengths (S,) [m].
 
-    The resampled polyline is shorter than the original up to the cut, so the cut lies slightly beyond `wanted`. It is
-    found by false position with the Illinois rule, between `wanted` and the tip.
+    The resampled polyline is shorter than the original up to the cut, so the cut lies slightly beyond `wanted`. The cut
+    is found by false position with the Illinois rule, between `wanted` and the tip.
     """
     if not len(points):
         return np.asarray(points, np.float32)

@@ -21,7 +21,7 @@ def joined(points: np.ndarray, directions: np.ndarray, lengths: np.ndarray) -> n
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    """Normalize vectors (..., 3); zero stays zero."""
+    """Return vectors (..., 3) normalized; zero vectors stay zero."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(lengths > 0.0, lengths, 1.0)
 
@@ -32,7 +32,7 @@ def across(vectors: np.ndarray) -> np.ndarray:
 
 
 def turned(directions: np.ndarray, targets: np.ndarray, shares: np.ndarray) -> np.ndarray:
-    """Rotate unit vectors (..., 3) toward others by fractions (...) in [0, 1] of the angle between them.
+    """Return unit vectors (..., 3) rotated toward others by fractions (...) in [0, 1] of the angle between them.
 
     A direction opposite to its target turns about an arbitrary perpendicular axis. Zero vectors, and directions with a
     zero target, are unchanged.
@@ -61,7 +61,7 @@ def rotations(start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def blended(points: np.ndarray, others: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Blend strands with others (S, P, 3) [m] by weights (S,) in [0, 1]: (S, P, 3) float32 [m].
+    """Return strands (S, P, 3) float32 [m] blended with others (S, P, 3) [m] by weights (S,) in [0, 1].
 
     Directions of segments are interpolated by angle, lengths linearly. Roots do not move.
     """

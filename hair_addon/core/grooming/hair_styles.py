@@ -47,7 +47,7 @@ def clump_trees(
     binder = RootBinder(mesh, guide_roots, settings, regions, laid, is_mirrored, device)
 
     placed_on, its_texture = mesh if shape is None else shape, texture
-    if is_mirrored:  # as stored roots, so that sites are the same on a mirrored surface
+    if is_mirrored:  # like stored roots, so that sites are the same on a mirrored surface
         placed_on = TriMesh(-placed_on.vertices, placed_on.triangles[:, [0, 2, 1]])
         its_texture = None if texture is None else texture.with_flipped_winding()
 
@@ -78,7 +78,7 @@ def bind_styles(
     progress: Progress = no_progress,
     cut: CutMask | None = None,
 ) -> "Styling | None":
-    """Return the `Styling` of strands; None if they follow their guides unchanged, as `is_plain` tells.
+    """Return the `Styling` of strands; None if strands follow their guides unchanged (`is_plain`).
 
     axes: (4, 4) to the surface's own coordinates, from `own_axes`, None for the identity; progress(step, part):
     callback for the placement of clump sites, may raise to cancel; cut: the `CutMask` of strands whose lengths differ,

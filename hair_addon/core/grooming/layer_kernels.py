@@ -109,7 +109,8 @@ def _record(
 def compose(layers: GuideLayers, guides: np.ndarray | None = None, out: np.ndarray | None = None) -> np.ndarray:
     """Return the points (N, 3) float32 of guides with their layers.
 
-    guides: (M,) indices of the guides to be composed, None for all; out: (N, 3) float32, changed in their places.
+    guides: (M,) indices of the guides to be composed, None for all; out: (N, 3) float32, in which their points are
+    overwritten, None for a new array.
     """
     if out is None:
         out = np.empty((len(layers.base), 3), np.float32)
@@ -124,9 +125,9 @@ def compose(layers: GuideLayers, guides: np.ndarray | None = None, out: np.ndarr
 
 
 def record(layers: GuideLayers, active: int, points: np.ndarray, guides: np.ndarray) -> None:
-    """Change the turns and stretches of a layer, which are contiguous, to those with which it makes edited guides.
+    """Overwrite the contiguous turns and stretches of a layer, so that it reproduces edited guides.
 
-    active: index of the layer; points: (N, 3) float32 of the guides; guides: (M,) int32, those that were edited.
+    active: index of the layer; points: (N, 3) float32 of the guides; guides: (M,) int32, indices of the edited guides.
     """
     out = wp.array(layers.turns[active], dtype=wp.vec4, device="cpu", copy=False)
     out_stretches = wp.array(layers.stretches[active], dtype=float, device="cpu", copy=False)

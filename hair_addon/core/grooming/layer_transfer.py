@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Layers of guides carried to another set of guides, by the weights with which strands follow guides (Eq. 9).
 
-The weights are squared, which blurs combing less: it returns better from another number of guides.
+The weights are squared: combing is blurred less, and is restored better after a change of the number of guides.
 
 Turns are averaged as rotation vectors in the frames of the roots: the vector of each guide is carried to the other root
 by the least rotation between the normals.
@@ -16,18 +16,18 @@ from .. import geometry
 from .guide_layers import GuideLayers, added
 from .guide_shapes import rotations
 
-_SAME_PLACE = 1e-6  # of the extent of the roots: guides that are closer are the same
+_SAME_PLACE = 1e-6  # of the extent of the roots: guides at a smaller distance are the same
 _OF_GUIDES, _OF_LAYERS = ("base", "counts", "normals", "tangents"), ("turns", "stretches", "weights")
 
 
 def transferred(
     layers: GuideLayers, others: GuideLayers, indices: np.ndarray, weights: np.ndarray, apart: np.ndarray | None = None
 ) -> GuideLayers:
-    """Return other guides (M) with the layers of guides, whose weights (L, M) are interpolated too.
+    """Return other guides (M) with the layers of guides; the layers' weights (L, M) are interpolated too.
 
-    others: `GuideLayers` without layers; indices (M, k): guides that each follows, -1 for none, with weights (M, k);
-    apart (M,): distance to the first of them, as a fraction of the extent of the roots, None if unknown. Guides at the
-    place of another with as many points take its turns bit for bit.
+    others: `GuideLayers` without layers; indices (M, k): guides that each other guide follows, -1 for none, with weights
+    (M, k); apart (M,): distance to the first of them, as a fraction of the extent of the roots, None if unknown. A
+    guide at the place of another guide with as many points takes its turns bit for bit.
     """
     indices, weights = np.asarray(indices), np.where(np.asarray(indices) >= 0, weights, 0.0).astype(np.float64) ** 2
     sums = weights.sum(axis=1, keepdims=True)
@@ -58,7 +58,7 @@ def transferred(
                 continue
             sampled = _sampled(starts, np.asarray(layers.counts), sources[rows], int(count))
             carry = rotations(axes[sources[rows], :, 2], other_axes[chosen[rows], :, 2])
-            # Columns of axes are the frame: into the other root's frame, from the root's vector in space.
+            # The columns of axes are a frame: `into` maps a root's vector in space to the other root's frame.
             into = np.swapaxes(other_axes[chosen[rows]], 1, 2) @ carry
             turned = np.einsum("mij,lmpj->lmpi", into, vectors[:, sampled])
             turns[:, rows] += share[rows][None, :, None, None] * turned
@@ -115,7 +115,7 @@ def _axes(layers):
 
 
 def _root_vectors(layers):
-    """Return (L, N, 3) rotation vectors of turns in space, as at the roots."""
+    """Return (L, N, 3) rotation vectors of turns, in space, by the frames of the roots."""
     quaternions = layers.turns.astype(np.float64)
     axis = quaternions[..., 1:]
     sine = np.linalg.norm(axis, axis=-1)

@@ -138,7 +138,7 @@ def _run_backwards(at_first, at_last, sizes):
 
 
 def polylines(curves: Iterable[ArrayLike]) -> tuple[np.ndarray, np.ndarray]:
-    """Concatenate arrays (P, 3): points (N, 3) float32 and starts (C+1,). Raises `HairError`."""
+    """Return (points (N, 3) float32, starts (C+1,)) of concatenated arrays (P, 3). Raises `HairError`."""
     try:
         lines = [array_of(line, np.float32) for line in curves]
     except (TypeError, ValueError, OverflowError):  # not iterable

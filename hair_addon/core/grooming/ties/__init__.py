@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides gathered at ties: their way over the surface, through the tie, and on along a drawn line."""
+"""Guides gathered at ties: the way over the surface, through the tie, and onward along a drawn line."""
 
 from typing import TYPE_CHECKING
 

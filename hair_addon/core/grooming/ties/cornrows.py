@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cornrows: guides go over the surface to the nearest drawn line, and along it as a braid that lies on the surface.
 
-The way of a root to its line descends the distance from the whole line. Where it arrives, the guide joins the braid and
-goes on to the end of the line; hair that is longer goes on straight.
+The way of a root to its line descends the distance from the whole line. At the line, the guide joins the braid and
+follows it to the end of the line; longer hair continues straight ahead.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from . import tie_tails
 from .gather_settings import GatherSettings
 
 _SAMPLES = 400  # points of a line on the surface
-_END = 40  # of them, whose direction hair beyond the end goes on in
+_END = 40  # last samples; hair beyond the end continues in their direction
 _WIDE = 1e9  # reach of a braid that does not taper [m]
 _RISE = 0.6  # height of a braid's middle above its clearance, relative to its radius
 
@@ -29,7 +29,7 @@ def on_surface(query: SurfaceQuery, mesh: TriMesh, line: np.ndarray) -> tuple[np
 
 
 def braid_line(points: np.ndarray, normals: np.ndarray, reach: float, settings: GatherSettings) -> tie_tails.TailLine:
-    """Return the middle of a braid over points (M, 3) [m] of the surface; it goes on straight for a length [m]."""
+    """Return the middle of a braid over points (M, 3) [m] of the surface, continued straight by `reach` [m]."""
     lifted = points + (settings.clearance + _RISE * settings.tie_radius) * normals
     ahead = unit(lifted[-1] - lifted[-_END])
     beyond = lifted[-1] + np.linspace(0.0, reach, _SAMPLES + 1)[1:, None] * ahead
@@ -42,11 +42,11 @@ def braid_line(points: np.ndarray, normals: np.ndarray, reach: float, settings: 
 
 
 def ways_along(ways: np.ndarray, line: tie_tails.TailLine, reach: float, settings: GatherSettings) -> np.ndarray:
-    """Return the ways (S, M, 3) [m] of guides in a braid for a length [m], from the ends of ways (S, K, 3) to it."""
+    """Return the ways (S, M, 3) [m] of guides along a braid for `reach` [m], after ways (S, K, 3) to the braid."""
     arrived = ways[:, -1]
     nearest = np.linalg.norm(arrived[:, None] - line.centers[None, :_SAMPLES], axis=2).argmin(axis=1)
     joined = line.along[nearest] + settings.tie_radius
-    # The lock and the place in it follow from where and on which side a guide joins.
+    # The place and the side at which a guide joins determine its lock, and its place in the lock.
     beside = np.sum((arrived - line.centers[nearest]) * line.sides[nearest], axis=1)
     angles = 2.0 * np.pi * (joined / settings.pitch + 0.25 * np.sign(beside))
     order = np.argsort(np.argsort(joined, kind="stable"))

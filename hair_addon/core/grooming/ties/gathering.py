@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides gathered at ties: along the surface to the nearest tie, through it in order, and on along its line.
+"""Gathering of guides at ties: along the surface to the nearest tie, through the tie in order, and along its line.
 
-The way of a root over the surface descends the distance from the tie (geometry/surface_distance.py). Its height grows
-toward the tie as the hair of all roots that are farther away passes there: its area over the circumference. Each guide
-keeps its angle around the tie, and its distance becomes its place in the disk of the tie by equal area. Segments keep
-their lengths; guides that are too short end on their way.
+The way of a root over the surface descends the distance from the tie (geometry/surface_distance.py). Its height
+grows toward the tie, because it lies on the hair of all roots that it passes: by the area of this hair divided by the
+circumference. Each guide keeps its angle around the tie, and its distance determines its place in the disk of the tie,
+by equal areas. Segments keep their lengths; guides that are too short end before the tie.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from .gather_settings import GatherSettings
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_STEPS = 160  # over the surface, of the longest way
+_STEPS = 160  # of the longest way over the surface
 _TAIL_POINTS = 300
 _BULGE = 0.25  # height of loose hair relative to its way
 
@@ -34,10 +34,10 @@ _BULGE = 0.25  # height of loose hair relative to its way
 def gathered(
     mesh: TriMesh, points: np.ndarray, lines: Sequence[np.ndarray], settings: GatherSettings
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Gather guides (S, P, 3) [m] → (points (S, P, 3) float32 [m], (S,) bool: which are gathered).
+    """Return (points (S, P, 3) float32 [m] of gathered guides, (S,) bool: guides that are gathered).
 
-    mesh: a checked `TriMesh`, the surface as it is seen; lines: (K, 3) [m] each, from the tie on. Guides on parts of
-    the surface without a tie stay. Raises `HairError` for lines without length.
+    mesh: a checked `TriMesh`, the visible surface; points (S, P, 3) [m]; lines: (K, 3) [m] each, from the tie on.
+    Guides on parts of the surface without a tie do not change. Raises `HairError` for lines without length.
     """
     lines = [_checked(line) for line in lines]
     if not lines:
@@ -122,7 +122,7 @@ def _traced(mesh, query, roots, field, settings):
         here = mesh_math.positions(mesh, found).astype(np.float64)
         distance = surface_distance.at(field, mesh, found)
         normal = mesh_math.normals(mesh, found).astype(np.float64)
-        if apart:  # ways end where the distance stops to fall
+        if apart:  # ways end where the distance stops falling
             is_ended = ~(distance < apart[-1]) | (apart[-1] < near)
             here[is_ended], distance[is_ended], normal[is_ended] = (
                 ways[-1][is_ended],
@@ -144,7 +144,7 @@ def _heights(apart, settings):
     """Return heights (S, K) above the surface: the clearance, the hair below, and the bulge of loose hair."""
     whole = apart[:, :1]
     behind = np.sort(whole[:, 0])
-    passed = (np.searchsorted(behind, whole) - np.searchsorted(behind, apart)) / len(behind)  # of hair that is nearer
+    passed = (np.searchsorted(behind, whole) - np.searchsorted(behind, apart)) / len(behind)  # hair of nearer roots
     radius = settings.tie_radius
     pile = np.minimum(radius**2 / np.maximum(2.0 * apart, radius), radius)
     part = np.clip(1.0 - apart / np.maximum(whole, 1e-12), 0.0, 1.0)
@@ -156,7 +156,7 @@ def _heights(apart, settings):
 def _angles(ways, tail, normal):
     """Return (S,) angles in the disk of the tie from which ways arrive.
 
-    The plane of the surface is turned into the disk, so that hair from above a tail that hangs lies on its outside.
+    The plane of the surface is rotated onto the disk, so that hair from above a hanging tail lies outside.
     """
     arriving = ways[:, -1] - tail.centers[0]
     arriving -= np.sum(arriving * normal, axis=1, keepdims=True) * normal

@@ -12,9 +12,9 @@ from ..guide_shapes import unit
 from .gather_settings import GatherSettings
 
 _SAMPLES = 800  # points of a line
-_LOCKS = {"BRAID": 3, "CORNROWS": 3, "ROPE": 2}  # that a tail is divided into
+_LOCKS = {"BRAID": 3, "CORNROWS": 3, "ROPE": 2}  # number of locks of a tail
 _INNER = 0.75  # radius of every other layer of a bun, relative to the outer ones
-_WOUND = 2.0  # length of the way of a bun, relative to its hair, whose segments cut its curves
+_WOUND = 2.0  # length of a bun's way relative to its hair, whose segments cut the way's curves
 _MOST_LAYERS = 24  # of a bun
 _TAPER = 0.35  # radius of the tail's end, relative to its widest place
 
@@ -23,7 +23,7 @@ _TAPER = 0.35  # radius of the tail's end, relative to its widest place
 class TailLine:
     """A line with frames: along (M,) [m] from the tie, centers (M, 3) [m], sides and ups (M, 3) unit and perpendicular.
 
-    reach: length [m] that the widths of the tail refer to.
+    reach: length [m] over which the tail's width changes.
     """
 
     along: np.ndarray
@@ -43,8 +43,8 @@ class TailLine:
 def tail_line(line: np.ndarray, normal: np.ndarray, reach: float, settings: GatherSettings) -> TailLine:
     """Return the `TailLine` of a drawn line (K, 3) [m] that begins at its tie, or of the bun there.
 
-    normal: (3,) unit, of the surface at the tie; reach: length [m] of the longest hair, for which the line goes on
-    straight at its end.
+    normal: (3,) unit, of the surface at the tie; reach: length [m] of the longest hair, by which the line is
+    continued straight at its end.
     """
     line = np.asarray(line, np.float64)
     start = unit(line[1] - line[0])
@@ -71,14 +71,14 @@ def tail_line(line: np.ndarray, normal: np.ndarray, reach: float, settings: Gath
 
 
 def extent(reach: float, settings: GatherSettings) -> float:
-    """Return the length [m] of line that hair of a length takes up at most."""
+    """Return the greatest length [m] of line that hair of a length `reach` occupies."""
     return reach * (_WOUND if settings.shape == "BUN" else 1.0)
 
 
 def offsets(
     line: TailLine, angles: np.ndarray, ranks: np.ndarray, along: np.ndarray, settings: GatherSettings
 ) -> np.ndarray:
-    """Return (S, M, 2) [m]: the place of hair beside the line, on its sides and ups.
+    """Return (S, M, 2) [m]: the place of hair beside the line, along its sides and ups.
 
     angles (S,), ranks (S,) in [0, 1]: the place in the disk of the tie by equal area; along: (S, M) [m] from the tie.
     """
@@ -103,14 +103,14 @@ def offsets(
 
 
 def _radius(line, along, settings):
-    """Return the radius (...) [m] of a tail: the tie's at first, then the tail's, smaller at the end."""
+    """Return the radius (...) [m] of a tail: the tie's at the start, then the tail's, smaller at the end."""
     part = along / line.reach
     grown = settings.tie_radius + _ease(part / 0.25) * (settings.tail_radius - settings.tie_radius)
     return grown if settings.shape == "BUN" else grown * (1.0 - (1.0 - _TAPER) * _ease((part - 0.5) / 0.5))
 
 
 def _bun(tie, start, normal, reach, settings):
-    """Return points (M, 3) of spirals on a ball that rests on the surface, back and forth, every second one inside."""
+    """Return points (M, 3) of spirals back and forth on a ball on the surface; every second spiral is inside."""
     side = start - normal * (start @ normal)
     side = unit(side) if np.linalg.norm(side) > 0.1 else unit(np.cross(normal, np.eye(3)[np.abs(normal).argmin()]))
     other = np.cross(normal, side)
@@ -132,7 +132,7 @@ def _bun(tie, start, normal, reach, settings):
 
 
 def _smooth(centers):
-    """Round the corners of a line; its ends stay."""
+    """Return a line with rounded corners, changed in place; the ends do not move."""
     for _ in range(12):
         centers[1:-1] = 0.5 * centers[1:-1] + 0.25 * (centers[:-2] + centers[2:])
     return centers
