@@ -29,7 +29,7 @@ def no_progress(_step: str, _part: float) -> None:
 
 @dataclass(frozen=True)
 class Stage:
-    """Yielded before a stage that must run on the caller's thread, to report progress and allow canceling."""
+    """A step on the caller's thread: a generator yields it first, to report progress and allow canceling."""
 
     step: str
     part: float

@@ -17,7 +17,7 @@ import numpy as np
 
 from .errors import HairError
 
-_NO_TEXT = re.compile("[\0\ud800-\udfff]")  # null and surrogates
+_NO_TEXT = re.compile("[\0\ud800-\udfff]")  # null characters and surrogates
 
 
 @dataclass(frozen=True)
@@ -129,14 +129,14 @@ class Settings:
 
 
 def require_class(value: object, settings_class: type, name: str) -> None:
-    """Raise `HairError` unless a value is an instance of a settings class; name: of the argument."""
+    """Raise `HairError` unless a value is an instance of a settings class; name: the argument's name."""
     if not isinstance(value, settings_class):
         module = settings_class.__module__.rpartition(".")[2]
         raise HairError(f"{name} must be {module}.{settings_class.__name__}, not {described(value)}.")
 
 
 def described(value: object) -> str:
-    """Describe a value of any type on one line."""
+    """Return a description of a value of any type, on one line."""
     if isinstance(value, str):
         return reprlib.repr(value)
     if value is None or isinstance(value, bool | np.bool_):
@@ -172,7 +172,7 @@ def plain_value(label: str, value: Any, default: Any, details: Param) -> Any:
 
 
 def _length(value):
-    """Return the length of a sequence that is not text; None for other values."""
+    """Return the length of a sequence other than text; None for other values."""
     if not hasattr(value, "__len__") or isinstance(value, str | bytes | Mapping | Set):
         return None
     if isinstance(value, np.ndarray) and value.ndim == 0:  # its `__len__` raises
@@ -206,7 +206,7 @@ def _plain_number(label, value, is_whole, details):
 
 
 def _as_float(number):
-    """Convert a real number to float; infinity if it is too large."""
+    """Return a real number as a float; infinity if it is too large."""
     try:
         return float(number)
     except OverflowError:
