@@ -201,7 +201,7 @@ def moved(layers: GuideLayers, move: Callable[[np.ndarray], np.ndarray]) -> Guid
 
 
 def merged(layers: GuideLayers, lower: int) -> GuideLayers:
-    """Return the layers with one layer and the next merged, by their weights, into one of weight 1; guides do not change."""
+    """Return layers in which a layer and the next are merged, with their weights; guides do not change."""
     shape = composed(layers)
     above = [index for index in range(len(layers.turns)) if index != lower + 1]
     turns, stretches = layers.turns.copy(), layers.stretches.copy()

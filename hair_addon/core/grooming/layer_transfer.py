@@ -25,7 +25,7 @@ def transferred(
 ) -> GuideLayers:
     """Return other guides (M) with the layers of guides; the layers' weights (L, M) are interpolated too.
 
-    others: `GuideLayers` without layers; indices (M, k): guides that each other guide follows, -1 for none, with weights
+    others: `GuideLayers` without layers; indices (M, k): guides that these follow, -1 for none, with weights
     (M, k); apart (M,): distance to the first of them, as a fraction of the extent of the roots, None if unknown. A
     guide at the place of another guide with as many points takes its turns bit for bit.
     """
