@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light among strands: paths from the viewer through a grid of fibers, and their means by voxel.
 
-Kernels here run on CPU, on CUDA and, translated by `core/kernels/glsl_text.py`, on any graphics card: they use only
-what that supports (`tests/test_metal.py` translates them all).
+The kernels run on CPU, on CUDA and, translated by `core/kernels/glsl_text.py`, on any GPU: they use only features that
+the translation supports (`tests/test_metal.py` translates all kernels).
 """
 
 from typing import TYPE_CHECKING

@@ -139,7 +139,7 @@ def gather(
     while True:
         light.follow(more, seed * _MOST_TURNS + turn, part_of(progress, tried / (tried + more), 1.0))
         tried, turn = tried + more, turn + 1
-        wanted = light.wanted  # times as many
+        wanted = light.wanted  # factor of the number of paths
         more = int(tried * min(max(_SPARE * wanted - 1.0, _LEAST_TURN), 1.0))
         if wanted < 1.0 or tried + more > most_paths:
             return light.of_systems(), int(light.taken)
@@ -164,9 +164,9 @@ class PathSums:
             self._in_sight, self._hiding = _sight_of(grid, surroundings) or (self._medium, self._mesh)
 
     def see(self, seen: Seen, weight: float = 1.0) -> None:
-        """Start further paths in another view, and add the light drawn there to the sums multiplied by a weight.
+        """Start further paths in another view: multiply the sums by a weight, and add the light drawn in the view.
 
-        An exception raised by a pause of `parallel.on_one_core` leaves all unchanged.
+        An exception raised by a pause of `parallel.on_one_core` leaves everything unchanged.
         """
         count = len(seen.segments)
         require_indices("segments", seen.segments.numpy(), len(self.grid.points) - 1)
@@ -181,7 +181,7 @@ class PathSums:
         self._seen = seen
 
     def _start_in(self, seen):
-        """Prepare paths from a view with visible hair; returns the light drawn there in uniform light."""
+        """Prepare paths from a view with visible hair, and return the light of its samples in uniform light."""
         even = _even_there(self._medium, seen.view, seen.segments, seen.places)
         faint = _FAINT * voxel_sums.brightness(seen.drawn)[0] / len(seen.segments)
         self._sources = sources_of(self._surroundings, faint)
@@ -205,7 +205,7 @@ class PathSums:
 
     @property
     def wanted(self) -> float:
-        """Return the estimated factor of paths that reduces the relative standard error of the mean light to 1.5 %."""
+        """The factor of paths that, by estimate, reduces the relative standard error of the mean light to 1.5 %."""
         return (_standard_error(self._total, self._squares, self.taken) / _KNOWN) ** 2
 
     def _fade(self, weight):
@@ -213,7 +213,7 @@ class PathSums:
         self._total, self._squares, self.taken = weight * self._total, weight * self._squares, weight * self.taken
 
     def of_systems(self) -> list[wp.array4d[wp.float64]]:
-        """Return (Z, Y, X, 12) of each system of hair, as of `gather`."""
+        """Return sums (Z, Y, X, 12) of each hair system, as in `gather`."""
         return self._sums.of_systems()
 
     def shares(
@@ -253,7 +253,7 @@ def _even_there(medium, seen_in, segments, places):
 
 
 def _traced(medium, sources, seen_in, starts, progress):
-    """Trace paths; returns their starts, their light, and the light in uniform light, (N,) each."""
+    """Trace paths, and return their start places, their light, and the light in uniform light, (N,) each."""
     count, seen_here, device = len(starts.segments), view.on_device(seen_in), medium.points.device
     found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
     # On a GPU a share takes about as long as all paths.

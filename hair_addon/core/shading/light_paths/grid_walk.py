@@ -50,10 +50,10 @@ class Medium:
 
 @wp.struct
 class Hit:
-    """The hit of a ray: a segment, identified by its first point, or a triangle; its place.
+    """The hit of a ray: a segment, identified by its first point, or a triangle, and the position.
 
-    The triangle's normal on the side of the ray. offset: from the segment's axis, as a fraction of the radius, positive
-    along cross(ray, tangent).
+    normal: of the triangle, on the side of the ray; offset: from the segment's axis, as a fraction of the radius,
+    positive along cross(ray, tangent).
     """
 
     kind: int

@@ -2,7 +2,7 @@
 """Light at the events of a path.
 
 Light comes from random points of lamps and of the world, and from lamps and the world that the path hits [Veach95].
-Both methods sample the same light: each is weighted by its share of both densities (the balance heuristic), so that
+Both methods sample the same light, so each is weighted by its share of both densities (the balance heuristic), so that
 neither lamps near a strand nor narrow lobes give few paths much light.
 """
 
@@ -27,7 +27,7 @@ _LEAST = wp.constant(0.25)  # relative to a voxel: distance below which the ligh
 class Event:
     """A place on strand `own`, or on a surface if `own` is negative.
 
-    facing: unit vector towards the path's last place; offset: in the strand's width, from -1 to 1; weight: of light
+    facing: unit vector toward the path's last place; offset: in the strand's width, from -1 to 1; weight: of light
     from there to the viewer.
     """
 
@@ -62,9 +62,9 @@ def _is_shadowed(medium: Medium, lit: Lit, here: Event):
 
 @wp.func
 def _one_of(sources: Sources, index: int, random: wp.uint32):
-    """Return (the lamp of an index, or a random lamp if there are more than `_LAMPS_AT_ONCE`.
+    """Return (index of a lamp, one over its probability, random state).
 
-    One over its probability; random state).
+    The lamp is that of an index, or a random lamp if there are more than `_LAMPS_AT_ONCE`.
     """
     state = random
     if sources.count <= _LAMPS_AT_ONCE:
@@ -75,9 +75,9 @@ def _one_of(sources: Sources, index: int, random: wp.uint32):
 
 @wp.func
 def _lamp_at(medium: Medium, sources: Sources, index: int, here: Event, random: wp.uint32):
-    """Return (`Lit` by the lamp of `_one_of`, or by the world for an index after the lamps.
+    """Return (`Lit`, factor of its light, random state).
 
-    Its share; random state).
+    It is lit by the lamp of `_one_of`, or by the world for an index after the lamps.
     """
     state = random
     lit = Lit()

@@ -30,7 +30,7 @@ class Sources:
 
 @wp.struct
 class Lit:
-    """Light of a lamp at a place: unit vector towards a point of it, distance [m], irradiance.
+    """Light of a lamp at a place: unit vector toward a point of the lamp, distance [m], irradiance.
 
     density: of random points of the lamp in this direction [1/sr]; the lamp's radiance is density × irradiance.
     """

@@ -22,11 +22,11 @@ _LEAST_PATHS = 1024  # fewer are not worth a thread
 class Surroundings:
     """Everything that lights hair, except hair: surfaces, lamps and the world.
 
-    corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own;
-    albedo: (F, 3) base colors of them; lamps: (N,) records with the fields of `Light` in shaders/light/lights.glsl;
-    importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance, an equirectangular picture as in
+    corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) at corners, unit, or zero for the triangle's own;
+    albedo: (F, 3) base colors; lamps: (N,) records with the fields of `Light` in shaders/light/lights.glsl; importance:
+    (N,) mean irradiance of lamps; world: (H, W, 3) radiance, an equirectangular picture as in
     core/imaging/environment.py; gloss: (F, 3) roughness, metallic, and reflectance at normal incidence of triangles,
-    None: all are matte; is_seen: (F,) bool, whether triangles hide hair from the viewer, None: all do.
+    None if all are matte; is_seen: (F,) bool, whether triangles hide hair from the viewer, None if all do.
     """
 
     corners: np.ndarray

@@ -18,8 +18,8 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 _LEAST_SEGMENTS = 20_000  # fewer are not worth a thread
 _WIDER = wp.constant(1e-4)  # enlargement of segments for rounding, relative to a cell
-_REACH = wp.constant(1.7321)  # cells from a cell's center to the nearest point of a line, at most
-_STEPS = wp.constant(1023.0)  # of that point, along each axis
+_REACH = wp.constant(1.7321)  # greatest distance in cells from a cell's center to the nearest point of a line
+_STEPS = wp.constant(1023.0)  # steps of this point's place, along each axis
 _TURNS = wp.constant(65535.0)  # steps of a line's direction, along both axes
 LINE_ERROR = wp.constant(0.004)  # maximum distance in cells between a line and its stored form
 _WIDTHS = wp.constant(4)  # number of stored radii, each half the previous one
@@ -31,14 +31,14 @@ class StrandCells:
 
     along_voxel: int  # K
     radius: float  # the largest [m]
-    bricks: wp.array[int]  # (V,): of each voxel, which of those that are divided it is; -1: it is empty
-    starts: wp.array[int]  # (B K³ + 1,): first of each cell in `segments`
-    segments: wp.array[int]  # (M,) first points of segments, once for each cell that they are in, rising in each
-    lines: wp.array[wp.uint32]  # (2 M,) two words of `line_of` for each of those
+    bricks: wp.array[int]  # (V,): index of each voxel among the divided voxels, -1 for empty voxels
+    starts: wp.array[int]  # (B K³ + 1,): first entry of each cell in `segments`
+    segments: wp.array[int]  # (M,) first points of segments, once for each of their cells, ascending in each cell
+    lines: wp.array[wp.uint32]  # (2 M,) two words of `line_of` for each of `segments`
 
     @property
     def widths(self) -> np.ndarray:
-        """(4,) radii to which those of segments are rounded up [m]: the largest, and each half the previous one."""
+        """(4,) radii [m] to which the radii of segments are rounded up: the largest, and each half the previous one."""
         return self.radius * 0.5 ** np.arange(_WIDTHS)
 
 
@@ -343,7 +343,7 @@ def build(
         numbers, brick_count = running_sums.ends_of(is_used)
         bricks = wp.empty(voxel_count, dtype=int)
         kernel_cache.launch(_number, voxel_count, [is_used, numbers], [bricks], device)
-        # Sorting on a GPU takes twice the room.
+        # Sorting on a GPU takes twice the memory.
         cells = parallel.empty(count if device.is_cpu else 2 * count, int, device)
         segments, lines = parallel.empty(count, int, device), parallel.empty(2 * count, wp.uint32, device)
         _by_segments(hair, [0, bricks, ends, none, cells, segments, lines])
@@ -353,7 +353,7 @@ def build(
 
 
 def _by_segments(hair, given):
-    """Launch Launch `_find` for all segments."""
+    """Launch `_find` for all segments."""
     count, device = max(len(hair.points) - 1, 0), hair.points.device
     if count:
         parts = parallel.part_count(count, device, _LEAST_SEGMENTS)
@@ -378,7 +378,7 @@ def _sorted(cells, cell_count, segments, lines):
 
 
 def _sorted_by_cores(cells, cell_count, segments, lines):
-    """Return the same as `_sorted` on a CPU: each core writes a share of the segments into their cells."""
+    """Return the result of `_sorted` on a CPU: each core writes a share of the segments to their cells."""
     device, count = cells.device, len(segments)
     counts = wp.zeros((parallel.share_count(count, device, _LEAST_SEGMENTS), cell_count + 1), dtype=int, device=device)
     total, starts = (wp.zeros(cell_count + 1, dtype=int, device=device) for _ in range(2))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands as segments in the cells of a grid, for tracing paths of light.
 
-Each cell lists all segments that touch it with their width, so a ray finds the nearest segment by few tests. Very many
-strands are thinned out: the remaining strands are wider and block as much light.
+Each cell lists all segments that touch it with their width, so a ray finds the nearest segment with few tests. Very
+many strands are thinned out: the remaining strands are wider and block as much light.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ from . import strand_cells
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-SEGMENT_COUNT = 3_000_000  # at most, of all strands
+SEGMENT_COUNT = 3_000_000  # greatest number of all strands' segments
 VOXEL_COUNT = 375_000
 MOST_VOXELS = 200  # along a side
 CELLS_ALONG_VOXEL = 3  # maximum per voxel side: cells are wider than strands
@@ -72,16 +72,16 @@ class StrandGrid:
     points: wp.array[wp.vec3]  # (N,) [m]
     radii: wp.array[float]  # (N,) [m]
     sigma_a: wp.array[wp.vec3]  # (N,)
-    strands: wp.array[int]  # (N,): whose point it is
+    strands: wp.array[int]  # (N,): the strand of each point
     roughness: wp.array[float]  # (S,)
     fibres: wp.array[int]  # (S,): rows of `fibre_rows`
-    systems: wp.array[int]  # (S,): which hair
+    systems: wp.array[int]  # (S,): the hair system of each strand
     fibre_rows: wp.array2d[float]  # (F, 5): ior, azimuthal scale, tilt, shift of TRT in tilts, coat
     thinned: tuple[Thinned, ...]  # of each system
 
     @property
     def origin(self) -> tuple[int, int, int]:
-        """Return indices along X, Y, Z of the first voxel, among voxels that fill the world."""
+        """Indices along X, Y, Z of the first voxel, among voxels that fill the world."""
         return tuple(np.rint(self.corner / self.voxel).astype(int).tolist())
 
     @property
@@ -155,7 +155,7 @@ def build(
 
 
 def has_area(systems: Sequence[Strands]) -> bool:
-    """Whether any strand has a length and a width, so that rays can hit it."""
+    """Return whether any strand has a length and a width, so that rays can hit it."""
     for strands in systems:
         turn = strands.to_world[:3, :3].T
         for first in range(0, len(strands.points), _AT_ONCE):
@@ -262,8 +262,8 @@ def _measure(
 
 
 def _measured(points, radii, strands):
-    """Return ((3,) least and largest coordinates, largest radius, sum of length × width of segments); no area
-    without any.
+    """Return ((3,) least and largest coordinates, largest radius, sum of length × width of segments),
+    all zero without points.
     """
     count = len(points)
     if not count:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums over paths by voxel → ratios without holes: voxels with few paths are blended with larger voxels.
+"""Ratios without holes from sums over paths by voxel: voxels with few paths are blended with larger voxels.
 
 All computations run on the device of the sums. Each thread adds in a fixed order, so the same sums give the same bits.
 """
@@ -14,7 +14,7 @@ wp.set_module_options({"enable_backward": False})
 
 # RGB of four sums: light of paths, and the same in uniform light; drawn light, and the same in uniform light.
 CHANNELS = 12
-_PRIOR = 512.0  # weight in paths of the ratio of larger voxels
+_PRIOR = 512.0  # weight of the ratio of larger voxels, in paths
 _LEAST_VOXELS = 4096  # fewer are not worth a thread
 _MOST_PARTS = 512  # maximum number of parts of a sum
 

@@ -16,7 +16,7 @@ from .voxel_means import CHANNELS
 
 wp.set_module_options({"enable_backward": False})
 
-_MOST_PARTS = 4096  # of all values
+_MOST_PARTS = 4096  # parts of all values
 _LARGEST_SUM = 4.0e18  # limit of integers, below 2^62
 
 
@@ -148,7 +148,7 @@ class VoxelSums:
         self._sums = wp.zeros((rows, CHANNELS), dtype=wp.float64, device=grid.device)
 
     def of_systems(self) -> list[wp.array4d[wp.float64]]:
-        """Return (Z, Y, X, 12) of each system of hair."""
+        """Return the sums (Z, Y, X, 12) of each hair system."""
         count = int(np.prod(self._voxels))
         firsts = range(0, len(self._sums), count)
         return [self._sums[first : first + count].reshape((*self._voxels, CHANNELS)) for first in firsts]
@@ -178,7 +178,7 @@ class VoxelSums:
         second_values: wp.array[wp.vec3],
         first_channel: int,
     ) -> None:
-        """Add RGB (N,) to three channels from `first_channel` on, and others to the three after these.
+        """Add `first_values`, RGB (N,), to three channels from `first_channel` on, `second_values` to the next three.
 
         segments: of the grid, which the caller has checked.
         """
@@ -227,7 +227,7 @@ def _add_brightness(values: wp.array[wp.vec3], part_size: int, out_parts: wp.arr
 
 
 def brightness(values: wp.array[wp.vec3]) -> tuple[float, float]:
-    """Return the sum of all channels of (N,) RGB, and the sum of the squares of the sum of three."""
+    """Return the sum of all channels of (N,) RGB values, and the sum of the squares of each value's channel sum."""
     if not len(values):
         return 0.0, 0.0
     size = -(-len(values) // _MOST_PARTS)
