@@ -2,7 +2,7 @@
 """Marschner's angles about a fiber [Marschner03], from directions and back.
 
 The tangent points from root to tip, `to_light` and `to_view` away from the fiber; all three are unit vectors (..., 3).
-An inclination theta is measured from the normal plane, positive towards the tip. The azimuth phi is the rotation about
+An inclination theta is measured from the normal plane, positive toward the tip. The azimuth phi is the rotation about
 the tangent from the light to the viewer: 0 on the side of the light, pi straight behind the fiber. Radians everywhere.
 """
 
@@ -32,14 +32,14 @@ class FibreAngles(NamedTuple):
 
 
 def fibre_angles(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray) -> FibreAngles:
-    """Unit vectors (..., 3) → `FibreAngles` (...)."""
+    """Return the `FibreAngles` (...) of unit vectors (..., 3)."""
     theta_i = inclination(np.sum(tangent * to_light, axis=-1))
     theta_o = inclination(np.sum(tangent * to_view, axis=-1))
     return FibreAngles(theta_i, theta_o, relative_azimuth(tangent, to_light, to_view))
 
 
 def relative_azimuth(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray) -> np.ndarray:
-    """phi (...) in (-pi, pi]. A direction along the tangent has no azimuth: phi is then 0.
+    """Return phi (...) in (-pi, pi], and 0 for a direction along the tangent, which has no azimuth.
 
     Scattering is even in phi, so the shader computes |phi|.
     """
@@ -50,12 +50,12 @@ def relative_azimuth(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndar
 
 
 def inclination(sin_theta: Values) -> np.ndarray:
-    """Dot product with the tangent (...) → theta (...); values beyond ±1 by rounding are clamped."""
+    """Return theta (...) from the dot product with the tangent (...); values beyond ±1 by rounding are clamped."""
     return np.arcsin(np.clip(sin_theta, -1.0, 1.0))
 
 
 def direction(tangent: np.ndarray, normal: np.ndarray, theta: Values, phi: Values) -> np.ndarray:
-    """Inclinations and azimuths (...) → unit vectors (..., 3), with phi counted from `normal` about `tangent`.
+    """Return unit vectors (..., 3) with inclinations and azimuths (...); phi is counted from `normal` about `tangent`.
 
     `normal` (..., 3) is a unit vector perpendicular to `tangent` (..., 3).
     """
@@ -66,11 +66,11 @@ def direction(tangent: np.ndarray, normal: np.ndarray, theta: Values, phi: Value
 
 
 def cos_theta_d(sin_theta_i: Values, sin_theta_o: Values) -> np.ndarray:
-    """cos((theta_o - theta_i) / 2) from the two dot products, exact by the half-angle formula; in [0, 1]."""
+    """Return cos((theta_o - theta_i) / 2) from the two dot products, exact by the half-angle formula; in [0, 1]."""
     cosines = sin_from_cos(sin_theta_i) * sin_from_cos(sin_theta_o)
     return np.sqrt(np.maximum(0.0, 0.5 * (1.0 + cosines + sin_theta_i * sin_theta_o)))
 
 
 def sin_from_cos(cosine: Values) -> np.ndarray:
-    """Sine of an angle in [0, pi], or cosine of an inclination from its sine; rounding may exceed ±1."""
+    """Return the sine of an angle in [0, pi], or the cosine of an inclination from its sine; rounding may exceed ±1."""
     return np.sqrt(np.maximum(0.0, 1.0 - np.square(cosine)))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Azimuthal roughness: the trimmed logistic of [Chiang16], and its convolution with tables.
 
-A rough fiber's N_p is a smooth one's, convolved over the circle of phi. So tables of rough fibers come from those of
-smooth ones, whose texels are exact means, by one matrix: no energy is lost, and roughness 0 is the smooth table.
+N_p of a rough fiber is N_p of a smooth fiber, convolved over the circle of phi. So one matrix converts tables of smooth
+fibers, whose texels are exact means, to tables of rough fibers: no energy is lost, and roughness 0 is the smooth table.
 """
 
 import numpy as np
@@ -11,14 +11,14 @@ from .angles import Values
 
 
 def trimmed_logistic(phi: Values, scale: Values) -> np.ndarray:
-    """Density D_s (...) [1/rad] of the deflection phi in [-pi, pi]; scale s [rad]."""
+    """Return the density D_s (...) [1/rad] of the deflection phi in [-pi, pi]; scale s [rad]."""
     # The logistic density is 1 / (4 s cosh²(x / 2s)); this form does not overflow.
     decay = np.exp(-np.abs(phi) / scale)
     return decay / (scale * np.square(1.0 + decay) * np.tanh(0.5 * np.pi / scale))
 
 
 def roughening(edges: np.ndarray, scale: Values) -> np.ndarray:
-    """Return (W, W) matrix that turns the cell means of a smooth N over phi (..., W) into those of a rough one.
+    """Return the (W, W) matrix that converts cell means (..., W) over phi of a smooth fiber's N to a rough fiber's.
 
     edges: W + 1 monotone values of phi from 0 to pi or back; scale s [rad].
     """
@@ -26,11 +26,11 @@ def roughening(edges: np.ndarray, scale: Values) -> np.ndarray:
 
 
 def forward_mean(edges: np.ndarray) -> np.ndarray:
-    """Return (W, W) matrix that averages N over light from around each phi that strands have scattered forward.
+    """Return the (W, W) matrix that averages N over light that strands have scattered forward, around each phi.
 
-    The weight at a distance x is cos²(x) up to pi / 2. Its mean cosine, 8 / 3 pi or 0.85, is close to that of light
-    scattered forward by one fiber, 0.80 to 0.83 for brown to white hair. N^G of [Zinke08] weights the half circle
-    uniformly (0.64), which light reaches after three fibers.
+    The weight at a distance x is cos²(x) up to pi / 2. Its mean cosine, 8 / 3 pi or 0.85, is close to the mean
+    cosine of light scattered forward by one fiber, 0.80 to 0.83 for brown to white hair. N^G of [Zinke08] weights the
+    half circle uniformly (0.64), which light reaches after three fibers.
     """
 
     def second_antiderivative(x):
@@ -54,7 +54,7 @@ def _spreading(edges, second_antiderivative):
 
 
 def _cell_integrals(x_edges, y_edges, second_antiderivative):
-    """Integrals (W, W) of D(x + y) over pairs of cells: second differences of G, continued around the circle."""
+    """Return integrals (W, W) of D(x + y) over pairs of cells: second differences of G, continued around the circle."""
     x = np.abs(x_edges[:, None] + y_edges[None, :])  # up to 2 pi
     beyond = np.maximum(x - np.pi, 0.0)
     # Beyond pi, D is mirrored, so the integral C of D is replaced by 1 - C in the integrand of G.
@@ -63,7 +63,7 @@ def _cell_integrals(x_edges, y_edges, second_antiderivative):
 
 
 def _logistic_antiderivative(x, scale):
-    """Integral of C(x) = tanh(x / 2s) / (2 tanh(pi / 2s)), itself the integral of D_s, from 0 to x in [0, pi]."""
+    """Return the integral, from 0 to x in [0, pi], of C(x) = tanh(x / 2s) / (2 tanh(pi / 2s)), the integral of D_s."""
     half = 0.5 * x / scale
     log_cosh = half + np.log1p(np.exp(-2.0 * half)) - np.log(2.0)
     return scale * log_cosh / np.tanh(0.5 * np.pi / scale)

@@ -40,7 +40,7 @@ def major_axis(tangent: np.ndarray, random: Values) -> np.ndarray:
 
 
 def cos_twice_phi_h(tangent: np.ndarray, axis: np.ndarray, to_light: np.ndarray, to_view: np.ndarray) -> np.ndarray:
-    """cos(2 phi_h) = cos(phi_i + phi_o), (...), of azimuths measured from the major axis."""
+    """Return cos(2 phi_h) = cos(phi_i + phi_o), (...), of azimuths measured from the major axis."""
     other = np.cross(tangent, axis)
     light, view = ([np.sum(direction * base, axis=-1) for base in (axis, other)] for direction in (to_light, to_view))
     return (light[0] * view[0] - light[1] * view[1]) / (np.hypot(*light) * np.hypot(*view))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Energy-conserving rough fiber: R, TT, TRT and all longer paths [DEon11] [Chiang16], as in Cycles.
 
-The radiance towards the viewer, for irradiance 1 on a plane facing the light, is the sum over the lobes p of
+The radiance toward the viewer, for irradiance 1 on a plane facing the light, is the sum over the lobes p of
 M_p(theta_i, theta_o) N_p(theta_o, phi). It is a density of the light's direction: a white fiber in uniform light has
 exactly the radiance of that light, for any roughness and tilt. It is not reciprocal: N is evaluated at theta_o, because
 paths through the fiber are traced from the viewer.
@@ -23,7 +23,7 @@ LOBES = (paths.R, paths.TT, paths.TRT, paths.RESIDUAL)
 def lobes(settings: Settings, roughness: Values | None = None) -> list[tuple[float, Values]]:
     """Return [(shift, v)] of the four lobes: center [rad] and variance [rad²] in theta_i + theta_o.
 
-    roughness: (...) of varied strands; None: that of the settings.
+    roughness: (...) of varied strands; None: the roughness of the settings.
     """
     roughness = settings.roughness if roughness is None else roughness
     shifts = [2.0 * alpha for alpha, _beta in longitudinal_lobes(settings)]
@@ -36,7 +36,7 @@ def lobes(settings: Settings, roughness: Values | None = None) -> list[tuple[flo
 def m_lobes(
     theta_i: Values, theta_o: Values, settings: Settings, roughness: Values | None = None, widening: Values = 0.0
 ) -> np.ndarray:
-    """M_p (..., 4) of inclinations (...); roughness as in `lobes`; widening: (...) added to each variance."""
+    """Return M_p (..., 4) at inclinations (...); roughness: as in `lobes`; widening: (...) added to each variance."""
     sin_i, cos_i = np.sin(theta_i), np.cos(theta_i)
     turned = [(theta_o - shift, v + widening) for shift, v in lobes(settings, roughness)]
     # A view rotated past the pole continues on the other side.
@@ -44,7 +44,7 @@ def m_lobes(
 
 
 def near_field_lobes(h: Values, phi: Values, cos_theta_o: Values, settings: Settings) -> np.ndarray:
-    """A_p D_s (..., 4, C) of the ray that hits the fiber at the offset h (...) in [-1, 1]."""
+    """Return A_p D_s (..., 4, C) of the ray that hits the fiber at the offset h (...) in [-1, 1]."""
     gamma = np.arcsin(h)
     eta_prime, _ = bravais_indices(cos_theta_o, settings.eta)
     scale = scale_from_radial_roughness(settings.radial_roughness)
@@ -61,7 +61,7 @@ def near_field_lobes(h: Values, phi: Values, cos_theta_o: Values, settings: Sett
 
 
 def n_lobes(phi: Values, cos_theta_o: Values, settings: Settings, node_count: int = 200) -> np.ndarray:
-    """N_p (..., 4, C) by quadrature: the mean of `near_field_lobes` over the fiber's width.
+    """Return N_p (..., 4, C) by quadrature: the mean of `near_field_lobes` over the fiber's width.
 
     With 200 nodes the error is below 1e-4 for a radial roughness of at least 0.15; `lookup_tables` uses exact means
     instead.
@@ -75,11 +75,11 @@ def n_lobes(phi: Values, cos_theta_o: Values, settings: Settings, node_count: in
 
 
 def lobe_sum(m: np.ndarray, n: np.ndarray, n_trt: np.ndarray, n_res: np.ndarray) -> np.ndarray:
-    """Sum of M_p N_p (..., 3) from m (..., 4) = M_R, M_TT, M_TRT, M_res; n (..., 4) = N_TT, N_R; n_trt and n_res."""
+    """Return the sum of M_p N_p (..., 3); m (..., 4): M_R, M_TT, M_TRT, M_res; n (..., 4): N_TT, N_R; n_trt; n_res."""
     return m[..., 0:1] * n[..., 3:] + m[..., 1:2] * n[..., :3] + m[..., 2:3] * n_trt + m[..., 3:] * n_res
 
 
 def scattering(angles: FibreAngles, settings: Settings) -> np.ndarray:
-    """Radiance per irradiance (..., C) at `FibreAngles` (...) from a fiber narrower than a pixel."""
+    """Return radiance per irradiance (..., C) at `FibreAngles` (...) from a fiber narrower than a pixel."""
     m = m_lobes(angles.theta_i, angles.theta_o, settings)
     return np.einsum("...p,...pc->...c", m, n_lobes(angles.phi, np.cos(angles.theta_o), settings))

@@ -7,7 +7,7 @@ from .angles import Values
 
 
 def dielectric_reflectance(cos_incident: Values, eta: Values) -> np.ndarray:
-    """Unpolarized Fresnel reflectance for light from outside; 1 for total reflection.
+    """Return the Fresnel reflectance for unpolarized light from outside; 1 for total reflection.
 
     cos_incident (...): cosine between ray and surface normal, [0, 1]; eta: index inside over index outside.
     """
@@ -32,7 +32,7 @@ def bravais_indices(cos_theta_d: Values, eta: Values) -> tuple[np.ndarray, np.nd
 def bravais_reflectance(
     cos_gamma_i: Values, cos_gamma_t: Values, eta_prime: Values, eta_double_prime: Values
 ) -> np.ndarray:
-    """F(eta', eta'', gamma_i) of Eq. 17: equals `dielectric_reflectance(cos_theta_d * cos_gamma_i, eta)`.
+    """Return F(eta', eta'', gamma_i) of Eq. 17, which equals `dielectric_reflectance(cos_theta_d * cos_gamma_i, eta)`.
 
     gamma_t follows from eta' for both polarizations. Public code refracts a second ray by eta'', which is totally
     reflected if eta'' < 1 (theta_d > 57 degrees for hair), although a ray that enters a denser medium never is.

@@ -42,12 +42,12 @@ class StrandSettings(_Settings):
 
 
 def highlight_exponent(roughness: Values) -> np.ndarray:
-    """Exponent (...) of a highlight as wide as the R lobe of a longitudinal roughness (...)."""
+    """Return the exponent (...) of a highlight as wide as the R lobe of a longitudinal roughness (...)."""
     return np.clip(1.0 / variance_from_roughness(roughness), _LEAST_EXPONENT, _GREATEST_EXPONENT)
 
 
 def highlight_peak(reflectance: Values, exponent: Values) -> np.ndarray:
-    """Peak (...) of a highlight whose directional albedo under uniform light is `reflectance`; at most 1."""
+    """Return the peak (...) of a highlight whose directional albedo under uniform light is `reflectance`; at most 1."""
     return np.minimum(reflectance / kajiya_kay_specular_albedo(exponent), 1.0)
 
 
@@ -59,7 +59,7 @@ def kajiya_kay_of_strands(
     sigma_a: np.ndarray,
     roughness: Values,
 ) -> np.ndarray:
-    """`kajiya_kay` (..., 3) of `StrandSettings`, for strands of absorption (..., 3) and roughness (...)."""
+    """Return `kajiya_kay` (..., 3) of `StrandSettings`, for strands of absorption (..., 3) and roughness (...)."""
     exponent = highlight_exponent((1.0 - settings.coat) * roughness)
     peak = highlight_peak(settings.reflectance, exponent)
     diffuse = kajiya_kay_diffuse(tangent, to_light)[..., None] / np.pi**2
@@ -68,18 +68,18 @@ def kajiya_kay_of_strands(
 
 
 def kajiya_kay_diffuse(tangent: np.ndarray, to_light: np.ndarray) -> np.ndarray:
-    """sin(T, L), the cosine of the light's inclination, (...). Eq. 11.
+    """Return sin(T, L), the cosine of the light's inclination, (...). Eq. 11.
 
-    It is one for light perpendicular to the fiber and zero for light along it: the report's text states the opposite.
+    The value is one for light perpendicular to the fiber and zero for light along it; the report states the opposite.
     """
     return sin_from_cos(np.sum(tangent * to_light, axis=-1))
 
 
 def kajiya_kay_specular(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray, exponent: Values) -> np.ndarray:
-    """max(0, cos(theta_i + theta_o))^exponent, (...): 1 on the mirror cone theta_o = -theta_i. Eq. 12.
+    """Return max(0, cos(theta_i + theta_o))^exponent, (...), 1 on the mirror cone theta_o = -theta_i. Eq. 12.
 
-    Departs from the report: its second sine is of V, and the product of cosines is subtracted because L and V both
-    point away from the fiber.
+    This departs from the report: the second sine is of V, and the product of cosines is subtracted because L and V
+    both point away from the fiber.
     """
     t_dot_l = np.sum(tangent * to_light, axis=-1)
     t_dot_v = np.sum(tangent * to_view, axis=-1)
@@ -88,7 +88,7 @@ def kajiya_kay_specular(tangent: np.ndarray, to_light: np.ndarray, to_view: np.n
 
 
 def kajiya_kay(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray, settings: Settings) -> np.ndarray:
-    """Radiance per irradiance towards the viewer, RGB (..., 3). Eq. 13; its K is part of the colors."""
+    """Return radiance per irradiance toward the viewer, RGB (..., 3). Eq. 13; its K is part of the colors."""
     diffuse = kajiya_kay_diffuse(tangent, to_light)[..., None]
     specular = kajiya_kay_specular(tangent, to_light, to_view, settings.exponent)[..., None]
     # The integral of sin(T, L) over the sphere is pi^2: divided by it, the diffuse color is an albedo.
@@ -96,7 +96,7 @@ def kajiya_kay(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray, s
 
 
 def kajiya_kay_specular_albedo(exponent: Values) -> np.ndarray:
-    """Directional albedo of a highlight of peak one under uniform light, the mean over all directions of view.
+    """Return the directional albedo of a highlight of peak one under uniform light, the mean over all views.
 
     The exact value is pi / 2 times the integral of cos^n(s) ((pi - |s|) cos(s) + sin(|s|)) over s = theta_i + theta_o;
     the approximation is within 0.5 % for exponents of 10 and more, 4 % for 1.
@@ -105,7 +105,7 @@ def kajiya_kay_specular_albedo(exponent: Values) -> np.ndarray:
 
 
 def mean_albedo(settings: Settings) -> np.ndarray:
-    """Radiance in a uniform surrounding of radiance one, RGB (3,), as `albedo.mean_albedo` for the Marschner model."""
+    """Return the radiance in uniform light of radiance one, RGB (3,), as `mean_albedo` of albedo.py for Marschner."""
     specular = np.asarray(settings.specular_color) * kajiya_kay_specular_albedo(settings.exponent)
     return np.asarray(settings.diffuse_color) + specular
 

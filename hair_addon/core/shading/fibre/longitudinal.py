@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Energy-conserving longitudinal scattering function of [DEon11].
 
-It is a density over solid angle in a slice of azimuth: its integral times cos(theta_i) over theta_i is 1 for every
-theta_o and variance. Marschner's Gaussian loses the part beyond the poles.
+The function is a density over solid angle in a slice of azimuth: the integral of the function times cos(theta_i) over
+theta_i is 1 for every theta_o and variance. Marschner's Gaussian loses the part beyond the poles.
 """
 
 import numpy as np
@@ -27,7 +27,7 @@ def i0e(x: Values) -> np.ndarray:
 
 
 def d_eon_lobe(sin_i: Values, cos_i: Values, sin_o: Values, cos_o: Values, v: Values) -> np.ndarray:
-    """M_v (...) of [DEon11] from sines and cosines of the inclinations, v the variance in theta_i + theta_o.
+    """Return M_v (...) of [DEon11] from sines and cosines of the inclinations; v: variance in theta_i + theta_o.
 
     The printed exp(-sin sin / v) I0(cos cos / v) / (2 v sinh(1 / v)) overflows below v = 0.01; here the exponents are
     combined first. cos(theta_i + theta_o) - 1 is computed as half a squared distance, which is accurate in single

@@ -154,7 +154,7 @@ class Settings(_Settings):
 
 
 def gaussian(x: Values, sigma: Values) -> np.ndarray:
-    """Unit-area Gaussian of standard deviation sigma."""
+    """Return the unit-area Gaussian of standard deviation sigma."""
     return np.exp(-0.5 * np.square(x / sigma)) / (sigma * math.sqrt(2.0 * math.pi))
 
 
@@ -166,14 +166,14 @@ def beta_r_of(roughness: Values) -> np.ndarray:
 def longitudinal_lobes(settings: Settings, beta_r: Values | None = None) -> list[tuple[float, Values]]:
     """Return [(alpha, beta)] of R, TT and TRT: center and standard deviation in theta_h.
 
-    beta_r: deviation (...) of R on varied strands; None: that of the settings.
+    beta_r: deviation (...) of R on varied strands; None: the deviation of the settings.
     """
     beta_r = settings.beta_r if beta_r is None else beta_r
     return [(s * settings.tilt, width * beta_r) for s, width in zip(_SHIFTS[settings.shifts], _WIDTHS, strict=True)]
 
 
 def gaussian_lobes(theta_h: Values, settings: Settings, beta_r: Values | None = None) -> np.ndarray:
-    """M_R, M_TT and M_TRT (..., 3) at theta_h (...); beta_r as in `longitudinal_lobes`."""
+    """Return M_R, M_TT and M_TRT (..., 3) at theta_h (...); beta_r: as in `longitudinal_lobes`."""
     lobes = longitudinal_lobes(settings, beta_r)
     return np.stack([m_lobe(theta_h, alpha, beta) for alpha, beta in lobes], axis=-1)
 
@@ -191,13 +191,13 @@ def _root_term(p, gamma, cos_theta_d, eta, sigma_a):
 
 
 def n_r(phi: Values, cos_theta_d: Values, eta: Values) -> np.ndarray:
-    """N_R (...): a quarter of cos(phi / 2), weighted by the reflectance of the facet that mirrors light to phi."""
+    """Return N_R (...): a quarter of cos(phi / 2), times the reflectance of the facet that mirrors light to phi."""
     cos_half = np.cos(0.5 * np.abs(phi))
     return 0.25 * cos_half * dielectric_reflectance(cos_theta_d * cos_half, eta)
 
 
 def n_tt(phi: Values, cos_theta_d: Values, eta: Values, sigma_a: ArrayLike) -> np.ndarray:
-    """N_TT (..., C); zero for |phi| below 2 asin(1 / eta'), where no ray leaves after two crossings."""
+    """Return N_TT (..., C), zero for |phi| below 2 asin(1 / eta'), where no ray leaves after two crossings."""
     phi, cos_theta_d = np.broadcast_arrays(np.abs(phi), cos_theta_d)
     eta_prime, _ = bravais_indices(cos_theta_d, eta)
     lit = phi >= 2.0 * np.arcsin(1.0 / eta_prime)
@@ -273,7 +273,7 @@ class Caustic:
 
 
 def scattering(angles: FibreAngles, settings: Settings) -> np.ndarray:
-    """S (..., 3) [1/sr] at `FibreAngles` (...). Eq. 14."""
+    """Return S (..., 3) [1/sr] at `FibreAngles` (...). Eq. 14."""
     cos_theta_d = np.maximum(np.cos(angles.theta_d), LEAST_COS_THETA_D)
     m = gaussian_lobes(angles.theta_h, settings)
     transmitted = n_tt(angles.phi, cos_theta_d, settings.eta, settings.sigma_a)
@@ -286,6 +286,6 @@ def scattering(angles: FibreAngles, settings: Settings) -> np.ndarray:
 
 
 def marschner_scattering(m: np.ndarray, n: np.ndarray, n_trt: np.ndarray, cos_theta_d: Values) -> np.ndarray:
-    """S (..., 3) from m (..., 3) = M_R, M_TT, M_TRT; n (..., 4) = N_TT, N_R; and n_trt (..., 3). Eq. 14."""
+    """Return S (..., 3) of m (..., 3) = M_R, M_TT, M_TRT; n (..., 4) = N_TT, N_R; and n_trt (..., 3). Eq. 14."""
     product = m[..., 0:1] * n[..., 3:4] + m[..., 1:2] * n[..., 0:3] + m[..., 2:3] * n_trt
     return product / np.square(np.maximum(cos_theta_d, LEAST_COS_THETA_D))[..., None]

@@ -16,13 +16,13 @@ R, TT, TRT, RESIDUAL = 0, 1, 2, 3
 
 
 def exit_angle(p: int, gamma: Values, eta_prime: Values) -> np.ndarray:
-    """phi (...) at which a ray with the angle of incidence gamma leaves: R and TRT in (-pi, pi), TT in (0, 2 pi)."""
+    """Return phi (...) at which a ray of incidence gamma leaves: R and TRT in (-pi, pi), TT in (0, 2 pi)."""
     gamma_t = np.arcsin(np.sin(gamma) / eta_prime)
     return 2.0 * p * gamma_t - 2.0 * gamma + (p % 2) * np.pi
 
 
 def exit_angle_slope(p: int, gamma: Values, eta_prime: Values) -> np.ndarray:
-    """d(phi) / d(gamma), finite at the fiber's rim where d(phi) / d(h) is not."""
+    """Return d(phi) / d(gamma), finite at the fiber's rim where d(phi) / d(h) is not."""
     return 2.0 * p * np.cos(gamma) / np.sqrt(np.square(eta_prime) - np.square(np.sin(gamma))) - 2.0
 
 
@@ -65,9 +65,7 @@ def trt_gamma(
     bisections: int = 16,
     newton_steps: int = 2,
 ) -> np.ndarray:
-    """Return gamma (...) in one monotone segment at which TRT leaves at phi.
-
-    The nearer end of the segment if there is none.
+    """Return gamma (...) in one monotone segment at which TRT leaves at phi; the segment's nearer end if there is none.
 
     Newton's steps square the remaining error of the bisection, and are limited to its interval, as the slope is nearly
     zero beside the caustic.
@@ -94,15 +92,15 @@ def attenuation(fresnel: np.ndarray, transmittance: Values) -> tuple[np.ndarray,
 
 
 def residual_attenuation(fresnel: Values, transmittance: Values) -> np.ndarray:
-    """Attenuation of all longer paths together: the geometric series after TRT, for fresnel < 1 [Chiang16]."""
+    """Return the attenuation of all longer paths: the geometric series after TRT, for fresnel < 1 [Chiang16]."""
     turned = fresnel * transmittance
     return np.square((1.0 - fresnel) * turned) * transmittance / (1.0 - turned)
 
 
 def crossing_transmittance(gamma: Values, cos_theta_d: Values, eta: Values, sigma_a: ArrayLike) -> np.ndarray:
-    """T (..., C): transmittance of one internal crossing; sigma_a (C,) per radius.
+    """Return T (..., C), the transmittance of one internal crossing; sigma_a (C,) per radius.
 
-    The exponent is the length of the chord; the report's exponent, 1 + cos(2 gamma_t), is half the square of that
+    The exponent is the length of the chord; the report's exponent, 1 + cos(2 gamma_t), is half the square of this
     length.
     """
     eta_prime, _ = bravais_indices(cos_theta_d, eta)

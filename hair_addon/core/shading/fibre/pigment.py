@@ -24,14 +24,14 @@ _BRIGHTEST = 0.9999
 
 
 def sigma_a_from_melanin(melanin: Values, redness: Values) -> np.ndarray:
-    """Amount of pigment and its red share, both (...) in [0, 1] → sigma_a (..., 3) per fiber radius."""
+    """Return sigma_a (..., 3) per fiber radius of an amount of pigment and its red share, both (...) in [0, 1]."""
     concentration = -np.log(np.maximum(1.0 - np.asarray(melanin, float), LEAST_LIGHT))[..., None]
     redness = np.asarray(redness, float)[..., None]
     return concentration * ((1.0 - redness) * _EUMELANIN + redness * _PHEOMELANIN)
 
 
 def sigma_a_from_color(color: ArrayLike, azimuthal_roughness: Values = 0.3) -> np.ndarray:
-    """Colour of a groom, linear RGB (..., 3) → the sigma_a (..., 3) of its fibers [Chiang16]."""
+    """Return sigma_a (..., 3) of the fibers of a groom with a color, linear RGB (..., 3) [Chiang16]."""
     color = np.clip(color, _DARKEST, _BRIGHTEST)
     return np.square(np.log(color) / color_falloff(azimuthal_roughness))
 
@@ -58,5 +58,5 @@ def color_from_falloff(sigma_a: ArrayLike, falloff: Values) -> np.ndarray:
 
 
 def color_falloff(roughness: Values) -> np.ndarray:
-    """Fit of [Chiang16] to path-traced grooms: decrease of ln(color) with sqrt(sigma_a)."""
+    """Return the decrease of ln(color) with sqrt(sigma_a): the fit of [Chiang16] to path-traced grooms."""
     return np.polynomial.polynomial.polyval(roughness, [5.969, -0.215, 2.532, -10.73, 5.574, 0.245])

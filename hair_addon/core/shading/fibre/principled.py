@@ -15,17 +15,17 @@ LEAST_SCALE = 0.006
 
 
 def deviation_from_roughness(roughness: Values) -> Values:
-    """Longitudinal roughness in [0, 1] → standard deviation [rad] of the R lobe in theta_i + theta_o."""
+    """Return the standard deviation [rad] of the R lobe in theta_i + theta_o; roughness: longitudinal, in [0, 1]."""
     return LINEAR * roughness + QUADRATIC * np.square(roughness) + STEEP * np.power(roughness, 20.0)
 
 
 def variance_from_roughness(roughness: Values) -> np.ndarray:
-    """Longitudinal roughness in [0, 1] → v_R [rad²], the variance in theta_i + theta_o."""
+    """Return v_R [rad²], the variance in theta_i + theta_o; roughness: longitudinal, in [0, 1]."""
     return np.maximum(np.square(deviation_from_roughness(roughness)), LEAST_VARIANCE)
 
 
 def scale_from_radial_roughness(roughness: Values) -> np.ndarray:
-    """Radial roughness in [0, 1] → s [rad], the scale of the azimuthal logistic."""
+    """Return s [rad], the scale of the azimuthal logistic; roughness: radial, in [0, 1]."""
     scale = np.sqrt(np.pi / 8.0) * (0.265 * roughness + 1.194 * roughness**2 + 5.372 * roughness**22)
     return np.maximum(scale, LEAST_SCALE)
 
@@ -39,11 +39,11 @@ def varied_roughness(roughness: Values, amount: float, random: Values) -> np.nda
 
 
 def beta_r_from_roughness(roughness: Values) -> Values:
-    """Longitudinal roughness in [0, 1] → beta_R [rad], the deviation in theta_h, half that in theta_i + theta_o."""
+    """Return beta_R [rad], the deviation in theta_h: half that in theta_i + theta_o; roughness: longitudinal."""
     return 0.5 * deviation_from_roughness(roughness)
 
 
 def roughness_from_beta_r(beta_r: float) -> float:
-    """beta_R [rad] → longitudinal roughness, clamped to [0, 1]; the inverse of `beta_r_from_roughness`."""
+    """Return the longitudinal roughness, clamped to [0, 1]: the inverse of `beta_r_from_roughness`; beta_r [rad]."""
     roughness = np.linspace(0.0, 1.0, 4097)
     return float(np.interp(beta_r, beta_r_from_roughness(roughness), roughness))

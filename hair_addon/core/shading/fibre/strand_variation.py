@@ -47,7 +47,7 @@ class Settings(_Settings):
 
 
 def strand_sigma_a(settings: Settings, random: Values, position: Values) -> np.ndarray:
-    """sigma_a (..., 3) of strands with random numbers (...) in [0, 1], at positions (...) from root 0 to tip 1."""
+    """Return sigma_a (..., 3) of strands with random numbers (...) in [0, 1], at positions (...), root 0 to tip 1."""
     gradient = tip_gradient(settings.gradient_start, settings.gradient_end, position)
     return sigma_a_along(settings, random, gradient)
 
