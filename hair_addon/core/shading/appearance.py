@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The artist's settings for the viewport's models and for Cycles, with the names and units of Principled Hair.
 
-Defaults are those of Principled Hair too, except the pigment: dark blond, whose shading is visible in the light of
-Blender's start-up scene.
+Defaults are also those of Principled Hair, except the pigment: it is dark blond, whose shading is visible in the light
+of Blender's start-up scene.
 """
 
 import math
@@ -38,8 +38,8 @@ TABLE_FIELDS = ("mode", "eta", "sigma_a", "tilt", "roughness", "radial_roughness
 STRAND_FIELDS = ("random_color", "random_roughness", "tip_absorption", "tip_tint", "gradient_start", "gradient_end")
 
 # A film of water fills the gaps between the cuticle's scales: the surface becomes smooth (narrow highlights, no tilt),
-# and the effective index of refraction lower. The pigment does not change. Water is not a Coat, as Cycles samples its
-# Coat with another roughness than it weights it with (DECISIONS.md, Wet hair).
+# and the effective index of refraction lower. The pigment does not change. Water is not modeled by Coat: Cycles samples
+# its Coat with one roughness and weights it with another (DECISIONS.md, Wet hair).
 _WET = {"roughness": 0.14, "cuticle_angle": math.radians(0.5), "ior": 1.38}
 
 # Fibers whose index is that of air reflect nothing.
@@ -215,7 +215,7 @@ def dimmed(color: np.ndarray, appearance: Appearance) -> np.ndarray:
 
 @lru_cache(maxsize=_CACHE_SIZE)
 def strand_settings(appearance: Appearance) -> strand_variation.Settings:
-    """Convert to `strand_variation.Settings`: variation of the absorption between strands and along them."""
+    """Return the `strand_variation.Settings`: variation of the absorption between strands and along them."""
     pigment, dye, melanin = _absorption(appearance)
     return strand_variation.Settings(
         pigment=tuple(map(float, pigment)),
@@ -249,7 +249,7 @@ def _dye(tint, radial_roughness):
 
 @lru_cache(maxsize=_CACHE_SIZE)
 def table_settings(appearance: Appearance, base: lookup_tables.Settings | None = None) -> lookup_tables.Settings:
-    """Convert to `lookup_tables.Settings` of an average strand at its root.
+    """Return the `lookup_tables.Settings` of an average strand at its root.
 
     base: provides the other settings: size and axes of the tables, shifts, glints of the classic mode.
     """
@@ -272,13 +272,13 @@ _NEUTRAL_COLOR = (0.5, 0.5, 0.5)  # a ball of hair of this color is as bright as
 
 @lru_cache(maxsize=_CACHE_SIZE)
 def neutral(look: Appearance) -> Appearance:
-    """Return the look with bright gray strands that are all alike, to be tinted, and with its own highlights."""
+    """Return a look for tinting: all strands are the same bright gray, with the highlights of the given look."""
     shading = {name: getattr(look, name) for name in ("roughness", "radial_roughness", "coat", "ior", "cuticle_angle")}
     return Appearance(parametrization="COLOR", color=_NEUTRAL_COLOR, **shading)
 
 
 def kajiya_kay_settings(appearance: Appearance) -> kajiya_kay.Settings:
-    """Convert to `kajiya_kay.Settings`: the groom's color, and a highlight with R's width and R's energy."""
+    """Return the `kajiya_kay.Settings`: the groom's color, and a highlight with R's width and R's energy."""
     appearance = shaded(appearance)
     exponent = float(kajiya_kay.highlight_exponent((1.0 - appearance.coat) * appearance.roughness))
     peak = float(kajiya_kay.highlight_peak(_mean_reflectance(appearance.ior), exponent))
@@ -287,7 +287,7 @@ def kajiya_kay_settings(appearance: Appearance) -> kajiya_kay.Settings:
 
 
 def kajiya_kay_strand_settings(appearance: Appearance) -> kajiya_kay.StrandSettings:
-    """Convert to `kajiya_kay.StrandSettings`, for strands with variation."""
+    """Return the `kajiya_kay.StrandSettings` for strands with variation."""
     appearance = shaded(appearance)
     return kajiya_kay.StrandSettings(
         falloff=float(color_falloff(appearance.radial_roughness)),
@@ -308,7 +308,7 @@ def _mean_reflectance(eta):
 
 
 def principled_sockets(appearance: Appearance) -> dict[str, Any]:
-    """Convert to {socket: value} of Principled Hair: model Chiang, parametrization Absorption.
+    """Return {socket: value} for Principled Hair: model Chiang, parametrization Absorption.
 
     The absorption is that of an average strand at its root; `strand_settings` has the variation.
     """

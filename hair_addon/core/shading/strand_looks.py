@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Looks of strands that differ by maps: absorption at root and tip, and a factor of the roughness."""
+"""Looks of strands that vary by maps: absorption at root and tip, and a factor of the roughness."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ class StrandLooks:
         )
 
     def sigma_a(self, gradient: np.ndarray) -> np.ndarray:
-        """Return sigma_a (S, ..., 3) where the tip's color is reached by a part (S, ...) or (...)."""
+        """Return sigma_a (S, ..., 3) at fractions (S, ...) or (...) of the tip's color."""
         gradient = np.asarray(gradient, float)[..., None]
         shape = (len(self.root), *(1,) * (max(gradient.ndim, 2) - 2), 3)
         root, tip = self.root.astype(float).reshape(shape), self.tip.astype(float).reshape(shape)
@@ -99,7 +99,7 @@ def _dyes(tints, radial_roughness):
 
 
 def gradient_of(look: Appearance, positions: np.ndarray) -> np.ndarray:
-    """Return the part (...) of the tip's color at positions (...) from root 0 to tip 1."""
+    """Return the fraction (...) of the tip's color at positions (...) from root 0 to tip 1."""
     settings = appearance.strand_settings(look)
     return strand_variation.tip_gradient(settings.gradient_start, settings.gradient_end, positions)
 

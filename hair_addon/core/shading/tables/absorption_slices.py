@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """N for a range of absorptions: one 3D texture for every strand, point and color channel.
 
-N depends only on each channel's absorption. So a slice of one scalar sigma_a serves red, green and blue, and a shader
-looks up three times instead of once in the three channels of `lookup_tables`.
+N of a channel depends only on its absorption. So a slice of one scalar sigma_a serves red, green and blue, and a shader
+reads three times, instead of reading the three channels of `lookup_tables` once.
 
     n    N_TT, N_TRT, N of the residual, N_R    over phi (columns), cos(theta) (rows) and sqrt(sigma_a) (slices)
     n_g  the same, averaged over directions as in `dual_scattering`; energy-conserving mode
@@ -27,7 +27,7 @@ from . import lookup_tables
 from .cell_means import smooth_trt_means
 
 SLICE_COUNT = 16
-_DARKEST = 2.0**-14  # below the smallest normal half float values count as black
+_DARKEST = 2.0**-14  # values below the smallest normal half float count as black
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def bake(
 
 
 def _elliptic_trt(settings, sigma_a, device):
-    """N_TRT (K, H, W, 4) for indices from eta*_1 to eta*_2."""
+    """Return N_TRT (K, H, W, 4) for indices from eta*_1 to eta*_2."""
     layers = [replace(settings, eta=float(eta)) for eta in layer_etas(settings.eta, settings.eccentricity)]
     if device == "cpu":
         edges, cosines = lookup_tables.phi_edges(settings), lookup_tables.row_cosines(settings)
@@ -86,7 +86,7 @@ def _elliptic_trt(settings, sigma_a, device):
 
 
 def _texels(n_r, n_tt, n_trt, n_res):
-    """Combine lobes, which broadcast to (H, W, K), to texels (K, H, W, 4)."""
+    """Return texels (K, H, W, 4) of lobes, which broadcast to (H, W, K)."""
     height, width, slice_count = n_tt.shape
     texels = np.empty((slice_count, height, width, 4), np.float32)
     for channel, lobe in enumerate((n_tt, n_trt, n_res, n_r)):
@@ -139,9 +139,9 @@ def sample_radiance(
     roughness: Values | None = None,
     cos_twice_phi_h: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return radiance per irradiance (..., 3) at `FibreAngles` (...) of strands with sigma_a (..., 3), as the shader.
+    """Return radiance per irradiance (..., 3) at `FibreAngles` (...) of strands with sigma_a (..., 3), like the shader.
 
-    roughness: (...) of varied strands; None: that of the settings; cos_twice_phi_h (...): as in `elliptic_section`, for
+    roughness: (...) of varied strands; None: the settings' own; cos_twice_phi_h (...): as in `elliptic_section`, for
     elliptic sections.
     """
     settings = slices.settings

@@ -27,7 +27,7 @@ def mean_parts(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> 
 
 
 def azimuthal_moments(tables: lookup_tables.Tables) -> np.ndarray:
-    """Return (4, K, 3) float32: the radiance towards theta_o in uniform light, and its moments.
+    """Return (4, K, 3) float32: the radiance toward theta_o in uniform light, and its moments.
 
     The second row is the same integral with the weight cos(phi), phi the azimuth between light and viewer: positive for
     back scattering. The third and fourth rows are the radiance in light that varies as the Legendre polynomials P1 and

@@ -28,10 +28,10 @@ _WIDE_NODES, _WIDE_WEIGHTS = np.polynomial.legendre.leggauss(64)
 def smooth_means(
     edges: np.ndarray, cosines: np.ndarray, settings: Settings, sigma_a: Absorptions, progress: Progress = no_progress
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """N_R (H, W, 1), N_TT and N_TRT (H, W, C) as means over the cells between `edges`, float32.
+    """Return N_R (H, W, 1), N_TT and N_TRT (H, W, C) as means over the cells between `edges`, float32.
 
     edges: W + 1 monotone values of phi from 0 to pi or back; cosines (H,): of theta_d; sigma_a (C,). In the classic
-    mode the caustic is treated as in `settings`, else it is kept. progress(step, part): progress callback.
+    mode the caustic is treated as in `settings`, otherwise it is kept. progress(step, part): progress callback.
     """
     shape = (len(cosines), len(edges) - 1)
     n_r, n_tt, n_trt = (np.empty((*shape, count), np.float32) for count in (1, len(sigma_a), len(sigma_a)))
@@ -52,7 +52,7 @@ def smooth_trt_means(edges: np.ndarray, cosines: np.ndarray, settings: Settings,
 
 
 def residual(cosines: np.ndarray, eta: float, sigma_a: Absorptions) -> np.ndarray:
-    """N of all paths beyond TRT together, which leave evenly around the fibre: (H, C) for cosines (H,)."""
+    """Return N (H, C) of all paths beyond TRT together, which leave evenly around the fiber; cosines (H,)."""
     gamma = 0.25 * np.pi * (1.0 + _WIDE_NODES)
     dh = 0.25 * np.pi * _WIDE_WEIGHTS * np.cos(gamma)  # half of the sum over both halves
     attenuated = paths.path_attenuation(paths.RESIDUAL, gamma, cosines[:, None], eta, sigma_a)
@@ -90,7 +90,7 @@ def _cell_means(p, edges, cos_theta_d, eta, sigma_a, caustic=None):
 def _gamma_edges(p, edges, eta_prime):
     """Return for each monotone segment (H, W + 1): gamma of the ray that leaves at each edge.
 
-    The nearer end of the segment if there is none.
+    Gamma is the nearer end of the segment if there is no such ray.
 
     Only phi >= 0 is covered; N is even. eta_prime (H, 1).
     """

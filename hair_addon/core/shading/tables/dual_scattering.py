@@ -2,8 +2,8 @@
 """Multiple scattering: the tables of dual scattering [Zinke08], from those of one fiber, and light among strands.
 
 Of the light that hits a strand, a_f is scattered forward and a_b backward, with variances beta_f² and beta_b². All are
-per color channel, over the inclination of the light. Front and back are the two halves of the circle of phi; the
-light's azimuth may be anywhere in its half, so of light scattered by phi the fraction |phi| / pi goes forward. Both
+per color channel and depend on the inclination of the light. Front and back are the two halves of the circle of phi.
+The light's azimuth may be anywhere in its half, so of light scattered by phi the fraction |phi| / pi goes forward. Both
 parts give the two fluxes through a layer of strands [Kubelka31]; [Zinke08] neglects repeated backward scattering, and
 assumes an infinitely deep layer behind a strand.
 """
@@ -28,7 +28,7 @@ _LEAST_ATTENUATION, _MOST_REFLECTANCE = 1e-3, 0.995
 
 _LEAST_COSINE, _LEAST_FLUX = 1e-3, 1e-6  # lower limits of the mean cosine and of fluxes
 
-_WHITEST = 0.99  # the series over scattering events must end
+_WHITEST = 0.99  # so that the series over scattering events converges
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def light_inclinations(count: int = SAMPLE_COUNT) -> np.ndarray:
 
 
 def bake(tables: lookup_tables.Tables) -> DualTables:
-    """`lookup_tables.Tables` → `DualTables`."""
+    """Return the `DualTables` of `lookup_tables.Tables`."""
     forward, backward = scattered_parts(tables, light_inclinations())
     rows = quantities(forward, backward, tables.settings)
     mean = forward_mean(lookup_tables.phi_edges(tables.settings)).astype(np.float32)
@@ -236,10 +236,10 @@ def drifts(
 ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """Return (shift, variance) (...) in theta_i + theta_o of light scattered forward in front, and from behind.
 
-    The latter has one more event, in this strand. Each event multiplies the mean sine of the inclination by a mean
-    cosine, so fluxes among strands that scatter only this fraction give the mean sine after any number of events, and
-    thereby that number. Each event shifts light towards the same end of the strands. In deep hair the number of events
-    has a geometric distribution, whose deviation equals its mean.
+    Light from behind has one more event, in this strand. Each event multiplies the mean sine of the inclination by a
+    mean cosine, so fluxes among strands that scatter only this fraction give the mean sine after any number of events,
+    and thereby that number. Each event shifts light toward the same end of the strands. In deep hair the number of
+    events has a geometric distribution, whose deviation equals its mean.
     """
     parts = np.stack([quantity["a_f"], quantity["a_b"]])
     # Means over the channels, which differ little.
@@ -296,7 +296,7 @@ def radiance(
 ) -> np.ndarray:
     """Return radiance per irradiance (..., 3) of a strand with `front` and `behind` (...) others on average.
 
-    The irradiance is that outside the hair. quantity: {name: (..., 3)} of the surrounding strands, at theta_i; n, n_g:
+    The irradiance is outside the hair. quantity: {name: (..., 3)} of the surrounding strands, at theta_i; n, n_g:
     arguments of `energy_conserving.lobe_sum` except M, for direct light and light scattered forward; roughness: (...)
     of varied strands. Widths and shifts are means over the channels.
     """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of hair whose strands have looks by maps: the same for any looks within a range of absorption.
+"""Tables of hair whose looks vary by maps: the same tables serve all looks within a range of absorption.
 
-A strand is lit among strands with its own look, as neighbors have nearly the same where a map varies it. Slices are at
+A strand is lit among strands with its own look, because a map gives neighbors nearly the same look. Slices are at
 fixed absorptions, so that a strand does not change while others are painted.
 """
 

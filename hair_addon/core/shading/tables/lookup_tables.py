@@ -73,9 +73,9 @@ class Tables:
 
 
 def bake(settings: Settings, device: str = "cpu", progress: Progress = no_progress) -> Tables:
-    """Bake `Tables`; device: a Warp device such as "cuda:0", or the processor.
+    """Bake `Tables`; device: a Warp device such as "cuda:0", or the CPU.
 
-    progress(step, part): called with the progress, may raise to cancel.
+    progress(step, part): progress callback, may raise to cancel.
     """
     n_r, n_tt, n_trt, n_res = azimuthal_lobes(settings, settings.sigma_a, device, progress)
     m = _longitudinal(settings, device)
@@ -102,7 +102,7 @@ def azimuthal_lobes(
 
 
 def spread_columns(lobes: Sequence[np.ndarray], spread: np.ndarray) -> list[np.ndarray]:
-    """Multiply the columns of cell means (H, W, C), of any C, by a matrix (W, W), all in one product."""
+    """Return cell means (H, W, C), of any C, whose columns are multiplied by a matrix (W, W), all in one product."""
     height, width, _channels = lobes[0].shape
     counts = [lobe.shape[2] for lobe in lobes]
     side_by_side = np.concatenate([lobe.swapaxes(1, 2) for lobe in lobes], axis=1)  # (H, channels, W)
@@ -147,7 +147,7 @@ def n_coordinates(phi: Values, cos_theta_d: Values, axes: str) -> tuple[Values, 
 
 
 def sample(table: np.ndarray, u: Values, v: Values) -> np.ndarray:
-    """Sample (H, W, C) at coordinates (...) in [0, 1] → (..., C): bilinear, clamped to the edge, as a texture unit."""
+    """Return samples (..., C) of (H, W, C) at coordinates (...) in [0, 1], as a texture unit: bilinear and clamped."""
     height, width = table.shape[:2]
     x = np.clip(np.asarray(u) * width - 0.5, 0.0, width - 1.0)
     y = np.clip(np.asarray(v) * height - 0.5, 0.0, height - 1.0)
@@ -181,7 +181,7 @@ def sample_scattering(tables: Tables, angles: FibreAngles) -> np.ndarray:
 
 
 def to_half(values: np.ndarray) -> np.ndarray:
-    """Convert to float16, clamped to the largest half float; subnormals become 0, as they are fifty times slower."""
+    """Return float16, clamped to the largest half float; subnormals become 0, because they are fifty times slower."""
     limit = np.finfo(np.float16)
     values = np.clip(values, float(limit.min), float(limit.max))
     return np.where(np.abs(values) < float(limit.tiny), 0.0, values).astype(np.float16)

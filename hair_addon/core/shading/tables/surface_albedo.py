@@ -7,7 +7,7 @@ import numpy as np
 
 SIZE = 32
 _SAMPLE_COUNT = 512  # of microfacets' normals, for each texel
-_REFRACTIVE_INDEX = 1.5  # of the dielectric whose Fresnel reflectance is scaled to all others
+_REFRACTIVE_INDEX = 1.5  # of the dielectric whose Fresnel reflectance is scaled to other dielectrics
 
 
 @cache
@@ -29,7 +29,7 @@ def table() -> np.ndarray:
 
 
 def _microfacets(roughness, n_dot_v):
-    """Return V·H of normals sampled by their density [Walter07, Eq. 35], and the light each reflects as a mirror."""
+    """Return V·H of normals sampled by their density [Walter07, Eq. 35], and light that each reflects as a mirror."""
     index = np.arange(_SAMPLE_COUNT)
     share, azimuth = (index + 0.5) / _SAMPLE_COUNT, 2.0 * np.pi * np.modf(0.61803399 * index)[0]
     squared = roughness**4

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The texels of `cell_means`, `azimuthal` and the M table, one thread each: for GPUs, where a bake takes milliseconds.
 
-In double precision, as beside a caustic the width of a cell in gamma is a small difference. This file imports Warp;
-`lookup_tables` imports it only when it is asked for another device than the processor's NumPy.
+The kernels use double precision, because beside a caustic the width of a cell in gamma is a small difference. This file
+imports Warp, so `lookup_tables` imports it only for devices other than the CPU, where NumPy bakes.
 """
 
 import numpy as np
@@ -30,7 +30,7 @@ _R, _TT, _TRT = (wp.constant(path) for path in (R, TT, TRT))
 
 @wp.struct
 class _Inclination:
-    """What a row of a table tells of the fibre: sine and cosine of theta_d or theta_o, eta, and eta'."""
+    """The inclination of a table's row: sine and cosine of theta_d or theta_o, eta, and eta'."""
 
     sine: F
     cosine: F
@@ -225,9 +225,9 @@ def azimuthal_means(
     spread: np.ndarray | None,
     device: str,
 ) -> list[np.ndarray]:
-    """N_R (H, W, 1), N_TT and N_TRT (H, W, C), NumPy float32, baked on a Warp device.
+    """Return N_R (H, W, 1), N_TT and N_TRT (H, W, C), NumPy float32, baked on a Warp device.
 
-    Arguments as for `cell_means.smooth_means`; spread: the matrix (W, W) of `azimuthal.roughening`, or None.
+    Arguments as in `cell_means.smooth_means`; spread: the matrix (W, W) of `azimuthal.roughening`, or None.
     """
     is_treated = settings.mode == "classic" and settings.caustic == "published"
     caustic = Caustic.at(cosines, settings, sigma_a)
@@ -247,7 +247,7 @@ def azimuthal_means(
 
 
 def longitudinal_texels(theta: np.ndarray, settings: Settings, device: str) -> np.ndarray:
-    """M (H, W, 4), NumPy float32, baked on a Warp device; theta (W,): inclinations of columns and rows."""
+    """Return M (H, W, 4), NumPy float32, baked on a Warp device; theta (W,): inclinations of columns and rows."""
     is_energy = settings.mode == "energy"
     lobes = energy_conserving.lobes(settings) if is_energy else longitudinal_lobes(settings)
     with wp.ScopedDevice(device):
