@@ -35,7 +35,7 @@ class Parameter:
 
 @dataclass
 class Curves:
-    """Polylines that are being written: `CurvesWriter.add` returns them, `CurvesWriter.write_points` adds points."""
+    """Polylines that are being written, from `CurvesWriter.add`; `CurvesWriter.write_points` adds points."""
 
     name: str
     properties: list[Property]

@@ -29,7 +29,7 @@ _MOST_OBJECTS = 1_000_000
 
 @dataclass(frozen=True)
 class _Node:
-    """An object of curves: its path, the properties of its schema, and those of its parent transforms, by depth."""
+    """An object of curves: its path, the properties of its schema, and of its parent transforms by depth."""
 
     path: tuple[str, ...]
     properties: Mapping[str, Property]
@@ -37,7 +37,7 @@ class _Node:
 
 
 def read(path: Path) -> CurveFile:
-    """Read the curves of an Alembic file, animated curves at their first sample. Raises `HairError`."""
+    """Return the curves of an Alembic file, animated curves at their first sample. Raises `HairError`."""
     with _damage_as_error(path), Archive(path) as archive:
         nodes = _nodes(archive.top())
         application = archive.metadata.get("_ai_Application", "")
@@ -172,7 +172,7 @@ def _placed(points, matrix):
 
 
 class _Parameters:
-    """Geometry parameters of curves and of their parent transforms; the nearest one takes precedence."""
+    """Geometry parameters of curves and of their parent transforms; the nearest object takes precedence."""
 
     def __init__(self, archive, node, stack):
         self._archive, self._places = archive, []

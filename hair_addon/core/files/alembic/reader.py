@@ -38,7 +38,7 @@ _KINDS: Mapping[int, str | None] = {
 _DATA = 1 << 63
 _DIGEST = 16  # [bytes] before the content of a sample
 _HEADER_SIZE = 16
-_ACYCLIC = float(np.finfo(np.float64).max) / 32.0  # the cycle length that marks acyclic times
+_ACYCLIC = float(np.finfo(np.float64).max) / 32.0  # a cycle of this length marks acyclic times
 _MOST_DEPTH = 200  # nesting of objects and of compounds
 _READ_ANEW = 64  # limit of bytes read, in file sizes: samples may be shared, but must not fill the memory
 
@@ -104,7 +104,7 @@ class Object:
 
 
 class Archive:
-    """An archive that is open for reading: a context manager. Raises `HairError` if it is no archive, and `Damaged`."""
+    """An archive that is open for reading: a context manager. Raises `HairError` for other files, and `Damaged`."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
