@@ -26,14 +26,14 @@ _DATA_WIDTH, _BIN_WIDTH = 3, 7  # numbers of a point
 
 
 def read_data(path: Path) -> CurveFile:
-    """Read the strands of a .data file. Raises `HairError`."""
+    """Return the strands of a .data file. Raises `HairError`."""
     with contents.bytes_of(path) as data:
         values, counts, _end = _parsed(data, _DATA_WIDTH)
         return CurveFile(curve_sets(path.stem, values, counts), usual=DATA_USUAL)
 
 
 def read_bin(path: Path) -> CurveFile:
-    """Read the strands of a .bin file. Raises `HairError`."""
+    """Return the strands of a .bin file. Raises `HairError`."""
     with contents.bytes_of(path) as data:
         values, counts = _whole(data, _BIN_WIDTH) or _whole(data, _DATA_WIDTH) or _refuse()
         return CurveFile(curve_sets(path.stem, values[:, :3], counts), usual=BIN_USUAL)

@@ -35,7 +35,7 @@ _NO_THICKNESS = 1.0
 
 
 def read(path: Path) -> CurveFile:
-    """Read the strands of a HAIR file. Raises `HairError`."""
+    """Return the strands of a HAIR file. Raises `HairError`."""
     with contents.bytes_of(path) as data:
         return _read(data, path.stem)
 

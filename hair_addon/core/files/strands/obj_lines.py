@@ -19,7 +19,7 @@ _USUAL = Convention(1.0, "Y")
 
 
 def read(path: Path) -> CurveFile:
-    """Read the lines of an .obj file. Raises `HairError`."""
+    """Return the lines of an .obj file. Raises `HairError`."""
     with contents.bytes_of(path) as data:
         points, objects = _statements(data)
         if not objects:

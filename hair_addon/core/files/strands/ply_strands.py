@@ -34,7 +34,7 @@ _EDGES = ("vertex1", "vertex2")
 
 
 def read(path: Path) -> CurveFile:
-    """Read the strands of a .ply file. Raises `HairError`."""
+    """Return the strands of a .ply file. Raises `HairError`."""
     with contents.bytes_of(path) as data:
         elements, comments = ply_table.parsed(data)
         return _read(elements, comments, path.stem)

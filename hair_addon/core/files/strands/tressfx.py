@@ -28,7 +28,7 @@ _USUAL = Convention(0.01, "Y")
 
 
 def read(path: Path) -> CurveFile:
-    """Read the strands of a binary .tfx file. Raises `HairError`."""
+    """Return the strands of a binary .tfx file. Raises `HairError`."""
     with contents.bytes_of(path) as data:
         return _read(data, path.stem)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grooms → files of strands: HAIR, HairSalon's .data, PLY and .npz, of one frame, in meters.
+"""Writers of strand files from grooms: HAIR, HairSalon's .data, PLY and .npz, of one frame, in meters.
 
 All are in the axes of Blender, Z up, except .data, which has Y up like HairSalon's files. HAIR and .data have no
 guides, groups or attributes: the strands are written, or the guides if there are no strands.
@@ -41,7 +41,7 @@ class StrandsWriter:
         self._points[number] = np.concatenate([*self._added[number][1].parts(points)])
 
     def notes(self) -> list[HairError]:
-        """Return warnings about what the file does not have."""
+        """Return warnings about content that the file lacks."""
         if self._has_kinds or len(self.written()) == len(self._added):
             return []
         return [HairError("The file has the strands alone: its format does not tell guides from strands.")]
