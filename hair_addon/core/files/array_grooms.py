@@ -28,7 +28,7 @@ _NAMES = {"guide_points": "Guides", "strand_points": "Hair"}
 
 
 def read(path: Path, axis: str = "Z") -> CurveFile:
-    """Read the curves of a file of arrays; axis: the up axis if the file has none. Raises `HairError`."""
+    """Return the curves of a file of arrays; axis: the up axis if the file has none. Raises `HairError`."""
     with untrusted_arrays.opened(path) as archive:
         return _read(path, archive, axis)
 

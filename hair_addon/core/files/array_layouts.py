@@ -5,8 +5,8 @@
     counts      (S,) integers with sum N; offsets (S + 1,), ascending from 0 to N, or (S,) without the last entry
     widths      diameters (width, thickness, diameter) or radii (radius): (S, P), (N,), (S,) or one number
 
-The array with a fitting shape holds the positions. If several arrays fit, the array with a name in `_POINTS` does.
-Names are compared without case. Numbers may have 16, 32 or 64 bits.
+The array with a fitting shape holds the positions. If several arrays fit, the array whose name is in `_POINTS` holds
+the positions. Names are compared without case. Numbers may have 16, 32 or 64 bits.
 """
 
 import zipfile

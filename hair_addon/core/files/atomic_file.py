@@ -16,7 +16,7 @@ _PARTIAL = re.compile(r"\.vellus_[0-9a-f]{16}_(.+)", re.ASCII | re.DOTALL)
 
 @contextlib.contextmanager
 def atomic_file(path: str | Path, partial: Path | None = None, is_forced: bool = True) -> Generator[Path]:
-    """Yield a temporary path, as `atomic_files` for one file; partial: this path, None for a new one."""
+    """Yield a temporary path, like `atomic_files`, for one file; partial: the temporary path, None for a new path."""
     with atomic_files([path], None if partial is None else [partial], is_forced) as (there,):
         yield there
 
@@ -25,9 +25,9 @@ def atomic_file(path: str | Path, partial: Path | None = None, is_forced: bool =
 def atomic_files(
     paths: Iterable[str | Path], partials: list[Path] | None = None, is_forced: bool = True
 ) -> Generator[list[Path]]:
-    """Yield temporary paths to write to; on success their files replace `paths`, after an error none does.
+    """Yield temporary paths to write to; the files replace `paths` on success, and are removed after an error.
 
-    partials: the temporary paths, None for new ones. Raises `HairError` if a folder cannot be written or the disk is
+    partials: the temporary paths, None for new paths. Raises `HairError` if a folder cannot be written or the disk is
     full. is_forced: whether files are flushed to disk before they are moved; some exporters do not report a full disk.
     """
     places = [Path(path) for path in paths]

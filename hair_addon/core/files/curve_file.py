@@ -142,7 +142,7 @@ class CurveSet:
 
 
 def as_polylines(curves: CurveSet) -> CurveSet:
-    """Return the curves, splines evaluated to polylines that have the same counts at all times."""
+    """Return the curves with splines as polylines, which have the same counts of points at all times."""
     counts, is_smooth, motion = curves.counts, curves.is_smooth, curves.motion
     columns = [values for values in (curves.points, curves.colors, curves.radii) if values is not None]
     values, new_counts, lines = bezier_segments.smooth_lines(np.column_stack(columns), counts, is_smooth)
@@ -176,7 +176,7 @@ class CurveFile:
 
 
 def join(sets: Sequence[CurveSet]) -> CurveSet:
-    """Return one set of the curves of sets in the same coordinates, without attributes that any of these sets lacks.
+    """Return one set with the curves of sets in equal coordinates. Attributes that any of the sets lacks are dropped.
 
     Radii are an exception: curves without radii get 0, which means none. Motion is kept if all moving sets have the
     same times.

@@ -70,7 +70,7 @@ def _named(meters):
 
 
 class _Ends:
-    """Ends of some curves in file coordinates, and their distance to the surface for a convention."""
+    """Ends of some curves in file coordinates, and the distance of the ends to the surface for a convention."""
 
     def __init__(self, sets, mesh):
         found = []

@@ -71,7 +71,7 @@ class FrameCache:
         self.read_manifest()
 
     def read_manifest(self) -> Manifest | None:
-        """Read the manifest from disk; None if it is missing or invalid."""
+        """Return the manifest, read again from disk; None if it is missing or invalid."""
         try:
             self.manifest = frame_manifest.read(self.folder)
         except HairError as error:
@@ -99,7 +99,7 @@ class FrameCache:
         if known is None or known[0] != stamp:
             read_with = self.manifest
             is_whole = self._frame_arrays(number) is not None
-            if not is_whole and self.read_manifest() != read_with:  # baked by another process meanwhile
+            if not is_whole and self.read_manifest() != read_with:  # another process has baked since
                 self._frame_arrays(number)
             known = self._checked.get(number)
         return None if known is None else known[1]
@@ -385,7 +385,7 @@ def _numbers(folder, is_state):
 
 
 def _remove(folder, is_chosen):
-    """Remove the plain files of a folder whose names are chosen; returns their number."""
+    """Remove the plain files of a folder whose names `is_chosen`; returns the number of files removed."""
     with os.scandir(folder) as entries:
         chosen = [entry.path for entry in entries if is_chosen(entry.name) and entry.is_file(follow_symlinks=False)]
     for path in chosen:

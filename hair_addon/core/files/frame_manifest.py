@@ -53,7 +53,7 @@ class Manifest:
     first: int
     last: int
     fps: float  # frames a second
-    state: str = "part"  # one of `STATES`
+    state: str = "part"  # from `STATES`
     state_layout: array_file.Layout = field(default_factory=dict)
     notes: tuple[tuple[str, str], ...] = ()
     parted_by: str = ""
@@ -163,13 +163,13 @@ def write(folder: Path, manifest: Manifest) -> None:
 
 
 def read(folder: Path) -> Manifest:
-    """Read a folder's manifest. Raises `HairError` for content that `write` does not produce."""
+    """Return the manifest of a folder. Raises `HairError` for content that `write` does not produce."""
     path = folder / NAME
     return parsed(untrusted_file.read(path, _LARGEST_FILE), path)
 
 
 def parsed(data: bytes, path: Path) -> Manifest:
-    """Parse the bytes of a manifest; path: for error messages. Raises `HairError`."""
+    """Return the manifest that bytes of a file contain; path: for error messages. Raises `HairError`."""
     try:
         found = json.loads(data.decode("utf-8"))
         if type(found) is not dict or (found.pop("format"), found.pop("version")) != (FORMAT, VERSION):

@@ -117,7 +117,7 @@ class Check:
             yield part
 
     def notes(self) -> Iterator[HairError]:
-        """Yield warnings about the treatment of these curves by importers."""
+        """Yield warnings about how importers treat these curves."""
         curves, name = self.curves, self.curves.group_name
         if self.no_length:
             count = len(self.no_length)

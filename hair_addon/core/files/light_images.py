@@ -10,7 +10,7 @@ from ..errors import HairError, cause_of
 
 
 def read_layers(path: str | Path) -> dict[str, np.ndarray]:
-    """Return {layer: (H, W, 3) float32 scene-linear colors}, bottom row first; an unnamed layer is "".
+    """Return {layer: (H, W, 3) float32 scene-linear colors}, bottom row first; the unnamed layer is "".
 
     Raises `HairError` for a file that cannot be read, or has no colors.
     """

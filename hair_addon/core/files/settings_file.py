@@ -38,7 +38,7 @@ class GroomSettings:
     guides: GuideSettings = field(default_factory=GuideSettings)
     hair: HairSettings = field(default_factory=HairSettings)
     appearance: Appearance = field(default_factory=Appearance)
-    tables: lookup_tables.Settings = field(default_factory=lookup_tables.Settings)  # except those in the appearance
+    tables: lookup_tables.Settings = field(default_factory=lookup_tables.Settings)  # without settings of the appearance
     styles: tuple[StyleSettings, ...] = ()  # in the order of application; a list is converted to a tuple
     style_names: tuple[str, ...] = ()  # one for each style, "" for unnamed; empty if no style has a name
     dynamics: DynamicsSettings = field(default_factory=DynamicsSettings)
@@ -106,7 +106,7 @@ def write(path: str | Path, settings: GroomSettings) -> None:
 
 
 def to_object(settings: GroomSettings) -> dict[str, Any]:
-    """Convert `GroomSettings` to the JSON object of a file."""
+    """Return `GroomSettings` as the JSON object of a file."""
     lists = {"styles": list_of_styles(settings), "maps": list_of_maps(settings)}
     curves = {"thickness_curve": settings.thickness_curve} if settings.thickness_curve else {}
     return {"format": FORMAT, "version": VERSION, **sections_of(settings), **lists, **curves}
@@ -162,22 +162,22 @@ class PartialSettings:
 
 
 def read(path: str | Path) -> GroomSettings:
-    """Read `GroomSettings` from a file; omitted settings have their defaults. Raises `HairError`."""
+    """Return the `GroomSettings` in a file; omitted settings have their defaults. Raises `HairError`."""
     return from_object(read_object(path), path)
 
 
 def from_object(found: dict[str, Any], path: str | Path) -> GroomSettings:
-    """Convert the result of `read_object` to `GroomSettings`. Raises `HairError`, which names the file."""
+    """Return the result of `read_object` as `GroomSettings`. Raises `HairError`, which names the file."""
     return partial_of_object(found, path).changed(GroomSettings())
 
 
 def read_partial(path: str | Path) -> PartialSettings:
-    """Read only the settings in a file. Raises `HairError`."""
+    """Return only the settings that a file contains. Raises `HairError`."""
     return partial_of_object(read_object(path), path)
 
 
 def partial_of_object(found: dict[str, Any], path: str | Path) -> PartialSettings:
-    """Convert the result of `read_object` to `PartialSettings`. Raises `HairError`, which names the file."""
+    """Return the result of `read_object` as `PartialSettings`. Raises `HairError`, which names the file."""
     sections = _sections(found, path)
     styles, names = None, ()
     if "styles" in sections:
@@ -257,7 +257,7 @@ def to_settings(
     place: str = "",
     allowed: list[tuple[str, Any, Param]] | None = None,
 ) -> S:
-    """Convert a JSON object to `Settings`. Raises `HairError` with file and key.
+    """Return a JSON object as `Settings`. Raises `HairError`, which names the file and the key.
 
     place: prefix of the key in errors; allowed: the accepted declarations of the class, None for all.
     """
@@ -304,7 +304,7 @@ def _sections(found, path):
 
 
 def read_object(path: str | Path) -> dict[str, Any]:
-    """Read the JSON object {name: value} of a file. Raises `HairError`."""
+    """Return the JSON object {name: value} of a file. Raises `HairError`."""
     path = Path(path)
     try:
         if not path.is_file():
@@ -319,7 +319,7 @@ def read_object(path: str | Path) -> dict[str, Any]:
 
 
 def object_of_text(text: str, path: str | Path) -> dict[str, Any]:
-    """Parse the JSON object {name: value} of a text; path: for error messages. Raises `HairError`."""
+    """Return the JSON object {name: value} of a text; path: for error messages. Raises `HairError`."""
     try:
         found = json.loads(text, object_pairs_hook=_once, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:

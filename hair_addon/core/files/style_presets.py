@@ -36,7 +36,7 @@ _OF_HAIR = ("point_count", "tip_taper")
 
 
 def read(identifier: str) -> PartialSettings:
-    """Read a preset by its identifier. Raises `HairError`."""
+    """Return the preset of an identifier. Raises `HairError`."""
     if identifier not in PRESETS:
         sentence = 'No style preset "{name}": choose from {known}.'
         raise HairError(sentence, name=identifier, known=", ".join(PRESETS))
@@ -56,7 +56,7 @@ def fit(preset: PartialSettings, factor: float, strand_spacing: float) -> Partia
 
 
 def to_object(settings: GroomSettings) -> dict[str, Any]:
-    """Convert the styles of `GroomSettings`, and the hair settings of `_OF_HAIR`, to the JSON object of a preset."""
+    """Return the styles of `GroomSettings`, and the hair settings of `_OF_HAIR`, as the JSON object of a preset."""
     found = settings_file.to_object(settings)
     hair_values = {name: value for name, value in found["hair"].items() if name in _OF_HAIR}
     return {"format": found["format"], "version": found["version"], "hair": hair_values, "styles": found["styles"]}

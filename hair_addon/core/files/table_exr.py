@@ -29,7 +29,7 @@ FORMAT_VERSION = 2
 _MAX_BYTES = 64 * 2**20
 _MAX_SETTINGS_LENGTH = 10_000
 _MAGIC = b"\x76\x2f\x31\x01"
-_PREFIX = "vellus."  # of our header attributes
+_PREFIX = "vellus."  # prefix of our header attributes
 
 
 def write_tables(folder: str | Path, tables: Tables, version: str) -> list[Path]:
@@ -49,7 +49,7 @@ def write_dual_tables(folder: str | Path, dual: DualTables, version: str) -> lis
 
 
 def read_tables(folder: str | Path) -> Tables:
-    """Read `Tables`, with their settings, from a folder of `write_tables`.
+    """Return `Tables`, with their settings, from a folder of `write_tables`.
 
     Raises `HairError` if a file is missing, damaged, foreign, or from another bake.
     """
@@ -59,7 +59,7 @@ def read_tables(folder: str | Path) -> Tables:
 
 
 def read_dual_tables(folder: str | Path) -> DualTables:
-    """Read `DualTables` from a folder of `write_dual_tables`. Raises `HairError` like `read_tables`."""
+    """Return `DualTables` from a folder of `write_dual_tables`. Raises `HairError` like `read_tables`."""
     settings = _settings_of_folder(folder, "dual")
     arrays = _read_set(folder, table_axes.DUAL_TABLES, settings)
     return DualTables(arrays["dual"], arrays["n_g"], arrays["n_g_trt"], settings)

@@ -24,7 +24,7 @@ _OF_DAMAGE = (
 
 @contextmanager
 def opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open an archive of arrays. Invalid archives raise `HairError`, also within the context."""
+    """Yield an open archive of arrays. Invalid archives raise `HairError`, also within the context."""
     try:
         with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
             yield archive
