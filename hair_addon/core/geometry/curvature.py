@@ -9,7 +9,7 @@ SHARPEST = 10.0  # limit of the curvature, relative to a sphere of the same area
 
 
 def mean_curvature(mesh: TriMesh) -> np.ndarray:
-    """Return the absolute mean curvature (V,) float64 [1/m], half the sum of the principal ones; 1 / r on a sphere.
+    """Return the absolute mean curvature (V,) float64 [1/m], half the sum of principal curvatures; 1 / r on a sphere.
 
     The integral of mean curvature over a patch is the sum of a quarter of each edge's length times its dihedral angle,
     with half of the edge in each face [CohenSteiner03]. An edge with one face, or more than two, has no curvature.
@@ -24,7 +24,7 @@ def mean_curvature(mesh: TriMesh) -> np.ndarray:
     firsts = firsts[counts == 2]
     one, other = order[firsts], order[firsts + 1]
     normals = mesh.scaled_normals[triangles] / (2.0 * mesh.areas[triangles, None])
-    # Faces with opposite winding traverse a shared edge in the same direction: one of the normals is flipped.
+    # Faces with opposite winding traverse a shared edge in the same direction: one normal is flipped.
     senses = np.where(starts[one] == starts[other], -1.0, 1.0)[:, None]
     first_normals, second_normals = normals[one // 3], senses * normals[other // 3]
     edges = (mesh.vertices[ends[one]] - mesh.vertices[starts[one]]).astype(np.float64)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import HairError
 
-# Least extent of landmarks, relative to the largest, in a direction that enters the affine map, or the rotation.
+# Least extent of landmarks, relative to the largest, in a direction that enters the affine map or the rotation.
 _DEEP, _WIDE = 0.1, 1e-3
 
 
@@ -29,7 +29,7 @@ class Warp:
     weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def places(self, points: np.ndarray) -> np.ndarray:
-        """Map points (N, 3) [m] → (N, 3) float64 [m]."""
+        """Return the images (N, 3) float64 [m] of points (N, 3) [m]."""
         points = np.asarray(points, np.float64)
         distances = np.linalg.norm(points[:, None] - self.centers, axis=2)
         return points @ self.linear.T + self.offset + distances @ self.weights

@@ -11,7 +11,7 @@ class Mirror:
     """A reflection in a plane through the origin, along a given direction.
 
     normal (3,), unit; across (3,): direction of the reflection with across · normal = 1, None for the normal. An object
-    that is sheared in world space is reflected along its own axis, which is oblique to the plane.
+    that is sheared in world space is reflected along the object's axis, which is oblique to the plane.
     """
 
     normal: np.ndarray

@@ -39,7 +39,7 @@ class VertexRotations:
 
     @cached_property
     def needed(self) -> np.ndarray:
-        """Vertices (N,) int32, ascending: all with a rotation, and all whose positions affect a rotation."""
+        """Vertices (N,) int32, ascending: the vertices with a rotation, and the vertices that affect one."""
         is_needed = np.zeros(len(self.rest), bool)
         is_needed[self.corners] = True
         is_needed[self.vertices] = True

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cubic curves of [UsdCurves24] and NURBS as rational Bézier segments, and Bézier segments as polylines.
 
-A curve's values are rows of numbers: the position, and further attributes that are interpolated likewise, such as a
-width.
+A curve's values are rows of numbers: the position, and further attributes that are interpolated like the position,
+such as a width.
 """
 
 from dataclasses import dataclass

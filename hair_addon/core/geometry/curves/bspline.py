@@ -49,7 +49,7 @@ def evaluate_recursive(
 ) -> np.ndarray:
     """Return points (C, T, 3) float64 [m] of controls (C, n, 3) [m] at parameters (T,) in [0, 1].  Eq. 1 as corrected.
 
-    weights: (n,) or (C, n), positive, for rational curves (NURBS); None for polynomial ones.
+    weights: (n,) or (C, n), positive, for rational curves (NURBS); None for polynomial curves.
     """
     controls = np.asarray(controls, dtype=np.float64)
     values = basis(parameters, controls.shape[1], degree)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Recovery of the original faces after Blender has flipped them, as it does when it applies a mirroring scale.
 
-A flipped face begins at the same corner and has the opposite winding. If modifiers subdivide faces, those of the cage
-are flipped, which changes the order of each face's quads and of the vertices inside it.
+A flipped face begins at the same corner and has the opposite winding. If modifiers subdivide faces, the faces of the
+cage are flipped, which changes the order of each face's quads and of the vertices inside the face.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ _SIDES = np.array([(0, 1), (1, 2), (2, 3), (3, 0)])
 
 @dataclass(frozen=True)
 class FlippedFaces:
-    """The permutation of corners and vertices by a flip, which is its own inverse.
+    """The permutation of corners and vertices by a flip. The permutation is its own inverse.
 
     corners: (C,) int, the present corner of each original corner; vertices: (V,) int32, the present number of each
     original vertex, None if all numbers are unchanged.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""UV map check: Blender's hair nodes find roots on a moving surface by UV, which is ambiguous where UVs overlap."""
+"""Check of UV maps: Blender's hair nodes find roots on a moving surface by UV, which is ambiguous where UVs overlap."""
 
 from dataclasses import dataclass
 

@@ -20,7 +20,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 GRID_SIZE = 32  # cells along each axis; distant cells wrap around and share a bucket, which only costs time
 CELLS_PER_RADIUS = 2.0  # cell width / first search radius: visiting fewer cells is faster than comparing fewer points
 CELL_WIDTH = 0.8  # width of the cells that sort the queries / first search radius
-CELLS_ALONG = 1024  # maximum number of these cells along each axis
+CELLS_ALONG = 1024  # maximum number of sorting cells along each axis
 CANDIDATE_LIMIT = 128  # maximum number of candidate points for the queries of one cell
 candidate_indices = wp.types.vector(length=CANDIDATE_LIMIT, dtype=int)
 candidate_values = wp.types.vector(length=CANDIDATE_LIMIT, dtype=float)
