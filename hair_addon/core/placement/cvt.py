@@ -172,7 +172,7 @@ def _descend(
 
 
 def _spread(domain, state, device):
-    """Return sites with crowded ones moved to the widest gaps, which no descent does; None if no site is crowded.
+    """Return sites after crowded sites move to the widest gaps, which no descent does; None if no site is crowded.
 
     With a few distant initial sites, tips of thin parts have too many sites.
     """
@@ -212,7 +212,7 @@ class _State:
         return Springs(self.on, self.sums.masses, self._device).moves(gradient)
 
     def lloyd_moves(self, gradient):
-        """Return moves (n, 3) as `moves`, without coupling between cells."""
+        """Return moves (n, 3) like `moves`, without coupling between cells."""
         return self.inverse * gradient
 
     @property
@@ -250,7 +250,7 @@ def _pair_count(domain, cells, sites, device):
 
 
 def _thinned(domain, cells, sites, device):
-    """Return sites without crowded sites, of which the most crowded are removed first, but no two neighbors.
+    """Return sites without crowded sites: the most crowded sites are removed first, but no two neighbors.
 
     Thin parts and corners have too many sites of a coarse level, which no descent moves elsewhere.
     """

@@ -170,7 +170,7 @@ class Domain:
     def symmetric(self, half: SurfacePoints, count: int) -> SurfacePoints:
         """Return `count` `SurfacePoints`: one half, (count + 1) // 2 points, and their closest images on the surface.
 
-        For an odd count the point nearest to the mirror moves to it, and is its own image.
+        For an odd count the point nearest to the mirror moves to the mirror, and is its own image.
         """
         places = positions(self.mesh, half).astype(np.float64)
         heights = self._heights(places)

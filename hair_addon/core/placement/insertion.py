@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Insertion of sites between fixed ones: farthest points, then Lloyd's relaxation of the new sites alone.
+"""Insertion of sites between fixed sites: farthest points, then Lloyd's relaxation of the new sites alone.
 
-The energy is that of cvt.py, including the cells of fixed sites.
+The energy is the same as in cvt.py, and includes the cells of fixed sites.
 """
 
 import numpy as np

@@ -2,10 +2,10 @@
 """Approximate Hessian of the energy, as a preconditioner: a network of springs between neighboring sites.
 
 When two sites approach each other, the energy grows in proportion to the mass on both sides of their border; sideways
-motion is free. The Hessian of the energy [Liu09] is therefore close to that of springs, with stiffnesses in proportion
-to the shares of the two cells' masses. The mass of a cell without springs, along a border of the surface, holds its
-site in place. Solving with this matrix spreads a change over many cells at once, whereas Lloyd's method propagates it
-from cell to cell; [Hateley15] use a graph Laplacian.
+motion is free. The Hessian of the energy [Liu09] is therefore close to the Hessian of springs, with stiffnesses in
+proportion to the shares of the two cells' masses. The mass of a cell without springs, along a border of the surface,
+holds its site in place. Solving with this matrix spreads a change over many cells at once, whereas Lloyd's method
+propagates the change from cell to cell; [Hateley15] use a graph Laplacian.
 """
 
 import numpy as np

@@ -8,7 +8,7 @@ from ..geometry.mesh import SurfacePoints, TriMesh, interpolate
 from ..geometry.sampling import check_density, corner_masses, sample_surface
 from .domain import Parts, cut
 
-PIECE_COUNT = 10_000  # least number of pieces of a surface: finer details on a large triangle are missed
+PIECE_COUNT = 10_000  # least number of pieces of a surface: details that are finer than a piece are missed
 EDGE_FINENESS = 2.0  # refinement of pieces in which the mask varies
 LONGEST_EDGE = 1.5  # of a piece, relative to the square root of its share of the area
 
@@ -45,5 +45,5 @@ def sample_textured(
 
 
 def _flat(corners):
-    """Reshape (Q, 3, 3) → (3 Q, 3) float32."""
+    """Return corners (Q, 3, 3) as rows (3 Q, 3) float32."""
     return np.ascontiguousarray(corners, np.float32).reshape(-1, 3)

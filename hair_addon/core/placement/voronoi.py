@@ -226,7 +226,7 @@ def detours(domain: Domain, densities: np.ndarray, site_count: int) -> np.ndarra
 def sum_cells(
     kernel: wp.Kernel, count: int, inputs: list[Any], outputs: list[wp.array], sites: Sites, device: wp.DeviceLike
 ) -> Sums:
-    """Run a kernel that adds to masses, moments and energies of cells, with separate sums for each thread → `Sums`."""
+    """Return the `Sums` of a kernel that adds masses, moments and energies of cells, separately in each thread."""
     shapes = (len(sites.places), (len(sites.places), 3), len(sites.places))
     sums = [
         [wp.zeros(shape, dtype=wp.int64, device=device) for shape in shapes]
