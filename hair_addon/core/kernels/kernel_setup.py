@@ -106,7 +106,7 @@ class _Loading:
 
     def begin(self, thread_count):
         _under_way.add(self)
-        # Daemon threads: Blender would wait for others before it runs `_end_all`.
+        # Daemon threads: Blender would wait for other threads before it runs `_end_all`.
         for _ in range(thread_count):
             thread = threading.Thread(target=self._run, name="vellus", daemon=True)
             thread.start()

@@ -122,7 +122,7 @@ def on_one_core(pause: Callable[[], None] | None = None) -> Iterator[None]:
 
 
 def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=None, threads_per_row=1):
-    """Launch a kernel on parts of the rows, with a thread for each core; arguments(part, first, end): its arguments."""
+    """Launch a kernel on parts of the rows, a thread per core; arguments(part, first, end): a part's arguments."""
     if part_count == 1:
         pause = getattr(_limits, "pause", None)
         if device.is_cpu and pause is not None:
@@ -150,7 +150,7 @@ def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=No
         numbers = itertools.count(1)
 
         def launch_part(part):
-            if next(numbers) == part_count:  # all others have begun
+            if next(numbers) == part_count:  # all other parts have begun
                 under_way()
             prepared[part].launch()
 
