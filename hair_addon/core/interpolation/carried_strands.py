@@ -6,9 +6,9 @@ A strand's point x beside the point c(s) of its course keeps its offset in a fra
     x' = x + (c'(s) - c(s)) + (Q(s) - 1) (x - c(s))
 
 Where the course does not move, both terms are zero and no bit changes. Q rotates the former tangents of the course to
-the present ones. At the root it is a rotation about the surface's normal, in proportion to how closely the course lies
-along the surface, followed by the least rotation; it continues along the course by least rotations [Bishop75], so that
-strands are not twisted.
+the present tangents. At the root, Q is a rotation about the surface's normal, in proportion to how closely the course
+lies along the surface, followed by the least rotation. Q continues along the course by least rotations [Bishop75], so
+that strands are not twisted.
 """
 
 import numpy as np

@@ -41,8 +41,8 @@ FADE = math.radians(30.0)  # of the angle limit, over which a guide's weight fad
 class Candidates:
     """The guides nearest to each strand, nearest first, and the first excluded one: (S, k + 1) arrays on one device.
 
-    indices int32, -1 in unused slots; ways float32 [m], lengths of paths to them around part lines or straight, inf in
-    unused slots; guide_count: number of guides, above all indices.
+    indices int32, -1 in unused slots; ways float32 [m]: lengths of the paths to these guides, straight or around part
+    lines, inf in unused slots; guide_count: number of guides, above all indices.
     """
 
     indices: "wp.array2d[int]"
@@ -217,8 +217,8 @@ def _nearest_guides(guide_roots, roots, count, regions):
 def _parted(lines, roots, normals, guide_roots, guide_normals, candidates, ways, regions):
     """Return candidates and path lengths (S, k + 1) around part lines.
 
-    Near a line more guides are searched, to replace those behind it. The last path length is at most the distance to a
-    guide that was not searched.
+    Near a line the search finds more guides, to replace guides behind it. The last path length is at most the distance
+    to a guide that the search did not find.
     """
     near = part_lines.near(lines, roots, ways)
     if not len(near):

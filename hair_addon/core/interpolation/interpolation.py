@@ -10,7 +10,7 @@ Eq. 10 is λ_i = 1, which makes a strand shorter than its guides if they diverge
 With λ_i as above each segment has the average length of its guides' segments. Weights do not depend on the point
 (guide_weights.py): combing repeats only `interpolate`.
 
-R_j is the minimal rotation from the guide's normal to the strand's: it needs no UV map and is continuous wherever
+R_j is the least rotation from the guide's normal to the strand's normal: it needs no UV map and is continuous wherever
 normals are. With a frame F (tangent, bitangent, normal) at either root it is F_strand Z F_guide^T, Z being a rotation
 about the normal. So guides are transformed to their frames once, a neighbor costs five multiplications per point
 instead of nine, and the strand's frame is applied to the sum.
