@@ -6,9 +6,9 @@ At the arc length s_i of a point p_i, with C the center strand of level k after 
     q_i = c + (1 - B_ki (1 - thickness)) Rot(t_c, 2π twist · profile(x_i)) (p_i - c)
 
 The strand follows the curve of these points up to its own length, so that strands pulled onto the center lie on it
-(clump.strand). Roots do not move: a pull at the root grows over twice the distance to the center. The fraction
-`stray` of strands joins no lock; a tenth more joins partly, so that it can be animated. Sites and levels are in
-clump_trees.py.
+(clump.strand). Roots do not move: the pull grows from the root over twice the distance to the center. The fraction
+`stray` of strands joins no lock; a tenth more joins partly, so that the fraction can be animated. Sites and levels are
+in clump_trees.py.
 """
 
 import math

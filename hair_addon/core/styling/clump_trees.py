@@ -129,12 +129,15 @@ class ClumpTrees:
         return self._members[key]
 
     def parents(self, tree: TreeSettings, level: int) -> list[np.ndarray]:
-        """Return (K,) int32 per level, the coarsest first: centers above those of a level, last the own indices."""
+        """Return (K,) int32 per level, the coarsest first: the centers of coarser levels above the centers of a level.
+
+        The last array is the indices of these K centers themselves.
+        """
         own = np.arange(len(self.levels(tree)[level].roots), dtype=np.int32)
         return self._upward(tree, own, level)
 
     def _upward(self, tree, places, level):
-        """Return indices in a level and in all coarser ones, the coarsest first."""
+        """Return indices in a level and in all coarser levels, the coarsest first."""
         found = [places]
         levels = self.levels(tree)
         for finer in range(level, 0, -1):

@@ -15,7 +15,7 @@ from .base import Cutter, Step, StyleSettings
 
 __all__ = ["Bend", "Braid", "Clump", "Curl", "Frizz", "Lean", "Smooth", "Trim", "Wet"]
 
-# The classes of settings by their names in `api`, each written out so that type checkers know it.
+# The classes of settings by their names in `api`, written out for type checkers.
 Trim, Clump, Curl, Frizz, Bend = trim.Settings, clump.Settings, curl.Settings, frizz.Settings, bend.Settings
 Smooth, Lean, Braid, Wet = smooth.Settings, lean.Settings, braid.Settings, wet.Settings
 

@@ -40,7 +40,7 @@ class Program:
 
 
 def tree_settings(settings: StyleSettings) -> TreeSettings | None:
-    """Return the `TreeSettings` of a style that gathers strands; None for others."""
+    """Return the `TreeSettings` of a style that gathers strands; None for other styles."""
     module = kinds.module_of(settings)
     return module.tree(settings) if hasattr(module, "tree") else None
 

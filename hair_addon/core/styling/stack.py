@@ -79,7 +79,7 @@ class Styling:
     ) -> None:
         """Style strands in place: points (M, P) [m] of all strands, or of (M,) chosen ones.
 
-        centres: `Centres` of each level; for chosen strands, only of those in `centres_of`.
+        centres: `Centres` of each level; for chosen strands, only of the centers in `centres_of`.
         """
         if not len(self.program):
             return

@@ -18,7 +18,7 @@ from . import kinds, style_text
 from .program import CHOICES, NUMBERS, Program
 
 # No gradients are needed. A GPU's approximate divisions and roots move hair by less than 2e-6 of its size;
-# steps.cpp uses exact ones where errors would be larger.
+# steps.cpp uses exact operations where errors would be larger.
 _OPTIONS = {"enable_backward": False, "fast_math": True}
 wp.set_module_options(_OPTIONS)
 
@@ -69,7 +69,7 @@ class Variant:
 
 
 def variant(width: int, most_points: int, module: wp.Module | None = None) -> Variant:
-    """Return a `Variant` in a Warp module, by default that of this file."""
+    """Return a `Variant` in a Warp module, by default the module of this file."""
     if module is not None:
         module.options.update(_OPTIONS)
 
