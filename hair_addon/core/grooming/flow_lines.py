@@ -40,7 +40,7 @@ class FlowLines:
 def lay(
     mesh: TriMesh, segments: ArrayLike, device: wp.DeviceLike = "cpu", drawn_on: np.ndarray | None = None
 ) -> FlowLines:
-    """Return the `FlowLines` of segments (L, 2, 3) [m] projected onto a checked mesh; segments that touch form a line.
+    """Return the `FlowLines` of segments (L, 2, 3) [m] on a checked mesh; consecutive segments that touch form a line.
 
     drawn_on: (V, 3) vertices of the posed surface on which the segments were drawn, None for the mesh's own. Raises
     `HairError`.

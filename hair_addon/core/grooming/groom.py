@@ -254,7 +254,7 @@ def distribute_guides(
     device: str = "cpu",
     progress: Progress = no_progress,
 ) -> Strands:
-    """Place guides evenly and grow them: (guide_count, POINT_COUNT) `Strands`; `dynamics.draped_growth` drapes them.
+    """Return evenly placed, grown guides (guide_count, POINT_COUNT); `dynamics.draped_growth` drapes them.
 
     mesh: `TriMesh` [m]; settings: `GuideSettings`; values of None are computed from the mesh (groom_defaults.py);
     density: (V,) of vertices, at least 0, None for uniform; texture: `Texture` that is multiplied with it, or None;
@@ -328,7 +328,7 @@ def bind_hair(
     part lines near the surface, across which strands do not blend guides (consecutive segments that touch form a line),
     or None; drawn_on: (V, 3) vertices of the posed surface on which the part lines were drawn, None for the mesh's own;
     shape: as in `distribute_guides`; roots: existing `SurfacePoints` of strands, None to place them; is_mirrored:
-    whether the mesh's triangles are wound opposite to those of the stored roots, which identify strands. Raises
+    whether the mesh's triangles are wound opposite to the triangles of the stored roots, which identify strands. Raises
     `HairError`.
     """
     check_mesh(mesh)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Attraction of guides to the surface: they lie down along it at a clearance, with constant lengths."""
+"""Attraction of guides to the surface: guides lie down along the surface at a clearance, with constant lengths."""
 
 import numpy as np
 import warp as wp

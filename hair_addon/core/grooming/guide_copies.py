@@ -30,7 +30,7 @@ class Mirroring:
 
 
 def nearest(places: np.ndarray, others: np.ndarray, count: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Return indices (M, count) of the places (G, 3) [m] nearest to others (M, 3) [m], and distances [m]; G > 0."""
+    """Return indices (M, count) of the places (G, 3) [m] nearest to other places (M, 3), and distances [m]; G > 0."""
     own, other = (wp.array(np.ascontiguousarray(a, np.float32), dtype=wp.vec3, device="cpu") for a in (places, others))
     indices, distances = hash_grid.neighbours(own, other, _EVERYWHERE, count)
     return indices.numpy(), distances.numpy()
@@ -131,7 +131,7 @@ def copied(
 
 
 def upright_rotations(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return rotations (N, 3, 3) that map unit normals (N, 3) to others, and upward tangents to upward tangents.
+    """Return rotations (N, 3, 3) that map unit normals (N, 3) to other normals, and upward tangents to upward tangents.
 
     They are the least rotations where either surface is nearly level.
     """

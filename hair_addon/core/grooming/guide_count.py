@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changes of the number of guides: insertion between existing guides, or removal of the most crowded ones."""
+"""Changes of the number of guides: insertion between existing guides, or removal of the most crowded guides."""
 
 import heapq
 from collections.abc import Sequence
@@ -38,9 +38,9 @@ def new_roots(
     texture: Texture | None = None,
     device: str = "cpu",
 ) -> SurfacePoints:
-    """Return at most `count` new roots, evenly between others.
+    """Return at most `count` new roots, evenly between existing roots.
 
-    around: (G,) bool, roots to which new ones may be nearest; density (V,) and texture: of guides; without them, new
+    around: (G,) bool, roots that new roots may be placed around; density (V,) and texture: of guides; without them, new
     roots are confined to the part of the surface that the existing guides cover.
     """
     within = None

@@ -115,7 +115,7 @@ def composed_again(layers: GuideLayers, shape: np.ndarray, is_chosen: np.ndarray
 def recorded(
     layers: GuideLayers, active: int, points: np.ndarray, shape: np.ndarray | None = None, in_place: bool = False
 ) -> tuple[GuideLayers, np.ndarray]:
-    """Return (layers whose layer `active` reproduces edited guides, (G,) bool: guides that changed).
+    """Return (layers whose layer of index `active` reproduces edited guides, (G,) bool: guides that changed).
 
     points: (N, 3) of the edited guides; shape: (N, 3) float32, the composed points if they are known; in_place: whether
     the arrays of `layers` may change. Other layers do not change. The base of a guide moves with its root. Guides for
@@ -153,8 +153,8 @@ def moved(layers: GuideLayers, move: Callable[[np.ndarray], np.ndarray]) -> Guid
     """Return the layers of guides that a map of space has moved; weights do not change.
 
     move: a function of points (N, 3), in the order of the guides' points. Turns stay the same under rotations and
-    scales, and are reflected by reflections. Under other maps, each layer with the layers below reproduces
-    the mapped shape.
+    scales, and are reflected by reflections. Under other maps, each layer together with the layers below
+    makes the mapped shape.
     """
     if not len(layers.base):
         return layers
@@ -201,7 +201,10 @@ def moved(layers: GuideLayers, move: Callable[[np.ndarray], np.ndarray]) -> Guid
 
 
 def merged(layers: GuideLayers, lower: int) -> GuideLayers:
-    """Return layers in which a layer and the next are merged, with their weights; guides do not change."""
+    """Return layers in which a layer and the layer above are merged, with their weights, into one layer of weight 1.
+
+    lower: index of the lower layer. The shapes of guides do not change.
+    """
     shape = composed(layers)
     above = [index for index in range(len(layers.turns)) if index != lower + 1]
     turns, stretches = layers.turns.copy(), layers.stretches.copy()

@@ -13,7 +13,7 @@ _CLOSE = 1e-7  # tolerance relative to a guide's length
 def resized(points: np.ndarray, settings: LengthSettings, weights: np.ndarray) -> np.ndarray:
     """Return guides (S, P, 3) float32 [m] with the lengths of `LengthSettings` and unchanged roots.
 
-    points (S, P, 3) [m]; weights (S,) in [0, 1]: fraction of the change. Guides of zero length, and those with the
+    points (S, P, 3) [m]; weights (S,) in [0, 1]: fraction of the change. Guides of zero length, and guides with the
     wanted length, are bit-identical.
     """
     present = lengths_of(np.asarray(points, np.float64))

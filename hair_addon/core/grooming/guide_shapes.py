@@ -49,7 +49,7 @@ def turned(directions: np.ndarray, targets: np.ndarray, shares: np.ndarray) -> n
 
 
 def rotations(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return the least rotations (N, 3, 3) that map unit vectors (N, 3) to others."""
+    """Return the least rotations (N, 3, 3) that map unit vectors (N, 3) to other unit vectors."""
     axis, cosine = np.cross(start, end), np.sum(start * end, axis=1)
     cross = np.zeros((len(start), 3, 3))
     for row, column, part, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):

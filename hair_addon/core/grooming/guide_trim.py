@@ -20,7 +20,7 @@ SHORTEST = 1e-3  # least remaining fraction of a guide's length, which preserves
 def plane_crossings(points: np.ndarray, origin: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Return the arc length (S,) [m] at which guides (S, P, 3) [m] first cross a plane to the side of its normal (3,).
 
-    origin (3,) [m]: a point of the plane. Infinite for guides without a crossing, and for those rooted on that side.
+    origin (3,) [m]: a point of the plane. Infinite for guides without a crossing, and for guides rooted on that side.
     """
     heights = (np.asarray(points, np.float64) - origin) @ np.asarray(normal, np.float64)
     is_crossing = (heights[:, :-1] <= 0.0) & (heights[:, 1:] > 0.0)

@@ -25,7 +25,7 @@ from .groom import HairSettings
 if TYPE_CHECKING:
     from ..styling.stack import Styling
 
-_ROUNDS = 2  # of relaxation: sizes of cells vary by 0.09, less than those of real locks
+_ROUNDS = 2  # of relaxation: sizes of cells vary by 0.09, less than sizes of real locks
 
 
 def clump_trees(
