@@ -42,7 +42,7 @@ STRAND_FIELDS = ("random_color", "random_roughness", "tip_absorption", "tip_tint
 # its Coat with one roughness and weights it with another (DECISIONS.md, Wet hair).
 _WET = {"roughness": 0.14, "cuticle_angle": math.radians(0.5), "ior": 1.38}
 
-# Fibers whose index is that of air reflect nothing.
+# Fibers with the refractive index of air reflect nothing.
 _LEAST_SCATTERING = 1e-6
 
 # Fields that define the color, by parametrization.
@@ -208,7 +208,7 @@ def mean_color(appearance: Appearance) -> np.ndarray:
 
 
 def dimmed(color: np.ndarray, appearance: Appearance) -> np.ndarray:
-    """Return the color (3,) of hair whose fibers reflect as much as those of a look; color: of dry fibers."""
+    """Return the color (3,) of hair with the reflectance of a look's fibers; color: (3,) of hair with dry fibers."""
     scattering = _mean_reflectance(shaded(appearance).ior) / _mean_reflectance(FITTED_IOR)
     return color_of_scattering(color, max(scattering, _LEAST_SCATTERING))
 

@@ -13,7 +13,7 @@ from .strand_looks import StrandLooks, gradient_of, roughness_of
 def colors(
     look: Appearance, randoms: np.ndarray, point_count: int, strand_looks: StrandLooks | None = None
 ) -> np.ndarray:
-    """Return linear RGB (S, P, 3) float32: the color of a head of hair that is everywhere like each point.
+    """Return linear RGB (S, P, 3) float32: at each point, the color of hair that is like this point everywhere.
 
     randoms: (S,) random numbers of strands; strand_looks: (S,) if maps vary them. Points are evenly spaced along
     strands.

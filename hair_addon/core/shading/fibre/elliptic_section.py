@@ -2,8 +2,8 @@
 """Elliptic fibers: the internal reflection of a circular fiber with an effective index that depends on the azimuth
 [Marschner03].
 
-The index eta* is that of a circle that would bend light as the ellipse does where light and viewer are, on average, at
-the azimuth phi_h from the major axis. It goes from eta*_1 there to eta*_2 across, linear in cos(2 phi_h).
+A circle with the index eta* bends light like the ellipse, for light and viewer at the mean azimuth phi_h from the major
+axis. The index goes from eta*_1 along the major axis to eta*_2 across it, linearly in cos(2 phi_h).
 """
 
 import numpy as np

@@ -22,8 +22,8 @@ def dielectric_reflectance(cos_incident: Values, eta: Values) -> np.ndarray:
 def bravais_indices(cos_theta_d: Values, eta: Values) -> tuple[np.ndarray, np.ndarray]:
     """Return (eta', eta''): effective indices in the normal plane for a ray inclined by theta_d [Marschner03].
 
-    eta' determines refraction and the reflectance of perpendicular polarization; eta'' = eta^2 / eta' that of parallel
-    polarization. cos_theta_d (...) in (0, 1].
+    eta' determines refraction and the reflectance of perpendicular polarization, eta'' = eta^2 / eta' the reflectance
+    of parallel polarization. cos_theta_d (...) in (0, 1].
     """
     root = np.sqrt(np.square(eta) - 1.0 + np.square(cos_theta_d))  # sqrt(eta^2 - sin^2 theta_d)
     return root / cos_theta_d, np.square(eta) * cos_theta_d / root
@@ -35,7 +35,8 @@ def bravais_reflectance(
     """Return F(eta', eta'', gamma_i) of Eq. 17, which equals `dielectric_reflectance(cos_theta_d * cos_gamma_i, eta)`.
 
     gamma_t follows from eta' for both polarizations. Public code refracts a second ray by eta'', which is totally
-    reflected if eta'' < 1 (theta_d > 57 degrees for hair), although a ray that enters a denser medium never is.
+    reflected if eta'' < 1 (theta_d > 57 degrees for hair), although a ray that enters a denser medium is never totally
+    reflected.
     """
     perpendicular = (cos_gamma_i - eta_prime * cos_gamma_t) / (cos_gamma_i + eta_prime * cos_gamma_t)
     parallel = (eta_double_prime * cos_gamma_i - cos_gamma_t) / (eta_double_prime * cos_gamma_i + cos_gamma_t)

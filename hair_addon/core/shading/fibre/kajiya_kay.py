@@ -105,7 +105,7 @@ def kajiya_kay_specular_albedo(exponent: Values) -> np.ndarray:
 
 
 def mean_albedo(settings: Settings) -> np.ndarray:
-    """Return the radiance in uniform light of radiance one, RGB (3,), as `mean_albedo` of albedo.py for Marschner."""
+    """Return the radiance in uniform light of radiance one, RGB (3,), as `albedo.mean_albedo` for Marschner."""
     specular = np.asarray(settings.specular_color) * kajiya_kay_specular_albedo(settings.exponent)
     return np.asarray(settings.diffuse_color) + specular
 

@@ -16,7 +16,7 @@ R, TT, TRT, RESIDUAL = 0, 1, 2, 3
 
 
 def exit_angle(p: int, gamma: Values, eta_prime: Values) -> np.ndarray:
-    """Return phi (...) at which a ray of incidence gamma leaves: R and TRT in (-pi, pi), TT in (0, 2 pi)."""
+    """Return phi (...) at which a ray with angle of incidence gamma leaves: R and TRT in (-pi, pi), TT in (0, 2 pi)."""
     gamma_t = np.arcsin(np.sin(gamma) / eta_prime)
     return 2.0 * p * gamma_t - 2.0 * gamma + (p % 2) * np.pi
 
@@ -36,7 +36,7 @@ def tt_gamma(phi: Values, eta_prime: Values) -> np.ndarray:
 
 
 def caustic_gamma(eta_prime: Values) -> np.ndarray:
-    """Return gamma_c (...), where TRT's exit angle has its extremum; pi/2 for eta' of 2 and more, where it has none."""
+    """Return gamma_c (...), where TRT's exit angle has its extremum; pi/2 for eta' of 2 and more, without extremum."""
     sin_squared = (4.0 - np.square(eta_prime)) / 3.0
     return np.where(sin_squared > 0.0, np.arcsin(np.sqrt(np.maximum(sin_squared, 0.0))), 0.5 * np.pi)
 

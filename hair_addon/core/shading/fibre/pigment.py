@@ -15,7 +15,7 @@ _PHEOMELANIN = np.array([0.343, 0.733, 1.924])
 
 FITTED_IOR = 1.55  # of the fibers to which [Chiang16] fitted colors
 
-# Transmittance of full melanin, as its absorption is finite.
+# Transmittance of full melanin: zero would need infinite absorption.
 LEAST_LIGHT = 1e-4
 
 # Colors are limited to below 1 and above 0: black would need infinite absorption, and white fibers scatter forever.

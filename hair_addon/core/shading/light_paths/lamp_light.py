@@ -77,7 +77,7 @@ def _one_of(sources: Sources, index: int, random: wp.uint32):
 def _lamp_at(medium: Medium, sources: Sources, index: int, here: Event, random: wp.uint32):
     """Return (`Lit`, factor of its light, random state).
 
-    It is lit by the lamp of `_one_of`, or by the world for an index after the lamps.
+    The light comes from the lamp of `_one_of`, or from the world for an index after the lamps.
     """
     state = random
     lit = Lit()

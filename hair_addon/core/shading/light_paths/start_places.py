@@ -3,8 +3,8 @@
 
 The number of tried places on a segment is proportional to its area in the picture; visible places become starts. A path
 is identified by its segment and its index there, which determine all its random numbers, and its directions are sampled
-in the frame of what it hits. While a camera or hair moves a little, the same paths therefore begin at the same places,
-and their light changes little.
+in the frame of the strand or surface that it hits. When a camera or hair moves a little, the same
+paths therefore begin at the same places, and their light changes little.
 """
 
 from dataclasses import dataclass

@@ -37,7 +37,7 @@ class Strands:
 
     absorption: function of indices of strands (N,) → sigma_a (N, 2, 3), or (1, 2, 3) if all strands are equal, at root
     and tip; gradient: (P,) fraction of the tip's absorption at each point; fibre: (S,) index of each strand's settings
-    among those given to `build`.
+    among the settings given to `build`.
     """
 
     points: np.ndarray  # (S, P, 3)

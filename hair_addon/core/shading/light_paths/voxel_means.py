@@ -235,7 +235,7 @@ def shares(sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int
 
     The shares are RGB relative to the light in uniform light, and the fraction of the drawn light to keep; both
     together are the light of the paths. Drawn light distinguishes strands and places within a voxel. The fraction is
-    the one that explains the light of the paths best, limited so that it exceeds their light in no channel.
+    the best fit to the light of the paths, limited so that the kept light exceeds their light in no channel.
     """
     require_count("sums", sums.shape[3], CHANNELS)
     with wp.ScopedDevice(sums.device):
@@ -261,11 +261,11 @@ def explained_part(sums: wp.array4d[wp.float64]) -> float:
 def smooth_ratios(
     sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int, int] = (0, 0, 0)
 ) -> np.ndarray:
-    """Return ratios (Z, Y, X, 3 N) of sums of light RGB to those of uniform light RGB over some paths: sums
-    (Z, Y, X, 6 N) have both, N times.
+    """Return ratios (Z, Y, X, 3 N) of light RGB to uniform light RGB, from sums (Z, Y, X, 6 N) over some paths,
+    which have both N times.
 
-    From large to small voxels, each ratio is blended with that of the enclosing larger voxel, which has the weight of
-    `prior` average paths. origin: index of the first voxel along X, Y, Z: voxels with an even index share a larger
+    From large to small voxels, each ratio is blended with the ratio of the enclosing larger voxel, which has the weight
+    of `_PRIOR` average paths. origin: index of the first voxel along X, Y, Z: voxels with an even index share a larger
     voxel with the next. Black without any light.
     """
     with wp.ScopedDevice(sums.device):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The world as a light source of paths: an equirectangular picture whose texels are sampled by their light.
 
-Paths that hit the sky sample it too; both are weighted by their share of the densities [Veach95], so that small bright
-places, such as windows and suns, cause no noise. A nearly uniform picture is not sampled by its light.
+Paths that hit the sky sample the world too; both samples are weighted by their share of the densities [Veach95], so
+that small bright places, such as windows and suns, cause no noise. A nearly uniform picture is not sampled by light.
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Multiple scattering: the tables of dual scattering [Zinke08], from those of one fiber, and light among strands.
+"""Multiple scattering: tables of dual scattering [Zinke08], from the tables of one fiber, and light among strands.
 
 Of the light that hits a strand, a_f is scattered forward and a_b backward, with variances beta_f² and beta_b². All are
 per color channel and depend on the inclination of the light. Front and back are the two halves of the circle of phi.
@@ -166,7 +166,7 @@ def _weighted(values, parts):
 def back_scattering(
     a_f: Values, a_b: Values, alpha_f: Values, alpha_b: Values, beta_f: Values, beta_b: Values
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (A_b, Delta_b, sigma_b) (...): light after one or three backward events and any number of forward ones.
+    """Return (A_b, Delta_b, sigma_b) (...): light after one or three backward events and any number of forward events.
 
     The moments are summed exactly over the numbers of events; [Zinke08] expands them for small a_b.
     """
@@ -209,7 +209,7 @@ def layer_parts(count: Values, attenuation: np.ndarray, reflectance: np.ndarray)
 
 
 def fluxes(front: Values, behind: Values, a_f: np.ndarray, a_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the (forward, backward) light (..., 3) at a strand with `front` and `behind` (...) others on average.
+    """Return the (forward, backward) light (..., 3) at a strand; front, behind: mean numbers (...) of strands around it.
 
     Both are fractions of the light at the first strand; no light comes from behind the last.
     """
@@ -267,7 +267,7 @@ def sample_radiance(
     front: Values,
     behind: Values,
 ) -> np.ndarray:
-    """Return radiance per irradiance (..., 3) of a strand with `front` and `behind` (...) others on average.
+    """Return radiance per irradiance (..., 3) of a strand; front, behind: mean numbers (...) of strands around it.
 
     For the energy-conserving mode, from tables, as the shader computes it.
     """
@@ -294,7 +294,7 @@ def radiance(
     *,
     roughness: Values | None = None,
 ) -> np.ndarray:
-    """Return radiance per irradiance (..., 3) of a strand with `front` and `behind` (...) others on average.
+    """Return radiance per irradiance (..., 3) of a strand; front, behind: mean numbers (...) of strands around it.
 
     The irradiance is outside the hair. quantity: {name: (..., 3)} of the surrounding strands, at theta_i; n, n_g:
     arguments of `energy_conserving.lobe_sum` except M, for direct light and light scattered forward; roughness: (...)

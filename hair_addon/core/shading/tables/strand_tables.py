@@ -122,9 +122,10 @@ def sample_radiance(
     front: Values,
     behind: Values,
 ) -> np.ndarray:
-    """Return radiance per irradiance (..., 3) at `FibreAngles` (...) of strands with `front` and `behind` (...) others.
+    """Return radiance per irradiance (..., 3) at `FibreAngles` (...) of strands.
 
-    random, position (...): of the strands. For the energy-conserving mode, from tables, as the shader computes it.
+    random, position (...): of the strands; front, behind: mean numbers (...) of strands in front and behind. For the
+    energy-conserving mode, from tables, as the shader computes it.
     """
     settings, variation, slices = tables.settings, tables.variation, tables.slices
     if slices.n_g is None:
