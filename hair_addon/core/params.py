@@ -54,7 +54,7 @@ def param_from_surface(typical: Any, description: str, **details: Any) -> Any:
 
 
 def param_of(settings_class: type["Settings"], name: str, default: Any = None, **details: Any) -> Any:
-    """Return a copy of another class's field; default and details override the declared ones."""
+    """Return a copy of another class's field; default and details override the declaration."""
     declaration = settings_class.__dataclass_fields__[name]
     metadata = {"param": replace(declaration.metadata["param"], **details)}
     return field(default=declaration.default if default is None else default, metadata=metadata)
