@@ -45,7 +45,7 @@ def relative_azimuth(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndar
     """
     light = to_light - np.sum(tangent * to_light, axis=-1)[..., None] * tangent
     view = to_view - np.sum(tangent * to_view, axis=-1)[..., None] * tangent
-    # The arc tangent keeps its precision at phi = 0 and pi, where an arc cosine of the dot product loses half.
+    # The arc tangent is precise at phi = 0 and pi, where an arc cosine of the dot product loses half the digits.
     return np.arctan2(np.sum(tangent * np.cross(light, view), axis=-1), np.sum(light * view, axis=-1))
 
 

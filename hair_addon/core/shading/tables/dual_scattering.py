@@ -209,7 +209,7 @@ def layer_parts(count: Values, attenuation: np.ndarray, reflectance: np.ndarray)
 
 
 def fluxes(front: Values, behind: Values, a_f: np.ndarray, a_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the (forward, backward) light (..., 3) at a strand; front, behind: mean numbers (...) of strands around it.
+    """Return the (forward, backward) light (..., 3) at a strand; front, behind: mean numbers (...) of others.
 
     Both are fractions of the light at the first strand; no light comes from behind the last.
     """
