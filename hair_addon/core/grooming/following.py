@@ -137,7 +137,7 @@ def follow_some(
     axes: np.ndarray = _AS_BOUND,
     styling: "Styling | None" = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (M, P, 3) float32 of some strands, as `growing_points`, and their weights (M, k) float32.
+    """Return points (M, P, 3) float32 of some strands, like `growing_points`, and their weights (M, k) float32.
 
     Only these strands and the centers of their clumps are computed. guides and styling: as in `strands_now`; chosen:
     (M,) indices of strands, for example from `guide_weights.Reach` for moved guides.

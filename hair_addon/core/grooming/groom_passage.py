@@ -22,7 +22,7 @@ _SAME = 1e-3  # largest deviation of a copy from a similarity, relative to the s
 _LEAST_KEPT = 0.9  # least fraction of guides that UV maps of the same layout place
 _MOST_STRETCH = 0.25  # largest RMS deviation from a similarity for UV maps that agree, relative to the roots' spread
 _REACH = 0.05  # largest distance of a root or a mask from the surface, relative to the surface's size
-_OUTSIDE = 1e-3  # of a UV layout's size
+_OUTSIDE = 1e-3  # largest distance of a mask from a UV layout, relative to the layout's size
 
 
 @dataclass(frozen=True)

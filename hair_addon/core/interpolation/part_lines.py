@@ -47,7 +47,7 @@ class PartLines:
 def lay(
     mesh: TriMesh, segments: ArrayLike, device: wp.DeviceLike = "cpu", drawn_on: np.ndarray | None = None
 ) -> PartLines:
-    """Lay segments (L, 2, 3) [m] on a checked mesh, as `PartLines`; consecutive segments form a line.
+    """Return the `PartLines` of segments (L, 2, 3) [m] laid on a checked mesh; consecutive segments form a line.
 
     drawn_on: vertices (V, 3) of the posed surface that the lines were drawn on, if they differ from the mesh's.
     """

@@ -28,7 +28,7 @@ MOST_SHARES = 8  # shares of a sum, each in its own memory
 _SLICE = 0.004  # [s] of a launch on one core between pauses
 _FIRST_SLICE = 64  # rows in the first slice
 
-_limits = threading.local()  # of the threads that `on_one_core` limits
+_limits = threading.local()  # for threads that `on_one_core` limits
 
 
 @dataclass(frozen=True)

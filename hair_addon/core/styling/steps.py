@@ -172,7 +172,7 @@ def apply_steps(
 
 
 def _copied(program, device):
-    """Return the arrays of a program on a device, copied once, as a stroke launches the same program repeatedly."""
+    """Return the arrays of a program on a device, copied once, because a stroke launches it repeatedly."""
     if device.alias not in program.copies:
         choices = wp.array(program.choices, dtype=int, device=device)
         program.copies[device.alias] = [choices, wp.array(program.numbers, dtype=float, device=device)]

@@ -3,8 +3,8 @@
 
 With w the amount: guides lean down by cling · w over the first 0.3 of their length; strands are smoothed over twice the
 lock size by relax · w, and clump in two levels with amounts 0.92 w^1.5 (large) and 0.92 w^½ (small; 9.2 w up to
-w = 0.01, as a square root starts vertically). Shading and simulated guides use w as their wetness, a value per strand
-if a mask or a variation makes w differ (strand_wetness.py).
+w = 0.01, because a square root starts vertically). Shading and simulated guides use w as their wetness, a value per
+strand if a mask or a variation makes w differ (strand_wetness.py).
 """
 
 from collections.abc import Mapping

@@ -243,8 +243,8 @@ class Caustic:
         gamma_c = np.where(exists, paths.caustic_gamma(eta_prime), 0.0)
         h_c = np.sin(gamma_c)
         curvature = 4.0 * h_c / (np.square(eta_prime) - h_c**2) ** 1.5 - 2.0 * h_c / (1.0 - h_c**2) ** 1.5
-        # The interval of h whose rays leave within w_c of the caustic; at eta' = 2 all rays do, as the exit angle is
-        # flat.
+        # The interval of h whose rays leave within w_c of the caustic; at eta' = 2 all rays do, because the exit
+        # angle is flat.
         interval = 2.0 * np.sqrt(2.0 * settings.glint_width / np.maximum(np.abs(curvature), 1e-12))
         interval = np.minimum(interval, settings.glint_limit)
         # 1 - smoothstep: the printed smoothstep would jump from 1 to 0 at eta' = 2.

@@ -67,8 +67,8 @@ def trt_gamma(
 ) -> np.ndarray:
     """Return gamma (...) in one monotone segment at which TRT leaves at phi; the segment's nearer end if there is none.
 
-    Newton's steps square the remaining error of the bisection, and are limited to its interval, as the slope is nearly
-    zero beside the caustic.
+    Newton's steps square the remaining error of the bisection, and are limited to its interval, because the slope is
+    nearly zero beside the caustic.
     """
     for _ in range(bisections):
         middle = 0.5 * (low + high)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scattering by one fiber as Warp functions in any precision: tables are baked in double precision, paths take floats.
+"""Scattering by one fiber as Warp functions in any precision: double precision for tables, single for paths.
 
 Shaders that evaluate lobes include the same source, in single precision (`core/kernels/glsl_text.py`). The reference is
 NumPy: `principled`, `longitudinal`, `fresnel` and `paths`. A ray is given by h, its offset from the axis in radii, and
 by sine and cosine of its inclination theta_o to the fiber's normal plane. With theta_d in place of theta_o the
-equations are those of the classic mode, as Bravais' indices depend on either angle in the same way.
+equations are those of the classic mode, because Bravais' indices depend on either angle in the same way.
 """
 
 from typing import Any

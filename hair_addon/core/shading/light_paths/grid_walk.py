@@ -2,7 +2,7 @@
 """Tracing of a ray to the next strand or surface: through voxels, and through the cells of voxels that contain hair
 [Amanatides87].
 
-Strands are round, as linear hair in Cycles: a segment is a cylinder around its axis, and a sphere around the point
+Strands are round, like linear hair in Cycles: a segment is a cylinder around its axis, and a sphere around the point
 between two segments fills the gap on the outside of a bend. A ray hits only the side of a strand that faces it, and
 thus no strand that contains its origin, where strands overlap [Embree26]; the path continues from the hit, on that
 side. A ray does not hit the strand that it leaves, even in bends.

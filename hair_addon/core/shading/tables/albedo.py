@@ -43,7 +43,7 @@ def fibre_moments(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) 
     edges = lookup_tables.phi_edges(settings)
     # The cells' integrals of 1 and of cos(phi), twice: N is even in phi.
     weights = [2.0 * np.diff(values) * np.sign(edges[-1] - edges[0]) for values in (edges, np.sin(edges))]
-    wanted = (0, 0), (1, 0), (0, 1), (0, 2)  # of `weights`, of `rows`
+    wanted = (0, 0), (1, 0), (0, 1), (0, 2)  # indices of `weights` and of `rows`
     return np.stack(
         [dual_scattering.lobe_albedos(lobes, weights[over], rows[degree]).sum(axis=0) for over, degree in wanted]
     )

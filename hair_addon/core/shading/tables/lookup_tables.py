@@ -9,7 +9,7 @@ In the classic mode:
 
 In the energy-conserving mode theta_o replaces theta_d, m contains the residual lobe instead of the cosine, and
 
-    n_res  the residual's red, green, blue   over cos(theta_o) (rows), in one column, as it does not depend on phi
+    n_res  the residual's red, green, blue   over cos(theta_o) (rows), in one column, because it does not depend on phi
 
 Coordinates address texel centers, as in a texture unit: column k of W is at u = (k + 0.5) / W, row j of H at
 v = (j + 0.5) / H. With the axes ANGLES, u of n is phi / pi; with COSINES, the report's, it is (cos(phi) + 1) / 2.

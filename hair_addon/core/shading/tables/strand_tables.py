@@ -15,7 +15,7 @@ from ..fibre.angles import FibreAngles, Values
 from ..fibre.principled import varied_roughness
 from . import absorption_slices, albedo, dual_scattering, lookup_tables
 
-GREATEST_SIZE = 128  # of slices: leaves 0.3 % of a peak; see DECISIONS.md
+GREATEST_SIZE = 128  # of slices: errors are below 0.3 % of a peak; see DECISIONS.md
 
 _BLACK = 16.0  # sigma_a whose transmittance is below half floats; the upper limit of slices
 
@@ -104,7 +104,7 @@ def _part_of_length(variation, gradient):
 def hair_return(
     tables: StrandTables, theta_o: Values, random: Values, position: Values
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return `albedo.azimuthal_moments`, (..., 3) each, of strands viewed from theta_o (...), as the shader."""
+    """Return `albedo.azimuthal_moments`, (..., 3) each, of strands viewed from theta_o (...), like the shader."""
     variation, covered = tables.variation, tables.slices.range
     roots = np.sqrt(strand_variation.strand_sigma_a(variation, random, position))
     along = np.clip((roots - covered.low) / max(covered.high - covered.low, 1e-6), 0.0, 1.0)
