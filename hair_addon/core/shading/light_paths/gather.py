@@ -33,7 +33,7 @@ _FAR = wp.constant(grid_walk.FAR)
 _KNOWN = 0.015  # relative standard error of the mean light below which no more paths are traced
 _FAINT = 0.3  # fraction of the mean drawn light below which shadows are traced only at random
 _SHARES, _LEAST_SHARE = 8, 8_192  # paths between progress reports on a CPU: a fraction of all paths, and the minimum
-_MOST_TURNS = 64  # passes over the same hair, for different random numbers
+_MOST_TURNS = 64  # passes over the same hair, each with its own random numbers
 _SPARE = 1.1  # factor of additional paths: the error is an estimate, and each further pass has overhead
 _LEAST_TURN = 0.125  # minimum paths of a further pass, as a fraction of the previous paths
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The texels of `cell_means`, `azimuthal` and the M table, one thread each: for GPUs, on which a bake takes milliseconds.
+"""The texels of `cell_means`, `azimuthal` and the M table, one thread each: for GPUs, which bake in milliseconds.
 
 The kernels use double precision, because beside a caustic the width of a cell in gamma is a small difference. This file
 imports Warp, so `lookup_tables` imports it only for devices other than the CPU, where NumPy bakes.
