@@ -27,9 +27,13 @@ TAIL = (BACK, (0.0, 0.062, 0.805), (0.0, 0.085, 0.785), (0.0, 0.088, 0.74), (0.0
 SIDE = ((0.062, 0.012, 0.715), (0.085, 0.022, 0.700), (0.092, 0.012, 0.660), (0.088, -0.01, 0.56))
 BRAIDS = (SIDE, tuple((-x, y, z) for x, y, z in SIDE))
 _ROW_ANGLES = np.linspace(-0.75, 1.75, 40)  # from the hairline over the top to the nape
+_ROW_TILTS = np.linspace(-1.3, 1.3, 9)  # of rows from the middle of the head to its sides
 ROWS = tuple(
-    tuple((x, 0.005 + 0.098 * np.sin(angle), 0.745 + 0.105 * np.cos(angle)) for angle in _ROW_ANGLES)
-    for x in (-0.044, -0.022, 0.0, 0.022, 0.044)
+    tuple(
+        (0.078 * np.sin(tilt), 0.005 + 0.098 * np.sin(angle), 0.745 + 0.105 * np.cos(tilt) * np.cos(angle))
+        for angle in _ROW_ANGLES
+    )
+    for tilt in _ROW_TILTS
 )
 LOOKS = (
     ("Ponytail", (TAIL,), {"shape": "PONYTAIL"}),
@@ -39,7 +43,7 @@ LOOKS = (
     (
         "Cornrows",
         ROWS,
-        {"shape": "CORNROWS", "tie_radius": 0.007, "pitch": 0.025, "clearance": 0.001, "tightness": 1.0},
+        {"shape": "CORNROWS", "tie_radius": 0.0055, "pitch": 0.022, "clearance": 0.0005, "tightness": 1.0},
     ),
 )
 
@@ -64,7 +68,8 @@ def main(out=OUT, size=(WIDTH, HEIGHT), only=None):
             bpy.context.view_layer.update()
             pictures.append(picture_files.below_caption(picture_files.drawn_at_once(*size, 4)))
     words = [
-        (title, size[0] * (place % COLUMNS) + 8, picture_files.BASELINE) for place, (title, _l, _v) in enumerate(LOOKS)
+        (title, size[0] * (place % COLUMNS) + 8, picture_files.BASELINE)
+        for place, title in enumerate(title for title, _lines, _values in LOOKS if not only or title in only)
     ]
     picture_files.write(picture_files.rows(pictures, COLUMNS), out, words, picture_files.FEW_BITS)
 

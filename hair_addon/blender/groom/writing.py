@@ -13,7 +13,7 @@ from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
 from ..data import guide_map_readers, scene, surface_space
 from ..data.maps import ramps, strand_maps
-from ..data.strands import attributes, curves, curves_objects, kept_shapes, kept_widths, stored_roots
+from ..data.strands import attributes, curves, curves_objects, gathered_groups, kept_shapes, kept_widths, stored_roots
 from ..data.surfaces import Surface, cage_of
 from ..host.notices import name_of
 from ..layers import carried_layers
@@ -56,7 +56,9 @@ def write_guides(
     points.set_result(surface.to_local(guides.numpy()))
     rooted_on = curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
     curves.write_points(target, points)
-    if before is not None:
+    if before is None:
+        gathered_groups.write(target, None)
+    else:
         carried_layers.write(target, surface, before, guides.roots)
     surface_space.keep_surface(target, rooted_on)
     return target

@@ -177,3 +177,86 @@ def test_what_cannot_be_gathered_is_refused(guides):
     with pytest.raises(HairError):
         gather(guides)
     assert np.array_equal(points(guides), before)
+
+
+def groups_of(guides):
+    return np.array([value.value for value in guides.data.attributes["gathered"].data])
+
+
+SIDES = [((sign, 0.0, 0.0), (1.4 * sign, 0.0, 0.0), (1.4 * sign, 0.0, -2.0)) for sign in (-1.0, 1.0)]
+
+PARALLEL = [[(x + sign * 0.25, y, z) for x, y, z in LINE] for sign in (-1.0, 1.0)]
+
+
+def count_between(hair):
+    """Return the number of strands that end between the two tails of `PARALLEL`."""
+    tips = points(hair)[:, -1]
+    return np.count_nonzero((np.abs(tips[:, 0]) < 0.12) & (tips[:, 1] > 1.0))
+
+
+def test_strands_stay_with_the_tie_of_their_nearest_guide(guides):
+    """Few strands hang between two tails, and a region attribute that the user has picked stays."""
+    api.change_guides(guides, "COUNT", factor=8.0)
+    add_line(lines=PARALLEL)
+    gather(guides)
+    hair = bpy.data.objects["Hair"]
+    assert hair.data.vellus.hair.region_attribute == "gathered"
+    parted = count_between(hair)
+    hair.data.vellus.hair.region_attribute = ""
+    bpy.context.view_layer.update()
+    assert 4 * parted < count_between(hair)
+    own = guides.data.attributes.new("own", "INT", "CURVE")
+    own.data.foreach_set("value", np.ones(len(guides.data.curves), np.int32))
+    hair.data.vellus.hair.region_attribute = "own"
+    gather(guides)
+    assert hair.data.vellus.hair.region_attribute == "own"
+
+
+def test_guides_that_are_gathered_later_have_groups_of_their_own(guides):
+    add_line(lines=SIDES[:1])
+    gather(guides, mask="top")
+    before = groups_of(guides)
+    first = before > 0
+    assert first.any() and not first.all()
+    guides.data.attributes.new(".selection", "BOOLEAN", "CURVE").data.foreach_set("value", ~first)
+    gather(guides, selected_only=True)
+    groups = groups_of(guides)
+    assert np.array_equal(groups[first], before[first])
+    assert groups[~first].min() > before.max()
+
+
+def test_added_and_mirrored_guides_are_in_groups(guides):
+    """New guides take the group of the guides around them; mirrored ties are apart, a tie in the middle is not."""
+    add_line(lines=SIDES)
+    gather(guides)
+    api.change_guides(guides, "COUNT", factor=2.0)
+    assert np.array_equal(groups_of(guides) == 1, points(guides)[:, -1, 0] < 0.0)
+    api.change_guides(guides, "MIRROR")
+    tips, groups = points(guides)[:, -1], groups_of(guides)
+    assert not set(groups[tips[:, 0] < 0.0]) & set(groups[tips[:, 0] > 0.0])
+    bpy.data.objects.remove(bpy.data.objects["Tie"])
+    add_line()
+    gather(guides)
+    api.change_guides(guides, "MIRROR")
+    assert (groups_of(guides) == 1).all()
+
+
+def test_layers_carry_groups_to_guides_that_are_grown_again(guides):
+    api.add_layer(guides)
+    add_line(lines=SIDES)
+    gather(guides)
+    guides.data.vellus.guides.guide_count = 80
+    bpy.context.view_layer.update()
+    assert len(guides.data.curves) == 80
+    assert np.array_equal(groups_of(guides) == 1, points(guides)[:, -1, 0] < 0.0)
+
+
+def test_guides_that_are_no_longer_gathered_part_no_hair(guides):
+    add_line(lines=SIDES)
+    gather(guides)
+    hair = bpy.data.objects["Hair"]
+    count = len(hair.data.curves)
+    guides.data.attributes.remove(guides.data.attributes["gathered"])
+    hair.data.vellus.hair.strand_count += 1
+    bpy.context.view_layer.update()
+    assert not hair.data.vellus.status and len(hair.data.curves) == count + 1

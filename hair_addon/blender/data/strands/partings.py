@@ -11,7 +11,7 @@ from ....core.errors import HairError
 from ....core.interpolation.regions import Regions
 from ...host.notices import name_of, text_of
 from .. import scene
-from . import drawn_lines
+from . import drawn_lines, gathered_groups
 
 _WHOLE = {"INT", "INT8", "BOOLEAN"}
 
@@ -51,12 +51,14 @@ def read(surface_object, surface, guide_curves, settings, depsgraph):
     if weights is not None:
         regions.append(Regions((weights > 0.5).astype(np.int32)[surface.mesh.triangles]))
     if settings.region_attribute:
-        regions.append(_read_numbers(surface_object, surface, guide_curves, settings.region_attribute, depsgraph))
+        numbers = _read_numbers(surface_object, surface, guide_curves, settings.region_attribute, depsgraph)
+        regions += [] if numbers is None else [numbers]
     lines = drawn_lines.read(surface_object, surface, settings.part_lines, depsgraph)
     return Partings(tuple(regions), lines, drawn_lines.key(surface_object, settings.part_lines, depsgraph))
 
 
 def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):
+    """Return the `Regions` of an attribute; None for that of gathered guides without any. Raises `HairError`."""
     numbers = corners = guides = None
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
@@ -76,6 +78,8 @@ def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):
     if attribute is not None:
         guides = _whole_numbers(attribute, name_of(guide_curves), ("CURVE",))
     if corners is None and guides is None:
+        if name == gathered_groups.NAME:
+            return None  # the guides were grown again
         sentence = 'Neither "{name}" nor its guides have an attribute "{attribute}": pick another, or clear the field.'
         raise HairError(sentence, name=name_of(surface_object), attribute=name)
     return Regions(corners, guides)

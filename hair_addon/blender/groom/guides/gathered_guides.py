@@ -8,12 +8,18 @@ from ....core import grooming
 from ....core.errors import HairError
 from ....core.grooming import ties
 from ....core.grooming.ties.gather_settings import GatherSettings
-from ...data.strands import drawn_lines
+from ...data.strands import attributes, curves, drawn_lines, gathered_groups
+from ...host.notices import text_of
 from . import guide_tools, outside_guides
+
+_MEMBER = 0.5  # weight from which a guide belongs to its tie
 
 
 def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) -> int:
-    """Gather guides at the ties of a curve object; returns the number changed. Raises `HairError`."""
+    """Gather guides at the ties of a curve object; returns the number changed. Raises `HairError`.
+
+    Hair between the guides is parted by the ties and locks, if no other attribute parts it.
+    """
     guides = guide_tools.read(datablock, settings, depsgraph)
     if not settings.line:
         raise HairError("Pick a curve object: each of its curves begins at a tie and leads the tail.")
@@ -21,20 +27,30 @@ def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) ->
     lines = [] if segments is None else _lines(segments)
     mesh, after = guides.surface.posed_mesh, guides.points.copy()
     barrier = outside_guides.prepared(guides, 0.0, ())
-    changed = 0
+    groups = np.zeros(len(guides.counts), np.int32)
     for chosen, places in guide_tools.to_shape(guides):
-        posed, is_gathered = ties.gathering.gathered(mesh, guides.posed_of(chosen, places), lines, settings)
-        changed += int(is_gathered.sum())
+        posed, found = ties.gathering.gathered(mesh, guides.posed_of(chosen, places), lines, settings)
+        groups[chosen] = found
         laid = outside_guides.pushed_posed(barrier, posed)
         at_rest = guides.carried_back(laid, chosen)
         weights = guides.weights[chosen]
         partly = grooming.guide_shapes.blended(guides.points[places], at_rest, weights)
         at_rest = np.where((weights < 1.0)[:, None, None], partly, at_rest)
         at_rest[:, 0] = guides.points[places[:, 0]]
-        after[places[is_gathered]] = at_rest[is_gathered]
-    if not changed:
+        after[places[found > 0]] = at_rest[found > 0]
+    if not groups.any():
         raise HairError("No guides were gathered, because the ties are on another part of the surface: move the curve.")
-    return guide_tools.write_shapes(guides, after)
+    changed = guide_tools.write_shapes(guides, after)
+    gathered_groups.add(datablock, np.where(guides.weights >= _MEMBER, groups, 0))
+    _part_hair(datablock)
+    return changed
+
+
+def _part_hair(datablock):
+    """Part the hair between gathered guides by their groups."""
+    for hair in curves.followers(datablock):
+        if not text_of(hair.vellus.hair, "region_attribute") and not attributes.is_from_library(hair):
+            hair.vellus.hair.region_attribute = gathered_groups.NAME
 
 
 def _lines(segments):

@@ -17,7 +17,7 @@ from ....core.grooming.groom import POINT_COUNT, HairSettings
 from ....core.grooming.guide_layers import GuideLayers
 from ....core.grooming.guide_tool_settings import CountSettings, MirrorSettings
 from ...data import masks
-from ...data.strands import curves, guide_curves, partings
+from ...data.strands import curves, gathered_groups, guide_curves, partings
 from ...layers import carried_layers
 from ...layers.carried_layers import LayersBefore
 from ...settings import preferences
@@ -27,6 +27,8 @@ from .guide_tools import CombedGuides
 
 # Points (M, P, 3) [m], guides (M,) whose attributes are copied, and roots.
 Additions = tuple[np.ndarray, np.ndarray, SurfacePoints]
+
+_ASIDE = 0.3  # share of guides, beyond one half, that a tie gathers from one side if it is not in the middle
 
 
 def change_count(datablock: Curves, settings: CountSettings, depsgraph: Depsgraph) -> int:
@@ -73,8 +75,23 @@ def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) ->
         additions.append((images(guides.points[guides.of_count(int(count), sources)]), sources, image_roots))
         if before is not None:
             layers.append(_mirrored_layers(guides.surface, before.layers, sources, images))
+    groups = gathered_groups.read(datablock)
     write(guides, additions, found.removed, before, layers)
+    if groups is not None:
+        _part_images(datablock, groups, np.concatenate([sources for _points, sources, _roots in additions]))
     return len(found.sources)
+
+
+def _part_images(datablock, groups, sources):
+    """Give images of gathered guides groups of their own, unless the ties of these gather both sides.
+
+    groups (G,): of all guides before; sources (M,): guides whose images are the last ones now.
+    """
+    shares = np.bincount(groups[sources], minlength=groups.max() + 1) / np.maximum(np.bincount(groups), 1)
+    is_apart = (groups[sources] > 0) & (np.abs(shares[groups[sources]] - 0.5) > _ASIDE)
+    images = np.zeros(len(datablock.curves), np.int32)
+    images[len(images) - len(sources) :][is_apart] = groups[sources][is_apart]
+    gathered_groups.add(datablock, images)
 
 
 def write(

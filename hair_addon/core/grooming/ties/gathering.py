@@ -34,7 +34,10 @@ _BULGE = 0.25  # height of loose hair relative to its way
 def gathered(
     mesh: TriMesh, points: np.ndarray, lines: Sequence[np.ndarray], settings: GatherSettings
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return (points (S, P, 3) float32 [m] of gathered guides, (S,) bool: guides that are gathered).
+    """Return (points (S, P, 3) float32 [m] of gathered guides, groups (S,) int32).
+
+    Groups number the guides that go through one tie, or form one lock of a rope, braid or cornrow, from 1; guides that
+    are not gathered have 0.
 
     mesh: a checked `TriMesh`, the visible surface; points (S, P, 3) [m]; lines: (K, 3) [m] each, from the tie on.
     Guides on parts of the surface without a tie do not change. Raises `HairError` for lines without length.
@@ -50,11 +53,14 @@ def gathered(
     distances = np.stack([surface_distance.at(field, mesh, roots) for field in fields])
     nearest = distances.argmin(axis=0)
     is_gathered = np.isfinite(distances.min(axis=0))
+    groups = np.zeros(len(points), np.int32)
+    lock_count = tie_tails.LOCKS.get(settings.shape, 1)
     for place, (line, field) in enumerate(zip(lines, fields, strict=True)):
         rows = np.flatnonzero(is_gathered & (nearest == place))
         if len(rows) and points.shape[1] > 1:
-            after[rows] = _at_line(mesh, query, points[rows], line, field, settings)
-    return after, is_gathered
+            after[rows], locks = _at_line(mesh, query, points[rows], line, field, settings)
+            groups[rows] = 1 + place * lock_count + locks
+    return after, groups
 
 
 def _checked(line):
@@ -78,32 +84,34 @@ def _field(mesh, query, line, settings):
 
 
 def _at_line(mesh, query, points, line, field, settings):
-    """Return the guides (S, P, 3) that one line gathers."""
+    """Return the guides (S, P, 3) that one line gathers, and their locks (S,)."""
     lengths = split(points)[1]
     reach = float(lengths.sum(axis=1).max())
-    if settings.shape == "CORNROWS":
-        ways, apart, normals = _traced(mesh, query, points[:, 0], field, settings)
-        ways += _heights(apart, settings)[..., None] * normals
-        braid = cornrows.braid_line(*cornrows.on_surface(query, mesh, line), reach, settings)
-        ways = np.concatenate([ways, cornrows.ways_along(ways, braid, reach, settings)], axis=1)
-        ways[:, 0] = points[:, 0]
-        return joined(points, split(_walked(ways, lengths))[0], lengths)
-    tie = query.nearest(line[:1])
-    tail = tie_tails.tail_line(line, mesh_math.normals(mesh, tie)[0], reach, settings)
     ways, apart, normals = _traced(mesh, query, points[:, 0], field, settings)
-    sizes = apart[:, :1]
-    order = np.argsort(np.argsort(sizes[:, 0], kind="stable"))
+    order = np.argsort(np.argsort(apart[:, 0], kind="stable"))
     ranks = (order + 0.5) / len(order)
     ways += _heights(apart, settings)[..., None] * normals
+    if settings.shape == "CORNROWS":
+        braid = cornrows.braid_line(*cornrows.on_surface(query, mesh, line), reach, settings)
+        behind, locks = cornrows.ways_along(ways, ranks, braid, reach, settings)
+    else:
+        behind, locks = _behind_tie(mesh, query, ways, ranks, line, reach, settings)
+    ways = np.concatenate([ways, behind], axis=1)
+    ways[:, 0] = points[:, 0]
+    return joined(points, split(_walked(ways, lengths))[0], lengths), locks
+
+
+def _behind_tie(mesh, query, ways, ranks, line, reach, settings):
+    """Return the ways (S, M, 3) of guides behind a tie, and their locks (S,)."""
+    tie = query.nearest(line[:1])
+    tail = tie_tails.tail_line(line, mesh_math.normals(mesh, tie)[0], reach, settings)
     angles = _angles(ways, tail, mesh_math.normals(mesh, tie)[0])
     along = np.linspace(0.0, tie_tails.extent(reach, settings), _TAIL_POINTS)
     along = np.broadcast_to(along, (len(ways), _TAIL_POINTS))
     centers, sides, ups = tail.at(along)
-    offsets = tie_tails.offsets(tail, angles, ranks, along, settings)
-    ways = np.concatenate([ways, centers + offsets[..., :1] * sides + offsets[..., 1:] * ups], axis=1)
-    ways[:, 0] = points[:, 0]
-    laid = _walked(ways, lengths)
-    return joined(points, split(laid)[0], lengths)
+    locks = tie_tails.locks_at(angles, settings)
+    offsets = tie_tails.offsets(tail, angles, ranks, along, locks, settings)
+    return centers + offsets[..., :1] * sides + offsets[..., 1:] * ups, locks
 
 
 def _traced(mesh, query, roots, field, settings):

@@ -12,7 +12,7 @@ from ..guide_shapes import unit
 from .gather_settings import GatherSettings
 
 _SAMPLES = 800  # points of a line
-_LOCKS = {"BRAID": 3, "CORNROWS": 3, "ROPE": 2}  # number of locks of a tail
+LOCKS = {"BRAID": 3, "CORNROWS": 3, "ROPE": 2}  # number of locks of a tail
 _INNER = 0.75  # radius of every other layer of a bun, relative to the outer ones
 _WOUND = 2.0  # length of a bun's way relative to its hair, whose segments cut the way's curves
 _MOST_LAYERS = 24  # of a bun
@@ -75,24 +75,35 @@ def extent(reach: float, settings: GatherSettings) -> float:
     return reach * (_WOUND if settings.shape == "BUN" else 1.0)
 
 
+def locks_at(angles: np.ndarray, settings: GatherSettings) -> np.ndarray:
+    """Return (S,) int: the lock of a rope or braid that hair at angles (S,) in the disk of the tie joins; else 0."""
+    count = LOCKS.get(settings.shape, 1)
+    return np.minimum((angles % (2.0 * np.pi) * count / (2.0 * np.pi)).astype(int), count - 1)
+
+
 def offsets(
-    line: TailLine, angles: np.ndarray, ranks: np.ndarray, along: np.ndarray, settings: GatherSettings
+    line: TailLine,
+    angles: np.ndarray,
+    ranks: np.ndarray,
+    along: np.ndarray,
+    locks: np.ndarray,
+    settings: GatherSettings,
 ) -> np.ndarray:
     """Return (S, M, 2) [m]: the place of hair beside the line, along its sides and ups.
 
-    angles (S,), ranks (S,) in [0, 1]: the place in the disk of the tie by equal area; along: (S, M) [m] from the tie.
+    angles (S,), ranks (S,) in [0, 1]: the place in the disk of the tie by equal area; along: (S, M) [m] from the tie;
+    locks (S,): the lock that hair belongs to.
     """
     unit_radius = np.sqrt(ranks)
     place = unit_radius[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     radius = _radius(line, along, settings)
     gathered = radius[..., None] * place[:, None]
-    count = _LOCKS.get(settings.shape)
+    count = LOCKS.get(settings.shape)
     if count is None:
         return gathered
-    turn = angles % (2.0 * np.pi) * count
-    lock = np.minimum((turn / (2.0 * np.pi)).astype(int), count - 1)
+    turn = angles * count
     own = unit_radius[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    phase = 2.0 * np.pi * (along / settings.pitch + (lock / count)[:, None])
+    phase = 2.0 * np.pi * (along / settings.pitch + (locks / count)[:, None])
     if settings.shape == "ROPE":
         centers, size = 0.5 * np.stack([np.cos(phase), np.sin(phase)], axis=-1), 0.5
     else:  # three locks that cross in turn over and under the middle
