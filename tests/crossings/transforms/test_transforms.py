@@ -12,10 +12,11 @@ import pytest
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.live import handlers
 from hair_addon.blender.settings import style_items
-from tests.support import placed_hair
+from tests.support import placed_hair, rooted
 from tests.support.exchange.imported import select
 from tests.support.pairs import pairs
 from tests.support.placed_hair import PLACES, Placed, require_carried, seen
+from tests.support.reading import points
 
 
 @pytest.fixture(scope="module")
@@ -281,6 +282,28 @@ def test_hair_without_guides_stays_on_its_surface(place):
     before = seen()
     CHANGES["apply all"]()
     require_carried(before, seen())
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    pairs(["apply all", "apply scale", "origin to cursor"], ["uneven", "mirrored", "on a scaled rig"]),
+    indirect=["place"],
+)
+def test_hair_between_guides_of_another_surface_stays_in_place(place, change):
+    """Such hair stays in place, and is rooted on its own surface again once it has guides of that surface again."""
+    hair, guides = (bpy.data.objects[name] for name in ("Hair", "Guides"))
+    bpy.ops.mesh.primitive_grid_add(location=(5.0, 0.0, 0.0))
+    bpy.ops.vellus.distribute_guides(guide_count=12)
+    other = next(c for c in bpy.data.hair_curves if c.vellus.kind == "GUIDES" and c.surface == bpy.context.object)
+    hair.data.vellus.guide_curves = other
+    bpy.context.view_layer.update()
+    before = seen()
+    CHANGES[change]()
+    require_carried(before, seen())
+    hair.data.vellus.guide_curves = guides.data
+    bpy.context.view_layer.update()
+    assert rooted.should_be_rooted(hair)
+    assert rooted.far_root(hair, points(hair), bpy.context.evaluated_depsgraph_get()) == ""
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,8 @@ def find(strands: Curves, surface: Surface, to_world_before: Affine | None) -> A
 
     to_world_before: the former transform of the surface's object, if it is known.
     """
+    if _is_rooted_elsewhere(strands):
+        return _kept_by_objects(strands, to_world_before)
     rest_before = _rest_before(strands, surface)
     for change in _candidates(strands, to_world_before):
         if rest_before is None:
@@ -45,6 +47,28 @@ def find(strands: Curves, surface: Surface, to_world_before: Affine | None) -> A
         elif rest_before.shape == surface.rest.shape and _is_close(change.points(rest_before), surface.rest, surface):
             return change
     return _fitted(strands, surface, rest_before)
+
+
+def _is_rooted_elsewhere(strands):
+    """Whether strands are hair between guides of another surface: its roots are on that surface."""
+    guides = strands.vellus.guide_curves
+    if strands.vellus.kind != "HAIR" or guides is None or curves.is_hand_made(strands):
+        return False
+    return guides.surface not in (None, strands.surface)
+
+
+def _kept_by_objects(strands, to_world_before):
+    """Return the change of the surface's transform if the objects of strands still have its former transform.
+
+    Blender keeps children in place when it applies transforms. An artist may have placed objects elsewhere.
+    """
+    now, objects = surface_space.to_world(strands.surface), curves_objects.objects_of(strands)
+    if not (objects and now.is_valid and to_world_before is not None and to_world_before.is_valid):
+        return None
+    change = now.inverse @ to_world_before
+    left = surface_space.between(objects[0], strands.surface)
+    is_left = is_due(strands) and np.allclose(left.matrix, change.matrix, rtol=_CLOSE, atol=_CLOSE)
+    return change if is_left and not change.is_identity else None
 
 
 def _fitted(strands, surface, rest_before):
@@ -244,7 +268,7 @@ def _are_rooted(strands, surface, change):
 def _root_places(strands, surface):
     """Return (mask (S,) of strands with stored roots, (S, 3) local positions of these at rest); None if none has."""
     places = stored_roots.places(strands, len(surface.rest))
-    if places is None or len(places[0]) != len(strands.curves):
+    if places is None or len(places[0]) != len(strands.curves) or _is_rooted_elsewhere(strands):
         return None
     vertices, barycentric = places
     is_rooted = barycentric.any(axis=1)
