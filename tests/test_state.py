@@ -135,5 +135,5 @@ def test_caches_stand_at_the_top_of_a_module():
     """Caches are at the top of a module, where `invalidation.CACHES` can name them."""
     for path in MODULES:
         tree = syntax(path)
-        made = [node.lineno for node in nodes(tree) if called(node) == "Cache"]
+        made = sorted(node.lineno for node in nodes(tree) if called(node) == "Cache")
         assert made == [value.lineno for value in module_values(tree).values() if called(value) == "Cache"], path

@@ -87,7 +87,7 @@ def scalp(sphere):
     return sphere
 
 
-def test_examples_of_functions_run(scalp, coarse_shadows, tmp_path, monkeypatch):
+def test_examples_of_functions_run(scalp, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     bpy.ops.wm.save_as_mainfile(filepath="shot.blend")
     monkeypatch.setattr(warp.config, "log_level", warp.LOG_WARNING)

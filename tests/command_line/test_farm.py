@@ -176,7 +176,7 @@ def made_by(job):
     return made
 
 
-def test_submitting_twice_makes_two_whole_jobs_and_requeue_goes_on(turning, coarse_shadows, tmp_path):  # noqa: F811
+def test_submitting_twice_makes_two_whole_jobs_and_requeue_goes_on(turning, tmp_path):  # noqa: F811
     blend = shutil.copy(turning, tmp_path / "ball.blend")
     settings = {"frames": "1-3", "chunk_size": 2, "blendfile": str(blend), "samples": 1}
     settings["pattern"] = str(tmp_path / "{timestamp}" / "f_#.exr")

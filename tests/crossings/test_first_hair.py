@@ -79,7 +79,7 @@ def hair_on(surface, **changes):
 
 
 @pytest.mark.parametrize(("add", "side"), [(add_cube, (0.3, -0.5, 1.0)), (add_monkey, (0.2, -1.0, 0.2))])
-def test_hair_covers_its_surface(scene, coarse_shadows, add, side):
+def test_hair_covers_its_surface(scene, add, side):
     surface = add(scene)
     _guides, hair = hair_on(surface)
     look_from(side)

@@ -118,10 +118,10 @@ def scene(scene_files, request, monkeypatch):
     """Return an empty scene with undo; preferences, which take longer to load, are those of the process.
 
     The nodes that deform hair are in memory, as after deleting hair; use `read_homefile` for a scene without them. The
-    data of the test's other fixtures of this file is loaded already, as in an opened file. The maps of world light are
-    as small as the pictures of tests, and fewer, as others would take most of the time.
+    data of the test's other fixtures of this file is loaded already, as in an opened file. The maps of light are as
+    small as the pictures of tests, and those of world light fewer, as others would take most of the time.
     """
-    set_world_maps(monkeypatch, *COARSE_WORLD)
+    shrink_shadows(monkeypatch)
     wanted = [*takewhile(request.fixturenames.__contains__, STAGES)]
     if "made_anew" in request.fixturenames:
         wanted = []
@@ -209,12 +209,6 @@ def arm(scene):
     return arm
 
 
-@pytest.fixture
-def coarse_shadows(monkeypatch):
-    """Small shadow maps of lamps."""
-    shrink_shadows(monkeypatch)
-
-
 def shrink_shadows(patch):
     """Set small maps of both kinds, also for pictures that several tests share; patch: a `pytest.MonkeyPatch`."""
     set_world_maps(patch, *COARSE_WORLD)
@@ -222,7 +216,7 @@ def shrink_shadows(patch):
 
 
 @pytest.fixture
-def fine_shadows(lit, monkeypatch):
+def fine_shadows(scene, monkeypatch):
     """Shadow maps of normal size, for laws of shadows."""
     set_world_maps(monkeypatch, *FINE_WORLD)
     monkeypatch.setattr(scene_lights, "_MAP_SIZE", 512)
@@ -235,7 +229,7 @@ def fine_world(scene, monkeypatch):
 
 
 @pytest.fixture
-def lit(hair, coarse_shadows):
+def lit(hair):
     """Return the sphere with hair, a camera in front of it and a sun behind the camera."""
     blender_scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))

@@ -180,7 +180,7 @@ class _Target:
     def _dispatch(self, program, textures):
         for name, texture in zip(seen_programs.IMAGES, textures.values(), strict=True):
             program.image(name, texture)
-        drawing.dispatch_over(program, self.size)
+        drawing.dispatch_over(program, self.size, seen_programs.GROUP_SIZE)
 
 
 def _size_of(view, places):

@@ -202,9 +202,9 @@ def rasterize_strands(strands, program, record, blocks, samplers, images, consta
         run_for_each(program, walked * runs_of_strand(record), scene_programs.RUN_GROUP_SIZE)
 
 
-def dispatch_over(program, size):
-    """Run a bound compute program once for every texel of a picture; size: (width, height)."""
-    width, height = (-(-length // scene_programs.PICTURE_GROUP_SIZE) for length in size)
+def dispatch_over(program, size, group_size=(scene_programs.PICTURE_GROUP_SIZE,) * 2):
+    """Run a bound compute program once for every texel of a picture; size, group_size: (width, height)."""
+    width, height = (-(-length // threads) for length, threads in zip(size, group_size, strict=True))
     gpu.compute.dispatch(program, width, height, 1)
 
 

@@ -21,8 +21,6 @@ from tests.support.interface.modal import Operator, drive
 from tests.support.pictures.rendering import light_up
 from tests.support.reading import evaluated_points, everything, read_picture
 
-pytestmark = pytest.mark.usefixtures("coarse_shadows")
-
 LAST = 5
 
 

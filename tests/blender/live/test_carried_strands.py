@@ -181,7 +181,7 @@ def parts_seen(texture):
     return (found / 255.0) ** 2 if texture.format == "RGBA8" else found
 
 
-def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_shadows, monkeypatch):
+def test_light_follows_what_moves_without_being_measured_anew(watched, monkeypatch):
     """Each frame adds one direction to the light, and after all directions it equals that measured at rest, except
     for rounding.
     """
@@ -209,7 +209,7 @@ def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_sh
     assert np.abs(parts_seen(at_rest.hair_visibility[0]["visibility_z"]) - first).max() > 0.02
 
 
-def test_a_surface_that_turns_as_an_object_passes_a_matrix(hair, window, coarse_shadows, monkeypatch):
+def test_a_surface_that_turns_as_an_object_passes_a_matrix(hair, window, monkeypatch):
     """A surface that turns as an object uploads no vertices and strands; each frame adds one direction to the light."""
     bpy.ops.object.light_add(type="SUN")
     surface = hair.data.surface
@@ -233,7 +233,7 @@ def test_a_surface_that_turns_as_an_object_passes_a_matrix(hair, window, coarse_
     assert not called
 
 
-def test_hair_that_warp_computes_is_lit_as_at_rest_while_it_plays(hair, coarse_shadows, monkeypatch):
+def test_hair_that_warp_computes_is_lit_as_at_rest_while_it_plays(hair, monkeypatch):
     measured, real = [], ambient_visibility.measure
     monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
     read(former=read())

@@ -183,7 +183,7 @@ def test_nothing_is_measured_without_a_window(monkeypatch):
 
 
 @pytest.mark.usefixtures("made_anew")
-def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkeypatch):
+def test_a_viewport_that_draws_hair_chooses(hair, window, monkeypatch):
     """The first drawing of hair in a viewport measures the GPU, and all later edits of bound hair use the choice."""
     viewport.view_cache.clear()
     calls, asked = counts_of(monkeypatch), []
@@ -206,7 +206,7 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkey
     np.testing.assert_allclose(drawn(hair), grown(hair), rtol=0.0, atol=CLOSE)
 
 
-def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, coarse_shadows, monkeypatch):
+def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, monkeypatch):
     viewport.view_cache.clear()
     measured, real = [], ambient_visibility.measure
     monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
@@ -238,7 +238,7 @@ def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, coarse_shad
     assert view() is at_rest
 
 
-def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watched, coarse_shadows, monkeypatch):
+def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watched, monkeypatch):
     """A stroke uploads one texture of twelve bytes per point of the guides, reads six numbers back and allocates
     nothing.
     """

@@ -12,8 +12,6 @@ from tests.support.counting import counts_of
 from tests.support.pictures.viewports import view3d
 from tests.support.reading import points
 
-pytestmark = pytest.mark.usefixtures("coarse_shadows")
-
 
 def read(space=None, **details):
     bpy.context.view_layer.update()

@@ -363,7 +363,7 @@ def test_light_that_samples_share_is_as_bright_below_hair(stage):
 
 
 @pytest.mark.parametrize(("kind", "has_hair"), pairs(["SUN", "POINT", "SPOT", "AREA"], [False, True], 2))
-def test_surfaces_cast_shadows_as_in_cycles(kind, has_hair, stage, tmp_path):
+def test_surfaces_cast_shadows_as_in_cycles(kind, has_hair, stage, fine_shadows, tmp_path):
     """A box casts a shadow on a floor as in Cycles, in each block of 4 × 4 pixels, far from hair in the light of one
     lamp.
     """

@@ -20,8 +20,6 @@ from hair_addon.core.long_work import Job, Stage, run_now
 from tests.support.interface.modal import ESC, TIMER, Operator, drive
 from tests.support.reading import points, snapshot
 
-pytestmark = pytest.mark.usefixtures("coarse_shadows")
-
 
 def test_work_ends_as_it_would_at_once(window):
     def work():

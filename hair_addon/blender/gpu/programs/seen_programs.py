@@ -17,6 +17,8 @@ IMAGES = (
 )  # in the order of VISIBILITY_SAMPLERS
 BYTES = "RGBA8"  # format of textures of strands' visibility
 SUMS = "RGBA16F"  # format of textures of sums
+# Threads of a work group: a row of texels, as textures of few strands have few rows.
+GROUP_SIZE = (64, 1)
 
 _PUT = {"light/write_visibility_sums.glsl": "light/write_visibility_bytes.glsl"}
 
@@ -48,7 +50,7 @@ def bytes_program():
 
 def _program(texture_format):
     info = gpu.types.GPUShaderCreateInfo()
-    info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
+    info.local_group_size(*GROUP_SIZE)
     qualifiers = {"READ", "WRITE"} if texture_format == SUMS else {"WRITE"}
     for slot, name in enumerate(IMAGES):
         info.image(slot, texture_format, "FLOAT_2D", name, qualifiers=qualifiers)

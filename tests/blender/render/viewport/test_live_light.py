@@ -76,7 +76,7 @@ def turned(camera, degrees):
     return camera[0] @ turn, camera[1]
 
 
-def test_at_rest_the_light_is_that_of_renders(view):
+def test_at_rest_the_light_is_that_of_renders(view, fine_shadows):
     """At rest the light of blocks of pixels equals that of renders within 3 % of the mean.
 
     Dual scattering differs by more.

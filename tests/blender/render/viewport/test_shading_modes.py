@@ -41,7 +41,7 @@ def facing(angle=0.0, is_above=False):
 
 
 @pytest.fixture
-def ball(hair, coarse_shadows):
+def ball(hair):
     """Return the 3-D view of a ball of short, dense hair without lamps."""
     hair.data.vellus.hair.strand_count, hair.data.vellus.hair.radius = 1500, 0.016
     bpy.data.hair_curves["Guides"].vellus.guides.length = 0.25
