@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """F1 and *Online Manual* lead from every property and operator to an existing heading of the manual."""
 
+import functools
 import re
 import urllib.parse
 import webbrowser
@@ -41,6 +42,7 @@ def address(doc_id):
     return wm.WM_OT_doc_view_manual._lookup_rna_url(rna_id, verbose=False)
 
 
+@functools.cache
 def headings(page):
     return re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
 

@@ -23,7 +23,7 @@ import numpy as np
 MODULE = "bl_ext.user_default.vellus"
 COARSE = Path(__file__).resolve().parents[1] / "child_processes" / "sitecustomize.py"
 SCRIPTS = Path(__file__).resolve().parents[3] / "docs" / "scripts.md"
-# In the order of `tests/api/test_api.py`: later examples use what earlier ones made.
+# All files with functions; later examples use what earlier ones made.
 API_FILES = (
     "grooms",
     "dynamics",

@@ -352,11 +352,14 @@ def test_an_edge_is_as_soft_as_the_filter_is_wide(scene, tmp_path, sample_count)
 
 
 def test_a_script_that_renders_exits_normally():
-    """A script that renders exits normally, because programs and textures are freed before Blender's graphics."""
+    """A script that renders exits normally, because programs and textures are freed before Blender's graphics; its
+    first function of `api` registers the add-on.
+    """
     script = (
-        "import bpy, hair_addon\n"
-        "hair_addon.register()\n"
-        "bpy.ops.vellus.add_hair(guide_count=5, strand_count=20)\n"
+        "import bpy\n"
+        "from hair_addon import api\n"
+        "settings = api.GroomSettings(api.GuideSettings(guide_count=5), api.HairSettings(strand_count=20))\n"
+        "api.add_hair(bpy.context.object, settings)\n"
         "render = bpy.context.scene.render\n"
         "render.engine, render.resolution_x, render.resolution_y = 'VELLUS', 16, 16\n"
         "assert bpy.ops.render.render() == {'FINISHED'}\n"
