@@ -56,8 +56,11 @@ def decompose(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
     left = np.maximum(radiance.reshape(-1, 3), 0.0).astype(float)
     least = _LEAST_PART * float((left @ _LUMINANCE) @ solid_angles)
     lobes = []
+    centres = _spread_out(400)
+    nearness = np.exp(_SHARPNESS * (centres @ directions.T - 1.0))
     for _ in range(_LOBE_LIMIT):
-        window, excess = _brightest(left, directions, solid_angles)
+        peak = centres[np.argmax(nearness @ ((left @ _LUMINANCE) * solid_angles))]
+        window, excess = _excess_around(peak, left, directions)
         power = excess.T @ solid_angles[window]
         if not power @ _LUMINANCE > least:
             break
@@ -69,11 +72,8 @@ def decompose(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
     return lobes, left.reshape(radiance.shape)
 
 
-def _brightest(radiance, directions, solid_angles):
-    """Return indices (M,) of the texels around the brightest point, and their radiance (M, 3) above the background."""
-    centres = _spread_out(400)
-    kernel = np.exp(_SHARPNESS * (centres @ directions.T - 1.0))
-    peak = centres[np.argmax(kernel @ ((radiance @ _LUMINANCE) * solid_angles))]
+def _excess_around(peak, radiance, directions):
+    """Return indices (M,) of the texels around a point, and their radiance (M, 3) above the background."""
     cosines = directions @ peak
     ring = (cosines < _WINDOW) & (cosines > _RING)
     window = np.flatnonzero(cosines >= _WINDOW)
