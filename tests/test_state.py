@@ -51,6 +51,7 @@ PURE = {
     "core/kernels/compiled_kernels.py: _fitting",
     "core/maps/pixels.py: _linear_bytes",
     "core/maps/varied_settings.py: all_varied",
+    "core/maps/varied_settings.py: of_styles",
     "core/params.py: _declared",
     "core/shading/appearance.py: _mean_reflectance",
     "core/shading/appearance.py: neutral",
@@ -58,6 +59,7 @@ PURE = {
     "core/shading/appearance.py: table_settings",
     "core/shading/appearance.py: wetted",
     "core/shading/tables/surface_albedo.py: table",
+    "core/styling/kinds.py: varied_numbers_of",
 }
 
 _DISPLAYS = (ast.Dict, ast.DictComp, ast.List, ast.ListComp, ast.Set, ast.SetComp)

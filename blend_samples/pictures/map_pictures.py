@@ -2,8 +2,9 @@
 """Maps beside the hair that they vary: `python blend_samples/pictures/map_pictures.py` draws them in Vellus and Cycles.
 
 Writes docs/manual/maps.jpg. From the top: a tiger's coat (an image of colors), a fade (weights of the length), a
-beard that thins out (weights of length and thickness) and bleached ends (a random number for each clump). Each map
-is made by the buttons of the panel, and filled as brushes would.
+beard that thins out (weights of length and thickness), bleached ends (a random number for each clump) and curls on one
+side (weights of the radius and the pitch of curls). Each map is made by the buttons of the panel, and filled as brushes
+would.
 """
 
 import argparse
@@ -117,7 +118,21 @@ def beard(strands):
     return seen_weights(head_object, item.source)
 
 
-ROWS = {"tiger": tiger, "fade": fade, "beard": beard, "bleached": bleached}
+def one_sided(strands):
+    """Return curls that become straight towards one side of the head."""
+    head_object = ten_grooms.dressed_head()
+    hair = head_grooms.long_wavy(head_object, int(30_000 * strands))
+    name = next(item.name for item in hair.vellus.styles if item.kind == "CURL")
+    weights = part(places_of(head_object)[:, 0], -0.05, 0.05)
+    for number, low, high in (("radius", 0.0, 2.0), ("pitch", 2.0, 0.8)):
+        setting = f"styles.{name}.{number}"
+        item = paint(hair, setting, "GROUP", lambda item: paint_weights(head_object, item.source, weights))
+        item.low, item.high = low, high
+    see("Long Wavy")
+    return seen_weights(head_object, item.source)
+
+
+ROWS = {"tiger": tiger, "fade": fade, "beard": beard, "bleached": bleached, "one_sided": one_sided}
 
 
 def begin_map(hair, setting, kind):

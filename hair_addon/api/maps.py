@@ -19,7 +19,8 @@ __all__ = ["MapSettings", "clear_map", "maps_of", "set_map", "set_thickness_curv
 def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any) -> MapSettings:
     """Vary a setting of hair Curves by a map, which replaces the setting's present map; returns the map.
 
-    setting: such as "look.color", or "guides.length" of its guides; source: an image, or "image:NAME", "group:NAME" of
+    setting: such as "look.color", "styles.Curl.radius" of the style with the name Curl, or "guides.length" of its
+    guides; source: an image, or "image:NAME", "group:NAME" of
     a vertex group, "attribute:NAME" of the surface, "curves:NAME" of an attribute of the hair's own curves, "strand" or
     "clump" for random numbers; changes: fields of `MapSettings`: uv, low, high, is_inverted, amount, seed, ramp. ramp:
     a curve of the map's values such as "0:0 0.3:1 1:1", or a color ramp "0:0.1/0/0 1:1/0.8/0.5" that gives the colors.
@@ -40,8 +41,21 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
     varied_settings.require_varied(setting)
     settings = changed(MapSettings, MapSettings(setting=setting, kind=kind, source=name), changes)
     varied_settings.require_map(settings)
+    _require_style(target, setting)
     blender.settings.map_items.keep(target.vellus, settings)
     return settings
+
+
+def _require_style(target, setting):
+    """Raise `HairError` if a setting is of a style that hair Curves do not have, or that maps cannot vary."""
+    name, of_style = varied_settings.style_of(setting)
+    if not name:
+        return
+    items = blender.settings.style_items
+    styles = dict(zip(items.names_of(target.vellus), items.styles_of(target.vellus), strict=True))
+    if name not in styles or varied_settings.details_of_style(styles[name], of_style) is None:
+        sentence = 'The hair has no style "{name}" with a setting "{setting}": use the name and a setting of a style.'
+        raise HairError(sentence, name=name, setting=of_style)
 
 
 def maps_of(hair: Curves) -> tuple[MapSettings, ...]:

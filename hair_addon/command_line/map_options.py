@@ -26,7 +26,8 @@ def add_maps(parser):
         default=[],
         help="vary a setting by image:FILE or image:NAME, group:NAME, attribute:NAME, curves:NAME, strand or clump, "
         "with fields after a comma, as in look.melanin=group:dark,low=0.5 or "
-        f"'look.color=strand,ramp=0:0.1/0.05/0 1:1/0.8/0.5'; settings: {known}",
+        f"'look.color=strand,ramp=0:0.1/0.05/0 1:1/0.8/0.5'; settings: {known}, "
+        "and settings of styles by their names, such as styles.Curl.radius",
     )
     parser.add_argument(
         "--thickness-curve",

@@ -6,15 +6,27 @@
 #include "strands/write_packed_strand.glsl"
 #include "strands/strip.glsl"
 #include "strands/strand_language.glsl"
-#include "all.strand"
 
-// Numbers of a strand in `known`: its normal, its identity in two parts, its clump center in each level, its masks.
+// Numbers of a strand in `known`: its normal, its identity in two parts, its clump center in each level, its masks, and
+// the numbers of steps that differ between strands.
 const int KNOWN_LEVELS = 5;
+ivec2 known_first;
 
-float known_number(ivec2 first, int number)
+float known_number(int number)
 {
-  return texelFetch(known, first + ivec2(number / 4, 0), 0)[number % 4];
+  return texelFetch(known, known_first + ivec2(number / 4, 0), 0)[number % 4];
 }
+
+float varied_number_at(int place)
+{
+  if (((row_now.varied >> place) & 1) == 0) {
+    return number_at(place);
+  }
+  int row = row_now.first_varied + bitCount(row_now.varied & ((1 << place) - 1));
+  return known_number(KNOWN_LEVELS + styling.level_count + row);
+}
+
+#include "all.strand"
 
 int whole(float high, float low)
 {
@@ -42,14 +54,14 @@ void read_strand(ivec2 first)
 }
 
 // Sets the clump center of the strand in a step.
-void take_centre(ivec2 first)
+void take_centre()
 {
   centre = row_now.first_centre;
   centre_normal = normal;
   lock = identity;
   in_lock = 0.0;
   has_centre_points = row_now.level >= 0 && centre < styling.centre_count;
-  int member = int(known_number(first, KNOWN_LEVELS + row_now.level));
+  int member = int(known_number(KNOWN_LEVELS + row_now.level));
   if (member < 0) {
     if (((NEEDING_CENTRE >> kind) & 1) != 0) {
       base = 0.0;
@@ -127,10 +139,10 @@ void main()
   point_count = styling.point_count;
   hand = styling.hand;
   int strand = first_strand + place;
-  ivec2 known_first = strand_texel(strand, 0, styling.known_texels, styling.row_known);
+  known_first = strand_texel(strand, 0, styling.known_texels, styling.row_known);
   vec4 head = texelFetch(known, known_first, 0);
   normal = head.xyz;
-  identity = whole(head.w, known_number(known_first, 4));
+  identity = whole(head.w, known_number(4));
   ivec2 first = strand_texel(styling.first_strand + place, 0, POINTS, styling.row_strands);
   read_strand(first);
   bool is_touched = false;
@@ -142,9 +154,9 @@ void main()
     // A_si = base · profile(x_i).
     base = number_at(AMOUNT_NUMBER) * (1.0 - number_at(VARY_NUMBER) * random(VARY));
     if (row_now.mask >= 0) {
-      base *= known_number(known_first, KNOWN_LEVELS + styling.level_count + row_now.mask);
+      base *= known_number(KNOWN_LEVELS + styling.level_count + row_now.mask);
     }
-    take_centre(known_first);
+    take_centre();
     if (base > 0.0) {
       is_touched = true;
       take_profile();

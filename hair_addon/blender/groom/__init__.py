@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         strand_thickness,
         styled_hair,
         varied_guides,
+        varied_styles,
         writing,
     )
 else:

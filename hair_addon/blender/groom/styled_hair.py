@@ -2,7 +2,7 @@
 """The styles of bound hair: reading them from its Curves, and binding them to its strands."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,7 @@ from ..data.maps.sources import Source
 from ..data.strands import style_inputs
 from ..data.surfaces import Surface
 from ..settings import setting_properties
-from . import strand_lengths
+from . import strand_lengths, varied_styles
 
 if TYPE_CHECKING:
     from ...core.styling.stack import Styling
@@ -35,8 +35,8 @@ class ReadStyles:
     """Styles of a hair, and the inputs that they refer to.
 
     applied: from the local coordinates in which the hair was generated, which define the axes and the origin of random
-    shapes, to the present ones; length: source of the map of the strands' length; map_status: sentence about that
-    source.
+    shapes, to the present ones; length: source of the map of the strands' length; map_status: sentence about a missing
+    source of a map; numbers: of styles that maps vary.
     """
 
     styles: tuple[StyleSettings, ...] = ()
@@ -44,19 +44,20 @@ class ReadStyles:
     applied: Affine = field(default_factory=Affine.identity)
     length: Source | None = None
     map_status: str = ""
+    numbers: varied_styles.Numbers = field(default_factory=dict)
 
     def is_same(self, other: "ReadStyles") -> bool:
         """Whether both style hair identically."""
-        if not np.array_equal(self.applied.matrix, other.applied.matrix) or not self.has_length(
-            other.length, other.map_status
+        if not np.array_equal(self.applied.matrix, other.applied.matrix) or not self.has_maps(
+            other.length, other.map_status, other.numbers
         ):
             return False
         return self._active == other._active and _are_same(self.inputs, other.inputs)
 
-    def has_length(self, length: Source | None, map_status: str) -> bool:
-        """Whether a map, with a sentence about its source, varies the length of strands; None for no map."""
+    def has_maps(self, length: Source | None, map_status: str, numbers: varied_styles.Numbers) -> bool:
+        """Whether the maps of `read_maps` vary strands."""
         is_same = length is None if self.length is None else self.length.is_same(length)
-        return is_same and self.map_status == map_status
+        return is_same and self.map_status == map_status and varied_styles.are_same(self.numbers, numbers)
 
     @property
     def _active(self):
@@ -116,13 +117,23 @@ def read_styles(
     hair: Curves | None = None,
 ) -> ReadStyles:
     """Return the `ReadStyles` of hair on a surface; guide_curves, hair: None if they are new. Raises `HairError`."""
-    length = strand_lengths.read(hair, surface_object, surface, styles)
+    maps = read_maps(hair, surface_object, surface, styles)
     if not styles:
-        return ReadStyles((), Inputs(), Affine.identity(), *length)
+        return ReadStyles((), Inputs(), Affine.identity(), *maps)
     styles = [setting_properties.as_stored(settings) for settings in styles]  # rounded as Curves store them
     applied = Affine.identity() if hair is None else surface_space.applied(hair)
     inputs = style_inputs.read(surface_object, surface, guide_curves, styles, depsgraph)
-    return ReadStyles(tuple(styles), inputs, applied, *length)
+    return ReadStyles(tuple(styles), inputs, applied, *maps)
+
+
+def read_maps(
+    hair: Curves | None, surface_object: Object | None, surface: Surface, styles: Sequence[StyleSettings]
+) -> tuple[Source | None, str, varied_styles.Numbers]:
+    """Return (length, map_status, numbers) of `ReadStyles`; hair: None if it is new."""
+    length, status = strand_lengths.read(hair, surface_object, surface, styles)
+    stored = [setting_properties.as_stored(settings) for settings in styles]
+    numbers, other_status = varied_styles.read(hair, surface_object, surface, stored)
+    return length, status or other_status, numbers
 
 
 def bind(
@@ -144,7 +155,7 @@ def bind(
         settings,
         read.styles,
         make_trees(),
-        read.inputs,
+        replace(read.inputs, numbers=varied_styles.number_maps(read.numbers)),
         grooming.hair_styles.own_axes((Affine.linear(surface.to_world_axes) @ read.applied).matrix),
         progress,
         cut,

@@ -12,13 +12,13 @@ from ...core.geometry.strands import Strands, lengths
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
 from ..data import guide_map_readers, scene, surface_space
-from ..data.maps import ramps, strand_maps
+from ..data.maps import strand_maps
 from ..data.strands import attributes, curves, curves_objects, gathered_groups, kept_shapes, kept_widths, stored_roots
 from ..data.surfaces import Surface, cage_of
 from ..host.notices import name_of
 from ..layers import carried_layers
 from ..materials import looks
-from ..settings import animated, setting_properties, style_items
+from ..settings import animated, ramp_nodes, setting_properties, style_items
 from . import bindings, hair_outside, size_fitting, staleness
 from .bindings import BoundHair
 from .grown_guides import GrownGuides
@@ -100,7 +100,7 @@ def write_hair(target: Curves) -> None:
     if not bound.has_moved_only:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         state.status = bound.map_status
-        state.thickness_key = ramps.digest(state.thickness_ramp)
+        state.thickness_key = ramp_nodes.text_of(state.thickness_ramp)
         size_fitting.keep(target, bound.fits)
         kept_shapes.forget(target)
         kept_widths.forget(target)

@@ -18,8 +18,8 @@ from ..groom import (
     pipeline,
     size_fitting,
     staleness,
-    strand_lengths,
     strand_thickness,
+    styled_hair,
     writing,
 )
 from ..groom.foreign import kept_following, kept_thickness
@@ -248,7 +248,7 @@ def is_ahead(hair):
     return (
         strand_thickness.is_same(hair, bound)
         and bound.styles.read.styles == styles
-        and bound.styles.read.has_length(*strand_lengths.read(hair, hair.surface, bound.surface, styles))
+        and bound.styles.read.has_maps(*styled_hair.read_maps(hair, hair.surface, bound.surface, styles))
     )
 
 

@@ -7,7 +7,6 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import masks, scene, usable_surfaces
-from ..data.maps import ramps
 from ..data.strands import curves, drawn_lines
 from ..groom import bindings, frame_faces, staleness
 from ..groom.surfaces import applied_transforms, edited_surfaces
@@ -212,7 +211,7 @@ def follow_ramps():
         state = hair.vellus
         if state.kind == "HAIR" and state.thickness_ramp is not None:
             _own_ramp(state, "thickness_ramp", owners)
-            is_other = ramps.digest(state.thickness_ramp) != state.thickness_key
+            is_other = ramp_nodes.text_of(state.thickness_ramp) != state.thickness_key
             if is_other and (curves.is_hand_made(hair) or not curves.is_combed(hair)):
                 state.is_stale = True
         for item in state.maps:

@@ -86,7 +86,9 @@ def is_set(item: VellusMap) -> bool:
 def read_faces(state) -> bool:
     """Return whether maps vary the strands of a hair by values on faces of the surface."""
     return any(
-        item.setting.startswith("strands.") and item.kind in {"IMAGE", "GROUP", "ATTRIBUTE"} and is_set(item)
+        item.setting.startswith(("strands.", "styles."))
+        and item.kind in {"IMAGE", "GROUP", "ATTRIBUTE"}
+        and is_set(item)
         for item in state.maps
     )
 
@@ -130,6 +132,31 @@ def remove(state, setting: str) -> bool:
             ramp_nodes.remove_unused(tree)
             return True
     return False
+
+
+def follow_styles(state, names: Sequence[str], places: Sequence[int | None], new_names: Sequence[str]) -> None:
+    """Rename the maps of renamed styles, and remove the maps of removed styles.
+
+    names: of the styles before; places: new index of each style, None for a removed one; new_names: present names.
+    """
+    now = {name: None if to is None else new_names[to] for name, to in zip(names, places, strict=True)}
+    for setting in [item.setting for item in state.maps]:
+        if now.get(varied_settings.style_of(setting)[0], "") is None:
+            remove(state, setting)
+    for item in state.maps:
+        name, setting = varied_settings.style_of(item.setting)
+        if now.get(name, name) != name:
+            item.setting = varied_settings.setting_of_style(now[name], setting)
+
+
+def copy_of_style(state, name: str, copied: str) -> None:
+    """Add the maps of a style to a copy of the style."""
+    for settings in maps_of(state):
+        its_name, setting = varied_settings.style_of(settings.setting)
+        if its_name == name:
+            image = item_of(state, settings.setting).image
+            item = keep(state, replace(settings, setting=varied_settings.setting_of_style(copied, setting)))
+            item.image = image
 
 
 def assign(state, maps: Sequence[MapSettings]) -> None:

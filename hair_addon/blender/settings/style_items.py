@@ -12,7 +12,7 @@ from ...core.errors import HairError
 from ...core.params import declared
 from ...core.styling.kinds import DESCRIPTIONS, KINDS, LABELS, MOST_STYLES, kind_of
 from ..host.notices import text_of
-from . import setting_properties, style_keys
+from . import map_items, setting_properties, style_keys
 from .marks import mark_geometry, mark_wet_style
 from .translations import CONTEXT
 
@@ -38,7 +38,7 @@ def _renamed(item, name, present, _is_set):
     if present and name != present:
         names = names_of(state)
         renamed = [name if other == present else other for other in names]
-        style_keys.follow(item.id_data, style_keys.Rearrangement(names, range(len(names)), renamed))
+        _follow_names(state, names, range(len(names)), renamed)
     return name
 
 
@@ -153,7 +153,7 @@ def add(state, settings, name="", place=None):
     _append(state, settings, name)
     state.styles.move(len(names), place)
     places = [index + (index >= place) for index in range(len(names))]
-    style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, names_of(state)))
+    _follow_names(state, names, places, names_of(state))
     state.active_style = place
     mark_wet_style(state, None)
 
@@ -161,7 +161,9 @@ def add(state, settings, name="", place=None):
 def duplicate(state, place):
     """Add a copy of a style after it, without keys and with a seed of its own. Raises `HairError`."""
     item = state.styles[place]
-    add(state, replace(settings_of(item), seed=new_seed(state)), text_of(item, "name"), place + 1)
+    name = text_of(item, "name")
+    add(state, replace(settings_of(item), seed=new_seed(state)), name, place + 1)
+    map_items.copy_of_style(state, name, names_of(state)[place + 1])
 
 
 def move(state, place, to):
@@ -230,8 +232,14 @@ def _named(state, styles, names):
 def _follow(state, names, order):
     """Update keys and mark the hair; order: previous index of each style in the list, None for a new style."""
     places = [order.index(index) if index in order else None for index in range(len(names))]
-    style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, names_of(state)))
+    _follow_names(state, names, places, names_of(state))
     mark_wet_style(state, None)
+
+
+def _follow_names(state, names, places, new_names):
+    """Update keys and maps of styles; names: before; places: their new indices, None for a removed style."""
+    style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, new_names))
+    map_items.follow_styles(state, names, places, new_names)
 
 
 def values_of(item):

@@ -87,11 +87,12 @@ def _value_side(layout, owner, name, title=""):
     return value_side
 
 
-def rows(layout, owner, settings_class, names):
-    """Draw a row for each of these settings of a class, in the order of declaration."""
+def rows(layout, owner, settings_class, names, style=""):
+    """Draw a row for each of these settings of a class, in the order of declaration; style: name of theirs."""
     for name, _default, details in declared(settings_class):
         if name in names:
-            varied = varied_settings.name_of(settings_class, name) if details.may_vary else ""
+            known = varied_settings.setting_of_style(style, name) if style else ""
+            varied = (known or varied_settings.name_of(settings_class, name)) if details.may_vary else ""
             is_stored = varied != "" and isinstance(getattr(owner, "id_data", None), bpy.types.Curves)  # not redo
             row(layout, owner, details.diameter[0] if details.diameter else name, name, varied if is_stored else "")
 
@@ -187,7 +188,7 @@ def style_rows(layout, item):
     owner, settings_class = style_items.group_of(item), KINDS[item.kind]
     row(layout, owner, "amount")
     shared = setting_properties.names_of(StyleSettings)
-    rows(layout, owner, settings_class, others(settings_class, shared, _PROFILE, _STYLE_OBJECTS))
+    rows(layout, owner, settings_class, others(settings_class, shared, _PROFILE, _STYLE_OBJECTS), text_of(item, "name"))
     for name in _STYLE_OBJECTS:
         if name in owner.bl_rna.properties:
             column = layout.column()

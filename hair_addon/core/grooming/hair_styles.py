@@ -91,7 +91,8 @@ def bind_styles(
     if cut is not None or settings.strand_length != 1.0:
         mask = CutMask(settings.strand_length) if cut is None else cut
         styles = (styling.program.CUT, *styles)
-        inputs = replace(inputs, masks={**inputs.masks, styling.program.CUT_KEY: mask})
+        numbers = {(place + 1, name): found for (place, name), found in inputs.numbers.items()}
+        inputs = replace(inputs, masks={**inputs.masks, styling.program.CUT_KEY: mask}, numbers=numbers)
     axes = np.eye(4) if axes is None else axes
     return styling.stack.bind(binding, guides, styles, inputs, trees, axes, settings.point_count)
 

@@ -8,10 +8,14 @@ from ..errors import HairError
 from ..grooming.groom import GuideSettings, HairSettings
 from ..params import Param, Settings, declared
 from ..shading.appearance import COLOR_FIELDS, Appearance
+from ..styling import kinds
+from ..styling.base import StyleSettings
 from . import map_settings, ramp_text
 
 # {first part of a setting's name: class of settings}
 SECTIONS = {"look": Appearance, "strands": HairSettings, "guides": GuideSettings}
+
+_STYLES = "styles."  # first part of the names of settings of styles
 
 # {setting: color parametrization that uses the setting}
 _PARAMETRIZATION = {f"look.{name}": way for way, names in COLOR_FIELDS.items() for name in names}
@@ -39,10 +43,35 @@ def name_of(settings_class: type[Settings], name: str) -> str:
     return found if found in all_varied() else ""
 
 
+def style_of(setting: str) -> tuple[str, str]:
+    """Return (name of a style, name of its setting) of a setting such as "styles.Curl.radius"; ("", "") for others."""
+    if not setting.startswith(_STYLES):
+        return "", ""
+    name, _, found = setting.removeprefix(_STYLES).rpartition(".")
+    return name, found
+
+
+def setting_of_style(name: str, setting: str) -> str:
+    """Return the name of a setting of a style, such as "styles.Curl.radius"."""
+    return f"{_STYLES}{name}.{setting}"
+
+
+def details_of_style(settings: StyleSettings, name: str) -> Param | None:
+    """Return the `Param` of a style's setting; None if no map can vary it."""
+    return next((d for its_name, _, d in declared(type(settings)) if its_name == name and d.may_vary), None)
+
+
+@cache
+def of_styles() -> tuple[str, ...]:
+    """Return the names of the settings of styles that may vary, without the names of styles."""
+    return tuple(dict.fromkeys(name for kind in kinds.KINDS for name in kinds.varied_settings_of(kind)))
+
+
 def require_varied(setting: str) -> None:
-    """Raise `HairError` unless a map may vary a setting such as "look.color"."""
-    if setting not in all_varied():
-        known = ", ".join(all_varied())
+    """Raise `HairError` unless a map may vary a setting such as "look.color" or "styles.Curl.radius"."""
+    name, of_style = style_of(setting)
+    if setting not in all_varied() and not (name and of_style in of_styles()):
+        known = ", ".join([*all_varied(), *(setting_of_style("NAME", each) for each in of_styles())])
         raise HairError('No map can vary "{setting}": use one of {known}.', setting=setting, known=known)
 
 
@@ -69,7 +98,7 @@ def parsed_source(text: str) -> tuple[str, str]:
 
 def is_color(setting: str) -> bool:
     """Return whether a setting is a color."""
-    return isinstance(all_varied()[setting][0], tuple)
+    return setting in all_varied() and isinstance(all_varied()[setting][0], tuple)
 
 
 def is_of_guides(setting: str) -> bool:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         strand_wetness,
         style_inputs,
         style_text,
+        varied_numbers,
     )
 else:
     __getattr__ = submodules(__name__)

@@ -104,7 +104,8 @@ class Step:
     """A row of a program: one run of a .strand file.
 
     kind: a key of `kinds.STEPS`; numbers: values of the file's own parameters, by the names in `NUMBERS` of its module;
-    level: level of the clump centers that the step needs, counted from its style's first; None for a style above.
+    level: level of the clump centers that the step needs, counted from its style's first; None for a style above;
+    place, part: indices of its style in the stack, and of the step among the steps of this style.
     """
 
     kind: str
@@ -114,6 +115,8 @@ class Step:
     numbers: Mapping[str, Any]  # floats, or tuples of floats for a name with a size
     level: int | None = None
     keep_length: float = 1.0
+    place: int = 0
+    part: int = 0
 
 
 def evaluated(profile: Profile, x: np.ndarray) -> np.ndarray:

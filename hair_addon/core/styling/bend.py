@@ -30,6 +30,7 @@ class Settings(ProfiledSettings):
         high=20.0,
         unit="ROTATION",
         subtype="ANGLE",
+        may_vary=True,
     )
     turn: float = param(
         0.0,
@@ -39,6 +40,7 @@ class Settings(ProfiledSettings):
         high=math.pi,
         unit="ROTATION",
         subtype="ANGLE",
+        may_vary=True,
     )
     random_turn: float = param(
         0.0, "Random variation of the direction", label="Random direction", low=0.0, high=1.0, subtype="FACTOR"

@@ -21,6 +21,7 @@ from .base import Cutter, ProfiledSettings, Step, TreeSettings, step_of
 LABEL = "Braid"
 DESCRIPTION = "Braid or twist the strands of a lock"
 STEP = "WEAVE"
+SHARED_BY_LOCKS = True
 NEEDS_CENTRE = True
 NUMBERS = ("radius", "pitch", "flat_part", "tress_count", "thickness")  # of weave.strand
 
@@ -54,6 +55,7 @@ class Settings(ProfiledSettings):
         unit="LENGTH",
         subtype="DISTANCE",
         precision=4,
+        may_vary=True,
     )
     pitch: float = param(
         0.04,
@@ -64,14 +66,16 @@ class Settings(ProfiledSettings):
         unit="LENGTH",
         subtype="DISTANCE",
         precision=4,
+        may_vary=True,
     )
-    flatness: float = param(0.5, "Flatten a braid of three tresses", low=0.0, high=1.0, subtype="FACTOR")
+    flatness: float = param(0.5, "Flatten a braid of three tresses", low=0.0, high=1.0, subtype="FACTOR", may_vary=True)
     thickness: float = param(
         0.1,
         "Distance between the strands of a tress at full strength, as a part of the distance before",
         low=0.0,
         high=1.0,
         subtype="FACTOR",
+        may_vary=True,
     )
     start: float = param_of(ProfiledSettings, "start", 0.1)
     shape: float = param_of(ProfiledSettings, "shape", 0.1)

@@ -23,6 +23,7 @@ DESCRIPTION = "Gather strands into locks, and locks into larger ones"
 
 MOST_LEVELS = 4
 STEP = "CLUMP"
+SHARED_BY_LOCKS = True
 NEEDS_CENTRE = True
 NUMBERS = ("thickness", "twist", "stray")  # of clump.strand
 
@@ -72,8 +73,9 @@ class Settings(ProfiledSettings):
         low=0.0,
         high=1.0,
         subtype="FACTOR",
+        may_vary=True,
     )
-    twist: float = param(0.0, "Turns of a lock about its center from root to tip", low=-10.0, high=10.0)
+    twist: float = param(0.0, "Turns of a lock about its center from root to tip", low=-10.0, high=10.0, may_vary=True)
     crossover: float = param(
         0.05,
         "Part of the strands that belongs to the second nearest lock",

@@ -29,6 +29,7 @@ from .base import Cutter, ProfiledSettings, Step, step_of
 LABEL = "Curl"
 DESCRIPTION = "Wind strands into coils or waves"
 STEP = "CURL"
+SHARED_BY_LOCKS = True
 NUMBERS = (
     "radius",
     "pitch",
@@ -56,6 +57,7 @@ class Settings(ProfiledSettings):
         unit="LENGTH",
         subtype="DISTANCE",
         precision=4,
+        may_vary=True,
     )
     pitch: float = param(
         0.03,
@@ -66,6 +68,7 @@ class Settings(ProfiledSettings):
         unit="LENGTH",
         subtype="DISTANCE",
         precision=4,
+        may_vary=True,
     )
     pitch_vary: float = param(
         0.0,
@@ -76,7 +79,12 @@ class Settings(ProfiledSettings):
         subtype="FACTOR",
     )
     flatness: float = param(
-        0.0, "Flatten coils into waves: 0 is a round coil, 1 a flat wave", low=0.0, high=1.0, subtype="FACTOR"
+        0.0,
+        "Flatten coils into waves: 0 is a round coil, 1 a flat wave",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
     )
     coherence: float = param(
         0.85,
@@ -84,6 +92,7 @@ class Settings(ProfiledSettings):
         low=0.0,
         high=1.0,
         subtype="FACTOR",
+        may_vary=True,
     )
     stretch: float = param(0.0, "Lengthen the coils near the roots by this factor", low=0.0, high=4.0)
     left_handed: float = param(

@@ -50,6 +50,7 @@ class Settings(ProfiledSettings):
         unit="LENGTH",
         subtype="DISTANCE",
         precision=4,
+        may_vary=True,
     )
     wavelength: float = param(
         0.03,
@@ -60,6 +61,7 @@ class Settings(ProfiledSettings):
         unit="LENGTH",
         subtype="DISTANCE",
         precision=4,
+        may_vary=True,
     )
     octaves: int = param(
         2, "Number of octaves of noise; each has half the wavelength of the previous octave", low=1, high=MOST_OCTAVES

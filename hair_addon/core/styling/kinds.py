@@ -4,12 +4,16 @@
 `from kinds import *` gives the classes of settings, as `api` does: `Curl(radius=0.004)`.
 """
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
+import numpy as np
+
 from ..errors import HairError
-from ..params import described
+from ..params import declared, described
 from . import bend, braid, clump, curl, frizz, lean, smooth, trim, wet
 from .base import Cutter, Step, StyleSettings
 
@@ -99,3 +103,29 @@ def steps_of(settings: StyleSettings, cutters: Mapping[str, Cutter]) -> list[Ste
     """
     module = module_of(settings)
     return module.steps(settings, cutters) if hasattr(module, "steps") else []
+
+
+def varied_settings_of(kind: str) -> tuple[str, ...]:
+    """Return the settings of a kind of style that may differ between strands, as declared."""
+    return tuple(name for name, _default, details in declared(KINDS[kind]) if details.may_vary)
+
+
+@cache
+def varied_numbers_of(step: str) -> frozenset[str]:
+    """Return the numbers of a kind of step that may differ between strands."""
+    found: set[str] = set()
+    for kind, settings_class in KINDS.items():
+        settings = settings_class()
+        values = {name: np.array([getattr(settings, name)]) for name in varied_settings_of(kind)}
+        for made in steps_of(with_values(settings, values), {}):
+            if made.kind == step:
+                found |= {name for name, value in made.numbers.items() if isinstance(value, np.ndarray)}
+    return frozenset(found)
+
+
+def with_values(settings: StyleSettings, values: Mapping[str, np.ndarray]) -> Any:
+    """Return a copy of a style's settings with arrays (S,) in place of some values; they are not checked."""
+    found = copy.copy(settings)
+    for name, value in values.items():
+        object.__setattr__(found, name, value)  # the class is frozen
+    return found

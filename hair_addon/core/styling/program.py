@@ -12,8 +12,9 @@ from . import clump, kinds, style_text, trim, wet
 from .base import Cutter, Step, StyleSettings, TreeSettings, has_effect
 
 # The whole numbers of a step: its kind, of `kinds.STEP_KINDS`; its seed; its row of masks or -1; its row of members or
-# -1; the first of the centers that members count from.
-CHOICES = ("kind", "seed", "mask", "level", "first_centre")
+# -1; the first of the centers that members count from; a bit for each number that differs between strands; the first of
+# the rows after the masks that contain these numbers.
+CHOICES = ("kind", "seed", "mask", "level", "first_centre", "varied", "first_varied")
 # The numbers that all steps have, which precede their own numbers, and the total count.
 SHARED = ("amount", "vary", "at_root", "at_tip", "exponent", "is_flipped", "from", "keep_length")
 NUMBERS = 24
@@ -25,7 +26,7 @@ CUT_KEY = ("", "", True)
 
 @dataclass(frozen=True)
 class Program:
-    """Steps as read by kernels: (N, 5) int32 `CHOICES` and (N, NUMBERS) float32, which do not change."""
+    """Steps as read by kernels: (N, 7) int32 `CHOICES` and (N, NUMBERS) float32, which do not change."""
 
     choices: np.ndarray
     numbers: np.ndarray
@@ -70,11 +71,13 @@ def strand_steps(styles: Sequence[StyleSettings], cutters: Mapping[str, Cutter])
     """Return the steps that act on strands, in order; cutters: planes by their names in Trim styles."""
     made: list[Step] = []
     level, coherent = 0, None
-    for settings in filter(has_effect, styles):
+    for place, settings in enumerate(styles):
+        if not has_effect(settings):
+            continue
         tree = tree_settings(settings)
         made += [
-            replace(step, level=coherent if step.level is None else level + step.level)
-            for step in kinds.steps_of(settings, cutters)
+            replace(step, level=coherent if step.level is None else level + step.level, place=place, part=part)
+            for part, step in enumerate(kinds.steps_of(settings, cutters))
         ]
         if tree is not None:
             shared = settings.tip_level if isinstance(settings, clump.Settings) else 0
@@ -84,20 +87,29 @@ def strand_steps(styles: Sequence[StyleSettings], cutters: Mapping[str, Cutter])
 
 
 def compiled(
-    steps_made: Sequence[Step], masks: Sequence[tuple[str, str, bool]], first_centres: Sequence[int]
+    steps_made: Sequence[Step],
+    masks: Sequence[tuple[str, str, bool]],
+    first_centres: Sequence[int],
+    varied: Sequence[Sequence[int]] = (),
 ) -> Program:
     """Return the `Program` of steps.
 
-    masks: from `mask_keys`; first_centres: offset of the centers of each level, the guides' own last.
+    masks: from `mask_keys`; first_centres: offset of the centers of each level, the guides' own last; varied: for each
+    step the places of its numbers that differ between strands, from `varied_numbers.places_of`; none if it is empty.
     """
     choices = np.zeros((len(steps_made), len(CHOICES)), np.int32)
     numbers = np.zeros((len(steps_made), NUMBERS), np.float32)
     guides_level = len(first_centres) - 1
+    first_varied = len(masks)
     for row, step in enumerate(steps_made):
         key = mask_key(step.settings)
         level = guides_level if step.level is None else step.level
         mask = -1 if key is None else masks.index(key)
-        choices[row] = kinds.STEP_KINDS[step.kind], step.settings.seed, mask, level, first_centres[level]
+        places = varied[row] if varied else ()
+        bits = sum(1 << len(SHARED) + place for place in places)
+        head = kinds.STEP_KINDS[step.kind], step.settings.seed, mask, level, first_centres[level]
+        choices[row] = *head, bits, first_varied
+        first_varied += len(places)
         shared = (step.amount, step.settings.vary, *_numbers_of(step.profile), step.keep_length)
         row_numbers = (*shared, *style_text.ordered(step))
         numbers[row, : len(row_numbers)] = row_numbers

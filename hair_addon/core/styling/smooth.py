@@ -28,6 +28,7 @@ class Settings(ProfiledSettings):
         soft_high=0.2,
         unit="LENGTH",
         subtype="DISTANCE",
+        may_vary=True,
     )
     root: float = param_of(ProfiledSettings, "root", 1.0)
 

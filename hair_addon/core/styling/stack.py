@@ -18,7 +18,7 @@ from ..geometry.strands import Strands
 from ..interpolation.hair_binding import HairBinding
 from ..kernels import kernel_cache
 from ..kernels.checks import require_count, require_indices
-from . import kinds, steps, strand_wetness
+from . import kinds, steps, strand_wetness, varied_numbers
 from . import program as programs
 from .base import StyleSettings, TreeSettings
 from .clump_trees import HAIR, ClumpTrees, Owner
@@ -168,7 +168,8 @@ class Styling:
         """
         if not strand_wetness.is_uneven(self.styles):
             return None
-        masks = dict(zip(programs.mask_keys(self.styles), self.data.masks.numpy(), strict=True))
+        keys = programs.mask_keys(self.styles)
+        masks = dict(zip(keys, self.data.masks.numpy()[: len(keys)], strict=True))
         return strand_wetness.of_strands(self.styles, masks, self.data.identities.numpy())
 
 
@@ -224,7 +225,8 @@ def bind(
     counts = [len(bound.roots) for bound in bindings]
     first_centres = [0, *np.cumsum(counts).tolist()]
     made = programs.strand_steps(styles, inputs.cutters)
-    program = programs.compiled(made, keys, first_centres)
+    varied = varied_numbers.places_of(made, inputs.numbers)
+    program = programs.compiled(made, keys, first_centres, varied)
     guide_identities = geometry.root_frames.identities(guides.roots, binding.is_mirrored)[0]
     side = _side(guides, binding.guide_normals.numpy())
     centre_normals = [side * bound.normals.numpy() for bound in bindings]
@@ -234,8 +236,11 @@ def bind(
         "centre_identities": _joined([*(bound.identities[0] for bound in bindings), guide_identities], int, device),
     }
 
-    def data_of(owner: Owner, bound: HairBinding, known: int) -> StrandData:
-        """Return the `StrandData` of strands that may belong to centers of the first `known` levels."""
+    def data_of(owner: Owner, bound: HairBinding, known: int, step_count: int) -> StrandData:
+        """Return the `StrandData` of strands that may belong to centers of the first `known` levels.
+
+        step_count: of the first steps, which are applied to them.
+        """
         rows = np.zeros((len(levels) + 1, len(bound.roots)), np.int32)
         for row in range(known):
             tree, level = levels[row]
@@ -245,19 +250,24 @@ def bind(
                 rows[row] = trees.members(owner, bound, tree)[level]
         rows[-1] = bound.guide_weights.indices.numpy()[:, 0]
         clumps = _finest_clumps(levels, owner, rows, known)
-        weights = np.array([inputs.masks[key].of_strands(bound, clumps) for key in keys], np.float32)
+        values = [inputs.masks[key].of_strands(bound, clumps) for key in keys]
+        for step, places in zip(made[:step_count], varied, strict=False):
+            if places:
+                locks = None if step.level is None else (bindings[step.level], rows[step.level])
+                values += varied_numbers.rows_of(step, inputs.numbers, inputs.cutters, bound, clumps, locks)
+        weights = np.array(values, np.float32).reshape(len(values), len(bound.roots))
         return StrandData(
             bound.normals if side == 1 else _joined([side * bound.normals.numpy()], wp.vec3, device),
             wp.array(bound.identities[0], dtype=int, device=device),
-            wp.array(weights.reshape(len(keys), len(bound.roots)), dtype=float, device=device),
+            wp.array(weights, dtype=float, device=device),
             wp.array(rows, dtype=int, device=device),
             **shared,
         )
 
-    centres = [
-        _Level(bound, first_centres[row], _steps_before(program, made, row), data_of(levels[row], bound, row))
-        for row, bound in enumerate(bindings)
-    ]
+    centres = []
+    for row, bound in enumerate(bindings):
+        before = _steps_before(program, made, row)
+        centres.append(_Level(bound, first_centres[row], before, data_of(levels[row], bound, row, len(before))))
     if levels:
         trees.keep_only({tree for tree, _level in levels})
     of_guides = {key: inputs.masks[key].of_guides(guides.roots) for key in keys}
@@ -269,7 +279,7 @@ def bind(
         inputs,
         trees,
         program,
-        data_of(HAIR, binding, len(levels)),
+        data_of(HAIR, binding, len(levels), len(made)),
         np.asarray(axes, np.float64),
         FollowedGuides(trees.binder.mesh, leaning, point_count),
         point_count,

@@ -10,7 +10,7 @@
 //   array_t<int> chosen_rows            (M,) their rows among S; empty where M is S
 //   array_t<vec3> normals               (S,) unit normals of the surface at the roots
 //   array_t<int> identities             (S,) IDs of strands
-//   array_t<float> masks                (masks, S) weights
+//   array_t<float> masks                (masks, S) weights, and numbers of steps that differ between strands
 //   array_t<int> members                (levels, S) the clump center that each strand belongs to, per level; -1: none
 //   array_t<vec4> centre_points         (K, P) points of center strands [m], and the arc length from the root
 //   array_t<vec3> centre_normals        (K,)
@@ -97,6 +97,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   const int* choice = choices.data + size_t(step) * CHOICES;
   const float* number = numbers.data + size_t(step) * NUMBERS;
   const int kind = choice[0], seed = choice[1], mask = choice[2], level = choice[3], first_centre = choice[4];
+  const int varied = choice[5], first_varied = choice[6];
   const float keep_length = number[KEEP_LENGTH_NUMBER];
 
   // A_si = base · profile(x_i).

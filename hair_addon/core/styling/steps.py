@@ -46,7 +46,7 @@ class StrandData:
 
     normals: "wp.array[wp.vec3]"  # (S,) unit
     identities: "wp.array[int]"  # (S,)
-    masks: "wp.array2d[float]"  # (masks, S)
+    masks: "wp.array2d[float]"  # (masks, S) weights, and numbers of steps that differ between strands
     members: "wp.array2d[int]"  # (levels, S) index of the strand's center in its level, -1: none
     centre_points: "wp.array2d[wp.vec4]"  # (K, P) x, y, z [m] and the arc length [m]
     centre_normals: "wp.array[wp.vec3]"  # (K,)
@@ -193,7 +193,11 @@ def _check(points, program, data, chosen, most_points):
     require_count("choices of a step", program.choices.shape[1], len(CHOICES))
     require_count("numbers of a step", program.numbers.shape[1], NUMBERS)
     require_count("steps", len(program.numbers), len(program))
-    step_kinds, _seeds, masks, levels, first_centres = program.choices.T
+    step_kinds, _seeds, masks, levels, first_centres, varied, first_varied = program.choices.T
+    has_varied = varied != 0
+    require_indices("first numbers of strands", first_varied[has_varied], len(data.masks))
+    ends = first_varied + np.bitwise_count(varied)
+    require_indices("numbers of strands", ends[has_varied] - 1, len(data.masks))
     require_indices("kinds of steps", step_kinds - 1, len(kinds.STEPS))
     require_indices("masks", masks[masks >= 0], len(data.masks))
     require_indices("clump levels", levels[levels >= 0], len(data.members))

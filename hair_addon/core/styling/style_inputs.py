@@ -8,12 +8,17 @@ import numpy as np
 
 from .base import Cutter
 from .masks import CutMask, Mask
+from .varied_numbers import NumberMap
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """Masks by `program.mask_key`; planes of cutters and directions of targets by the names of objects."""
+    """Masks by `program.mask_key`; planes of cutters and directions of targets by the names of objects.
+
+    numbers: that differ between strands, by (index of the style, name of its setting).
+    """
 
     masks: Mapping[tuple[str, str, bool], Mask | CutMask] = field(default_factory=dict)
     cutters: Mapping[str, Cutter] = field(default_factory=dict)
     targets: Mapping[str, np.ndarray] = field(default_factory=dict)
+    numbers: Mapping[tuple[int, str], NumberMap] = field(default_factory=dict)

@@ -42,7 +42,7 @@ def texts(steps: Iterable[str]) -> dict[str, str]:
 
 
 def ordered(step: Step) -> list[float]:
-    """Return a step's own numbers in the order in which kernels read them."""
+    """Return a step's own numbers in the order in which kernels read them; arrays if they differ between strands."""
     values = dict(step.numbers)
     found: list[float] = []
     for name in kinds.STEPS[step.kind].NUMBERS:
@@ -53,11 +53,13 @@ def ordered(step: Step) -> list[float]:
 
 
 def _declarations(step):
-    place = len(program.SHARED)
+    place, varied = len(program.SHARED), kinds.varied_numbers_of(step)
     lines = []
     for name in kinds.STEPS[step].NUMBERS:
         array = _ARRAY.fullmatch(name)
-        if array is None:
+        if name in varied:
+            lines.append(f"lanes {name} = varied_number_at({place});")
+        elif array is None:
             lines.append(f"float {name} = number_at({place});")
         else:
             lines.append(f"float {name};")

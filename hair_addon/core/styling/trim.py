@@ -45,7 +45,9 @@ METHODS = (
 class Settings(StyleSettings):
     """Lengths of strands."""
 
-    factor: float = param(1.0, "Part of its length that a strand keeps; values above 1 lengthen it", low=0.0, high=4.0)
+    factor: float = param(
+        1.0, "Part of its length that a strand keeps; values above 1 lengthen it", low=0.0, high=4.0, may_vary=True
+    )
     random: float = param(
         0.0,
         "Random variation of the length; higher values make some strands shorter",
@@ -53,6 +55,7 @@ class Settings(StyleSettings):
         low=0.0,
         high=1.0,
         subtype="FACTOR",
+        may_vary=True,
     )
     to_length: float = param(
         0.0,
@@ -65,10 +68,20 @@ class Settings(StyleSettings):
         subtype="DISTANCE",
     )
     undercoat: float = param(
-        0.0, "Part of the strands that is an undercoat of shorter ones", low=0.0, high=1.0, subtype="FACTOR"
+        0.0,
+        "Part of the strands that is an undercoat of shorter ones",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
     )
     undercoat_length: float = param(
-        0.5, "Length of the undercoat as a part of the other strands' length", low=0.0, high=1.0, subtype="FACTOR"
+        0.5,
+        "Length of the undercoat as a part of the other strands' length",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
     )
     method: str = param("CUT", "How strands become shorter", choices=METHODS)
     cutter: str = param("", "Empty object that cuts off what lies on the side of its Z axis")

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Ramps: curves of the thickness from root to tip, and curves and color ramps of a map's values, as samples."""
 
-import hashlib
-
 import numpy as np
 
 from ...settings import ramp_nodes
@@ -45,12 +43,3 @@ def map_samples(item, is_color: bool) -> np.ndarray | None:
 def _limited(values):
     values = np.array(values, np.float32)
     return np.clip(np.where(np.isfinite(values), values, np.float32(0.0)), np.float32(0.0), np.float32(1.0))
-
-
-def digest(tree):
-    """Everything that the curve depends on, as text; empty without a curve."""
-    node = node_of(tree)
-    if node is None or ramp_nodes.is_color(node):
-        return ""
-    points = [(*point.location, point.handle_type) for point in node.mapping.curves[0].points]
-    return hashlib.sha1(repr((points, node.mapping.extend)).encode(), usedforsecurity=False).hexdigest()

@@ -201,6 +201,8 @@ STEP = Block(
         "mask": "int",
         "level": "int",
         "first_centre": "int",
+        "varied": "int",  # a bit for each number that differs between strands
+        "first_varied": "int",  # the mask that contains the first of these numbers
         "numbers": ("vec4", 6),  # NUMBERS of core/styling/program.py, four by four
     },
 )

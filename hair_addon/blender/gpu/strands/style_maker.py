@@ -154,9 +154,9 @@ class StyleMaker:
         is_alike = styling.trees is self.styling.trees and _are_alike(styling, self.styling)
         if not can_style(styling) or not is_alike:
             return False
-        masks = styling.data.masks.numpy(), self.styling.data.masks.numpy()
-        for part, data, program in self._parts(styling):
-            if not np.array_equal(*masks):
+        before = self._parts(self.styling)
+        for (part, data, program), (_part, known, _program) in zip(self._parts(styling), before, strict=True):
+            if not np.array_equal(data.masks.numpy(), known.masks.numpy()):
                 part.upload_masks(data)
             part.upload_steps(program)
         self.styling = styling

@@ -8,7 +8,7 @@ from ....core import geometry
 from ....core.errors import HairError
 from ...data.maps import ramps, sources
 from ...data.strands import attributes, curves, kept_widths
-from ...settings import map_items
+from ...settings import map_items, ramp_nodes
 from .. import strand_thickness
 
 
@@ -31,7 +31,7 @@ def follow(hair: Curves) -> bool:
             factors = strand_thickness.factors(sources.stored_strands(hair), item)
         except HairError as error:
             state.status = str(error)
-    state.thickness_key, state.is_stale = ramps.digest(state.thickness_ramp), False
+    state.thickness_key, state.is_stale = ramp_nodes.text_of(state.thickness_ramp), False
     if factors is None and course is None:
         kept_widths.restore(hair)
     else:

@@ -15,6 +15,7 @@ from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean
 from hair_addon.core.styling.base import Cutter
 from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.style_inputs import Inputs
+from hair_addon.core.styling.varied_numbers import NumberMap
 from tests.support.pictures import drawn_strands
 from tests.support.strands.styled import head
 
@@ -99,6 +100,27 @@ def assert_same(hair, rng, styles, axes=None, **given):
     if found[-1] > CLOSE:
         assert (found <= np.maximum(CLOSE, SENSITIVE * shaken(hair, rng, wanted, *styles, **given))).all()
     return maker, before, wanted
+
+
+# Style, other styles above it, {setting: (value in one half of the head, value in the other half)}.
+VARIED = {
+    "curl in locks": (curl.Settings(), (clump.Settings(size=0.04),), {"radius": (0.004, 0.01), "pitch": (0.02, 0.05)}),
+    "frizz": (frizz.Settings(), (), {"amplitude": (0.002, 0.008), "wavelength": (0.02, 0.07)}),
+    "clump": (clump.Settings(size=0.04), (), {"thickness": (0.1, 0.6), "twist": (0.0, 1.0)}),
+}
+
+
+def varied(pair):
+    """Return the `NumberMap` of a value in each half of the head."""
+    return NumberMap(lambda binding, _clumps: np.where(binding.positions.numpy()[:, 0] > 0.0, pair[1], pair[0]))
+
+
+@pytest.mark.parametrize("name", VARIED)
+def test_numbers_that_differ_between_strands_are_those_of_warp(hair, rng, one_program, name):
+    style, above, values = VARIED[name]
+    numbers = {(len(above), setting): varied(pair) for setting, pair in values.items()}
+    wanted = assert_same(hair, rng, (*above, style), inputs=Inputs(numbers=numbers))[2]
+    assert np.abs(wanted - hair.styled(*above, style)).max() > 0.001
 
 
 @pytest.mark.parametrize("name", STACKS)

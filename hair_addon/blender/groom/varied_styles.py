@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Numbers of styles that differ between strands by maps, such as the radius of curls."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from bpy.types import Curves, Object
+
+from ...core.errors import HairError
+from ...core.interpolation.hair_binding import HairBinding
+from ...core.maps import combination, varied_settings
+from ...core.params import Param
+from ...core.styling import program
+from ...core.styling.base import StyleSettings
+from ...core.styling.varied_numbers import NumberMap
+from ..data.maps import ramps, sources
+from ..data.surfaces import Surface
+from ..settings import map_items, style_items
+
+_OF_PLACES = ("IMAGE", "GROUP", "ATTRIBUTE")  # strands of a lock share the values of these maps
+
+
+@dataclass(frozen=True, eq=False)
+class VariedNumber:
+    """A setting of a style that a map varies: its value, its `Param`, and the `Source` of the map."""
+
+    value: float
+    details: Param
+    source: sources.Source
+
+    def is_same(self, other: "VariedNumber") -> bool:
+        """Whether both give the same values at the same roots."""
+        return self.value == other.value and self.source.is_same(other.source)
+
+    @property
+    def number_map(self) -> NumberMap:
+        """The values for strands."""
+
+        def values(binding: HairBinding, clumps: np.ndarray | None) -> np.ndarray:
+            masks = self.source.values(binding.roots, binding.identities[0], clumps)[:, 0]
+            return combination.varied_number(self.value, masks, self.source.combination, self.details)
+
+        return NumberMap(values, self.source.settings.kind in _OF_PLACES)
+
+
+Numbers = Mapping[tuple[int, str], VariedNumber]  # by (index of the style, name of its setting)
+
+
+def read(
+    hair: Curves | None, surface_object: Object | None, surface: Surface, styles: Sequence[StyleSettings]
+) -> tuple[Numbers, str]:
+    """Return ({(index of the style, setting): `VariedNumber`} of hair, a sentence about a missing source).
+
+    hair: None if it is new; styles: of the hair, as Curves store them.
+    """
+    found, status = {}, ""
+    names = () if hair is None else style_items.names_of(hair.vellus)
+    for item in () if hair is None or len(names) != len(styles) else hair.vellus.maps:
+        name, setting = varied_settings.style_of(item.setting)
+        if name not in names or not map_items.is_set(item):
+            continue
+        place = names.index(name)
+        details = varied_settings.details_of_style(styles[place], setting)
+        if details is None:
+            continue
+        try:
+            settings = map_items.settings_of(item)
+            if settings.kind == "CLUMP" and not program.tree_levels(styles):
+                raise HairError("There are no clumps for a random map: add the style Clump.")
+            ramp = ramps.map_samples(item, False)
+            source = sources.read(hair, surface_object, surface, settings, item.image, ramp=ramp)
+            value = getattr(styles[place], setting)
+            found[place, setting] = VariedNumber(value, _limited(details, value), source)
+        except HairError as error:
+            status = str(error)
+    return found, status
+
+
+def _limited(details, value):
+    """Return the `Param` of a setting, with a smallest value in place of zero for a setting that must be positive."""
+    return details if details.above == -np.inf else replace(details, low=_LEAST * value, above=-np.inf)
+
+
+_LEAST = 1e-3  # of the setting
+
+
+def are_same(numbers: Numbers, others: Numbers) -> bool:
+    """Return whether maps vary the same numbers of styles equally."""
+    return numbers.keys() == others.keys() and all(found.is_same(others[key]) for key, found in numbers.items())
+
+
+def number_maps(numbers: Numbers) -> dict[tuple[int, str], NumberMap]:
+    """Return the `NumberMap` of each varied number."""
+    return {key: found.number_map for key, found in numbers.items()}

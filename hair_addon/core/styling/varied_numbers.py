@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Numbers of styles that differ between strands, such as the radius of curls by a map.
+
+A style computes the numbers of its steps from its settings. Settings that differ are arrays there, so each number has
+one equation, and an array of equal values gives the bits of the value.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..interpolation.hair_binding import HairBinding
+from . import kinds, style_text
+from .base import Cutter, Step
+
+
+@dataclass(frozen=True, eq=False)
+class NumberMap:
+    """Values of a setting of a style for strands.
+
+    read: a function of a `HairBinding` and the clumps (S,) int32 of its strands, None if unknown, that returns (S,)
+    float64 in the setting's unit and range; is_of_places: whether values belong to places of the surface, so that the
+    strands of a lock take that of the lock's center.
+    """
+
+    read: Callable[[HairBinding, np.ndarray | None], np.ndarray]
+    is_of_places: bool = True
+
+    def of_strands(
+        self, binding: HairBinding, clumps: np.ndarray | None, locks: tuple[HairBinding, np.ndarray] | None
+    ) -> np.ndarray:
+        """Return (S,) float64 of bound strands.
+
+        clumps: (S,) int32, None if unknown; locks: binding of the centers that strands share numbers of, and (S,) the
+        center of each strand, -1 for none; None for a step without locks.
+        """
+        own = self.read(binding, clumps)
+        if locks is None or not self.is_of_places or not len(locks[0].roots):
+            return own
+        of_centres, members = locks
+        return np.where(members >= 0, self.read(of_centres, None)[members], own)
+
+
+def places_of(steps: Sequence[Step], numbers: Mapping[tuple[int, str], NumberMap]) -> list[tuple[int, ...]]:
+    """Return for each step the places of its numbers that differ between strands, rising."""
+    found = []
+    for step in steps:
+        names = _names_of_style(step, numbers)
+        ordered = _ordered(step, {name: np.array([getattr(step.settings, name)]) for name in names}, {})
+        found.append(tuple(place for place, value in enumerate(ordered) if isinstance(value, np.ndarray)))
+    return found
+
+
+def rows_of(
+    step: Step,
+    numbers: Mapping[tuple[int, str], NumberMap],
+    cutters: Mapping[str, Cutter],
+    binding: HairBinding,
+    clumps: np.ndarray | None,
+    locks: tuple[HairBinding, np.ndarray] | None,
+) -> list[np.ndarray]:
+    """Return [(S,) float32] of the numbers of a step that differ between strands, in the order of `places_of`.
+
+    Other arguments: as of `NumberMap.of_strands`; locks are used by steps whose module has `SHARED_BY_LOCKS`.
+    """
+    shared = locks if hasattr(kinds.STEPS[step.kind], "SHARED_BY_LOCKS") else None
+    values = {
+        name: numbers[step.place, name].of_strands(binding, clumps, shared) for name in _names_of_style(step, numbers)
+    }
+    return [row.astype(np.float32) for row in _ordered(step, values, cutters) if isinstance(row, np.ndarray)]
+
+
+def _names_of_style(step, numbers):
+    """Return the settings of a step's style that differ between strands."""
+    return [name for place, name in numbers if place == step.place]
+
+
+def _ordered(step, values, cutters):
+    if not values:
+        return []
+    return style_text.ordered(kinds.steps_of(kinds.with_values(step.settings, values), cutters)[step.part])
