@@ -25,7 +25,7 @@ from . import recording
 class LayersBefore:
     """Layers of guides before these are grown again: their roots on the surface, and partings between them.
 
-    groups: (G,) of gathered guides, or None.
+    gathered: of gathered guides, or None.
 
     depsgraph: of that time, as an update in between would record half-written guides.
     """
@@ -34,7 +34,7 @@ class LayersBefore:
     guides: Strands
     settings: HairSettings
     parting: partings.Partings
-    groups: np.ndarray | None
+    gathered: gathered_groups.Gathered | None
     depsgraph: Depsgraph
 
 
@@ -51,8 +51,8 @@ def read(guides: Curves | None, surface: Surface) -> LayersBefore | None:
     if followers:
         settings = setting_properties.to_settings(followers[0].vellus.hair, HairSettings)
     parting = partings.read(guides.surface, surface, guides, settings, depsgraph)
-    its_guides, groups = curves.read_guides(guides, surface, "cpu"), gathered_groups.read(guides)
-    return LayersBefore(recording.read(guides, depsgraph), its_guides, settings, parting, groups, depsgraph)
+    its_guides, gathered = curves.read_guides(guides, surface, "cpu"), gathered_groups.read(guides)
+    return LayersBefore(recording.read(guides, depsgraph), its_guides, settings, parting, gathered, depsgraph)
 
 
 def write(guides: Curves, surface: Surface, before: LayersBefore, roots: SurfacePoints) -> None:
@@ -63,7 +63,8 @@ def write(guides: Curves, surface: Surface, before: LayersBefore, roots: Surface
     indices, weights, apart = _weights(surface, before, roots)
     layers = layer_transfer.transferred(before.layers, bare, indices, weights, apart)
     layer_attributes.write(guides, layers, layer_items.identities_of(guides.vellus))
-    gathered_groups.write(guides, None if before.groups is None else before.groups[np.maximum(indices[:, 0], 0)])
+    gathered = None if before.gathered is None else before.gathered[np.maximum(indices[:, 0], 0)]
+    gathered_groups.write(guides, gathered)
     guides.vellus.is_base_grown = True
     recording.note_shown(guides, before.depsgraph)
     recording.show(guides, guide_layers.composed(recording.read(guides, before.depsgraph)))

@@ -82,12 +82,14 @@ class Simulation:
         *,
         regions: np.ndarray | None = None,
         wetness: np.ndarray | None = None,
+        held: np.ndarray | None = None,
     ) -> None:
         """groom: (G, P, 3) [m], combed guides on the surface at rest; pose: of the guides' roots in the first frame.
 
         regions: (G,) integers from 0; guides of different regions do not interact; None for one region. wetness: (G,)
-        of each guide in [0, 1], None for the wetness of the settings. Raises `HairError` for non-finite values or
-        counts that do not match.
+        of each guide in [0, 1], None for the wetness of the settings. held: (G,) in [0, 1], the fraction of each
+        guide's length, from the root, that only follows the surface, up to a tie; None for none. Raises `HairError` for
+        non-finite values or counts that do not match.
         """
         self.settings, self.pose, self.world = settings, pose, world
         self.substeps = self.required_substeps = 0  # number in the last frame, and number that its motion requires
@@ -97,11 +99,13 @@ class Simulation:
         self._groom = self._checked(groom)
         self._regions = self._checked_regions(regions)
         self._wetness = self._checked_wetness(wetness)
+        self._held = np.zeros(len(groom)) if held is None else np.asarray(held, np.float64)
         combed = self._combed()
         vertices = detail.vertices_of(combed, settings.vertex_count)
         self._material, rest = self._shapes(vertices)
         self._rods = Rods(vertices, self._material, rest, self._device)
         self._rods.set_start(pose.turns)
+        self._hold()
         self._detail = detail.detail_of(combed, self._rods)
         self._resets = np.zeros((2, len(groom)), int)  # total number, and number of consecutive frames with resets
         self._colliders = Colliders(self._device)
@@ -111,6 +115,10 @@ class Simulation:
         self._air = Air(self._rods.arrays.slips.shape, self._device)
         self._volume, self._waters = self._new_volume(), self._new_waters()
         self._since_rubbed = 0.0  # [s]
+
+    def _hold(self):
+        """Hold guides up to their ties, if the settings do."""
+        self._rods.hold(self._held if self.settings.holds_ties else np.zeros_like(self._held))
 
     def _new_volume(self):
         """Return the `HairVolume`, with cells as large as the spacing of guides."""
@@ -192,6 +200,7 @@ class Simulation:
         self._detail = detail.detail_of(combed, at_rest)
         self._rods.set_material(self._material, rest)
         self._rods.set_groom(vertices, rest)
+        self._hold()
         self._volume, self._waters = self._new_volume(), self._new_waters()
 
     def advance(self, pose: RootPose, world: World, seconds: float) -> None:

@@ -47,7 +47,7 @@ def from_rows(points):
 
 
 def test_guides_lie_along_the_nearest_row(ball, guides):
-    after, groups = gathered(ball, guides, ROWS, SETTINGS)
+    after, groups, _held = gathered(ball, guides, ROWS, SETTINGS)
     assert (groups > 0).all()
     np.testing.assert_array_equal(after[:, 0], guides[:, 0])
     lengths = [np.linalg.norm(np.diff(points.astype(np.float64), axis=1), axis=2) for points in (guides, after)]
@@ -62,7 +62,7 @@ def test_guides_lie_along_the_nearest_row(ball, guides):
 
 def test_strands_of_a_row_cross_as_a_braid_does(ball, guides):
     """Within the last pitch, each guide lies at least a fifth of the radius on either side of the row's middle."""
-    after, _groups = gathered(ball, guides, ROWS, SETTINGS)
+    after, _groups, _held = gathered(ball, guides, ROWS, SETTINGS)
     height = SETTINGS.clearance + 0.6 * SETTINGS.tie_radius  # of the row's middle
     beside = np.abs(after[:, -10:, 0]) - 0.03 * (1.0 + height / RADIUS)
     assert beside.max(axis=1).min() > 0.2 * SETTINGS.tie_radius
@@ -71,7 +71,7 @@ def test_strands_of_a_row_cross_as_a_braid_does(ball, guides):
 
 def test_groups_are_locks_of_rows(ball, guides):
     """Guides of a group belong to one row, and each row has three groups."""
-    _after, groups = gathered(ball, guides, ROWS, SETTINGS)
+    _after, groups, _held = gathered(ball, guides, ROWS, SETTINGS)
     rows = from_rows(guides[:, 0]).argmin(axis=1)
     assert (groups > 0).all()
     assert ((groups - 1) // 3 == rows).all()
@@ -80,7 +80,7 @@ def test_groups_are_locks_of_rows(ball, guides):
 
 def test_guides_beyond_the_end_of_a_row_go_straight_on(ball, guides):
     longer = guides[:, :1] + 4.0 * (guides - guides[:, :1])
-    after, _groups = gathered(ball, longer, ROWS, SETTINGS)
+    after, _groups, _held = gathered(ball, longer, ROWS, SETTINGS)
     end = ROWS[1][-1]
     ahead = (ROWS[1][-1] - ROWS[1][-2]) / np.linalg.norm(ROWS[1][-1] - ROWS[1][-2])
     beyond = after[guides[:, 0, 0] > 0.0, -1] - end
@@ -90,8 +90,8 @@ def test_guides_beyond_the_end_of_a_row_go_straight_on(ball, guides):
 
 
 def test_a_row_that_moves_by_a_millimeter_moves_no_point_by_more_than_ten(ball, guides):
-    after, _groups = gathered(ball, guides, ROWS, SETTINGS)
-    moved, _groups = gathered(ball, guides, [row + np.array([0.001, 0.0, 0.0]) for row in ROWS], SETTINGS)
+    after, _groups, _held = gathered(ball, guides, ROWS, SETTINGS)
+    moved, _groups, _held = gathered(ball, guides, [row + np.array([0.001, 0.0, 0.0]) for row in ROWS], SETTINGS)
     apart = np.linalg.norm(moved - after, axis=2).max(axis=1)
     assert np.median(apart) < 0.004 and apart.max() < 0.010
 
@@ -99,7 +99,9 @@ def test_a_row_that_moves_by_a_millimeter_moves_no_point_by_more_than_ten(ball, 
 @pytest.mark.parametrize("scale", [0.01, 100.0])
 def test_the_shape_does_not_depend_on_the_scale(guides, scale):
     sizes = {name: getattr(SETTINGS, name) * scale for name in ("clearance", "tie_radius", "pitch", "tail_radius")}
-    expected, _groups = gathered(subdivided_sphere(4, RADIUS), guides, ROWS, SETTINGS)
+    expected, _groups, _held = gathered(subdivided_sphere(4, RADIUS), guides, ROWS, SETTINGS)
     rows = [row * scale for row in ROWS]
-    found, _groups = gathered(subdivided_sphere(4, RADIUS * scale), guides * scale, rows, replace(SETTINGS, **sizes))
+    found, _groups, _held = gathered(
+        subdivided_sphere(4, RADIUS * scale), guides * scale, rows, replace(SETTINGS, **sizes)
+    )
     assert np.quantile(np.linalg.norm(found / scale - expected, axis=2), 0.9) < 0.002

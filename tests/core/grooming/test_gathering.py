@@ -64,7 +64,7 @@ def test_distances_on_a_plane_are_exact_and_on_a_sphere_within_three_percent(bal
 @pytest.mark.parametrize("shape", ["PONYTAIL", "BRAID", "ROPE", "BUN"])
 def test_roots_and_lengths_stay_and_guides_pass_the_tie(ball, shape):
     guides = guides_on(80)
-    after, groups = gathered(ball, guides, [TAIL], replace(SETTINGS, shape=shape))
+    after, groups, _held = gathered(ball, guides, [TAIL], replace(SETTINGS, shape=shape))
     assert (groups == 1).all() if shape in ("PONYTAIL", "BUN") else len(np.unique(groups)) > 1
     assert groups.min() == 1
     np.testing.assert_array_equal(after[:, 0], guides[:, 0])
@@ -86,22 +86,22 @@ def test_roots_and_lengths_stay_and_guides_pass_the_tie(ball, shape):
 
 def test_symmetric_guides_stay_symmetric(ball):
     """Symmetric guides stay symmetric, up to the asymmetry of the mesh's triangles."""
-    after, _groups = gathered(ball, guides_on(80), [TAIL], SETTINGS)
+    after, _groups, _held = gathered(ball, guides_on(80), [TAIL], SETTINGS)
     mirrored = after[:40] * np.float32([-1.0, 1.0, 1.0])
     assert np.quantile(np.linalg.norm(mirrored - after[40:], axis=2), 0.95) < 0.01
 
 
 def test_a_tie_that_moves_by_a_millimeter_moves_no_point_far(ball):
     guides = guides_on(80)
-    after, _groups = gathered(ball, guides, [TAIL], SETTINGS)
-    moved, _groups = gathered(ball, guides, [TAIL + np.array([0.001, 0.0, 0.0])], SETTINGS)
+    after, _groups, _held = gathered(ball, guides, [TAIL], SETTINGS)
+    moved, _groups, _held = gathered(ball, guides, [TAIL + np.array([0.001, 0.0, 0.0])], SETTINGS)
     assert np.linalg.norm(moved - after, axis=2).max() < 0.01
 
 
 def test_guides_go_to_the_nearest_of_several_ties(ball):
     guides = guides_on(80)
     ties = [np.array([[sign * 0.1, 0.0, 0.0], [sign * 0.14, 0.0, -0.02], [sign * 0.14, 0.0, -0.2]]) for sign in (-1, 1)]
-    after, groups = gathered(ball, guides, ties, SETTINGS)
+    after, groups, _held = gathered(ball, guides, ties, SETTINGS)
     is_far = np.abs(guides[:, 0, 0]) > 0.01
     assert (groups > 0).all() and (np.sign(after[is_far, -1, 0]) == np.sign(guides[is_far, 0, 0])).all()
 
@@ -109,7 +109,7 @@ def test_guides_go_to_the_nearest_of_several_ties(ball):
 def test_short_guides_end_on_their_way_and_other_parts_stay(ball):
     guides = guides_on(80)
     short = guides[:, :1] + 0.05 * (guides - guides[:, :1])
-    after, _groups = gathered(ball, short, [TAIL], SETTINGS)
+    after, _groups, _held = gathered(ball, short, [TAIL], SETTINGS)
     np.testing.assert_allclose(segments(after), segments(short), rtol=1e-3)
     assert np.linalg.norm(after, axis=2).max() < RADIUS + 4.0 * SETTINGS.tie_radius
     apart = TriMesh(
@@ -117,7 +117,7 @@ def test_short_guides_end_on_their_way_and_other_parts_stay(ball):
         np.concatenate([ball.triangles, ball.triangles + len(ball.vertices)]),
     )
     both = np.concatenate([guides, guides + np.float32([1.0, 0.0, 0.0])])
-    after, groups = gathered(apart, both, [TAIL], SETTINGS)
+    after, groups, _held = gathered(apart, both, [TAIL], SETTINGS)
     assert (groups[:80] > 0).all() and not groups[80:].any()
     np.testing.assert_array_equal(after[80:], both[80:])
 
@@ -127,8 +127,8 @@ def test_the_shape_does_not_depend_on_the_scale(ball, scale):
     guides, lengths = guides_on(60), ("tie_radius", "tail_radius", "bun_radius", "pitch", "clearance")
     settings = replace(SETTINGS, **{name: scale * getattr(SETTINGS, name) for name in lengths})
     large = TriMesh((scale * ball.vertices).astype(np.float32), ball.triangles)
-    after, _groups = gathered(large, np.float32(scale) * guides, [scale * TAIL], settings)
-    expected, _groups = gathered(ball, guides, [TAIL], SETTINGS)
+    after, _groups, _held = gathered(large, np.float32(scale) * guides, [scale * TAIL], settings)
+    expected, _groups, _held = gathered(ball, guides, [TAIL], SETTINGS)
     assert np.quantile(np.abs(after / scale - expected), 0.95) < 1e-3
 
 

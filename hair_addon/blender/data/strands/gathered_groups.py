@@ -1,33 +1,56 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Groups of gathered guides: an integer attribute of guides, equal for guides of one tie or lock, 0 for all others."""
+"""Gathered guides: attributes of their groups, equal for guides of one tie or lock, and of the part up to the tie."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from . import attributes
 
 NAME = "gathered"
+HELD = "gathered_held"
+_TYPES = ((NAME, "INT"), (HELD, "FLOAT"))
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """groups (G,) int32: 0 for guides that are not gathered; held (G,) float32: part of the length up to the tie."""
+
+    groups: np.ndarray
+    held: np.ndarray
+
+    def __getitem__(self, chosen):
+        return Gathered(self.groups[chosen], self.held[chosen])
 
 
 def read(datablock):
-    """Return (G,) int32: the group of each guide; None if no guide is gathered."""
-    found = attributes.read(datablock, NAME, "INT", "CURVE")
-    return found if found is not None and found.any() else None
+    """Return the `Gathered` of guides; None if no guide is gathered."""
+    groups = attributes.read(datablock, NAME, "INT", "CURVE")
+    if groups is None or not groups.any():
+        return None
+    held = attributes.read(datablock, HELD, "FLOAT", "CURVE")
+    held = np.zeros(len(groups), np.float32) if held is None else np.clip(np.nan_to_num(held), 0.0, 1.0)
+    return Gathered(groups, np.where(groups != 0, held, 0.0).astype(np.float32))
 
 
-def write(datablock, groups):
-    """Store the groups (G,) of guides; the attribute is removed if they are None or all 0."""
-    is_gathered = groups is not None and groups.any()
-    present = datablock.attributes.get(NAME)
-    if present is not None and not (is_gathered and attributes.has(datablock, NAME, "INT", "CURVE")):
-        datablock.attributes.remove(present)
-    if is_gathered:
-        attributes.write(datablock, NAME, "INT", "CURVE", groups.astype(np.int32))
+def write(datablock, gathered):
+    """Store the `Gathered` of guides; the attributes are removed if it is None or no guide is gathered."""
+    is_any = gathered is not None and gathered.groups.any()
+    for name, data_type in _TYPES:
+        present = datablock.attributes.get(name)
+        if present is not None and not (is_any and attributes.has(datablock, name, data_type, "CURVE")):
+            datablock.attributes.remove(present)
+    if is_any:
+        attributes.write(datablock, NAME, "INT", "CURVE", gathered.groups.astype(np.int32))
+        attributes.write(datablock, HELD, "FLOAT", "CURVE", gathered.held.astype(np.float32))
 
 
-def add(datablock, groups):
-    """Store new groups (G,) of guides, 0 for guides that keep their own; groups that are equal before stay apart."""
+def add(datablock, gathered):
+    """Store new groups of guides, which are apart from equal numbers before; guides with 0 keep their own."""
     present = read(datablock)
     if present is None:
-        present = np.zeros(len(groups), np.int32)
-    others = np.where(groups > 0, 0, present)
-    write(datablock, np.where(groups > 0, groups + others.max(initial=0), others))
+        present = Gathered(np.zeros(len(gathered.groups), np.int32), np.zeros(len(gathered.groups), np.float32))
+    is_new = gathered.groups > 0
+    others = np.where(is_new, 0, present.groups)
+    groups = np.where(is_new, gathered.groups + others.max(initial=0), others)
+    write(datablock, Gathered(groups, np.where(is_new, gathered.held, present.held)))

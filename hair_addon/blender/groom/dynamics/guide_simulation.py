@@ -20,7 +20,7 @@ from ....core.params import given
 from ...data import surface_space
 from ...data.simulation import guide_poses, simulated_world, wet_guides
 from ...data.simulation.guide_poses import GuidePose
-from ...data.strands import curves
+from ...data.strands import curves, gathered_groups
 from ...data.surfaces import cage_of
 from ...host import scene_time
 from ...host.caches import Cache
@@ -185,6 +185,7 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
         preferences.device(),
         regions=guide_regions.regions_of(guides, depsgraph),
         wetness=frame.wetness,
+        held=held_of(guides),
     )
     for _ in range(settings.preroll):
         simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)
@@ -196,6 +197,12 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     begun.masks, begun.wetness = masks, frame.wetness
     begun.see(frame)
     return begun
+
+
+def held_of(guides: Curves) -> np.ndarray | None:
+    """Return (G,) float32: the fraction of each guide's length up to its tie; None if none is gathered."""
+    gathered = gathered_groups.read(guides)
+    return None if gathered is None else gathered.held
 
 
 def read(

@@ -27,10 +27,10 @@ def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) ->
     lines = [] if segments is None else _lines(segments)
     mesh, after = guides.surface.posed_mesh, guides.points.copy()
     barrier = outside_guides.prepared(guides, 0.0, ())
-    groups = np.zeros(len(guides.counts), np.int32)
+    groups, held = np.zeros(len(guides.counts), np.int32), np.zeros(len(guides.counts), np.float32)
     for chosen, places in guide_tools.to_shape(guides):
-        posed, found = ties.gathering.gathered(mesh, guides.posed_of(chosen, places), lines, settings)
-        groups[chosen] = found
+        posed, found, parts = ties.gathering.gathered(mesh, guides.posed_of(chosen, places), lines, settings)
+        groups[chosen], held[chosen] = found, parts
         laid = outside_guides.pushed_posed(barrier, posed)
         at_rest = guides.carried_back(laid, chosen)
         weights = guides.weights[chosen]
@@ -41,7 +41,8 @@ def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) ->
     if not groups.any():
         raise HairError("No guides were gathered, because the ties are on another part of the surface: move the curve.")
     changed = guide_tools.write_shapes(guides, after)
-    gathered_groups.add(datablock, np.where(guides.weights >= _MEMBER, groups, 0))
+    groups = np.where(guides.weights >= _MEMBER, groups, 0)
+    gathered_groups.add(datablock, gathered_groups.Gathered(groups, held))
     _part_hair(datablock)
     return changed
 

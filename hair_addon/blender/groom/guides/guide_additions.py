@@ -75,23 +75,26 @@ def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) ->
         additions.append((images(guides.points[guides.of_count(int(count), sources)]), sources, image_roots))
         if before is not None:
             layers.append(_mirrored_layers(guides.surface, before.layers, sources, images))
-    groups = gathered_groups.read(datablock)
+    gathered = gathered_groups.read(datablock)
     write(guides, additions, found.removed, before, layers)
-    if groups is not None:
-        _part_images(datablock, groups, np.concatenate([sources for _points, sources, _roots in additions]))
+    if gathered is not None:
+        _part_images(datablock, gathered, np.concatenate([sources for _points, sources, _roots in additions]))
     return len(found.sources)
 
 
-def _part_images(datablock, groups, sources):
+def _part_images(datablock, gathered, sources):
     """Give images of gathered guides groups of their own, unless the ties of these gather both sides.
 
-    groups (G,): of all guides before; sources (M,): guides whose images are the last ones now.
+    gathered: of all guides before; sources (M,): guides whose images are the last ones now.
     """
+    groups = gathered.groups
     shares = np.bincount(groups[sources], minlength=groups.max() + 1) / np.maximum(np.bincount(groups), 1)
     is_apart = (groups[sources] > 0) & (np.abs(shares[groups[sources]] - 0.5) > _ASIDE)
     images = np.zeros(len(datablock.curves), np.int32)
     images[len(images) - len(sources) :][is_apart] = groups[sources][is_apart]
-    gathered_groups.add(datablock, images)
+    held = np.zeros(len(images), np.float32)
+    held[len(images) - len(sources) :] = gathered.held[sources]
+    gathered_groups.add(datablock, gathered_groups.Gathered(images, held))
 
 
 def write(

@@ -39,7 +39,8 @@
     largest = higher_of(largest, dot(turn, turn));
     UNROLLED for (int k = 0; k < 6; ++k) {
       const lanes kept = get(lambda, 6 * j + k);
-      put(lambda, 6 * j + k, stepping ? (is_first ? lanes(0.0f) : kept) + z[k] : kept);
+      const lanes value = stepping ? (is_first ? lanes(0.0f) : kept) + z[k] : kept;
+      put(lambda, 6 * j + k, pins > lanes(static_cast<float>(j)) ? lanes(0.0f) : value);
     }
     const vector pull = shear * (1.0f / get(length, j));
     vector step = (pull - pull_after) * get(mobility, j + 1);

@@ -63,13 +63,14 @@ const auto changed_contacts = [&](ints asked) {
     const vector n = get_vector(contact(i), 0);
     const lanes a = get(contact(i), 3);
     const ints was_pressed = dot(n, n) > 0.5f;
-    is_changed = is_changed | (was_pressed != now.is_pressed) | (abs_of(now.a - a) > CHANGE * a);
+    is_changed = is_changed | (is_free(i) & ((was_pressed != now.is_pressed) | (abs_of(now.a - a) > CHANGE * a)));
   }
   return ints(asked & is_changed);
 };
 // Updates the contacts and points of some lanes from λ.
-const auto put_contacts = [&](bool is_first, float carried, ints asked) {
+const auto put_contacts = [&](bool is_first, float carried, ints lanes_asked) {
   for (int i = pinned + 1; i <= segment_count; ++i) {
+    const ints asked = lanes_asked & is_free(i);
     const touch now = touch_at(i, is_first, carried);
     const vector n = get_vector(contact(i), 0);
     const vector put_n = chosen(asked, now.n, n);

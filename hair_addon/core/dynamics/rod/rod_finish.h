@@ -12,7 +12,8 @@ if (has_planes && has_found) {
   ints is_inside = 0;
   for (int i = pinned + 1; i <= segment_count; ++i) {
     const float* const found = found_rows + size_t(8 * i) * STRIDE;
-    is_inside = is_inside | (get(found, 3) - dot(get_vector(found, 0), get_vector(x, i)) > INSIDE * get(length, i - 1));
+    const lanes inside = get(found, 3) - dot(get_vector(found, 0), get_vector(x, i));
+    is_inside = is_inside | (is_free(i) & (inside > INSIDE * get(length, i - 1)));
   }
   if (any_of(is_inside)) {
     is_pinched = repair(is_inside, plane_rows, found_rows);
@@ -32,7 +33,7 @@ for (int i = 0; i <= segment_count; ++i) {
     const float* plane = last_plane_rows + size_t(8 * i) * STRIDE;
     const vector n = get_vector(plane, 0);
     const lanes inside = dot(n, point) - get(plane, 3);
-    point = chosen((inside < 0.0f) & (is_pinched == 0), point - n * inside, point);
+    point = chosen((inside < 0.0f) & (is_pinched == 0) & is_free(i), point - n * inside, point);
     put_vector(x, i, point);
   }
   // Divided by h: the rounding error of h · (1 / h) would grow with each substep.

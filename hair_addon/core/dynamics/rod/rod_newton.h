@@ -50,7 +50,9 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
     moment = next_moment;
     // A lighter frame would be so stiff that single precision could not resolve its motion relative to its neighbors.
     const lanes least_inertia = LEAST_INERTIA * h * h * (1.0f + damping) / compliance;
-    const lanes turning = 1.0f / (higher_of(get(inertia, j), least_inertia) + geometric);
+    const lanes turning = pins > lanes(static_cast<float>(j))
+                              ? lanes(0.0f)
+                              : lanes(1.0f / (higher_of(get(inertia, j), least_inertia) + geometric));
     put(kept(j, TURNING), 0, turning);
 
     const vector d = direction_of(frame_b);

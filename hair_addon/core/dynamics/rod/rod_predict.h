@@ -45,8 +45,12 @@ for (int i = 0; i <= segment_count; ++i) {
     added += h * h * strength + critical;
   }
   const lanes share = 1.0f / (1.0f + added);
+  const auto is_held = pins >= lanes(static_cast<float>(i));
   put_vector(x, i, point + (step + force * lanes(h * h)) * share);
-  put(mobility, i, get(inverse_mass, i) * share);
+  put(mobility, i, is_held ? lanes(0.0f) : get(inverse_mass, i) * share);
+  if (any_of(is_held)) {
+    put_vector(x, i, chosen(is_held, root + rotated(root_frame, get_vector(groom, i)), get_vector(x, i)));
+  }
 }
 for (int j = 0; j < segment_count; ++j) {
   if (j + 1 < segment_count) {
@@ -57,4 +61,8 @@ for (int j = 0; j < segment_count; ++j) {
   put_frame(q_before, j, frame);
   const vector turn = get_vector(spin, j) * lanes(h);
   put_frame(q, j, j < pinned ? times(root_frame, get_frame(groom_frame, j)) : turned_by(turn, frame));
+  const auto is_held = pins > lanes(static_cast<float>(j));
+  if (any_of(is_held)) {
+    put_frame(q, j, chosen_rotation(is_held, times(root_frame, get_frame(groom_frame, j)), get_frame(q, j)));
+  }
 }

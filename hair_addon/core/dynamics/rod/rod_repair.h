@@ -19,21 +19,22 @@ const auto repair = [&](ints asked, const float* planes, const float* others) {
     const lanes none = lanes(0.0f), alone = is_in ? inside : none, alone_other = is_in_other ? inside_other : none;
     const lanes by = is_both ? (inside - along * inside_other) / apart : alone;
     const lanes by_other = is_both ? (inside_other - along * inside) / apart : alone_other;
-    put_vector(x, i, chosen(moving & (is_in | is_in_other), point + n * by + m * by_other, point));
+    put_vector(x, i, chosen(moving & (is_in | is_in_other) & is_free(i), point + n * by + m * by_other, point));
   };
   ints is_off = 0;
   const auto set_length = [&](int i) {  // of the segment before point i
     const vector from = get_vector(x, i - 1), to = get_vector(x, i), along = to - from;
     const lanes size = exact_sqrt_of(dot(along, along));
     const lanes wanted = get(length, i - 1);
-    is_off = is_off | (abs_of(size - wanted) > INSIDE * wanted);
+    is_off = is_off | (is_free(i) & (abs_of(size - wanted) > INSIDE * wanted));
     const vector change = along * ((wanted - size) / higher_of(size, wanted * 0.01f));
     if (i - 1 <= pinned) {
-      put_vector(x, i, chosen(moving, to + change, to));
+      put_vector(x, i, chosen(moving & is_free(i), to + change, to));
       return;
     }
-    put_vector(x, i - 1, chosen(moving, from - change * lanes(0.5f), from));
-    put_vector(x, i, chosen(moving, to + change * lanes(0.5f), to));
+    const lanes share = is_free(i - 1) ? lanes(0.5f) : lanes(1.0f);
+    put_vector(x, i - 1, chosen(moving & is_free(i - 1), from - change * lanes(0.5f), from));
+    put_vector(x, i, chosen(moving & is_free(i), to + change * share, to));
   };
   for (int sweep = 0; sweep < SWEEPS; ++sweep) {
     is_off = 0;
@@ -60,6 +61,7 @@ const auto bound_lengths = [&](ints asked) {
     const vector from = get_vector(x, i - 1), to = get_vector(x, i), along = to - from;
     const lanes size = exact_sqrt_of(dot(along, along)), wanted = get(length, i - 1);
     const lanes bounded = clamped(size, wanted * (1.0f - PINCHED), wanted * (1.0f + PINCHED));
-    put_vector(x, i, chosen(asked & (bounded != size), from + along * (bounded / higher_of(size, wanted * 0.01f)), to));
+    const vector reached = from + along * (bounded / higher_of(size, wanted * 0.01f));
+    put_vector(x, i, chosen(asked & (bounded != size) & is_free(i), reached, to));
   }
 };

@@ -30,6 +30,7 @@
 //     inverse_masses                       M + 1 rows
 //     inertias                             M rows
 //     grooms, groom_frames                 3 (M + 1), 4 M rows: the groom in the root's frame
+//     pins                                 1 row: points from the root that follow the surface, if more than `pinned`
 //     drag_rates                           3 rows: the rate of drag of slow air [1/s]; by v [1/m], by ∛v [1/s ∛(s/m)]
 //     roots                                14 rows: position, frame at the frame's start; position, frame at its end
 //     positions_before, predictions        3 (M + 1) rows each: between stages
@@ -133,6 +134,8 @@ const float *const groom = rows_of(strands.grooms), *const groom_frame = rows_of
 float *const x_before = rows_of(strands.positions_before), *const q_before = rows_of(strands.frames_before);
 float* const predicted_rows = rows_of(strands.predictions);
 float *const mobility = rows_of(strands.mobilities), *const resets = rows_of(strands.resets);
+const lanes pins = get(rows_of(strands.pins), 0);
+const auto is_free = [&](int i) { return pins < lanes(static_cast<float>(i)); };  // of a point after `pinned`
 float* const again = rows_of(strands.solved_again);
 const float *const root_rows = rows_of(strands.roots), *const found_rows = rows_of(around.found_planes);
 float* const plane_rows = rows_of(around.planes);
@@ -192,12 +195,12 @@ for (int substep = first; substep < end; ++substep) {
       float* plane = plane_rows + size_t(8 * i) * STRIDE;
       if (!is_again) {
         const vector n = get_vector(plane, 0);
-        touches = touches | (dot(n, n) > 0.5f);
+        touches = touches | (is_free(i) & (dot(n, n) > 0.5f));
         continue;
       }
       const float* found = found_rows + size_t(8 * i) * STRIDE;
       const lanes inside = get(found, 3) - dot(get_vector(found, 0), get_vector(x, i));
-      const ints is_inside = inside > INSIDE * get(length, i - 1);
+      const ints is_inside = is_free(i) & (inside > INSIDE * get(length, i - 1));
       if (!any_of(is_inside)) continue;
       touches = touches | is_inside;
       for (int k = 0; k < 8; ++k) put(plane, k, is_inside ? get(found, k) : get(plane, k));

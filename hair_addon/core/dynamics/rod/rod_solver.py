@@ -76,6 +76,7 @@ class RodArrays:
     grooms: wp.array3d[float]  # 3 (M + 1), in the root's frame [m]
     groom_frames: wp.array3d[float]  # 4 M, in the root's frame
     drag_rates: wp.array3d[float]  # 3: of slow air [1/s], per speed across [1/m], and per cube root of speed
+    pins: wp.array3d[float]  # 1: number of points after the root that follow the surface, if above `pinned`
     # Surface.
     roots: wp.array3d[float]  # ROOT_ROWS
     # Between the stages of a substep.
@@ -104,6 +105,7 @@ ROWS = {
     "grooms": (0, 3),
     "groom_frames": (4, 0),
     "drag_rates": None,
+    "pins": None,
     "roots": None,
     "positions_before": (0, 3),
     "predictions": (0, 3),
@@ -112,7 +114,7 @@ ROWS = {
     "resets": None,
     "solved_again": None,
 }
-_FIXED_ROWS = {"drag_rates": 3, "roots": ROOT_ROWS, "resets": 1, "solved_again": 1}
+_FIXED_ROWS = {"drag_rates": 3, "pins": 1, "roots": ROOT_ROWS, "resets": 1, "solved_again": 1}
 
 
 def row_count(name: str, segment_count: int) -> int:

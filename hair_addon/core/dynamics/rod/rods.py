@@ -144,6 +144,17 @@ class Rods:
         self._put("grooms", rotations.rotated(back, groom - groom[:, :1]))
         self._put("groom_frames", rotations.product(back, rest.frames))
 
+    def hold(self, fractions: np.ndarray) -> None:
+        """Let the first fraction (S,) of each strand, in [0, 1], only follow the surface.
+
+        The held part is rigid up to there: one more segment is held, as the shape between vertices depends on both.
+        """
+        require_count("fractions", np.size(fractions), self.strand_count)
+        if not (np.min(fractions) >= 0.0 and np.max(fractions) <= 1.0):
+            raise HairError("The held fraction of simulated strands must be from 0 to 1.")
+        pins = np.minimum(np.ceil(np.asarray(fractions) * self.segment_count) + 1.0, self.segment_count)
+        self._put("pins", np.where(np.asarray(fractions) > 0.0, pins, 0.0)[:, None])
+
     def reset(self, positions: np.ndarray | None = None, turns: np.ndarray | None = None) -> None:
         """Reset strands to rest in their groom; positions and turns: as in `move_roots`, None for the groom's own."""
         roots = self._root_rows(self._roots if positions is None else positions, turns)

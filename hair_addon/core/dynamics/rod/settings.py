@@ -103,6 +103,9 @@ class DynamicsSettings(Settings):
     pinned: float = param(
         0.0, "Fraction of each guide, from the root, that only follows the surface", low=0.0, high=1.0, subtype="FACTOR"
     )
+    holds_ties: bool = param(
+        True, "Let gathered hair only follow the surface up to its tie; behind the tie it swings", label="Hold ties"
+    )
     collides_with_surface: bool = param(
         True, "Keep the hair outside the surface it grows on", label="Collide with surface"
     )

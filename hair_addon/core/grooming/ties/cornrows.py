@@ -44,8 +44,9 @@ def braid_line(points: np.ndarray, normals: np.ndarray, reach: float, settings: 
 
 def ways_along(
     ways: np.ndarray, ranks: np.ndarray, line: tie_tails.TailLine, reach: float, settings: GatherSettings
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ways (S, M, 3) [m] of guides along a braid for `reach` [m], and the locks (S,) that they join.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the ways (S, M, 3) [m] of guides along a braid for `reach` [m], the locks (S,) that they join, and the
+    lengths (S,) [m] from there to the end of the row.
 
     ways (S, K, 3): the ways to the braid; ranks (S,) in [0, 1]: of their lengths, from the shortest on.
     """
@@ -64,7 +65,11 @@ def ways_along(
     along = joined[:, None] + np.linspace(0.0, reach, _SAMPLES)
     centers, sides, ups = line.at(along)
     offsets = tie_tails.offsets(line, angles, ranks, along, locks, settings)
-    return centers + offsets[..., :1] * sides + offsets[..., 1:] * ups, locks
+    return (
+        centers + offsets[..., :1] * sides + offsets[..., 1:] * ups,
+        locks,
+        np.maximum(line.along[_SAMPLES - 1] - joined, 0.0),
+    )
 
 
 def _nearest(line, points):

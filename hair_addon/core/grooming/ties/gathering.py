@@ -33,11 +33,11 @@ _BULGE = 0.25  # height of loose hair relative to its way
 
 def gathered(
     mesh: TriMesh, points: np.ndarray, lines: Sequence[np.ndarray], settings: GatherSettings
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return (points (S, P, 3) float32 [m] of gathered guides, groups (S,) int32).
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (points (S, P, 3) float32 [m] of gathered guides, groups (S,) int32, held (S,) float32).
 
     Groups number the guides that go through one tie, or form one lock of a rope, braid or cornrow, from 1; guides that
-    are not gathered have 0.
+    are not gathered have 0. held: the fraction of a guide's length up to its tie, or to the end of its row or bun.
 
     mesh: a checked `TriMesh`, the visible surface; points (S, P, 3) [m]; lines: (K, 3) [m] each, from the tie on.
     Guides on parts of the surface without a tie do not change. Raises `HairError` for lines without length.
@@ -54,13 +54,15 @@ def gathered(
     nearest = distances.argmin(axis=0)
     is_gathered = np.isfinite(distances.min(axis=0))
     groups = np.zeros(len(points), np.int32)
+    held = np.zeros(len(points), np.float32)
     lock_count = tie_tails.LOCKS.get(settings.shape, 1)
     for place, (line, field) in enumerate(zip(lines, fields, strict=True)):
         rows = np.flatnonzero(is_gathered & (nearest == place))
         if len(rows) and points.shape[1] > 1:
-            after[rows], locks = _at_line(mesh, query, points[rows], line, field, settings)
+            after[rows], locks, ends = _at_line(mesh, query, points[rows], line, field, settings)
             groups[rows] = 1 + place * lock_count + locks
-    return after, groups
+            held[rows] = np.clip(ends / np.maximum(split(points[rows])[1].sum(axis=1), 1e-30), 0.0, 1.0)
+    return after, groups, held
 
 
 def _checked(line):
@@ -84,7 +86,7 @@ def _field(mesh, query, line, settings):
 
 
 def _at_line(mesh, query, points, line, field, settings):
-    """Return the guides (S, P, 3) that one line gathers, and their locks (S,)."""
+    """Return the guides (S, P, 3) that one line gathers, their locks (S,), and the lengths (S,) up to the tie [m]."""
     lengths = split(points)[1]
     reach = float(lengths.sum(axis=1).max())
     ways, apart, normals = _traced(mesh, query, points[:, 0], field, settings)
@@ -93,12 +95,19 @@ def _at_line(mesh, query, points, line, field, settings):
     ways += _heights(apart, settings)[..., None] * normals
     if settings.shape == "CORNROWS":
         braid = cornrows.braid_line(*cornrows.on_surface(query, mesh, line), reach, settings)
-        behind, locks = cornrows.ways_along(ways, ranks, braid, reach, settings)
+        behind, locks, left = cornrows.ways_along(ways, ranks, braid, reach, settings)
+        ends = _lengths(np.concatenate([ways, behind[:, :1]], axis=1)) + left
     else:
+        ends = np.full(len(ways), np.inf) if settings.shape == "BUN" else _lengths(ways)
         behind, locks = _behind_tie(mesh, query, ways, ranks, line, reach, settings)
     ways = np.concatenate([ways, behind], axis=1)
     ways[:, 0] = points[:, 0]
-    return joined(points, split(_walked(ways, lengths))[0], lengths), locks
+    return joined(points, split(_walked(ways, lengths))[0], lengths), locks, ends
+
+
+def _lengths(ways):
+    """Return the lengths (S,) [m] of ways (S, K, 3)."""
+    return np.linalg.norm(np.diff(ways, axis=1), axis=2).sum(axis=1)
 
 
 def _behind_tie(mesh, query, ways, ranks, line, reach, settings):
