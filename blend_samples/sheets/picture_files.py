@@ -23,7 +23,7 @@ FEW_BITS = 0xF8  # the same of small pictures
 # Settings of files, as small as they get without a difference to the eye.
 _FORMATS = {
     ".png": {"file_format": "PNG", "color_depth": "8", "compression": 100},
-    ".jpg": {"file_format": "JPEG", "quality": 90},
+    ".jpg": {"file_format": "JPEG", "quality": 85},
 }
 
 
