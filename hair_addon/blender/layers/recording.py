@@ -50,17 +50,19 @@ def update(guides: Curves, depsgraph: Depsgraph) -> bool:
     if not len(state.layers) or attributes.is_from_library(guides):
         return False
     points = curves.read_points(guides)
-    is_combed = is_edited(guides, points)
+    fingerprint = geometry.fingerprint.fingerprint(points)
+    is_combed = state.layered != fingerprint
     if not is_combed and not layer_items.is_reweighed(state):
         return False
     had_status = bool(state.status)
     state.status = ""
-    layers, shape = read(guides, depsgraph, is_shown=True), None
+    layers, shown = read(guides, depsgraph, is_shown=True), None
     if is_combed and np.isfinite(points).all():
         shape = _shape(guides, layers)
         is_other = guide_layers.is_other(layers, points, shape)
-        before, (layers, refusal) = layers, _recorded(layers, state, points, shape)
+        before, (layers, refusal) = layers, _recorded(layers, state, points, shape, is_other)
         shape = guide_layers.composed_again(layers, shape, is_other)
+        shown = _shown(points, shape, layers.counts, guide_layers.is_other(layers, points, shape, is_other))
         if had_status:
             read(guides, depsgraph)  # reports masks that are still missing
         state.status = " ".join(sentence for sentence in (refusal, state.status) if sentence)
@@ -69,7 +71,21 @@ def update(guides: Curves, depsgraph: Depsgraph) -> bool:
         layers = read(guides, depsgraph)
         note_shown(guides, depsgraph)
         return show(guides, guide_layers.composed(layers))
-    return show_layers(guides, layers, shape)
+    if shown is None:
+        return show_layers(guides, layers)
+    if shown is points:
+        _note(guides, points, fingerprint)
+        return False
+    return show(guides, shown)
+
+
+def _shown(points, shape, counts, is_other):
+    """Return points (N, 3) with those of a shape (N, 3) for chosen guides (G,); `points` itself if none is chosen."""
+    if not is_other.any():
+        return points
+    shown, of_chosen = points.copy(), np.repeat(is_other, counts)
+    shown[of_chosen] = shape[of_chosen]
+    return shown
 
 
 def _write(guides, layers, before):
@@ -88,8 +104,11 @@ def _shape(guides, layers):
     return shape if shape is not None and len(shape) == len(layers.base) else guide_layers.composed(layers)
 
 
-def _recorded(layers, state, points, shape):
-    """Return (`GuideLayers` with edited points in the active layer, refusal or an empty text)."""
+def _recorded(layers, state, points, shape, is_other):
+    """Return (`GuideLayers` with edited points in the active layer, refusal or an empty text).
+
+    is_other: (G,), guides whose points differ from the shape (N, 3).
+    """
     refusal, place = "", state.active_layer
     try:
         layer_items.require_combable(state)
@@ -101,17 +120,13 @@ def _recorded(layers, state, points, shape):
         weights[0] = 0.0
         found, _changed = guide_layers.recorded(layers.weighted(weights), 0, points)
         return replace(found, weights=layers.weights), refusal
-    return guide_layers.recorded(layers, place, points, shape, in_place=True)[0], refusal
+    return guide_layers.recorded(layers, place, points, shape, is_other, in_place=True)[0], refusal
 
 
-def show_layers(guides: Curves, layers: GuideLayers, shape: np.ndarray | None = None) -> bool:
-    """Write what layers give to guides that differ from it; others keep their exact points. Returns as `show`.
-
-    shape: (N, 3) of the composed points if they are known.
-    """
-    shape, points = guide_layers.composed(layers) if shape is None else shape, curves.read_points(guides)
-    is_other = np.repeat(guide_layers.is_other(layers, points, shape), layers.counts)
-    return show(guides, np.where(is_other[:, None], shape, points))
+def show_layers(guides: Curves, layers: GuideLayers) -> bool:
+    """Write what layers give to guides that differ from it; others keep their exact points. Returns as `show`."""
+    shape, points = guide_layers.composed(layers), curves.read_points(guides)
+    return show(guides, _shown(points, shape, layers.counts, guide_layers.is_other(layers, points, shape)))
 
 
 def show(guides: Curves, shape: np.ndarray) -> bool:
@@ -126,9 +141,15 @@ def show(guides: Curves, shape: np.ndarray) -> bool:
 
 def note_shape(guides: Curves) -> None:
     """Note that layers give the present points; settings of guides still apply to the base unless it was edited."""
-    state, points = guides.vellus, curves.read_points(guides)
-    state.layered = geometry.fingerprint.fingerprint(points)
-    shape_cache.keep(state.layered, points)
+    points = curves.read_points(guides)
+    _note(guides, points, geometry.fingerprint.fingerprint(points))
+
+
+def _note(guides, points, fingerprint):
+    """Note that layers give the present points (N, 3) with a fingerprint."""
+    state = guides.vellus
+    state.layered = fingerprint
+    shape_cache.keep(fingerprint, points)
     if state.is_base_grown and not curves.is_hand_made(guides):
         state.written = state.layered
 

@@ -160,11 +160,34 @@ def test_recording_with_the_known_shape_is_the_same(combed):
     for name in ("base", "turns", "stretches"):
         assert np.array_equal(getattr(again, name), getattr(same, name))
     is_other = guide_layers.is_other(layers, edited, shape)
+    known, _changed = guide_layers.recorded(layers, 1, edited, shape, is_other)
+    assert np.array_equal(known.turns, again.turns) and np.array_equal(known.base, again.base)
     full = guide_layers.composed(again)
     partly = guide_layers.composed_again(again, shape, is_other)
     assert 0 < is_other.sum() < len(is_other)
     assert np.array_equal(partly[np.repeat(is_other, layers.counts)], full[np.repeat(is_other, layers.counts)])
     assert np.array_equal(partly[~np.repeat(is_other, layers.counts)], shape[~np.repeat(is_other, layers.counts)])
+
+
+def test_guides_are_other_beyond_two_millionths_of_their_extent(combed):
+    """Guides differ by more than rounding as a loop over guides finds; of some guides only these are compared."""
+    layers, points = combed
+    rng = np.random.default_rng(3)
+    starts = curve_offsets(layers.counts)
+    change = np.repeat(10.0 ** rng.uniform(-7.5, -4.5, len(layers.counts)), layers.counts)
+    change *= np.repeat(rng.random(len(layers.counts)) < 0.7, layers.counts)
+    edited = points + change.astype(np.float32)[:, None]
+    edited[starts[3]] = np.nan
+    expected = [
+        not np.abs(edited[start:end] - points[start:end]).max() <= np.float32(2e-6) * np.abs(points[start:end]).max()
+        for start, end in pairwise(starts)
+    ]
+    assert 0 < np.sum(expected) < len(expected)
+    assert np.array_equal(guide_layers.is_other(layers, edited, points), expected)
+    some = rng.random(len(expected)) < 0.5
+    assert np.array_equal(guide_layers.is_other(layers, edited, points, some), expected & some)
+    nothing = np.zeros(len(expected), bool)
+    assert not guide_layers.is_other(layers, edited, points, nothing).any()
 
 
 def test_zero_weights_are_the_base_bit_for_bit(combed):

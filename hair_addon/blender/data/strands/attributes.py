@@ -109,8 +109,9 @@ def read(curves, name, data_type, domain):
 
 
 def read_into(curves, name, data_type, domain, out):
-    """Read float values into a contiguous array, which stays unchanged without an attribute of this type and domain."""
+    """Read float values into a contiguous array, zeros without an attribute of this type and domain."""
     if not has(curves, name, data_type, domain):
+        out[...] = 0.0
         return
     attribute = curves.attributes[name]
     if len(attribute.data):

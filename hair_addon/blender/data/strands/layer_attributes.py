@@ -29,17 +29,22 @@ def read(datablock, identities, weights):
 
     base = values(_BASE, "FLOAT_VECTOR", "POINT", (point_count, 3))
     axes = (values(name, "FLOAT_VECTOR", "CURVE", (len(counts), 3)) for name in (_NORMAL, _TANGENT))
-    turns = np.zeros((len(identities), point_count, 4), np.float32)
-    stretches = np.zeros((len(identities), point_count), np.float32)
+    turns = np.empty((len(identities), point_count, 4), np.float32)
+    stretches = np.empty((len(identities), point_count), np.float32)
     for place, identity in enumerate(identities):
         attributes.read_into(datablock, _turn(identity), "QUATERNION", "POINT", turns[place])
         attributes.read_into(datablock, _stretch(identity), "FLOAT", "POINT", stretches[place])
+        # Each layer is checked while it is in the processor's cache.
+        for values_of_layer in (turns[place], stretches[place]):
+            finite = _finite(values_of_layer)
+            if finite is not values_of_layer:
+                values_of_layer[...] = finite
     return GuideLayers(
         base,
         counts,
         *axes,
-        _finite(turns),
-        _finite(stretches),
+        turns,
+        stretches,
         np.asarray(weights, np.float32).reshape(len(identities), len(counts)),
     )
 
