@@ -179,26 +179,26 @@ def follow_images(target, depsgraph):
 
 
 def _mapped():
-    """Return the hair and guides whose settings vary by maps; combed guides do not change with their settings."""
-    found = [datablock for datablock in bpy.data.hair_curves if len(datablock.vellus.maps)]
-    return [one for one in found if one.vellus.kind == "HAIR" or not curves.is_combed(one)]
+    """Return [(hair or guides, map)] of maps with an effect: combed guides do not change by maps of their growth."""
+    return [(one, item) for one in bpy.data.hair_curves for item in one.vellus.maps if _has_effect(one, item)]
+
+
+def _has_effect(mapped, item):
+    return mapped.vellus.kind == "HAIR" or item.setting.startswith("dynamics.") or not curves.is_combed(mapped)
 
 
 def follow_mapped_images(images):
     """Mark hair whose settings vary by any of some images, which may have been painted."""
-    for datablock in _mapped() if images else ():
-        for item in datablock.vellus.maps:
-            if item.kind == "IMAGE" and item.image in images:
-                marks.mark_changed_map(item)
+    for _mapped_curves, item in _mapped() if images else ():
+        if item.kind == "IMAGE" and item.image in images:
+            marks.mark_changed_map(item)
 
 
 def follow_mapped_surfaces(surfaces):
     """Mark hair whose settings vary by weights or attributes of any of some surfaces, which may have been painted."""
-    for datablock in _mapped() if surfaces else ():
-        if datablock.surface in surfaces:
-            for item in datablock.vellus.maps:
-                if item.kind in {"GROUP", "ATTRIBUTE", "IMAGE"}:
-                    marks.mark_changed_map(item)
+    for mapped, item in _mapped() if surfaces else ():
+        if mapped.surface in surfaces and item.kind in {"GROUP", "ATTRIBUTE", "IMAGE"}:
+            marks.mark_changed_map(item)
 
 
 def follow_ramps():
@@ -221,7 +221,7 @@ def follow_ramps():
             key = ramp_nodes.text_of(item.ramp_tree)
             if key != item.ramp_key and hair.is_editable:
                 item.ramp_key = key
-                if state.kind == "HAIR" or not curves.is_combed(hair):
+                if _has_effect(hair, item):
                     marks.mark_changed_map(item)
 
 

@@ -17,8 +17,10 @@ def mark_shading(group, _context):
 
 
 def mark_map(item, context):
-    """Mark what the map of a setting changes: the shading, or the strands."""
-    if item.setting.startswith("look."):
+    """Mark what the map of a setting changes: the shading, the simulation, or the strands."""
+    if item.setting.startswith("dynamics."):
+        mark_dynamics(item, context)
+    elif item.setting.startswith("look."):
         mark_shading(item, context)
     elif item.setting:
         mark_geometry(item, context)
@@ -27,7 +29,9 @@ def mark_map(item, context):
 def mark_changed_map(item):
     """Mark what a map changes whose source has changed, within the update that reports the source."""
     state = item.id_data.vellus
-    if item.setting.startswith("look."):
+    if item.setting.startswith("dynamics."):
+        state.is_dynamics_stale = True
+    elif item.setting.startswith("look."):
         state.is_shading_stale = True
     elif item.setting:
         state.is_stale = True

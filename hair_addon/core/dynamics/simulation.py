@@ -83,13 +83,15 @@ class Simulation:
         regions: np.ndarray | None = None,
         wetness: np.ndarray | None = None,
         held: np.ndarray | None = None,
+        stiffness: np.ndarray | None = None,
     ) -> None:
         """groom: (G, P, 3) [m], combed guides on the surface at rest; pose: of the guides' roots in the first frame.
 
         regions: (G,) integers from 0; guides of different regions do not interact; None for one region. wetness: (G,)
         of each guide in [0, 1], None for the wetness of the settings. held: (G,) in [0, 1], the fraction of each
-        guide's length, from the root, that only follows the surface, up to a tie; None for none. Raises `HairError` for
-        non-finite values or counts that do not match.
+        guide's length, from the root, that only follows the surface, up to a tie; None for none. stiffness: (G,) bend
+        stiffness of each guide, None for that of the settings. Raises `HairError` for non-finite values or counts that
+        do not match.
         """
         self.settings, self.pose, self.world = settings, pose, world
         self.substeps = self.required_substeps = 0  # number in the last frame, and number that its motion requires
@@ -100,6 +102,7 @@ class Simulation:
         self._regions = self._checked_regions(regions)
         self._wetness = self._checked_wetness(wetness)
         self._held = np.zeros(len(groom)) if held is None else np.asarray(held, np.float64)
+        self._stiffness = self._checked_stiffness(stiffness)
         combed = self._combed()
         vertices = detail.vertices_of(combed, settings.vertex_count)
         self._material, rest = self._shapes(vertices)
@@ -147,6 +150,13 @@ class Simulation:
                 raise HairError("The wetness of guides must be from 0 to 1.")
         return wetness
 
+    def _checked_stiffness(self, stiffness):
+        if stiffness is not None:
+            require_count("stiffnesses", len(stiffness), len(self._groom))
+            if not (np.isfinite(stiffness).all() and np.min(stiffness) > 0.0):
+                raise HairError("The stiffness of guides must be positive.")
+        return stiffness
+
     def _checked_regions(self, regions):
         count = len(self._groom)
         regions = np.zeros(count, np.int32) if regions is None else np.asarray(regions, np.int32)
@@ -159,24 +169,30 @@ class Simulation:
 
     def _shapes(self, vertices):
         """Return (`Material`, `RestShape`) of vertices."""
-        material = material_of(self.settings, np.linalg.norm(np.diff(vertices, axis=1), axis=2), self._wetness)
+        lengths = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
+        material = material_of(self.settings, lengths, self._wetness, self._stiffness)
         if not self.settings.sag_free:
             return material, combed_shape(vertices)
         x, y, z = (self.settings.gravity * component for component in self.world.gravity)
         return material, sag_free.sag_free(vertices, material, (x, y, z)).rest
 
     def change(
-        self, settings: DynamicsSettings, groom: np.ndarray | None = None, wetness: np.ndarray | None = None
+        self,
+        settings: DynamicsSettings,
+        groom: np.ndarray | None = None,
+        wetness: np.ndarray | None = None,
+        stiffness: np.ndarray | None = None,
     ) -> None:
-        """Continue with other settings, wetness and groom, with the same number of vertices.
+        """Continue with other settings, wetness, stiffness and groom, with the same number of vertices.
 
-        groom: None for no change; wetness: (G,), None for the wetness of the settings. Raises `HairError` for another
-        number of vertices.
+        groom: None for no change; wetness, stiffness: (G,), None for those of the settings. Raises `HairError` for
+        another number of vertices.
         """
+        stiffness = self._checked_stiffness(stiffness)
         wetness = self._checked_wetness(wetness)
         if settings.vertex_count != self.settings.vertex_count:
             raise HairError("A change of the number of points requires a new simulation: play from the start.")
-        self.settings, self._wetness = settings, wetness
+        self.settings, self._wetness, self._stiffness = settings, wetness, stiffness
         if groom is not None:
             require_count("guides", len(groom), len(self._groom))
             self._groom = self._checked(groom)

@@ -4,6 +4,7 @@
 from functools import cache
 from typing import Any
 
+from ..dynamics.rod.settings import DynamicsSettings
 from ..errors import HairError
 from ..grooming.groom import GuideSettings, HairSettings
 from ..params import Param, Settings, declared
@@ -13,7 +14,7 @@ from ..styling.base import StyleSettings
 from . import map_settings, ramp_text
 
 # {first part of a setting's name: class of settings}
-SECTIONS = {"look": Appearance, "strands": HairSettings, "guides": GuideSettings}
+SECTIONS = {"look": Appearance, "strands": HairSettings, "guides": GuideSettings, "dynamics": DynamicsSettings}
 
 _STYLES = "styles."  # first part of the names of settings of styles
 
@@ -103,7 +104,7 @@ def is_color(setting: str) -> bool:
 
 def is_of_guides(setting: str) -> bool:
     """Return whether a setting belongs to guides."""
-    return setting.startswith("guides.")
+    return setting.startswith(("guides.", "dynamics."))
 
 
 def is_used(setting: str, parametrization: str) -> bool:

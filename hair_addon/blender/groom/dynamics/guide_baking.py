@@ -20,7 +20,7 @@ from ....core.grooming import cost
 from ....core.long_work import Stage, Work
 from ...data import scene as scenes
 from ...data import surface_space
-from ...data.simulation import wet_guides
+from ...data.simulation import varied_stiffness, wet_guides
 from ...data.surfaces import cage_of
 from ...host import memory, scene_time
 from ...host.datablocks import Remembered
@@ -95,7 +95,8 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
         "units": scene.unit_settings.scale_length,
     }
     regions, wetness = _regions(guides), wet_guides.unkeyed(guides, scenes.last_depsgraph())
-    found = {_PARTING: regions, "wet places": wetness}
+    stiffness = varied_stiffness.unkeyed(guides, scenes.last_depsgraph())
+    found = {_PARTING: regions, "wet places": wetness, "stiffness": stiffness}
     return frame_manifest.digests_of(parts | {name: part for name, part in found.items() if part is not None})
 
 

@@ -18,7 +18,7 @@ from ....core.files import frame_manifest
 from ....core.geometry.affine import Affine
 from ....core.params import given
 from ...data import surface_space
-from ...data.simulation import guide_poses, simulated_world, wet_guides
+from ...data.simulation import guide_poses, simulated_world, varied_stiffness, wet_guides
 from ...data.simulation.guide_poses import GuidePose
 from ...data.strands import curves, gathered_groups
 from ...data.surfaces import cage_of
@@ -36,7 +36,7 @@ stiffness_cache = Cache()
 class FrameInput:
     """Input of the simulation in one frame. errors: of colliders that were left out or do not move.
 
-    wetness: (G,) of each guide, None if it does not vary.
+    wetness, stiffness: (G,) of each guide, None if they do not vary.
     """
 
     frame: int
@@ -45,6 +45,7 @@ class FrameInput:
     world: "dynamics.simulation.World"
     seconds: float
     wetness: np.ndarray | None = None
+    stiffness: np.ndarray | None = None
     errors: tuple[HairError, ...] = ()
 
 
@@ -54,7 +55,8 @@ class GuideSimulation:
 
     digest, topology: of guides and surface; identity: of both, as `_identity_of`; start: their pose in the first frame;
     start_space, space: `surface_space.applied` to guides in the first frame, and now; obstacles: {name: obstacle in its
-    last valid state}; masks: {mask of wetness: (G,) its weights}; wetness: of the last frame, as in `FrameInput`.
+    last valid state}; masks: {mask of wetness, or map of stiffness: (G,) its weights}; wetness, stiffness: of the
+    last frame, as in `FrameInput`.
     """
 
     digest: str
@@ -69,8 +71,9 @@ class GuideSimulation:
     meters: float  # per world unit
     obstacles: dict[str, "dynamics.simulation.Obstacle"] = field(default_factory=dict)
     parted_by: tuple[str, ...] = ()  # `guide_regions.parting_keys` when regions were read
-    masks: dict[tuple[str, str, bool], np.ndarray] = field(default_factory=dict)
+    masks: dict[Any, np.ndarray] = field(default_factory=dict)
     wetness: np.ndarray | None = None
+    stiffness: np.ndarray | None = None
     errors: tuple[HairError, ...] = ()  # of colliders, in the last frame
     may_have_other_faces: bool = False  # whether obstacles may change topology in the next frame
 
@@ -99,10 +102,12 @@ class GuideSimulation:
         return points
 
     def _change(self, frame):
-        """Use the settings and the wetness of a frame."""
-        if frame.settings != self.settings or not _are_same(frame.wetness, self.wetness):
-            self.simulation.change(in_meters(frame.settings, self.meters), wetness=frame.wetness)
-            self.settings, self.wetness = frame.settings, frame.wetness
+        """Use the settings, the wetness and the stiffness of a frame."""
+        are_same = _are_same(frame.wetness, self.wetness) and _are_same(frame.stiffness, self.stiffness)
+        if frame.settings != self.settings or not are_same:
+            settings = in_meters(frame.settings, self.meters)
+            self.simulation.change(settings, wetness=frame.wetness, stiffness=frame.stiffness)
+            self.settings, self.wetness, self.stiffness = frame.settings, frame.wetness, frame.stiffness
 
     def follow_parting(self, guides: Curves, depsgraph: Depsgraph) -> bool:
         """Update the regions of guides to the present parting; returns whether they changed. Raises `HairError`."""
@@ -173,7 +178,7 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     """Start a simulation of guides in the frame that a depsgraph was evaluated for. Raises `HairError`."""
     settings = simulated(properties.dynamics_of(guides.vellus))
     simulated_world.require_colliders(settings, depsgraph)
-    masks: dict[tuple[str, str, bool], np.ndarray] = {}
+    masks: dict[Any, np.ndarray] = {}
     frame = read(guides, scene, depsgraph, settings, masks)
     pose, meters = frame.pose, simulated_world.meters_of(scene, settings)
     local = combed_points(guides)
@@ -186,6 +191,7 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
         regions=guide_regions.regions_of(guides, depsgraph),
         wetness=frame.wetness,
         held=held_of(guides),
+        stiffness=frame.stiffness,
     )
     for _ in range(settings.preroll):
         simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)
@@ -194,7 +200,7 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     ids, space = _identity_of(guides), surface_space.applied(guides)
     begun = GuideSimulation(digest, topology, ids, settings, pose, space, space, local[:, 0].copy(), simulation, meters)
     begun.parted_by = guide_regions.parting_keys(guides)
-    begun.masks, begun.wetness = masks, frame.wetness
+    begun.masks, begun.wetness, begun.stiffness = masks, frame.wetness, frame.stiffness
     begun.see(frame)
     return begun
 
@@ -210,7 +216,7 @@ def read(
     scene: Scene,
     depsgraph: Depsgraph,
     settings: DynamicsSettings,
-    masks: dict[tuple[str, str, bool], np.ndarray],
+    masks: dict[Any, np.ndarray],
 ) -> FrameInput:
     """Return the `FrameInput` of guides in the frame that a depsgraph was evaluated for. Raises `HairError`.
 
@@ -222,7 +228,8 @@ def read(
     world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface, ways)
     seconds = settings.time_scale / scene_time.animation_rate(scene)
     wetness = wet_guides.of_guides(guides, pose.pose.surface, depsgraph, masks)
-    return FrameInput(scene_time.frame_of(scene), settings, pose, world, seconds, wetness, tuple(errors))
+    stiffness = varied_stiffness.of_guides(guides, pose.pose.surface, settings.bend_stiffness, masks)
+    return FrameInput(scene_time.frame_of(scene), settings, pose, world, seconds, wetness, stiffness, tuple(errors))
 
 
 def simulated(settings: DynamicsSettings) -> DynamicsSettings:
@@ -258,7 +265,7 @@ def _keep_stiffness(guides, frame, local):
     standing = pose.root_pose(pose).carried(groom - groom[:, :1])
     vertices = dynamics.rod.detail.vertices_of(standing, settings.vertex_count)
     lengths = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
-    material = dynamics.rod.material.material_of(settings, lengths, frame.wetness)
+    material = dynamics.rod.material.material_of(settings, lengths, frame.wetness, frame.stiffness)
     x, y, z = (settings.gravity * component for component in frame.world.gravity)
     factors = dynamics.rod.sag_free.least_stiffnesses(vertices, material, (x, y, z))
     needed = factors * settings.bend_stiffness

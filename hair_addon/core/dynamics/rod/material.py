@@ -47,21 +47,29 @@ class Material:
     damping_time: float  # [s]
 
 
-def material_of(settings: DynamicsSettings, lengths: np.ndarray, wetness: np.ndarray | None = None) -> Material:
+def material_of(
+    settings: DynamicsSettings,
+    lengths: np.ndarray,
+    wetness: np.ndarray | None = None,
+    stiffness: np.ndarray | None = None,
+) -> Material:
     """Return the `Material` of strands with lengths (S, M) [m] of segments in the groom, root to tip.
 
-    wetness: (S,) of each strand in [0, 1], None for the wetness of the settings. Raises `HairError` for segments of
-    zero length.
+    wetness: (S,) of each strand in [0, 1], None for the wetness of the settings; stiffness: (S,) positive bend
+    stiffness of each strand, None for that of the settings. Raises `HairError` for segments of zero length.
     """
     lengths = np.asarray(lengths, np.float64)
     if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
         raise HairError("Simulated strands have segments without length.")
     wet = np.full(len(lengths), settings.wetness) if wetness is None else np.asarray(wetness, np.float64)
     require_count("wetness", len(wet), len(lengths))
+    if stiffness is not None:
+        require_count("stiffnesses", len(stiffness), len(lengths))
     radius = settings.fibre_radius
     section = math.pi * radius**2
     softness = 1.0 - WET_SOFTNESS * wet
-    bend = settings.bend_stiffness * softness * settings.youngs_modulus * 1e9 * math.pi * radius**4 / 4.0
+    stiff = settings.bend_stiffness if stiffness is None else np.asarray(stiffness, np.float64)
+    bend = stiff * softness * settings.youngs_modulus * 1e9 * math.pi * radius**4 / 4.0
     twist_ratio = settings.youngs_modulus / (2.0 * settings.twist_stiffness * settings.shear_modulus)
     stretch = settings.stretch_stiffness * softness * settings.youngs_modulus * 1e9 * section
     line_mass = settings.weight * (1.0 + WET_WEIGHT * wet) * settings.density * section  # ρA [kg/m]

@@ -20,6 +20,7 @@ class DynamicsSettings(Settings):
         low=1e-3,
         high=1e4,
         soft_high=1e3,
+        may_vary=True,
     )
     twist_stiffness: float = param(
         1.0, "Stiffness of twisting, as a multiple of the value for the stiffness of bending", low=1e-3, high=1e3
