@@ -78,7 +78,7 @@ OTHERS = {
     "data_flow": ("data_flow.svg",),
     "dynamics_settings": ("manual/dynamics_*.png",),
     "cards": ("manual/cards.jpg",),
-    "maps": ("manual/maps.jpg",),
+    "maps": ("manual/maps.jpg", "manual/more_maps.jpg"),
     "dynamics": ("dynamics_*.png",),
     "five_minutes": ("five_minutes/*.png",),
     "curly_hair": ("manual/curly_*.png",),

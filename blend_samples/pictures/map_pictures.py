@@ -2,9 +2,9 @@
 """Maps beside the hair that they vary: `python blend_samples/pictures/map_pictures.py` draws them in Vellus and Cycles.
 
 Writes docs/manual/maps.jpg. From the top: a tiger's coat (an image of colors), a fade (weights of the length), a
-beard that thins out (weights of length and thickness), bleached ends (a random number for each clump) and curls on one
-side (weights of the radius and the pitch of curls). Each map is made by the buttons of the panel, and filled as brushes
-would.
+beard that thins out (weights of length and thickness) and bleached ends (a random number for each clump). Writes
+docs/manual/more_maps.jpg: curls on one side (weights of the radius and the pitch of curls), a calico coat (a color ramp
+of a mask) and brows that thin out. Each map is made by the buttons of the panel, and filled as brushes would.
 """
 
 import argparse
@@ -23,28 +23,34 @@ from blend_samples.heads import head, portrait
 from blend_samples.library import face_grooms, fur_grooms, head_grooms, ten_grooms
 from blend_samples.library.combing import part
 from blend_samples.sheets import picture_files
+from hair_addon.blender.settings import map_items
 
-OUT = Path(__file__).resolve().parents[2] / "docs" / "manual" / "maps.jpg"
+FOLDER = Path(__file__).resolve().parents[2] / "docs" / "manual"
 SIZE = 224, 264  # pixels of a picture
 TEXELS = 1024  # of a side of an image, as Paint makes it
 
 # Scene-linear.
 ORANGE, CREAM, BLACK = (0.24, 0.052, 0.007), (0.55, 0.42, 0.28), (0.006, 0.005, 0.005)
+WHITE = (0.75, 0.70, 0.62)
 
 
 def main():
-    """Draw what is asked for, all by default; the sheet is written only if all of it was drawn."""
+    """Draw what is asked for, all by default; a sheet is written only if all of it was drawn."""
+    names = [name for rows in SHEETS.values() for name in rows]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help=f"of {', '.join(ROWS)}; all by default")
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(names)}; all by default")
     parser.add_argument("--samples", type=int, default=16)
     parser.add_argument("--cycles-samples", type=int, default=64)
     parser.add_argument("--strands", type=float, default=1.0, help="factor of the numbers of strands")
-    parser.add_argument("--out", type=Path, default=OUT)
+    parser.add_argument("--folder", type=Path, default=FOLDER)
     given = parser.parse_args()
     hair_addon.register()
     gpu.init()
-    rows = [row(ROWS[name], given) for name in given.names or ROWS]
-    picture_files.write(np.concatenate(rows), given.out.resolve())
+    for file, makers in SHEETS.items():
+        asked = [make for name, make in makers.items() if name in (given.names or names)]
+        if asked:
+            rows = [row(make, given) for make in asked]
+            picture_files.write(np.concatenate(rows), (given.folder / file).resolve())
 
 
 def row(make, given):
@@ -70,6 +76,36 @@ def tiger(strands):
     paint(hair, "look.color", "IMAGE", lambda item: fill(item.image, colors))
     see("Short Fur", 176.0, (0.38, -1.40, 0.76))
     return framed(encoded(colors[::-1]))
+
+
+def calico(strands):
+    """Return a coat of white, orange and black patches on the monkey, by a color ramp of a painted mask."""
+    monkey = fur_grooms.build()
+    hair = fur_grooms.short_fur(monkey, int(60_000 * strands))
+    project_from_the_front(monkey)
+    look = hair.vellus.appearance
+    look.parametrization, look.color, look.tip_absorption, look.random_color = "COLOR", WHITE, 0.9, 0.05
+    item = begin_map(hair, "look.color", "IMAGE")
+    bpy.ops.vellus.add_map_ramp(setting="look.color")
+    stops = ((0.0, WHITE), (0.25, ORANGE), (0.75, BLACK))
+    words = (f"{position}:{'/'.join(map(str, color))}" for position, color in stops)
+    map_items.set_ramp(item, " ".join(["constant", *words]))
+    masks = np.repeat(patches()[..., None], 3, axis=2)
+    paint(hair, "look.color", "IMAGE", lambda item: fill(item.image, masks))
+    see("Short Fur", 176.0, (0.38, -1.40, 0.76))
+    return framed(encoded(masks[::-1]))
+
+
+def thin_brows(strands):
+    """Return brows that thin out outward: shorter and thinner strands."""
+    head_object = ten_grooms.dressed_head()
+    hair = face_grooms.eyebrows(head_object, int(1600 * strands))
+    inner = 1.0 - part(np.abs(places_of(head_object)[:, 0]), 0.024, 0.050)
+    for setting, low in (("strands.strand_length", 0.15), ("strands.thickness", 0.3)):
+        item = paint(hair, setting, "GROUP", lambda item: paint_weights(head_object, item.source, inner))
+        item.low = low
+    see("Eyebrows")
+    return seen_weights(head_object, item.source)
 
 
 def fade(strands):
@@ -132,7 +168,10 @@ def one_sided(strands):
     return seen_weights(head_object, item.source)
 
 
-ROWS = {"tiger": tiger, "fade": fade, "beard": beard, "bleached": bleached, "one_sided": one_sided}
+SHEETS = {
+    "maps.jpg": {"tiger": tiger, "fade": fade, "beard": beard, "bleached": bleached},
+    "more_maps.jpg": {"one_sided": one_sided, "calico": calico, "thin_brows": thin_brows},
+}
 
 
 def begin_map(hair, setting, kind):
@@ -199,6 +238,16 @@ def stripes():
     is_light = (muzzle < 1.0) | (brows < 1.0) | (side > 0.86)
     found = np.where(is_light[..., None], CREAM, ORANGE)
     return np.where((is_dark & ~is_light)[..., None], BLACK, found)
+
+
+def patches():
+    """Masks (TEXELS, TEXELS) of a calico cat seen from the front, 0, 0.5 and 1, the bottom row first."""
+    v, u = np.mgrid[-1.0 : 1.0 : TEXELS * 1j, -1.0 : 1.0 : TEXELS * 1j]
+    wave = np.sin(4.1 * u + 1.7 * np.sin(3.0 * v) + 0.4) + np.sin(3.3 * v - 2.0 * u + 1.1)
+    other = np.sin(5.0 * u - 2.6 * v + 2.0) + np.sin(2.7 * v + 1.9 * u)
+    found = np.where(wave > 0.35, np.where(other > 0.1, 1.0, 0.5), 0.0)
+    is_white = ((u / 0.22) ** 2 + ((v + 0.6) / 0.42) ** 2 < 1.0) | (np.abs(u) < 0.07)
+    return np.where(is_white, 0.0, found)
 
 
 def encoded(colors):
