@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Menu entries: Add ▸ Curve, File ▸ Import and Export, and the Object menu."""
+"""Menu entries: Add ▸ Curve, File ▸ Import and Export, the menus of objects and curves, also on a right-click."""
 
 import bpy
 
@@ -155,8 +155,10 @@ _ENTRIES = (
     ("TOPBAR_MT_file_export", _in_export_menu),
     ("VIEW3D_MT_curve_add", _in_add_menu),
     ("VIEW3D_MT_object", _in_object_menu),
+    ("VIEW3D_MT_object_context_menu", _in_object_menu),
     ("VIEW3D_MT_sculpt_curves", _in_curves_menu),
     ("VIEW3D_MT_edit_curves", _in_curves_menu),
+    ("VIEW3D_MT_edit_curves_context_menu", _in_curves_menu),
 )
 
 CLASSES = (VELLUS_MT_guide_tools, VELLUS_MT_hair, VELLUS_MT_unlocked_render, VELLUS_MT_refused_hair)

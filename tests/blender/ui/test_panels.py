@@ -277,10 +277,40 @@ def test_long_work_is_announced_and_short_work_is_not(hair, monkeypatch):
     assert any(text.startswith("Takes about") for text in draw(named("guides")).texts)
 
 
-@pytest.mark.parametrize("menu", ["VIEW3D_MT_curve_add", "VIEW3D_MT_object", "TOPBAR_MT_file_export"])
+@pytest.mark.parametrize(
+    "menu",
+    [
+        "VIEW3D_MT_curve_add",
+        "VIEW3D_MT_object",
+        "VIEW3D_MT_object_context_menu",
+        "VIEW3D_MT_edit_curves_context_menu",
+        "TOPBAR_MT_file_export",
+    ],
+)
 def test_menus_are_extended_once(menu):
     ours = [f for f in getattr(bpy.types, menu).draw._draw_funcs if f.__module__ == menus.__name__]
     assert len(ours) == 1
+
+
+@pytest.mark.parametrize(
+    ("menu", "active", "entry"),
+    [
+        ("VIEW3D_MT_object_context_menu", "Hair", "VELLUS_MT_hair"),
+        ("VIEW3D_MT_object_context_menu", "Sphere", "VELLUS_MT_hair"),
+        ("VIEW3D_MT_edit_curves_context_menu", "Guides", "VELLUS_MT_guide_tools"),
+    ],
+)
+def test_a_right_click_offers_hair(hair, menu, active, entry):
+    """Right-click menus of hair, its surface and its guides have an entry for hair; those of a camera have none."""
+    (ours,) = (f for f in getattr(bpy.types, menu).draw._draw_funcs if f.__module__ == menus.__name__)
+    for name, wanted in ((active, [entry]), ("Camera", [])):
+        if name == "Camera":
+            camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
+            bpy.context.scene.collection.objects.link(camera)
+        make_active(name)
+        layout = Layout()
+        ours(SimpleNamespace(layout=layout), Context())
+        assert list(layout.drawn) == wanted
 
 
 REDO = {
