@@ -25,8 +25,8 @@ GAZE, AHEAD = CAMERA, (0.0, -1.50, 0.735)  # [m]: what the eyes look at; straigh
 FSTOP = 8.0
 
 LENGTH = 0.34  # [m] of guides on the crown
-_HAIRLINE_LENGTH = 0.45  # of those at the border, as a part of it
-_HAIRLINE_REACH = 0.030  # [m] over which lengths grow from the border
+_HAIRLINE_LENGTH = 0.45  # length of guides at the hairline, as a fraction of `LENGTH`
+_HAIRLINE_REACH = 0.030  # [m] above the hairline at which guides have their full length
 _HAIRLINE_LOWER, _HAIRLINE_WIDTH = 0.006, 0.018  # [m] how far baby hair reaches below the border, and fades
 _STEPS = 41  # points of a guide
 _EAR = Vector((0.080, -0.042, 0.712)), Vector((0.030, 0.052, 0.054))  # [m]: middle and radii of what hair goes behind

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Flicker of hair in viewports during motion, on the sample head: differences between frames.
 
-Each movement begins at rest and is drawn with one pass a frame, as a viewport does while it lasts, alone and with what
-was shown before, and as pictures that have come to rest. Printed are display levels of 255, where hair is: the 99th
-percentile of how far a pixel changes from one frame to the next, for the three; the largest change; the 99th percentile
-of how far means of 12 × 12 pixels change, in which flicker is seen that single pixels hide; how far the means of the
-moving picture and of a pass alone are from that of the resting one, over all frames and in the worst of them; and the
-99th percentile of the moving picture's distance from it.
+Each movement begins at rest. It is drawn in three ways: with one pass a frame, with one pass that is mixed with the
+frame before, as a viewport does, and with all passes, as at rest. The figures are display levels of 255 where hair is:
+the 99th percentile of a pixel's change between frames, for the three ways; the largest change; the 99th percentile of
+the change of means of 12 × 12 pixels, which show flicker that single pixels hide; the distance of the means of the
+moving picture and of one pass from the mean of the resting picture, over all frames and in the worst frame; and the
+99th percentile of the moving picture's distance from the resting picture.
 
 .venv/bin/python tests/benchmarks/stable_pictures.py --strands 10000 --size 240 180
 """

@@ -155,7 +155,7 @@ def use(name):
 def comb_straight():
     """Show styled hair without its style in Sculpt Mode and while a brush combs, and with its style afterwards.
 
-    The guides are hidden before: combing shows them.
+    The guides are hidden at first; combing shows them.
     """
     with in_viewport():
         bpy.ops.object.mode_set(mode="OBJECT")

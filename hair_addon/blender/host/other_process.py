@@ -37,14 +37,14 @@ class OtherProcess:
         return self._process.poll() is None
 
     def wait(self, seconds):
-        """Wait until it ends; after that time it is killed."""
+        """Wait until the process ends; after these seconds it is killed."""
         try:
             self._process.wait(seconds)
         except subprocess.TimeoutExpired:
             self._end()
 
     def complaint(self):
-        """Return the last line of its errors; empty if there is none."""
+        """Return the last line that the process wrote as an error; empty if there is none."""
         lines = self._errors.read_text("utf-8", "replace").split("\n")
         return next((line.strip() for line in reversed(lines) if line.strip()), "")
 

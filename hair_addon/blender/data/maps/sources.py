@@ -291,7 +291,7 @@ def _values(attribute):
 
 
 def _corner_values(surface_object, surface, name):
-    """Return (F, 3, C) float32 at the corners of triangles of an attribute on any domain; None without it."""
+    """Return an attribute of any domain as (F, 3, C) float32 at the corners of triangles; None if it does not exist."""
     depsgraph = scene.last_depsgraph()
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
