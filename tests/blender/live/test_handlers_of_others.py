@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Handlers stay correct when other add-ons delete hair while Blender reports it as changed."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -8,13 +9,15 @@ from pathlib import Path
 import bpy
 
 from hair_addon.blender.live import updates
+from tests.support.commands import PYTHONPATH
 
 ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_hair_that_another_handler_deletes_does_not_end_blender():
     program = [sys.executable, "-m", "tests.support.walk.walk_handlers_of_others"]
-    done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    environment = os.environ | {"PYTHONPATH": PYTHONPATH}
+    done = subprocess.run(program, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0 and "all went on" in done.stdout, done.stderr[-3000:]
     assert "Traceback" not in done.stderr + done.stdout
 

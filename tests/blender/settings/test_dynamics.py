@@ -2,9 +2,9 @@
 """Dynamics are properties: values are stored exactly, mark the guides, follow keyframes, and regenerate nothing."""
 
 import math
+import os
 import subprocess
 import sys
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -18,9 +18,9 @@ from hair_addon.core.dynamics.rod import presets
 from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.params import declared
+from tests.support.commands import PYTHONPATH
 from tests.support.reading import points
 
-ROOT = Path(__file__).resolve().parents[3]
 UNKEYED = ("vertex_count", "preroll", "start_frame", "size")
 
 
@@ -214,5 +214,6 @@ def test_properties_come_and_go_with_the_add_on():
         "    hair_addon.unregister()\n"
         "    assert not hasattr(mesh_object, 'vellus') and not hasattr(curves, 'vellus')\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
+    environment = os.environ | {"PYTHONPATH": PYTHONPATH}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
     assert done.returncode == 0 and "Traceback" not in done.stderr, done.stderr

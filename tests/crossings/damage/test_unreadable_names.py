@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Very long names, and names that are not UTF-8 in damaged files, which Python cannot read, are handled."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import bpy
 import pytest
 
 from hair_addon import api
+from tests.support.commands import PYTHONPATH
 from tests.support.reading import points
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -17,7 +19,8 @@ ROOT = Path(__file__).resolve().parents[3]
 def test_hair_of_unreadable_names_is_drawn_edited_and_saved(tmp_path):
     """Hair with unreadable names is drawn, edited and saved, and its layers of guides can be renamed."""
     program = [sys.executable, "-m", "tests.support.walk.walk_unreadable_names", str(tmp_path)]
-    done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, errors="replace", timeout=120)
+    details = {"cwd": ROOT, "env": os.environ | {"PYTHONPATH": PYTHONPATH}, "timeout": 120}
+    done = subprocess.run(program, capture_output=True, text=True, errors="replace", **details)
     assert done.returncode == 0 and "all was used" in done.stdout, done.stderr[-3000:]
     assert "Traceback" not in done.stderr + done.stdout
 
